@@ -12,6 +12,7 @@ import math
 from abc import abstractmethod
 from typing import ClassVar
 
+from ..elements.dimensions import LENGTH, NONE, REACH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
@@ -229,6 +230,7 @@ def _cam_contact(e: Entry) -> Constraint | None:
     return FlatContact(e.name, axis, follower, profile, *contact)
 
 
+_TURN = {"theta": Field("expression", "", dimension=NONE)}
 _PERIODIC = Field(
     "flag", "whether the profile repeats every turn; then value and slope at 2 pi must be those at 0", default=True
 )
@@ -245,9 +247,13 @@ TYPES = table(
                 "expression",
                 "the follower's coordinate over theta = the cam's angle less the phase, from 0 to a full turn",
                 required=True,
-                local=(CAM_ANGLE,),
+                dimension=REACH,
+                along="follower",
+                local={"theta": Field("expression", "", dimension=REACH, along="cam")},
             ),
-            "phase": Field("expression", "the cam's angle where theta is 0 (rad)", default=0),
+            "phase": Field(
+                "expression", "the cam's angle where theta is 0 (rad)", default=0, dimension=REACH, along="cam"
+            ),
             "periodic": _PERIODIC,
         },
         _cam,
@@ -262,14 +268,15 @@ TYPES = table(
                 "choice", "shape of the follower", required=True, choices=("knife_edge", "roller", "flat_face")
             ),
             "contour": Field(
-                "expression", "r(theta), radius of the contour over its polar angle (m)", local=(CAM_ANGLE,)
+                "expression", "r(theta), radius of the contour over its polar angle (m)", dimension=LENGTH, local=_TURN
             ),
             "support": Field(
                 "expression",
                 "of a flat face: h(theta), distance of the tangent with its normal at theta (m)",
-                local=(CAM_ANGLE,),
+                dimension=LENGTH,
+                local=_TURN,
             ),
-            "radius": Field("expression", "radius of the roller (m)"),
+            "radius": Field("expression", "radius of the roller (m)", dimension=LENGTH),
             "coordinate": Field("name", "name of the polar angle of the contact point (<name>_contact)"),
             "periodic": _PERIODIC,
         },

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import ClassVar
 
+from ..elements.dimensions import REACH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field
@@ -155,6 +156,8 @@ TYPES = table(
                 "continuous",
                 required=True,
                 level=MOTION,
+                dimension=REACH,
+                along="coordinate",
             ),
             "between": Field("pair", "two markers whose distance is driven; they must not meet"),
             "angle": Field(

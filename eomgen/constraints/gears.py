@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from ..elements.dimensions import LENGTH, NONE
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
@@ -107,9 +108,9 @@ def _rack(e: Entry) -> Rack | None:
 
 
 _JOINTS = Field("joints", "two joints of one degree, or coordinates, whose axes one part carries", required=True)
-_RADII = Field("two", "base or pitch circle radii (m), in the order of the joints")
-_TEETH = Field("two", "numbers of teeth")
-_PHASE = Field("expression", "first angle where the second is 0 (rad)", default=0)
+_RADII = Field("two", "base or pitch circle radii (m), in the order of the joints", dimension=LENGTH)
+_TEETH = Field("two", "numbers of teeth", dimension=NONE)
+_PHASE = Field("expression", "first angle where the second is 0 (rad)", default=0, dimension=NONE)
 _JOINT = Field("joint", "a joint of one degree, or a coordinate", required=True)
 
 TYPES = table(
@@ -123,6 +124,7 @@ TYPES = table(
             "cones": Field(
                 "two",
                 "pitch cone angles of a bevel pair (rad), both z axes pointing away from where they meet, or to it",
+                dimension=NONE,
             ),
             "internal": Field("flag", "whether both turn the same way", default=False),
             "phase": _PHASE,
@@ -136,8 +138,10 @@ TYPES = table(
         {
             "pinion": _JOINT._replace(doc="joint of the pinion"),
             "rack": _JOINT._replace(doc="joint of the rack"),
-            "radius": Field("expression", "radius (m); negative if the rack moves the other way", required=True),
-            "offset": Field("expression", "travel where the pinion's angle is 0 (m)", default=0),
+            "radius": Field(
+                "expression", "radius (m); negative if the rack moves the other way", required=True, dimension=LENGTH
+            ),
+            "offset": Field("expression", "travel where the pinion's angle is 0 (m)", default=0, dimension=LENGTH),
         },
         _rack,
     ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from ..elements.dimensions import LENGTH, NONE
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry, Found
 from ..elements.field import Field
@@ -145,10 +146,13 @@ TYPES = table(
         {
             **{part: Field("joint", _FIXED.format(part)) for part in ("sun", "ring", "carrier")},
             "planet": Field("joint", "joint of a planet, on the carrier or on the frame, if planets are bodies"),
-            "radii": Field("wheels", "radii of sun, planet, ring that are there (m)"),
-            "teeth": Field("wheels", "numbers of teeth of sun, planet, ring that are there"),
+            "radii": Field("wheels", "radii of sun, planet, ring that are there (m)", dimension=LENGTH),
+            "teeth": Field("wheels", "numbers of teeth of sun, planet, ring that are there", dimension=NONE),
             "phase": Field(
-                "expression", "what the equation of the sun gives in the reference position (rad)", default=0
+                "expression",
+                "what the equation of the sun gives in the reference position (rad)",
+                default=0,
+                dimension=NONE,
             ),
         },
         _planetary,

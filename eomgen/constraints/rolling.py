@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import ClassVar
 
+from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
@@ -164,9 +165,11 @@ TYPES = table(
             "plane": Field(
                 "marker", "marker in the plane; z is its normal, on the side of the wheel (ground)", default="ground"
             ),
-            "radius": Field("expression", "radius (m)", required=True),
+            "radius": Field("expression", "radius (m)", required=True, dimension=LENGTH),
             "shape": Field("choice", "shape of the wheel", default="disc", choices=("disc", "sphere")),
-            "tube": Field("expression", "radius of the rounded edge of a disc, 0 for a sharp one (m)", default=0),
+            "tube": Field(
+                "expression", "radius of the rounded edge of a disc, 0 for a sharp one (m)", default=0, dimension=LENGTH
+            ),
             "no_spin": Field("flag", "whether a sphere cannot turn about the normal", default=False),
         },
         _rolling,

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..constraints import CONSTRAINTS
+from ..elements.dimensions import NONE
 from ..errors import ModelError
 from ..forces import FORCES
 from ..frames import GROUND, Frame, Marker
@@ -25,6 +26,7 @@ from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .cam_turns import check_turns
+from .check_dimensions import check_dimensions
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
 from .dotted_names import undotted
@@ -39,6 +41,7 @@ from .names import fault_of_model_name, nearest
 from .physical import check_bodies
 from .scope import Namespace
 from .sympy_face import in_order, name_of
+from .units import Unit, UnitError, read_unit
 from .values import Reader
 
 
@@ -112,6 +115,8 @@ def build(description: Description) -> Mechanism:
     negative, inertia_notes = check_bodies(bodies, joints, numbers, faults)
     check_turns(constraints, numbers, faults)
     check_energies(given, outputs, faults)
+    if not faults:
+        check_dimensions(reader, joints)
     if len(joints) == len(sections["joints"]):
         check_connected(bodies, joints, faults)
     if faults:
@@ -157,11 +162,22 @@ def _limits_told(reader: Reader, given: Any) -> bool:
     return given is None or reader.choice("limits", given, MODEL["limits"]) != "off"
 
 
-def _described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[str, str]:
+def _described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[Unit, str]:
     """Unit and doc of an entry, its keys checked."""
     check_keys(entry.path, entry.values, fields, reader.faults)
-    unit, doc = (reader.text(f"{entry.path}.{key}", entry.values.get(key, "")) for key in ("unit", "doc"))
+    text, doc = (reader.text(f"{entry.path}.{key}", entry.values.get(key, "")) for key in ("unit", "doc"))
+    try:
+        unit = read_unit(text)
+    except UnitError as error:
+        reader.faults.add(f"{entry.path}.unit", str(error), error.remedy)
+        return Unit(NONE), doc
+    if text:
+        reader.units[entry.path] = unit
     return unit, doc
+
+
+def _in_si(value: float | None, unit: Unit) -> float | None:
+    return value if value is None or unit.size == 1.0 else value * unit.size
 
 
 def _parameter(reader: Reader, entry: DescribedEntry) -> Parameter:
@@ -169,7 +185,7 @@ def _parameter(reader: Reader, entry: DescribedEntry) -> Parameter:
     unit, doc = _described(reader, entry, PARAMETER)
     given = entry.values.get("value")
     value = None if given is None else reader.number(f"{entry.path}.value", given)
-    return Parameter(str(entry.name), value, unit, doc)
+    return Parameter(str(entry.name), _in_si(value, unit), unit.si, doc)
 
 
 def _input(reader: Reader, entry: DescribedEntry) -> Input:
@@ -177,7 +193,7 @@ def _input(reader: Reader, entry: DescribedEntry) -> Input:
     unit, doc = _described(reader, entry, INPUT)
     given = entry.values.get("value")
     value = 0.0 if given is None else reader.number(f"{entry.path}.value", given)
-    return Input(str(entry.name), value or 0.0, unit, doc)
+    return Input(str(entry.name), _in_si(value, unit) or 0.0, unit.si, doc)
 
 
 def _with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:
@@ -257,13 +273,20 @@ def _output(reader: Reader, entry: DescribedEntry) -> Output:
     expression: Expr = reader.stand_in
     if "expression" in entry.values:
         expression = reader.expression(f"{path}.expression", entry.values["expression"], OUTPUT)
+    if unit.size != 1.0 and expression.value is not None:
+        faults.add(f"{path}.unit", "the unit of the plain number is not told", "name a parameter with a unit")
     kind = reader.names.kinds.get(entry.name) if isinstance(entry.name, str) else None
     if kind in ("coordinate", "velocity", "acceleration", "multiplier"):
         if expression != reader.graph.symbol(entry.name):
             faults.add(path, f"{entry.name!r} is a {kind}", f"an output of that name must be {entry.name} itself")
+        elif unit.size != 1.0:
+            remedy = f"leave the unit out, or give the output in {unit.text} a name of its own"
+            faults.add(f"{path}.unit", f"{entry.name!r} is a {kind}, which is in SI units", remedy)
     elif kind != "output":
         reader.names.declare("output", entry.name, path)
-    return Output(str(entry.name), expression, unit, doc)
+    if unit.size != 1.0:
+        expression = expression / unit.size
+    return Output(str(entry.name), expression, unit.text, doc)
 
 
 def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -> dict[str, Expr]:

@@ -97,7 +97,9 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
             Identifier.
         value : number, optional
             Needed to compile, not to derive.
-        unit, doc : str, optional
+        unit : str, optional
+            Unit of the value, such as ``"mm"`` or ``"N*m/rad"``; the value is converted to SI units.
+        doc : str, optional
             For display.
 
         Returns
@@ -131,7 +133,9 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
             Identifier; it may repeat a coordinate if the expression is that coordinate.
         expression : number, str or SymPy expression
             In t, parameters, inputs, coordinates, their rates and the motion of markers.
-        unit, doc : str, optional
+        unit : str, optional
+            Unit in which the result is given; without one it is in SI units.
+        doc : str, optional
             For display.
         """
         self._quantity("outputs", name, expression, unit, doc, key="expression")

@@ -6,7 +6,12 @@ This one table drives the check of Python calls, the keys of model files and the
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable, Mapping
+from typing import Any
 
+from ..constraints import CONSTRAINTS
+from ..elements.dimensions import ACCELERATION, ENERGY, LENGTH, MASS, NONE, REACH, TIME, Dimension
+from ..elements.dimensions import INERTIA as MOMENT_OF_INERTIA
 from ..elements.element_type import ElementType
 from ..elements.field import CONSTANT as CONSTANT
 from ..elements.field import MOTION as MOTION
@@ -14,6 +19,7 @@ from ..elements.field import NUMBER as NUMBER
 from ..elements.field import OUTPUT as OUTPUT
 from ..elements.field import Field as Field
 from ..elements.field import Fields as Fields
+from ..forces import FORCES
 from ..joints import JOINTS
 from ..numeric.splines import KINDS as TABLES
 from ..solids import SOLIDS
@@ -22,6 +28,7 @@ from .mechanism import Simulation
 #: kind -> how a message describes it
 KINDS = {
     "text": "a text",
+    "unit": "a unit, such as mm or N*m/rad",
     "name": "a name",
     "names": "a list of names",
     "body": "the name of a body",
@@ -76,7 +83,7 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4")
 
-_UNIT = Field("text", "unit, for display", default="")
+_UNIT = Field("unit", "unit of the value, such as mm or N*m/rad; converted to SI, and checked", default="")
 _DOC = Field("text", "one sentence, for display", default="")
 _NAME = Field("name", "name of the model and of the generated module", required=True)
 
@@ -133,14 +140,14 @@ FUNCTION: dict[str, Fields] = {
     },
 }
 MARKER: Fields = {
-    "at": Field("vector", "position in body axes (m)", default=(0, 0, 0)),
-    "rpy": Field("vector", "fixed-axis roll, pitch, yaw (rad)", default=(0, 0, 0)),
+    "at": Field("vector", "position in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
+    "rpy": Field("vector", "fixed-axis roll, pitch, yaw (rad)", default=(0, 0, 0), dimension=NONE),
     "axes": Field("frame_axes", "two of its axes in body axes, such as {x: [1, 1, 0], z: z}, instead of rpy"),
     "matrix": Field("matrix", "3 x 3, its axes as columns in body axes, instead of rpy"),
 }
 CYLINDER: Fields = {
     "around": Field("marker", "its z axis is the axis of the cylinder", required=True),
-    "radius": Field("expression", "radius (m)", required=True),
+    "radius": Field("expression", "radius (m)", required=True, dimension=LENGTH),
     "sense": Field("choice", "turn of the path about the axis", default="positive", choices=("positive", "negative")),
 }
 PLACED: Fields = {"body": Field("name", "a body or ground", required=True), **MARKER}
@@ -161,40 +168,47 @@ LIMITS: Fields = {
     "effort": Field("number", "greatest torque or force of the drive (N m or N)"),
 }
 BODY: Fields = {
-    "mass": Field("expression", "mass (kg); 0 for a body without mass"),
-    "com": Field("vector", "centre of mass in body axes (m)", default=(0, 0, 0)),
+    "mass": Field("expression", "mass (kg); 0 for a body without mass", dimension=MASS),
+    "com": Field("vector", "centre of mass in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
     "inertia": Field(
         "inertia",
         "inertia (kg m^2) about the centre of mass in body axes, unless about and axes say",
         default=(0, 0, 0),
+        dimension=MOMENT_OF_INERTIA,
     ),
     "markers": Field("markers", "named frames fixed in the body", default=()),
-    "principal": Field("vector", "principal moments (kg m^2), instead of inertia"),
-    "first_moment": Field("vector", "first moment m c about the body's origin (kg m), instead of com"),
-    "about": Field("about", "point the inertia is about; a marker gives its axes too", default="com"),
-    "axes": Field("vector", "roll, pitch, yaw (rad) of the axes of inertia or principal in the body"),
+    "principal": Field("vector", "principal moments (kg m^2), instead of inertia", dimension=MOMENT_OF_INERTIA),
+    "first_moment": Field(
+        "vector", "first moment m c about the body's origin (kg m), instead of com", dimension=Dimension(1, 1)
+    ),
+    "about": Field("about", "point the inertia is about; a marker gives its axes too", default="com", dimension=LENGTH),
+    "axes": Field("vector", "roll, pitch, yaw (rad) of the axes of inertia or principal in the body", dimension=NONE),
     "solids": Field("solids", "solids of uniform density, from which mass, com and inertia follow", default=()),
     "points": Field("points", "point masses, added to the rest", default=()),
     "check_inertia": Field("check", "what becomes of a mass and inertia that no body can have (the model's own)"),
     "display": Field("display", "shapes to draw, in body axes; data only", default=()),
 }
 POINT: Fields = {
-    "mass": Field("expression", "mass (kg)", required=True),
-    "at": Field("vector", "position in body axes (m)", default=(0, 0, 0)),
+    "mass": Field("expression", "mass (kg)", required=True, dimension=MASS),
+    "at": Field("vector", "position in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
 }
-_MASS = Field("expression", "mass (kg), instead of a density")
-_DENSITY = Field("expression", "density (kg/m^3)")
+_MASS = Field("expression", "mass (kg), instead of a density", dimension=MASS)
+_DENSITY = Field("expression", "density (kg/m^3)", dimension=Dimension(-3, 1))
 _SUBTRACT = Field("flag", "whether it is taken away: a hole", default=False)
 #: Type of solid -> its own keys; ``mesh`` is read from a file, the others are formulas.
 SOLID: dict[str, Fields] = {
-    name: {key: Field(d.kind, d.doc, required=True) for key, d in solid.dimensions.items()}
+    name: {key: Field(d.kind, d.doc, required=True, dimension=LENGTH) for key, d in solid.dimensions.items()}
     | ({"axis": Field("axis", "where its z axis lies in the body", default="z")} if solid.has_axis else {})
-    | {solid.content_key: _DENSITY if solid.content_key == "density" else Field("expression", "mass of a metre (kg/m)")}
+    | {
+        solid.content_key: _DENSITY
+        if solid.content_key == "density"
+        else Field("expression", "mass of a metre (kg/m)", dimension=Dimension(-1, 1))
+    }
     for name, solid in SOLIDS.items()
 } | {
     "mesh": {
         "file": Field("file", "STL file; its path from the folder of the model file", required=True),
-        "scale": Field("expression", "metres in one unit of the file", default=1),
+        "scale": Field("expression", "metres in one unit of the file", default=1, dimension=LENGTH),
         "density": _DENSITY,
     }
 }
@@ -216,13 +230,19 @@ COORDINATES = Field("names", "names of the coordinates, in order")
 JOINT_DATA: Fields = {
     "limits": Field("limits", "limits of the coordinate; nothing stops there, but a run that passes one says so"),
     "dry_friction": Field("number", "Coulomb friction (N m or N); data only"),
-    "armature": Field("expression", "inertia of the drive as the coordinate feels it (kg m^2 or kg)"),
+    "armature": Field(
+        "expression",
+        "inertia of the drive as the coordinate feels it (kg m^2 or kg)",
+        dimension=ENERGY.times(TIME, 2).times(REACH, -2),
+    ),
 }
 LAGRANGIAN: Fields = {
     "coordinates": Field("names", "generalized coordinates, in order", required=True),
-    "expression": Field("expression", "L(q, q_dot, t) = T - V", required=True, level=MOTION),
+    "expression": Field("expression", "L(q, q_dot, t) = T - V", required=True, level=MOTION, dimension=ENERGY),
     "forces": Field("forces", "generalized forces", default=(), level=MOTION),
-    "dissipation": Field("expression", "Rayleigh's dissipation function", default=0, level=MOTION),
+    "dissipation": Field(
+        "expression", "Rayleigh's dissipation function", default=0, level=MOTION, dimension=ENERGY.times(TIME, -1)
+    ),
     "constraints": Field(
         "expressions", "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=MOTION
     ),
@@ -238,8 +258,8 @@ EQUATIONS: Fields = {
         "expressions", "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=MOTION
     ),
     "multipliers": Field("names", "names of the multipliers l of the constraints, for outputs: M v' + C_q^T l = f"),
-    "kinetic_energy": Field("expression", "kinetic energy (J)", default=0, level=MOTION),
-    "potential_energy": Field("expression", "potential energy (J)", default=0, level=MOTION),
+    "kinetic_energy": Field("expression", "kinetic energy (J)", default=0, level=MOTION, dimension=ENERGY),
+    "potential_energy": Field("expression", "potential energy (J)", default=0, level=MOTION, dimension=ENERGY),
 }
 SIMULATION: Fields = {
     "end": Field("positive", "end time (s)", default=Simulation.end),
@@ -251,7 +271,9 @@ SIMULATION: Fields = {
 MODEL: Fields = {
     "name": _NAME,
     "doc": _DOC,
-    "gravity": Field("vector", "acceleration of gravity in ground axes (m/s^2)", default=(0, 0, 0)),
+    "gravity": Field(
+        "vector", "acceleration of gravity in ground axes (m/s^2)", default=(0, 0, 0), dimension=ACCELERATION
+    ),
     "parameters": Field("table", "constants that can change between runs"),
     "inputs": Field("table", "quantities given from outside over time"),
     "functions": Field("table", "functions for use in expressions: tables, and C code"),
@@ -326,6 +348,33 @@ def joint_fields(type_name: str) -> Fields:
     if len(joint.coordinates) == 1:
         fields |= JOINT_DATA
     return fields
+
+
+def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
+    """The keys of an entry of a section; empty for a type that is not known."""
+    kind = values.get("type")
+    types: Any = {"joints": JOINTS, "forces": FORCES, "constraints": CONSTRAINTS}.get(section)
+    if types is not None and isinstance(kind, str) and kind in types:
+        return joint_fields(kind) if section == "joints" else types[kind].fields(section[:-1], types)
+    return {"bodies": BODY, "inputs": INPUT, "outputs": OUTPUT_FIELDS, "events": EVENT}.get(section, {})
+
+
+#: Keys of the parts of an entry: placements, cylinders of paths, point masses and solids.
+PART_KEYS: Fields = {key: field for own in (*SOLID.values(), POINT, CYLINDER, MARKER) for key, field in own.items()}
+
+
+def acts_on_length(section: str, values: Mapping[str, Any], field: Field, is_length: Callable[[str], bool]) -> bool:
+    """Whether an entry acts on a length rather than an angle, where the dimension of a field depends on it.
+
+    Parameters
+    ----------
+    is_length : callable
+        Name of a coordinate, or of a joint of one, -> whether it is a length.
+    """
+    for key in (field.along, "coordinate"):
+        if values.get(key) is not None and section in ("forces", "constraints"):
+            return is_length(str(values[key]))
+    return "between" in values or "marker" in values
 
 
 def solid_fields(type_name: str) -> Fields:

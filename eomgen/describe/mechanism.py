@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, NamedTuple
 
+from ..elements import dimensions
 from ..errors import ModelError, Problem
 from ..frames import Frame, Marker
 from ..graph.core import Expr, Graph
@@ -116,6 +117,13 @@ class BodyShape(NamedTuple):
 ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
 SUMS = (ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS)
 TURNING = (7, 8, 9, 10)  #: angular velocity in ground axes and in the marker's own, then their rates
+#: Level of a Quantity -> its dimension, save for an angle (axis 3).
+LEVEL_DIMENSIONS = (
+    *(dimensions.LENGTH, dimensions.SPEED, dimensions.ACCELERATION),
+    *(dimensions.INERTIA.times(dimensions.TIME, -1), dimensions.INERTIA),
+    *(dimensions.SPEED.times(dimensions.MASS), dimensions.MASS),
+    *(dimensions.SPIN, dimensions.SPIN, dimensions.SPIN_RATE, dimensions.SPIN_RATE),
+)
 
 
 @dataclass(frozen=True)

@@ -101,6 +101,7 @@ _RANGE = {key: {"type": "number"} for key in ("from", "to", "step")}
 #: kind of field -> its schema; kinds not listed are handled by :func:`_field`.
 _KINDS: dict[str, Schema] = {
     "text": {"type": "string"},
+    "unit": {"type": "string"},
     "name": _ref("name"),
     "body": _ref("reference"),
     "joint": _ref("reference"),

@@ -36,6 +36,7 @@ from .names import nearest
 from .placement import TURNS, Numbers, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
 from .scope import Namespace, Scope
 from .sympy_face import is_sympy, lower_sympy
+from .units import Unit
 
 
 def is_number(value: object) -> bool:
@@ -64,6 +65,8 @@ class Reader:
         self.quantities: dict[str, Quantity] = {}
         self.stand_in = graph.symbol("?")
         self.numbers: dict[str, float] = {}  # declared values of parameters
+        self.units: dict[str, Unit] = {}  # by path of the parameter, input or output
+        self.expressions: list[tuple[str, Expr, Mapping[str, Expr]]] = []  # path, expression, names of its own
 
     def known(self, expression: Expr) -> float | None:
         """The value of an expression at the declared values of parameters, None if they do not tell."""
@@ -92,6 +95,12 @@ class Reader:
 
         Names in ``local`` come before those of the model; with ``exclusive`` a name must not be both.
         """
+        found = self._expression(path, value, level, local, exclusive)
+        if found.value is None:
+            self.expressions.append((path, found, local or {}))
+        return found
+
+    def _expression(self, path: str, value: Any, level: int, local: Mapping[str, Expr] | None, exclusive: bool) -> Expr:
         scope = Scope(self.graph, self.names, path, level, self.moving, self.quantities, local, exclusive)
         try:
             if isinstance(value, str):

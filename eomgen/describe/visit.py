@@ -10,22 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from ..constraints import CONSTRAINTS
-from ..forces import FORCES
-from ..joints import JOINTS
 from .description import GROUND_NAME, DescribedEntry, Description
-from .fields import (
-    BODY,
-    EQUATIONS,
-    EVENT,
-    INPUT,
-    LAGRANGIAN,
-    MARKER,
-    OUTPUT_FIELDS,
-    Field,
-    Fields,
-    joint_fields,
-)
+from .fields import EQUATIONS, LAGRANGIAN, MARKER, Field, Fields, fields_of
 
 
 class Slot(NamedTuple):
@@ -114,15 +100,6 @@ def _named(name: Any, change: Callable[[str], str]) -> Any:
 def copied(description: Description) -> Description:
     """A copy whose entries can be changed without changing the original's."""
     return visit(description, Visitor())
-
-
-def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
-    """The table of fields of an entry; empty for a type that is not known."""
-    kind = values.get("type")
-    types: Any = {"joints": JOINTS, "forces": FORCES, "constraints": CONSTRAINTS}.get(section)
-    if types is not None and isinstance(kind, str) and kind in types:
-        return joint_fields(kind) if section == "joints" else types[kind].fields(section[:-1], types)
-    return {"bodies": BODY, "inputs": INPUT, "outputs": OUTPUT_FIELDS, "events": EVENT}.get(section, {})
 
 
 def visit_entry(section: str, entry: DescribedEntry, visitor: Visitor) -> DescribedEntry:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..elements.dimensions import FORCE, PUSH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field
@@ -91,7 +92,7 @@ TYPES = table(
         "a force at a marker's origin.",
         {
             "marker": Field("marker", "where it acts", required=True),
-            "value": Field("vector", "force (N)", required=True, level=MOTION),
+            "value": Field("vector", "force (N)", required=True, level=MOTION, dimension=FORCE),
             "axes": _AXES,
         },
         _force,
@@ -110,6 +111,7 @@ TYPES = table(
                 "torque (N m): one on a joint (N where its coordinate is a length), three on a body",
                 required=True,
                 level=MOTION,
+                dimension=PUSH,
             ),
             "axes": _AXES,
         },
@@ -127,6 +129,7 @@ TYPES = table(
                 "positive drives the coordinate up, or pushes the markers apart (N or N m)",
                 required=True,
                 level=MOTION,
+                dimension=PUSH,
             ),
             "via": VIA,
         },

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..elements.dimensions import Dimension
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
@@ -90,7 +91,12 @@ TYPES = table(
         {
             "center": Field("marker", "what attracts", required=True),
             "body": Field("body", "the body that is attracted, at its centre of mass", required=True),
-            "mu": Field("expression", "gravitational parameter G M of the centre (m^3/s^2)", required=True),
+            "mu": Field(
+                "expression",
+                "gravitational parameter G M of the centre (m^3/s^2)",
+                required=True,
+                dimension=Dimension(3, 0, -2),
+            ),
             "extent": Field(
                 "choice",
                 "the body as a point, or with its inertia to second order: gravity-gradient torque and its force",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import combinations
 from typing import cast
 
+from ..elements.dimensions import ENERGY, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field
@@ -146,8 +147,11 @@ TYPES = table(
                 "six values for the diagonal, three of forces and three of torques, or a symmetric 6 x 6 matrix "
                 "(N/m, N, N m/rad)",
                 required=True,
+                dimension=ENERGY,
             ),
-            "damping": Field("matrix6", "the same per velocity", default=(0,) * 6, level=MOTION),
+            "damping": Field(
+                "matrix6", "the same per velocity", default=(0,) * 6, level=MOTION, dimension=ENERGY.times(TIME)
+            ),
         },
         _bushing,
     )

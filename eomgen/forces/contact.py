@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
+from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field, Fields
@@ -151,7 +152,7 @@ TYPES = table(
         "contact of a sphere about the second marker with the plane of the first, z pointing out of the solid.",
         {
             "between": Field("pair", _ENDS.format("sphere's centre"), required=True),
-            "radius": Field("expression", "radius of the sphere (m)", required=True),
+            "radius": Field("expression", "radius of the sphere (m)", required=True, dimension=LENGTH),
             **_CONTACT,
         },
         _on_plane,
@@ -161,7 +162,7 @@ TYPES = table(
         "contact of two spheres about two markers.",
         {
             "between": Field("pair", "the centres", required=True),
-            "radii": Field("radii", "radii of the spheres (m)", required=True),
+            "radii": Field("radii", "radii of the spheres (m)", required=True, dimension=LENGTH),
             **_CONTACT,
         },
         _two_spheres,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..elements.dimensions import DAMPING, NONE, PUSH, RATE
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field, Fields
@@ -66,11 +67,21 @@ class JointFriction(Force):
 
 #: Of contacts, as parts of the normal force.
 FRICTION: Fields = {
-    "friction": Field("expression", "coefficient of sliding friction", level=MOTION),
-    "static_friction": Field("expression", "coefficient at the onset of sliding; needs stribeck", level=MOTION),
-    "stribeck": Field("expression", "sliding velocity (m/s) over which static friction falls to sliding friction"),
-    "viscous_friction": Field("expression", "friction per normal force and velocity (s/m)", default=0, level=MOTION),
-    "smoothing": Field("expression", "sliding velocity (m/s) below which friction is smoothed"),
+    "friction": Field("expression", "coefficient of sliding friction", level=MOTION, dimension=NONE),
+    "static_friction": Field(
+        "expression", "coefficient at the onset of sliding; needs stribeck", level=MOTION, dimension=NONE
+    ),
+    "stribeck": Field(
+        "expression", "sliding velocity (m/s) over which static friction falls to sliding friction", dimension=RATE
+    ),
+    "viscous_friction": Field(
+        "expression",
+        "friction per normal force and velocity (s/m)",
+        default=0,
+        level=MOTION,
+        dimension=NONE.times(RATE, -1),
+    ),
+    "smoothing": Field("expression", "sliding velocity (m/s) below which friction is smoothed", dimension=RATE),
 }
 
 
@@ -118,11 +129,17 @@ TYPES = table(
         "friction of a joint's coordinate: viscous, Coulomb's with Stribeck's effect, or both.",
         {
             "joint": ON_JOINT._replace(required=True),
-            "viscous": Field("expression", "viscous coefficient (N m s/rad or N s/m)", level=MOTION),
-            "coulomb": Field("expression", "Coulomb friction (N m or N)", level=MOTION),
-            "static": Field("expression", "friction at the onset of sliding; needs stribeck", level=MOTION),
-            "stribeck": Field("expression", "velocity over which static friction falls to Coulomb's (rad/s or m/s)"),
-            "smoothing": Field("expression", "velocity below which Coulomb friction is smoothed (rad/s or m/s)"),
+            "viscous": Field("expression", "viscous coefficient (N m s/rad or N s/m)", level=MOTION, dimension=DAMPING),
+            "coulomb": Field("expression", "Coulomb friction (N m or N)", level=MOTION, dimension=PUSH),
+            "static": Field(
+                "expression", "friction at the onset of sliding; needs stribeck", level=MOTION, dimension=PUSH
+            ),
+            "stribeck": Field(
+                "expression", "velocity over which static friction falls to Coulomb's (rad/s or m/s)", dimension=RATE
+            ),
+            "smoothing": Field(
+                "expression", "velocity below which Coulomb friction is smoothed (rad/s or m/s)", dimension=RATE
+            ),
         },
         _joint_friction,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import ClassVar
 
+from ..elements.dimensions import ENERGY, LENGTH, NONE, PUSH, RATE, SPIN, Dimension
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field, Fields
@@ -66,22 +67,24 @@ def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Ent
     return read
 
 
-_OWN = ("length", "angle", "rate")
-
-
-def _law(of: str, unit: str) -> Fields:
+def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
+    """Keys of a law of ``of``, its dimension and that of ``rate``."""
+    local = {"length": LENGTH, "angle": NONE, "rate": rate}
+    names = {name: Field("expression", "", dimension=own) for name, own in local.items()}
     return {
         "law": Field(
             "expression",
             f"{unit} that drives the coordinate up or pushes the markers apart; an expression of {of}, ``rate`` "
             "and all that forces know",
             level=MOTION,
-            local=_OWN,
+            dimension=push,
+            local=names,
         ),
         "potential": Field(
             "expression",
             f"potential energy (J), of {of} and parameters; its force, minus its derivative, comes with it",
-            local=_OWN,
+            dimension=ENERGY,
+            local=names,
         ),
     }
 
@@ -93,7 +96,7 @@ TYPES = table(
         {
             "joint": ON_JOINT,
             "between": BETWEEN,
-            **_law("``length`` (``angle``, where the coordinate is one)", "force (N, or N m)"),
+            **_law("``length`` (``angle``, where the coordinate is one)", "force (N, or N m)", PUSH, RATE),
             "via": VIA,
         },
         _element(read_joint_or_path, False),
@@ -102,7 +105,7 @@ TYPES = table(
     ElementType(
         "torsional_element",
         "a torque of any law on an angle: of a joint, or of the second marker about the z axis of the first.",
-        {"joint": ON_JOINT, "between": BETWEEN, **_law("``angle``", "torque (N m)")},
+        {"joint": ON_JOINT, "between": BETWEEN, **_law("``angle``", "torque (N m)", ENERGY, SPIN)},
         _element(read_angle, True),
         one_of=("joint", "between"),
     ),

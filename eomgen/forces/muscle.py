@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from ..elements.dimensions import FORCE, LENGTH, NONE, SPEED
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field
@@ -112,15 +113,20 @@ TYPES = table(
         "a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion.",
         {
             "between": BETWEEN._replace(required=True),
-            "activation": Field("expression", "activation, 0 to 1", required=True, level=MOTION),
-            "force_max": Field("expression", "largest active force (N)", required=True),
-            "fiber_length": Field("expression", "optimal length of the fibres (m)", required=True),
-            "slack_length": Field("expression", "length of the tendon (m)", required=True),
-            "velocity_max": Field("expression", "fastest shortening of fibres (m/s), 10 lengths a second by default"),
-            "pennation": Field(
-                "expression", "angle of the fibres to the tendon at their optimal length (rad)", default=0
+            "activation": Field("expression", "activation, 0 to 1", required=True, level=MOTION, dimension=NONE),
+            "force_max": Field("expression", "largest active force (N)", required=True, dimension=FORCE),
+            "fiber_length": Field("expression", "optimal length of the fibres (m)", required=True, dimension=LENGTH),
+            "slack_length": Field("expression", "length of the tendon (m)", required=True, dimension=LENGTH),
+            "velocity_max": Field(
+                "expression", "fastest shortening of fibres (m/s), 10 lengths a second by default", dimension=SPEED
             ),
-            "damping": Field("expression", "force at velocity_max over force_max", default=0.1),
+            "pennation": Field(
+                "expression",
+                "angle of the fibres to the tendon at their optimal length (rad)",
+                default=0,
+                dimension=NONE,
+            ),
+            "damping": Field("expression", "force at velocity_max over force_max", default=0.1, dimension=NONE),
             "via": VIA,
         },
         _muscle,

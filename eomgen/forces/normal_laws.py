@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from ..elements.dimensions import NONE, PUSH, RATE
 from ..elements.entry import Entry
-from ..elements.field import Field, Fields
+from ..elements.field import EXPONENT, Field, Fields
 from ..graph.core import Expr
 from ..records import dataclass
 from .branches import beyond_zero
@@ -64,11 +65,17 @@ NORMAL: Fields = {
         "expression",
         "stiffness k in the force k d**n max(0, 1 + dissipation d_dot) of the penetration d (N/m**n)",
         required=True,
+        dimension=PUSH,
+        exponent="exponent",
     ),
-    "exponent": Field("expression", "exponent n", default=1.5),
-    "dissipation": Field("expression", "dissipation (s/m); or give restitution and velocity"),
-    "restitution": Field("expression", "coefficient of restitution, from which the dissipation follows"),
-    "velocity": Field("expression", "velocity of impact (m/s) to which the restitution belongs"),
+    "exponent": Field("expression", "exponent n", default=EXPONENT, dimension=NONE),
+    "dissipation": Field(
+        "expression", "dissipation (s/m); or give restitution and velocity", dimension=NONE.times(RATE, -1)
+    ),
+    "restitution": Field(
+        "expression", "coefficient of restitution, from which the dissipation follows", dimension=NONE
+    ),
+    "velocity": Field("expression", "velocity of impact (m/s) to which the restitution belongs", dimension=RATE),
     "formula": Field(
         "choice",
         "formula by which the dissipation follows from the restitution",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import ClassVar
 
+from ..elements.dimensions import DAMPING, ENERGY, LENGTH, NONE, REACH, STIFFNESS, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field
@@ -65,8 +66,10 @@ class Damper(Force):
         return [self.path.drawn(DASHPOT, TURNING_DASHPOT)]
 
 
-_STIFFNESS = Field("expression", "stiffness (N/m or N m/rad)", required=True)
-_DAMPING = Field("expression", "damping (N s/m or N m s/rad)", required=True, level=MOTION)
+_STIFFNESS = Field("expression", "stiffness (N/m or N m/rad)", required=True, dimension=STIFFNESS)
+_TURNING_STIFFNESS = _STIFFNESS._replace(dimension=ENERGY)
+_DAMPING = Field("expression", "damping (N s/m or N m s/rad)", required=True, level=MOTION, dimension=DAMPING)
+_TURNING_DAMPING = _DAMPING._replace(dimension=ENERGY.times(TIME))
 _MARKERS = BETWEEN._replace(required=True)
 _COORDINATE = ON_JOINT._replace(required=True)
 _ANGLE = {"joint": ON_JOINT, "between": BETWEEN}
@@ -95,7 +98,7 @@ TYPES = table(
         {
             "between": _MARKERS,
             "stiffness": _STIFFNESS,
-            "length": Field("expression", "length without force (m)", default=0),
+            "length": Field("expression", "length without force (m)", default=0, dimension=LENGTH),
             "via": VIA,
         },
         _spring(read_path, "length"),
@@ -111,8 +114,8 @@ TYPES = table(
         "a linear spring on an angle: of a joint, or of the second marker about the z axis of the first.",
         {
             **_ANGLE,
-            "stiffness": _STIFFNESS,
-            "angle": Field("expression", "angle without torque (rad)", default=0),
+            "stiffness": _TURNING_STIFFNESS,
+            "angle": Field("expression", "angle without torque (rad)", default=0, dimension=NONE),
         },
         _spring(read_angle, "angle"),
         one_of=("joint", "between"),
@@ -120,7 +123,7 @@ TYPES = table(
     ElementType(
         "torsional_damper",
         "a viscous damper on an angle: of a joint, or of the second marker about the z axis of the first.",
-        {**_ANGLE, "damping": _DAMPING},
+        {**_ANGLE, "damping": _TURNING_DAMPING},
         _damper(read_angle),
         one_of=("joint", "between"),
     ),
@@ -130,7 +133,7 @@ TYPES = table(
         {
             "joint": _COORDINATE,
             "stiffness": _STIFFNESS,
-            "rest": Field("expression", "the coordinate without force (rad or m)", default=0),
+            "rest": Field("expression", "the coordinate without force (rad or m)", default=0, dimension=REACH),
         },
         _spring(read_coordinate, "rest"),
     ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from ..elements.dimensions import REACH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
@@ -73,8 +74,8 @@ TYPES = table(
         {
             "joint": ON_JOINT._replace(required=True),
             "stiffness": NORMAL["stiffness"],
-            "lower": Field("expression", "lower limit (rad or m)"),
-            "upper": Field("expression", "upper limit (rad or m)"),
+            "lower": Field("expression", "lower limit (rad or m)", dimension=REACH),
+            "upper": Field("expression", "upper limit (rad or m)", dimension=REACH),
             **{key: field for key, field in NORMAL.items() if key != "stiffness"},
         },
         _stop,

@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
+from ..elements.dimensions import LENGTH
 from ..elements.field import MOTION, Field, Fields
 from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
@@ -21,7 +22,12 @@ ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
 ALONG_CURVE = (Coordinate("_s", "length"),)
 ON_SURFACE = (Coordinate("_u", "length"), Coordinate("_v", "length"))
 CURVE = Field(
-    "shape", "point of the curve in the predecessor's axes (m), by the joint's s", required=True, level=MOTION, own=1
+    "shape",
+    "point of the curve in the predecessor's axes (m), by the joint's s",
+    required=True,
+    level=MOTION,
+    own=1,
+    dimension=LENGTH,
 )
 SURFACE = Field(
     "shape",
@@ -29,6 +35,7 @@ SURFACE = Field(
     required=True,
     level=MOTION,
     own=2,
+    dimension=LENGTH,
 )
 
 

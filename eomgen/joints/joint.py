@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from itertools import product
 from typing import ClassVar, NamedTuple
 
+from ..elements import dimensions
 from ..elements.field import Field, Fields
 from ..elements.looks import JointLook
 from ..graph.core import Expr, Graph
@@ -66,7 +67,11 @@ class Shape(NamedTuple):
 SEQUENCES = tuple("".join(s) for s in product("xyz", repeat=3) if s[0] != s[1] and s[1] != s[2])
 SEQUENCE = Field("choice", "axes of the intrinsic Euler angles", default="xyz", choices=SEQUENCES)
 LENGTH = Field(
-    "expression", "length of the rod (m)", required=True, not_zero="a rod without length is a spherical joint"
+    "expression",
+    "length of the rod (m)",
+    required=True,
+    not_zero="a rod without length is a spherical joint",
+    dimension=dimensions.LENGTH,
 )
 
 

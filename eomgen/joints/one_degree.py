@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar
 
+from ..elements.dimensions import LENGTH
 from ..elements.field import Field, Fields
 from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
@@ -89,6 +90,7 @@ class Screw(Joint):
             "advance in one turn (m), negative for a left-handed thread",
             required=True,
             not_zero="a screw without advance is a revolute joint",
+            dimension=LENGTH,
         )
     }
     counts_turns: ClassVar[bool] = True

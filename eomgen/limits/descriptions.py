@@ -34,3 +34,5 @@ APART = 1e-12
 NO_LENGTH = 1e-9
 #: Imaginary part, relative to the value, below which a number is shown as real.
 SHOWN_COMPLEX = 1e-12
+#: By which powers of a dimension may differ: 1/3 + 1/3 + 1/3 misses 1 by less.
+POWERS = 1e-9

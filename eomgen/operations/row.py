@@ -53,6 +53,10 @@ class Operation(NamedTuple):
         f(-a) = -f(a), f(-a) = f(a), or neither.
     commutative, many : bool
         Operands may change places; words and SymPy's classes take any number of them.
+    dimension : {"pure", "alike", "ratio", "sign", "product", "quotient", "power", "root", "choice"}
+        How that of the value follows from those of the operands: operands and value without; all operands of one, and
+        the value; of one, the value without; of any, the value without; multiplied; divided; times a power; its half;
+        as "alike" save for the first.
     exact, analytic, fragile, jumps : bool
         Does not round; what vanishes around a point vanishes everywhere; may give a result that is not finite; jumps
         where its operands are equal, or its one operand is 0.
@@ -80,6 +84,7 @@ class Operation(NamedTuple):
     parity: int = 0
     commutative: bool = False
     many: bool = False
+    dimension: str = "pure"
     exact: bool = False
     analytic: bool = False
     fragile: bool = False

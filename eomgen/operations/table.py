@@ -62,36 +62,43 @@ ROWS = (
     Operation(
         "add", ARITHMETIC, operator.add, np.add, "{} + {}", "{} + {}", 2, (_one, _one), (unit, unit),
         rule=lambda g, a, b: g.add(a, b), sympy=lambda s, a, b: a + b, commutative=True, analytic=True,
+        dimension="alike",
     ),
     Operation(
         "sub", ARITHMETIC, operator.sub, np.subtract, "{} - {}", "{} - {}", 2,
         (_one, lambda g, y, a, b: g.neg(g.one.id)), (unit, unit),
         rule=lambda g, a, b: g.sub(a, b), sympy=lambda s, a, b: a - b, analytic=True,
+        dimension="alike",
     ),
     Operation(
         "mul", ARITHMETIC, operator.mul, np.multiply, "{}*{}", "{} * {}", 2,
         (lambda g, y, a, b: b, lambda g, y, a, b: a), (lambda y, a, b: abs(b), lambda y, a, b: abs(a)),
         error=lambda y, x, e: abs(x[0]) * e[1] + abs(x[1]) * e[0] + e[0] * e[1],
         rule=lambda g, a, b: g.mul(a, b), sympy=lambda s, a, b: a * b, commutative=True, analytic=True,
+        dimension="product",
     ),
     Operation(
         "div", ARITHMETIC, operator.truediv, np.divide, "{}/{}", "{} / {}", 2,
         (lambda g, y, a, b: over(g, b), lambda g, y, a, b: g.neg(g.mul(y, over(g, b)))),
         (lambda y, a, b: 1.0 / abs(b), lambda y, a, b: abs(y / b)),
         rule=lambda g, a, b: g.div(a, b), sympy=lambda s, a, b: a / b, analytic=True, fragile=True,
+        dimension="quotient",
     ),
     Operation(
         "neg", ARITHMETIC, operator.neg, np.negative, "-{}", "-{}", 1, (lambda g, y, a: g.neg(g.one.id),), (unit,),
         rule=lambda g, a: g.neg(a), sympy=lambda s, a: -a, exact=True, analytic=True,
+        dimension="alike",
     ),
     choice(
         "abs", abs, np.abs, "abs_of({})", slopes=(lambda g, y, a: g.make("sign", a),), rates=(unit,),
         sympy="Abs", sympy_class="Abs", parity=EVEN,
+        dimension="alike",
     ),
     choice(
         "sign", _sign, np.sign, "sign_of({})",
         body="choose(a > 0.0, same(1.0), choose(a < 0.0, same(-1.0), choose(a == 0.0, same(0.0), a)))",
         sympy="sign", sympy_class="sign", jumps=True,
+        dimension="sign",
     ),
     choice(  # NaN wins, as in numpy.minimum
         "min", lambda a, b: a if a <= b or a != a else b, np.minimum, "smaller({}, {})", arity=2,
@@ -99,6 +106,7 @@ ROWS = (
         rates=(lambda y, a, b: y == a, lambda y, a, b: y != a), error=lambda y, x, e: np.maximum(*e),
         rule=lambda g, a, b: a if a == b else None,
         sympy="Min", sympy_class="Min", commutative=True, many=True,
+        dimension="alike",
     ),
     choice(
         "max", lambda a, b: a if a >= b or a != a else b, np.maximum, "larger({}, {})", arity=2,
@@ -106,6 +114,7 @@ ROWS = (
         rates=(lambda y, a, b: y == a, lambda y, a, b: y != a), error=lambda y, x, e: np.maximum(*e),
         rule=lambda g, a, b: a if a == b else None,
         sympy="Max", sympy_class="Max", commutative=True, many=True,
+        dimension="alike",
     ),
     function(
         "pow", math.pow, np.power,
@@ -115,6 +124,7 @@ ROWS = (
         rounding=lambda y, a, b: (2.0 + abs(b)) * abs(y),  # repeated products where b is whole
         rule=lambda g, a, b: g.power(a, b), recurrence=None,
         sympy=lambda s, a, b: a**b, word="", digits="power", fragile=True,
+        dimension="power",
     ),
     function(
         "atan2", math.atan2, np.arctan2,  # a = opposite, b = adjacent
@@ -122,16 +132,19 @@ ROWS = (
          lambda g, y, a, b: g.neg(g.mul(a, over(g, _squares(g, a, b))))),
         (lambda y, a, b: abs(b) / (a * a + b * b), lambda y, a, b: abs(a) / (a * a + b * b)),
         recurrence=lambda g, y, a, b: ((b, g.neg(a)), _squares(g, a, b)),
+        dimension="ratio",
     ),
     function(
         "hypot", math.hypot, np.hypot, (lambda g, y, a, b: g.div(a, y), lambda g, y, a, b: g.div(b, y)),
         (lambda y, a, b: abs(a) / y, lambda y, a, b: abs(b) / y), recurrence=lambda g, y, a, b: ((a, b), y),
         sympy=lambda s, a, b: s.sqrt(a**2 + b**2), sympy_class="hypot", commutative=True,
+        dimension="alike",
     ),
     function(
         "sqrt", math.sqrt, np.sqrt, (lambda g, y, a: g.div(g.constant(0.5).id, y),), (lambda y, a: 0.5 / y,),
         error=lambda y, x, e: np.fmin(0.5 * e[0] / y, np.sqrt(e[0])),
         rule=_root_of_square, recurrence=None, fragile=True,
+        dimension="root",
     ),
     function("exp", math.exp, np.exp, (lambda g, y, a: y,), (lambda y, a: y,), analytic=True, fragile=True),
     function(
@@ -190,9 +203,9 @@ ROWS = (
         "atanh", math.atanh, np.arctanh, (lambda g, y, a: over(g, _one_and(g, "sub", a)),),
         (lambda y, a: 1.0 / (1.0 - a * a),), parity=ODD, fragile=True,
     ),
-    condition("lt", operator.lt, np.less, "({} < {})", "Lt", jumps=True),
-    condition("le", operator.le, np.less_equal, "({} <= {})", "Le", jumps=True),
-    condition("eq", operator.eq, np.equal, "({} == {})", "Eq", commutative=True, jumps=True),
+    condition("lt", operator.lt, np.less, "({} < {})", "Lt", jumps=True, dimension="ratio"),
+    condition("le", operator.le, np.less_equal, "({} <= {})", "Le", jumps=True, dimension="ratio"),
+    condition("eq", operator.eq, np.equal, "({} == {})", "Eq", commutative=True, jumps=True, dimension="ratio"),
     condition("not", operator.not_, np.logical_not, "({} == 0.0)", "Not"),
     condition(
         "and", lambda a, b: bool(a and b), np.logical_and, "(({} != 0.0) & ({} != 0.0))", "And",
@@ -208,6 +221,7 @@ ROWS = (
         rates=(lambda y, c, a, b: 0.0, lambda y, c, a, b: c != 0.0, lambda y, c, a, b: c == 0.0),
         rule=_chosen,
         sympy=lambda s, c, a, b: s.Piecewise((a, c), (b, True)), word="where",
+        dimension="choice",
     ),
 )  # fmt: skip
 

@@ -84,7 +84,7 @@ def test_the_shipped_examples(path: Path) -> None:
 
 def test_a_written_model_reads_back(slider_crank: Model, write) -> None:
     slider_crank.output("even", sympy.Piecewise((1, sympy.Symbol("theta") > 0), (sympy.Abs(sympy.Symbol("s")), True)))
-    slider_crank.parameter("odd", 0.1 + 0.2, unit="yes", doc="a text: with # signs, and 'quotes'")
+    slider_crank.parameter("odd", 0.1 + 0.2, unit="N*m", doc="a text: with # signs, and 'quotes'")
     slider_crank.parameter("third")
     text = slider_crank.to_yaml()
     assert faults(text) == []

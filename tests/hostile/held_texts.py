@@ -21,11 +21,8 @@ from eomgen.program import Program
 #: Table and key of every text -> where the model below holds it; None: a file that is read, see the last tests.
 PLACES: dict[tuple[str, str], str | None] = {
     ("MODEL", "doc"): "doc",
-    ("PARAMETER", "unit"): "parameters.l.unit",
     ("PARAMETER", "doc"): "parameters.l.doc",
-    ("INPUT", "unit"): "inputs.tau.unit",
     ("INPUT", "doc"): "inputs.tau.doc",
-    ("OUTPUT_FIELDS", "unit"): "outputs.y.unit",
     ("OUTPUT_FIELDS", "doc"): "outputs.y.doc",
     ("EVENT", "doc"): "events.low.doc",
     ("DISPLAY", "file"): "bodies.rod.display[0].file",
@@ -41,8 +38,8 @@ def described(text: str, name: str = "held") -> dict[str, Any]:
         "name": name,
         "doc": text,
         "gravity": [0, "-9.81", 0],
-        "parameters": {"l": {"value": 0.5, "unit": text, "doc": text}},
-        "inputs": {"tau": {"value": 0.0, "unit": text, "doc": text}},
+        "parameters": {"l": {"value": 0.5, "unit": "m", "doc": text}},
+        "inputs": {"tau": {"value": 0.0, "unit": "N*m", "doc": text}},
         "bodies": {
             "rod": {
                 "mass": 1.0,
@@ -54,7 +51,7 @@ def described(text: str, name: str = "held") -> dict[str, Any]:
         },
         "joints": {"A": {"type": "revolute", "between": ["ground", "rod"], "coordinate": "theta", "axis": "z"}},
         "forces": {"motor": {"type": "torque", "joint": "A", "value": "tau"}},
-        "outputs": {"y": {"expression": "y(rod.tip)", "unit": text, "doc": text}},
+        "outputs": {"y": {"expression": "y(rod.tip)", "unit": "m", "doc": text}},
         "events": {"low": {"expression": "y(rod.tip)", "doc": text}},
         "initial": {"theta": 0.3},
         "simulation": {"end": 1, "method": "DOP853"},

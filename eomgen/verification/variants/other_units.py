@@ -8,19 +8,18 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import Description
+from ...describe.fields import MODEL, PART_KEYS, Field, acts_on_length, fields_of
+from ...describe.mechanism import LEVEL_DIMENSIONS, MOMENTUM
+from ...describe.mechanism import MASS as TOTAL_MASS
 from ...describe.names import QUANTITIES
 from ...describe.rewritten_texts import rewritten, scaled
 from ...describe.scope import ENERGIES
 from ...describe.visit import Slot, Visitor, visit
-from .dimensions import INERTIA, LENGTH, NONE, SPEED, SPIN, TORQUE, Dimension, dimension_of
+from ...elements.dimensions import ENERGY, LENGTH, NONE, SPEED, SPIN, Dimension
 from .variant import NotApplicable, UnitScales, Variant, coordinates_of, kinds_of, velocities_of
 
 #: The engineer's units: millimetre, tonne, millisecond.
 MM_T_MS = UnitScales(length=1e3, mass=1e-3, time=1e3)
-_MARKER = {0: LENGTH, 1: SPEED, 2: Dimension(1, 0, -2), 3: Dimension(2, 1, -1), 4: INERTIA, 5: Dimension(1, 1, -1)}
-_MARKER |= {6: Dimension(0, 1), 7: SPIN, 8: SPIN, 9: Dimension(0, 0, -2), 10: Dimension(0, 0, -2)}
-#: Local names of laws and profiles -> dimension where the law acts on a length.
-_LOCAL = {"length": LENGTH, "angle": NONE}
 #: Keys that keep their SI values because nothing but their zeros, or their own value, counts.
 _KEPT = ("outputs", "events", "inputs")
 
@@ -61,38 +60,34 @@ class _Scaled(Visitor):
         for name, kind in self.kinds.items():
             own = LENGTH if kind == "length" else NONE
             for order, suffix in enumerate(("", "_dot", "_ddot")):
-                self.names[name + suffix] = (own._replace(time=-order).of(scales), kind)
+                self.names[name + suffix] = (scales.of(own._replace(time=-order)), kind)
         for name, kind in velocities_of(description).items():
             own = SPEED if kind == "length" else SPIN
-            self.names[name] = (own.of(scales), kind)
+            self.names[name] = (scales.of(own), kind)
         declared = {e.name for section in ("parameters", "inputs") for e in description.sections[section]}
-        self.names |= {name: (TORQUE.of(scales), "") for name in ENERGIES if name not in declared}
+        self.names |= {name: (scales.of(ENERGY), "") for name in ENERGIES if name not in declared}
         for name in ("momentum_x", "momentum_y", "momentum_z"):
-            self.names.setdefault(name, (_MARKER[5].of(scales), ""))
-        self.names.setdefault("total_mass", (_MARKER[6].of(scales), ""))
+            self.names.setdefault(name, (scales.of(LEVEL_DIMENSIONS[MOMENTUM]), ""))
+        self.names.setdefault("total_mass", (scales.of(LEVEL_DIMENSIONS[TOTAL_MASS]), ""))
         for name in declared:
             self.names.pop(name, None)
         self.joints = coordinates_of(description)
         self.home = {joint: own[0] for joint, own in self.joints.items() if len(own) == 1}
 
-    def acts_on_length(self, slot: Slot) -> bool:
-        """Whether an entry acts along a length rather than an angle."""
-        values = {} if slot.entry is None else slot.entry.values
+    def measured_in(self, slot: Slot) -> Dimension | None:
+        """The dimension of a scalar, as the row of its field says."""
+        if slot.entry is None:
+            return MODEL[slot.key].dimension if slot.section == "" else None
+        field = fields_of(slot.section, slot.entry.values).get(slot.key) or PART_KEYS[slot.key]
+        return field.measured_in(slot.entry.values, slot.place, self._acts_on_length(slot, field))
+
+    def _acts_on_length(self, slot: Slot, field: Field) -> bool:
+        assert slot.entry is not None
         if slot.section == "joints":
-            name = "" if slot.entry is None else slot.entry.name
-            return self.kinds.get((self.joints.get(name) or ("",))[0], "") == "length"
-        if slot.type == "cam":
-            key = "cam" if slot.key == "phase" else "follower"
-            return self.kinds.get(self.home.get(values[key], values[key])) == "length"
-        if slot.type == "driver":
-            if "coordinate" in values:
-                name = values["coordinate"]
-                return self.kinds.get(self.home.get(name, name)) == "length"
-            return "angle" not in values
-        joint = values.get("joint")
-        if joint is not None:
-            return self.kinds.get(self.home.get(joint, joint)) == "length"
-        return "between" in values or "marker" in values
+            return self.kinds.get((self.joints.get(slot.entry.name) or ("",))[0], "") == "length"
+        return acts_on_length(
+            slot.section, slot.entry.values, field, lambda name: self.kinds.get(self.home.get(name, name)) == "length"
+        )
 
     def scalar(self, value: Any, slot: Slot) -> Any:
         if (slot.section, slot.key) in (("", "initial"), ("", "guess"), ("events", "reset")):
@@ -100,19 +95,11 @@ class _Scaled(Visitor):
         elif slot.section in _KEPT or slot.type == "coupling":
             factor = 1.0
         else:
-            factor = dimension_of(slot, self.acts_on_length(slot)).of(self.scales)
-        if slot.key == "stiffness" and slot.type in ("stop", "point_plane", "sphere_plane", "sphere_sphere"):
-            return self._contact(value, slot, factor)
+            dimension = self.measured_in(slot)
+            if dimension is None:
+                raise NotApplicable(f"the dimension of {slot.key} in {slot.section or 'the model'} is not known")
+            factor = self.scales.of(dimension)
         return scaled(self.text(value, slot), factor)
-
-    def _contact(self, value: Any, slot: Slot, factor: float) -> Any:
-        """k in k d**n: the scale of d goes in to the power n."""
-        if slot.type == "stop" and not self.acts_on_length(slot):
-            return scaled(self.text(value, slot), factor)
-        exponent = 1.5 if slot.entry is None else slot.entry.values.get("exponent", 1.5)
-        if isinstance(exponent, str):
-            raise NotApplicable("the exponent of a contact is no number")
-        return scaled(self.text(value, slot), factor * self.scales.length ** -float(exponent))
 
     def text(self, value: Any, slot: Slot) -> Any:
         """A text whose names are measured in the new units."""
@@ -124,20 +111,19 @@ class _Scaled(Visitor):
 
         def locate(quantity: str, marker: str) -> str:
             level = QUANTITIES[quantity][0]
-            own = NONE if quantity == "angle" else _MARKER[level]
-            return f"({quantity}({marker})/{own.of(self.scales)!r})"
+            own = NONE if quantity == "angle" else LEVEL_DIMENSIONS[level]
+            return f"({quantity}({marker})/{self.scales.of(own)!r})"
 
         return rewritten(value, name, locate)
 
     def _locals(self, slot: Slot) -> dict[str, float]:
         """Names that only a law or a profile knows, and their scales."""
-        length = self.acts_on_length(slot)
-        if slot.type in ("element", "torsional_element"):
-            own = LENGTH if length and slot.type == "element" else NONE
-            rate = own._replace(time=-1)
-            return {"length": own.of(self.scales), "angle": 1.0, "rate": rate.of(self.scales)}
-        if slot.type == "cam" and slot.entry is not None:
-            cam = str(slot.entry.values["cam"])
-            sliding = self.kinds.get(self.home.get(cam, cam)) == "length"
-            return {"theta": (LENGTH if sliding else NONE).of(self.scales)}
-        return {"theta": 1.0} if slot.type == "cam_contact" else {}
+        if slot.entry is None:
+            return {}
+        own = fields_of(slot.section, slot.entry.values).get(slot.key)
+        found: dict[str, float] = {}
+        for name, field in own.local.items() if own is not None else ():
+            dimension = field.measured_in({}, (), self._acts_on_length(slot, field))
+            assert dimension is not None
+            found[name] = self.scales.of(dimension)
+        return found

@@ -16,6 +16,7 @@ from ...describe.build_joints import coordinate_names
 from ...describe.description import DescribedEntry, Description
 from ...describe.rewritten_texts import names_of
 from ...describe.visit import Slot, Visitor, visit
+from ...elements.dimensions import Dimension
 from ...joints import JOINTS
 from ...records import dataclass
 
@@ -39,6 +40,10 @@ class UnitScales:
     length: float = 1.0
     mass: float = 1.0
     time: float = 1.0
+
+    def of(self, dimension: Dimension) -> float:
+        """Units of a variant in one SI unit of a dimension."""
+        return float(self.length**dimension.length * self.mass**dimension.mass * self.time**dimension.time)
 
     @property
     def force(self) -> float:

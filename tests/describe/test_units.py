@@ -1,0 +1,282 @@
+"""Units: conversion to SI judged by pint and by closed forms; a table of right and wrong expressions."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pint
+import pytest
+
+import eomgen as eg
+from eomgen.describe.units import UnitError, read_unit
+
+#: parameters, inputs: name -> unit; c has none
+GIVEN = {"l": "mm", "m": "g", "F": "kN", "tau": "N*m", "k": "N/mm", "kt": "N*m/rad", "d": "N*s/m", "w": "rpm"}
+GIVEN |= {"g": "m/s^2", "T": "ms", "a": "deg", "rho": "g/cm^3", "n": "1", "p": "MPa"}
+
+
+def model(field: str, expression: str) -> eg.Model:
+    """A pendulum (angle th) on a slide (length x), with one expression under test."""
+    m = eg.Model("probe", gravity=(0, -9.81, 0))
+    for name, unit in GIVEN.items():
+        m.parameter(name, 1.0, unit=unit)
+    m.parameter("c", 1.0)
+    own = {field: expression}
+    cart = m.body("cart", mass=own.get("mass", 1))
+    rod = m.body("rod", mass=1, inertia=(0, 0, own.get("inertia", 1)), com=(own.get("com", 0.5), 0, 0))
+    m.prismatic("x", m.ground, cart, axis="x")
+    m.revolute("th", cart, rod)
+    if field == "torque":
+        m.torque("motor", on="th", value=expression)
+    elif field == "push":
+        m.torque("motor", on="x", value=expression)
+    elif field == "law":
+        m.element("coil", joint="x", law=expression)
+    elif field == "turning_law":
+        m.torsional_element("coil", joint="th", law=expression)
+    elif field == "stiffness":
+        m.spring("coil", m.ground, cart.marker("end", at=(1, 0, 0)), stiffness=expression)
+    elif field == "stop":
+        m.stop("end", joint="x", lower=0, stiffness=expression, exponent=1)
+    elif field == "stop2":
+        m.stop("end", joint="x", lower=0, stiffness=expression, exponent=2)
+    elif field == "bushing":
+        m.bushing("rubber", m.ground, cart, stiffness=[1, 1, 1, expression, 1, 1])
+    elif field == "bushing_force":
+        m.bushing("rubber", m.ground, cart, stiffness=[expression, 1, 1, 1, 1, 1])
+    elif field == "driver":
+        m.driver("lead", coordinate="th", value=expression)
+    elif field == "output":
+        m.output("y", expression)
+    elif field == "output_N":
+        m.output("y", expression, unit="N")
+    elif field == "initial":
+        m.initial(x=expression)
+    return m
+
+
+RIGHT = [
+    ("mass", "m"), ("mass", "2"), ("mass", "c"), ("mass", "rho*l**3"), ("mass", "0.3*l"), ("mass", "4/3*pi*rho*l**3"),
+    ("inertia", "m*l**2/12"), ("inertia", "0.2*l*l/12"), ("com", "l/2"), ("com", "sqrt(l*l)"), ("com", "hypot(l, l)"),
+    ("torque", "tau"), ("torque", "F*l*sin(th)"), ("torque", "-m*g*l*cos(th)"), ("torque", "m*9.81*l"),
+    ("torque", "-kt*th"), ("torque", "-kt*(th - a)"), ("torque", "tau*sin(w*t)"), ("torque", "tau*sin(3*t)"),
+    ("torque", "tau + c"), ("torque", "c*l"), ("torque", "tau*(x/l)**2"), ("torque", "tau*exp(-t/T)"),
+    ("push", "F"), ("push", "-k*x"), ("push", "-40*x"), ("push", "p*l**2"), ("push", "F - d*x_dot"),
+    ("law", "-k*(length - l) - d*rate"), ("turning_law", "-kt*angle - kt*T*rate"), ("stiffness", "k"),
+    ("stop", "k"), ("stop2", "k/l"), ("bushing", "kt"), ("bushing_force", "k"), ("driver", "w*t"),
+    ("driver", "atan2(l, c)"), ("output", "min(l, x)"), ("output", "where(x > l, F, -F)"),
+    ("output_N", "m*ax(rod)"), ("output_N", "total_energy/l"), ("output", "n + th"), ("initial", "2*l"),
+]  # fmt: skip
+WRONG = [
+    ("mass", "l", "l is a length (m), and a mass (kg) belongs here"),
+    ("mass", "rho*l**2", "a mass (kg) belongs here"),
+    ("inertia", "m*l/12", "a moment of inertia"),
+    ("com", "m", "m is a mass (kg), and a length (m) belongs here"),
+    ("com", "l**2", "and a length (m) belongs here"),
+    ("torque", "F", "F is a force (N), and a torque or an energy (N*m) belongs here"),
+    ("torque", "tau + F", "puts together"),
+    ("torque", "F*l + l", "puts together"),
+    ("torque", "-k*th", "a torque or an energy (N*m) belongs here"),
+    ("torque", "tau*sin(l)", "sin(l) is taken of a length (m)"),
+    ("torque", "tau*sin(w)", "sin(w) is taken of a rate (1/s)"),
+    ("torque", "tau*exp(t)", "exp(t) is taken of a time (s)"),
+    ("torque", "tau*2**l", "is taken of a length (m)"),
+    ("push", "tau", "a force (N) belongs here"),
+    ("push", "l", "l is a length (m), and a force (N) belongs here"),
+    ("push", "-2*k*x**2", "a force (N) belongs here"),
+    ("push", "F - k", "puts together"),
+    ("push", "p", "p is Pa, and a force (N) belongs here"),
+    ("law", "-k*(length - F)", "puts together"),
+    ("law", "-k*rate", "a force (N) belongs here"),
+    ("turning_law", "-k*angle", "a torque or an energy (N*m) belongs here"),
+    ("stiffness", "kt", "and a stiffness (N/m) belongs here"),
+    ("stop", "F", "and a stiffness (N/m) belongs here"),
+    ("stop2", "k", "belongs here"),
+    ("bushing", "k", "belongs here"),
+    ("bushing_force", "kt", "belongs here"),
+    ("driver", "l", "a number or an angle belongs here"),
+    ("driver", "w", "w is a rate (1/s)"),
+    ("output", "min(l, T)", "puts together"),
+    ("output", "where(x > th, l, 2*l)", "puts together"),
+    ("output", "l + T", "puts together"),
+    ("output", "atan2(x, T)", "puts together"),
+    ("output", "hypot(l, th)", "puts together"),
+    ("output", "sqrt(l) + l", "puts together"),
+    ("output", "x + x_dot", "puts together"),
+    ("output", "kinetic_energy + F", "puts together"),
+    ("output", "vx(rod) - ax(rod)", "puts together"),
+    ("output_N", "m", "m is a mass (kg), and a force (N) belongs here"),
+    ("output_N", "m*vx(rod)", "a force (N) belongs here"),
+    ("output", "log(p)", "log(p) is taken of Pa"),
+    ("initial", "a", "a length (m) belongs here"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("field", "expression"), RIGHT)
+def test_right_expressions_pass(field: str, expression: str) -> None:
+    model(field, expression).mechanism()
+
+
+@pytest.mark.parametrize(("field", "expression", "message"), WRONG)
+def test_wrong_expressions_are_told_with_their_place(field: str, expression: str, message: str) -> None:
+    with pytest.raises(eg.ModelError) as caught:
+        model(field, expression).mechanism()
+    (problem,) = caught.value.problems
+    assert message in problem.message
+    assert problem.remedy
+    assert problem.path.split(".")[0] in ("bodies", "forces", "constraints", "outputs", "initial")
+
+
+def test_all_are_told_at_once_with_their_lines(write) -> None:
+    text = """name: two
+parameters:
+  l: {value: 500, unit: mm}
+  F: {value: 1, unit: kN}
+bodies:
+  b: {mass: l, inertia: {zz: 1}}
+joints:
+  th: {type: revolute, between: [ground, b]}
+forces:
+  t:
+    type: torque
+    joint: th
+    value: F*l + F
+"""
+    with pytest.raises(eg.ModelError) as caught:
+        eg.load(write(text)).mechanism()
+    assert [(p.path, p.line) for p in caught.value.problems] == [("bodies.b.mass", 6), ("forces.t.value", 13)]
+
+
+def test_a_model_without_units_is_not_checked() -> None:
+    m = eg.Model("free")
+    b = m.body("b", mass=1, inertia=(0, 0, 1))
+    m.revolute("th", m.ground, b)
+    m.output("y", "sin(t) + th_dot")
+    m.mechanism()
+    m.parameter("l", 1, unit="m")
+    with pytest.raises(eg.ModelError, match="sin\\(t\\) is taken of a time"):
+        m.mechanism()
+
+
+UNITS = [
+    "mm",
+    "km/h",
+    "g*mm^2",
+    "deg",
+    "rpm",
+    "kN/mm",
+    "lbf*ft",
+    "N*mm/deg",
+    "bar",
+    "inch",
+    "t",
+    "ms",
+    "deg/s",
+    "Nm/rad",
+]
+UNITS = [u for u in UNITS if u != "Nm/rad"] + ["mN m", "1/min", "g/cm**3", "kg m^2/s^2", "hp", "kWh", "um", "turn", "%"]
+
+
+@pytest.mark.parametrize("text", UNITS)
+def test_sizes_are_those_of_pint(text: str) -> None:
+    unit = read_unit(text)
+    judge = pint.UnitRegistry().Quantity(1.0, text).to_base_units()
+    assert unit.size == pytest.approx(judge.magnitude, rel=4e-16 * 4)
+    again = read_unit(unit.si)
+    assert again.dimension.alike(unit.dimension)
+    assert again.size == 1.0
+
+
+def test_sizes_are_those_of_closed_forms() -> None:
+    assert read_unit("deg").size == math.pi / 180
+    assert read_unit("rpm").size == pytest.approx(2 * math.pi / 60, rel=1e-15)
+    assert read_unit("km/h").size == pytest.approx(1 / 3.6, rel=1e-15)
+    assert (read_unit("deg").si, read_unit("rpm").si, read_unit("N*mm").si) == ("rad", "rad/s", "N*m")
+
+
+@pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        ("degC", "in K"), ("degF", "in K"), ("furlongg", "products"), ("Nm", "N*m"), ("m**", "products"),
+        ("m^x", "products"), ("(m", "products"), ("m)", "products"), ("m//s", "products"), ("mol", "products"),
+        ("__import__('os')", "products"), ("m^99999", "products"), ("1e3 m", "products"), ("kg,m", "products"),
+    ],
+)  # fmt: skip
+def test_what_is_no_unit_is_refused(text: str, remedy: str) -> None:
+    with pytest.raises(UnitError) as caught:
+        read_unit(text)
+    assert remedy in caught.value.remedy
+    m = model("mass", "1")
+    m.parameter("bad", 1, unit=text)
+    with pytest.raises(eg.ModelError) as told:
+        m.mechanism()
+    assert [p.path for p in told.value.problems] == ["parameters.bad.unit"]
+
+
+def _pendulum(units: bool) -> eg.Model:
+    m = eg.Model("pendulum", gravity=(0, "-g", 0))
+    given = {"g": (9.81e-3, "mm/ms^2"), "l": (500, "mm"), "m": (250, "g"), "k": (5.0, "N*mm/deg"), "a": (20, "deg")}
+    plain = {"g": 9.81, "l": 0.5, "m": 0.25, "k": 5.0e-3 * 180 / math.pi, "a": math.radians(20)}
+    for name in given:
+        value, unit = given[name] if units else (plain[name], "")
+        m.parameter(name, value, unit=unit)
+    bob = m.body("bob", mass="m", com=("l", 0, 0), inertia=(0, 0, "m*l**2/12"))
+    m.revolute("th", m.ground, bob)
+    m.torsional_spring("coil", "th", stiffness="k", angle="a")
+    m.output("reach", "l*cos(th)", unit="mm" if units else "")
+    m.output("turn", "th", unit="deg" if units else "")
+    m.initial(th="a")
+    return m
+
+
+def test_other_units_are_the_same_physics() -> None:
+    one, other = (_pendulum(units).compile(target="numpy") for units in (True, False))
+    np.testing.assert_allclose(one.p, other.p, rtol=1e-15)
+    a, b = one.simulate((0, 1), rtol=1e-10, atol=1e-12), other.simulate((0, 1), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(a.x[:, -1], b.x[:, -1], rtol=1e-8, atol=1e-10)
+    x = [0.3, -0.2]
+    np.testing.assert_allclose(one.rhs(0.0, x), other.rhs(0.0, x), rtol=1e-14)
+    np.testing.assert_allclose(a["reach"], 1e3 * 0.5 * np.cos(a["th"]), rtol=1e-12)
+    np.testing.assert_allclose(a["turn"], np.degrees(a["th"]), rtol=1e-12)
+    assert (a.units["reach"], a.units["turn"], one.layout.unit("l"), one.layout.unit("k")) == (
+        "mm",
+        "deg",
+        "m",
+        "N*m/rad",
+    )
+
+
+def test_what_is_written_keeps_its_units(write) -> None:
+    made = _pendulum(True)
+    text = made.to_yaml()
+    assert "l: {value: 500, unit: mm}" in text
+    again = eg.load(write(text))
+    assert again.to_yaml() == text
+    assert again.mechanism().parameters == made.mechanism().parameters
+    assert made.mechanism().parameters[1].value == 0.5
+
+
+def test_outputs_that_cannot_be_converted_are_refused() -> None:
+    m = model("mass", "1")
+    m.output("th", "th", unit="deg")
+    m.output("number", 3, unit="mm")
+    with pytest.raises(eg.ModelError) as caught:
+        m.mechanism()
+    assert [p.path for p in caught.value.problems] == ["outputs.th.unit", "outputs.number.unit"]
+
+
+def test_pint_is_imported_for_other_units_only() -> None:
+    code = """
+import sys, eomgen as eg
+m = eg.Model("a"); m.parameter("l", {value}, unit={unit!r})
+b = m.body("b", mass=1); m.prismatic("x", m.ground, b)
+m.mechanism(); print("pint" in sys.modules)
+"""
+    for unit, imported in (("m", "False"), ("N*m/rad", "False"), ("mm", "True")):
+        told = subprocess.run(
+            [sys.executable, "-c", code.format(value=1, unit=unit)], capture_output=True, text=True, check=True
+        )
+        assert told.stdout.strip() == imported
