@@ -245,7 +245,7 @@ def test_other_units_are_the_same_physics() -> None:
         "mm",
         "deg",
         "m",
-        "N*m/rad",
+        "N*m",
     )
 
 
