@@ -61,6 +61,7 @@ class Browser:
 
     def __exit__(self, *_: object) -> None:
         self.socket.close()
+        self.loop.run_until_complete(asyncio.sleep(0.1))  # until the connection is closed
         self.process.terminate()
         self.process.wait(20)
         self.loop.close()

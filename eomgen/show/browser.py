@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.pictures import ROUNDED
 from .colors import color_of, style_of
 from .data import Array
 from .optional import k3d
@@ -17,7 +16,6 @@ from .player import player_html, player_script
 from .scene import Item, Scene
 from .shown_motion import ShownMotion
 
-STILL = ROUNDED  #: poses that differ by less are one
 NAMES = "#222222"  #: colour of names
 
 

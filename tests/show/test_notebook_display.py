@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import io
 import re
@@ -107,7 +108,7 @@ def test_a_kernel_shows_progress_pictures_and_short_tracebacks(tmp_path: Path) -
     ]
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(text) for text in cells])
     notebook.cells[5].metadata.tags = ["raises-exception"]
-    NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
+    asyncio.run(NotebookClient(notebook, timeout=120, kernel_name="python3").async_execute())  # closes its loop
     outputs = [cell.outputs for cell in notebook.cells]
     assert "base64" in outputs[0][0].data["text/html"]
     (bar,) = outputs[1]  # what was shown of the progress, at its end: nothing
