@@ -16,6 +16,7 @@ from ..errors import EomgenError, UsageError
 from ..limits.rounding import EPS
 from ..limits.runs import MOST_STATES
 from ..numeric.counts import read_count
+from ..simulation.events import told_by_the_caller
 from ..texts import shown
 from .cases import random_cases
 from .comparison import failed
@@ -73,7 +74,8 @@ def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, second
     """
     states, seed = _read(states, seed, seconds)
     start = perf_counter()
-    found = _of_module(module, states, seed)
+    with told_by_the_caller():
+        found = _of_module(module, states, seed)
     left = max(LEAST, seconds - (perf_counter() - start))
     found += _variants(module, getattr(module, "description", None), seed, left)
     return Verification(module.name, tuple(found), perf_counter() - start)
@@ -132,7 +134,8 @@ def verify_model(
     """
     states, seed = _read(states, seed, seconds)
     start = perf_counter()
-    found = _of_module(module, states, seed)
+    with told_by_the_caller():
+        found = _of_module(module, states, seed)
     found += _variants(module, model, seed, max(LEAST, seconds - (perf_counter() - start)))
     return Verification(module.name, tuple(found), perf_counter() - start)
 
@@ -151,7 +154,8 @@ def _variants(module: BoundModel, model: Any, seed: int, seconds: float) -> list
     from .variants import variant_findings
 
     try:
-        return variant_findings(model, seed=seed, seconds=seconds)
+        with told_by_the_caller():
+            return variant_findings(model, seed=seed, seconds=seconds)
     except EomgenError as error:
         return [failed(check, error)]
 
