@@ -230,7 +230,7 @@ def _cam_contact(e: Entry) -> Constraint | None:
     return FlatContact(e.name, axis, follower, profile, *contact)
 
 
-_TURN = {"theta": Field("expression", "", dimension=NONE)}
+_TURN = {CAM_ANGLE: Field("expression", "", dimension=NONE)}
 _PERIODIC = Field(
     "flag", "whether the profile repeats every turn; then value and slope at 2 pi must be those at 0", default=True
 )
@@ -249,7 +249,7 @@ TYPES = table(
                 required=True,
                 dimension=REACH,
                 along="follower",
-                local={"theta": Field("expression", "", dimension=REACH, along="cam")},
+                local={CAM_ANGLE: Field("expression", "", dimension=REACH, along="cam")},
             ),
             "phase": Field(
                 "expression", "the cam's angle where theta is 0 (rad)", default=0, dimension=REACH, along="cam"

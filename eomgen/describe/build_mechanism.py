@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -176,8 +178,15 @@ def _described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[U
     return unit, doc
 
 
-def _in_si(value: float | None, unit: Unit) -> float | None:
-    return value if value is None or unit.size == 1.0 else value * unit.size
+def _in_si(reader: Reader, path: str, value: float | None, unit: Unit) -> float | None:
+    """A value in SI units; one that no double holds there is a fault."""
+    if value is None or unit.size == 1.0:
+        return value
+    found = value * unit.size
+    if not math.isfinite(found) or (value != 0.0 and abs(found) < sys.float_info.min):
+        reader.faults.add(path, f"{value:g} {unit.text} in {unit.si} is no number of double precision", "check both")
+        return None
+    return found
 
 
 def _parameter(reader: Reader, entry: DescribedEntry) -> Parameter:
@@ -185,7 +194,7 @@ def _parameter(reader: Reader, entry: DescribedEntry) -> Parameter:
     unit, doc = _described(reader, entry, PARAMETER)
     given = entry.values.get("value")
     value = None if given is None else reader.number(f"{entry.path}.value", given)
-    return Parameter(str(entry.name), _in_si(value, unit), unit.si, doc)
+    return Parameter(str(entry.name), _in_si(reader, f"{entry.path}.value", value, unit), unit.si, doc)
 
 
 def _input(reader: Reader, entry: DescribedEntry) -> Input:
@@ -193,7 +202,7 @@ def _input(reader: Reader, entry: DescribedEntry) -> Input:
     unit, doc = _described(reader, entry, INPUT)
     given = entry.values.get("value")
     value = 0.0 if given is None else reader.number(f"{entry.path}.value", given)
-    return Input(str(entry.name), _in_si(value, unit) or 0.0, unit.si, doc)
+    return Input(str(entry.name), _in_si(reader, f"{entry.path}.value", value, unit) or 0.0, unit.si, doc)
 
 
 def _with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:

@@ -142,8 +142,10 @@ FUNCTION: dict[str, Fields] = {
 MARKER: Fields = {
     "at": Field("vector", "position in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
     "rpy": Field("vector", "fixed-axis roll, pitch, yaw (rad)", default=(0, 0, 0), dimension=NONE),
-    "axes": Field("frame_axes", "two of its axes in body axes, such as {x: [1, 1, 0], z: z}, instead of rpy"),
-    "matrix": Field("matrix", "3 x 3, its axes as columns in body axes, instead of rpy"),
+    "axes": Field(
+        "frame_axes", "two of its axes in body axes, such as {x: [1, 1, 0], z: z}, instead of rpy", dimension=NONE
+    ),
+    "matrix": Field("matrix", "3 x 3, its axes as columns in body axes, instead of rpy", dimension=NONE),
 }
 CYLINDER: Fields = {
     "around": Field("marker", "its z axis is the axis of the cylinder", required=True),

@@ -13,6 +13,7 @@ from .dotted_names import Undotted
 from .names import nearest
 from .placed_on import is_constant
 from .repetition import Fault
+from .units import UnitError, read_unit
 from .visit import Slot, visit_entry
 
 
@@ -176,9 +177,22 @@ def _values(
         elif given is not None:
             texts[name] = str(given)
         elif not is_constant(value := entry.values.get("value")):  # in parameters of its own that stand before it
+            if _is_converted(entry.values.get("unit")):
+                place = f"{entry.path}.unit"
+                remedy = "give an SI unit: what the expression gives from parameters in SI units is in SI units"
+                told(place, f"{str(value)!r} is an expression, which this unit would have to scale", remedy)
+                sound = False
             renaming = Renaming(component.names, instance.prefix, dict(texts), {}, component.closed, told)
             texts[name] = str(renaming.scalar(value, Slot("parameters", "", "value", (), entry)))
     return (numbers, texts) if sound else None
+
+
+def _is_converted(unit: Any) -> bool:
+    """Whether a value in this unit is not the same number in SI units."""
+    try:
+        return isinstance(unit, str) and read_unit(unit).size != 1.0
+    except UnitError:  # told where the parameter is read
+        return False
 
 
 def _copy_origins(target: Description, component: Component, instance: Instance, origins: Mapping[str, str]) -> None:

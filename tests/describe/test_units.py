@@ -280,3 +280,69 @@ m.mechanism(); print("pint" in sys.modules)
             [sys.executable, "-c", code.format(value=1, unit=unit)], capture_output=True, text=True, check=True
         )
         assert told.stdout.strip() == imported
+
+
+COMPONENT = """name: two
+gravity: [0, -9.81, 0]
+components:
+  link:
+    attachments: [top]
+    parameters:
+      l: {value: 500, unit: mm}
+      m: {value: 250, unit: g}
+    bodies: {rod: {mass: m, com: [l/2, 0, 0], inertia: {zz: m*l**2/12}}}
+    joints: {th: {type: revolute, between: [top, rod]}}
+parameters: {L: {value: 60, unit: cm}}
+add:
+  a: {component: link, at: ground}
+  b: {component: link, at: ground, parameters: {l: 300}}
+  c: {component: link, at: ground, parameters: {l: L/2}}
+"""
+
+
+def test_components_keep_their_units(write) -> None:
+    found = {p.name: (p.value, p.unit) for p in eg.load(write(COMPONENT)).mechanism().parameters}
+    assert found["a_l"] == (0.5, "m")
+    assert found["b_l"] == (0.3, "m")
+    assert found["L"] == (0.6, "m")
+    assert found["c_m"] == (0.25, "kg")
+    with pytest.raises(eg.ModelError) as caught:
+        eg.load(write(COMPONENT.replace("l: L/2", "l: L**2"))).mechanism()
+    assert any("a length (m) belongs here" in p.message for p in caught.value.problems)
+
+
+def test_an_expression_is_not_scaled_by_its_unit(write) -> None:
+    text = COMPONENT.replace("m: {value: 250, unit: g}", "m: {value: l*0.5, unit: g}")
+    with pytest.raises(eg.ModelError) as caught:
+        eg.load(write(text)).mechanism()
+    assert any("is an expression" in p.message for p in caught.value.problems)
+
+
+@pytest.mark.parametrize(("value", "unit"), [(1e308, "km"), (1e-305, "nm")])
+def test_values_out_of_range_are_refused(value: float, unit: str) -> None:
+    m = model("mass", "1")
+    m.parameter("far", value, unit=unit)
+    m.input("u", value, unit=unit)
+    with pytest.raises(eg.ModelError) as caught:
+        m.mechanism()
+    assert [p.path for p in caught.value.problems] == ["parameters.far.value", "inputs.u.value"]
+
+
+def test_springs_on_a_coordinate_know_its_dimension() -> None:
+    for kind, coordinate, right, wrong in (
+        ("revolute", "j", "N*mm/deg", "N/m"),
+        ("translational", "j_y", "N/mm", "N*m/rad"),
+        ("cylindrical", "j_z", "N/mm", "N*m/rad"),
+    ):
+        for unit, fine in ((right, True), (wrong, False)):
+            m = eg.Model("rubber")
+            m.parameter("k", 1, unit=unit)
+            b = m.body("b", mass=1, inertia=(1, 1, 1))
+            getattr(m, kind)("j", m.ground, b)
+            m.joint_spring("s", joint=coordinate, stiffness="k")
+            if fine:
+                m.mechanism()
+                continue
+            with pytest.raises(eg.ModelError) as caught:
+                m.mechanism()
+            assert [p.path for p in caught.value.problems] == ["forces.s.stiffness"]
