@@ -217,7 +217,7 @@ class Module(BoundModel):
         return find_lacking(self, "a Module", name)
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *CALLS})
+        return sorted({*super().__dir__(), *CALLS, *FORMS})
 
     def __repr__(self) -> str:
         from ..runtime.summary import line

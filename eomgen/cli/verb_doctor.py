@@ -21,7 +21,8 @@ from .failures import TOOLCHAIN, reports_failures
 from .screen import print_json, readable_size, say
 from .shared_options import json_option
 
-CORE = ("sympy", "numpy", "scipy", "cython", "jinja2", "click", "rich", "ruamel.yaml", "platformdirs", "defusedxml")
+CORE = ("sympy", "numpy", "scipy", "cython", "jinja2", "click", "rich", "ruamel.yaml", "platformdirs", "defusedxml",
+        "pint")  # fmt: skip
 #: extra -> (what it is for, its packages besides those that are always needed)
 EXTRAS = {
     "robots": ("robots in MJCF files", ("mujoco",)),

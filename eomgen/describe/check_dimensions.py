@@ -17,7 +17,7 @@ from ..graph.core import Expr, Graph
 from ..graph.traverse import reachable
 from ..operations import OPERATIONS
 from .description import DescribedEntry, Description
-from .fields import EQUATIONS, LAGRANGIAN, MODEL, PART_KEYS, Field, acts_on_length, fields_of
+from .fields import EQUATIONS, LAGRANGIAN, MODEL, Field, acts_on_length, fields_of, part_fields
 from .mechanism import LEVEL_DIMENSIONS, JointSpec
 from .scope import ENERGIES, RATES
 from .units import Unit, si_text
@@ -101,7 +101,9 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
                     own = units[entry.path].dimension.times(TIME, -order)
                     found.setdefault(f"{entry.name}{suffix}", Known(own, True))
     for joint in joints:
-        for name, coordinate in zip(joint.coordinates, joint.joint.coordinates, strict=True):
+        # the parameters of a curve or surface may be lengths, angles or anything else
+        free = max((option.own for option in joint.joint.options.values()), default=0)
+        for name, coordinate in list(zip(joint.coordinates, joint.joint.coordinates, strict=True))[free:]:
             own = LENGTH if coordinate.kind == "length" else NONE
             for order, suffix in enumerate(RATES):
                 found[name + suffix] = Known(own.times(TIME, -order))
@@ -135,9 +137,10 @@ def _field(section: str, entry: DescribedEntry | None, steps: list[Any]) -> tupl
         return (MODEL if own is None else own).get(key.partition("[")[0]), {}
     row = fields_of(section, entry.values).get(steps[0])
     if row is not None and row.kind in _NESTED:
-        words = [step for step in steps[1:] if isinstance(step, str) and step in PART_KEYS]
+        parts = part_fields()
+        words = [step for step in steps[1:] if isinstance(step, str) and step in parts]
         # a marker that is written as its position alone
-        row = PART_KEYS[words[-1]] if words else PART_KEYS["at"] if row.kind == "markers" else None
+        row = parts[words[-1]] if words else parts["at"] if row.kind == "markers" else None
     return row, entry.values
 
 
@@ -150,7 +153,11 @@ class _Check:
         self.wrong: dict[int, tuple[str, str]] = {}
 
     def faults(self, expression: Expr, wanted: Dimension | None) -> Iterator[tuple[str, str]]:
-        """Message and remedy of each fault of an expression."""
+        """Message and remedy of each fault of an expression.
+
+        Where no given unit is in it, only sums are checked: in ``-rate**3`` or ``exp(-t)`` a factor of 1 has what unit
+        it needs.
+        """
         nodes = reachable(self.graph, [expression.id])
         for i in nodes:
             if i not in self.known:
@@ -158,7 +165,9 @@ class _Check:
         found = [self.wrong[i] for i in nodes if i in self.wrong]
         yield from found
         result = self.known[expression.id]
-        if not found and wanted is not None and result.dimension is not None and not result.dimension.alike(wanted):
+        if found or wanted is None or result.dimension is None or not result.declared:
+            return
+        if not result.dimension.alike(wanted):
             message = (
                 f"{written(self.graph, expression.id)} is {named(result.dimension)}, and {named(wanted)} belongs here"
             )
@@ -217,7 +226,7 @@ class _Check:
 
     def _pure(self, i: int, parts: list[Known], operands: list[int]) -> Dimension | None:
         for own, k in zip(parts, operands, strict=True):
-            if own.dimension is not None and not own.dimension.alike(NONE):
+            if own.declared and own.dimension is not None and not own.dimension.alike(NONE):
                 message = f"{written(self.graph, i)} is taken of {named(own.dimension)}"
                 remedy = "take it of an angle (rad) or a number without unit, such as a ratio of two alike"
                 self.wrong[i] = message, self._remedy(reachable(self.graph, [k]), remedy)

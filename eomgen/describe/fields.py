@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 from ..constraints import CONSTRAINTS
@@ -361,8 +362,10 @@ def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
     return {"bodies": BODY, "inputs": INPUT, "outputs": OUTPUT_FIELDS, "events": EVENT}.get(section, {})
 
 
-#: Keys of the parts of an entry: placements, cylinders of paths, point masses and solids.
-PART_KEYS: Fields = {key: field for own in (*SOLID.values(), POINT, CYLINDER, MARKER) for key, field in own.items()}
+@cache
+def part_fields() -> Fields:
+    """Keys of the parts of an entry: placements, cylinders of paths, point masses and solids."""
+    return {key: field for own in (*SOLID.values(), POINT, CYLINDER, MARKER) for key, field in own.items()}
 
 
 def acts_on_length(section: str, values: Mapping[str, Any], field: Field, is_length: Callable[[str], bool]) -> bool:

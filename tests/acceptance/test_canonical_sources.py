@@ -109,7 +109,7 @@ EXTRA = {
         "B": {"type": "revolute", "between": ["a", "b"]},
     },
     "constraints": {"c": {"type": "coupling", "coordinates": {"B": "l*2", "A": "m*3"}, "offset": "m*l"}},
-    "events": {"stop": {"expression": "A", "reset": {"B_dot": "-l*B_dot", "A_dot": "-m*A_dot"}}},
+    "events": {"stop": {"expression": "A", "reset": {"B_dot": "-l*B_dot", "A_dot": "-l*A_dot/2"}}},
     "initial": {"B_dot": "m*l", "A": "l/5"},
     "guess": {"B": "l/4", "A": "m/9"},
     "simulation": {"end": 1, "rtol": 1e-7},

@@ -174,7 +174,7 @@ CASES: dict[str, tuple[Any, list[str], dict[str, float], float, int]] = {
         ["r", "l", "m_s", "theta", "theta_dot"], {"theta": 1.3, "theta_dot": -10.0}, 0.2, 1,
     ),
     "a reset that the loop takes back in part": (
-        crank("kick: {expression: theta + 1 + r, direction: -1, reset: {theta_dot: 1.1*theta_dot + r*l}}"),
+        crank("kick: {expression: theta + 1 + r/0.9, direction: -1, reset: {theta_dot: 1.1*theta_dot + 1.01*r*l}}"),
         ["r", "l", "theta_dot"], {"theta": -0.5, "theta_dot": 10.0}, 0.3, 1,
     ),
     "a reset that rolling takes back in part": (disc, ["r", "g", "lean", "spin_dot"], ROLLS, 0.4, 1),

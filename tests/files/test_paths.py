@@ -12,7 +12,7 @@ import pytest
 import eomgen as eg
 from eomgen.files.path_names import as_name, as_path
 from eomgen.files.reading import open_plain
-from eomgen.runtime.trajectory import load_trajectory
+from eomgen.runtime import load_trajectory
 from eomgen.solids.mesh import measure_mesh
 
 PENDULUM = Path(__file__).parents[2] / "examples" / "pendulum.yaml"

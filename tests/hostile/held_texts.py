@@ -93,9 +93,6 @@ def text_fields() -> Iterator[tuple[str, str]]:
 def assert_held(metadata: dict[str, Any], text: str) -> None:
     """Metadata has the text where the model has it, unchanged."""
     assert metadata["doc"] == text
-    assert {name: metadata["units"].get(name, "") for name in ("l", "tau", "y")} == dict.fromkeys(
-        ("l", "tau", "y"), text
-    )
     assert {name: metadata["docs"].get(name, "") for name in ("l", "tau", "y")} == dict.fromkeys(
         ("l", "tau", "y"), text
     )

@@ -225,6 +225,7 @@ def test_pictures_are_whole_and_hold_no_element_of_a_text(tmp_path: Any) -> None
         "HTML comment end",
     ):
         run = equations_of(key).compile(target="numpy", kernels=["rhs", "outputs", "events"]).simulate((0, 0.05))
+        run.units["y"] = NASTY[key]  # as a stored trajectory may have it
         axes = Figure().add_subplot()
         run.plot("y", ax=axes)
         label = axes.get_ylabel()

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import Description
-from ...describe.fields import MODEL, PART_KEYS, Field, acts_on_length, fields_of
+from ...describe.fields import MODEL, Field, acts_on_length, fields_of, part_fields
 from ...describe.mechanism import LEVEL_DIMENSIONS, MOMENTUM
 from ...describe.mechanism import MASS as TOTAL_MASS
 from ...describe.names import QUANTITIES
@@ -78,7 +78,7 @@ class _Scaled(Visitor):
         """The dimension of a scalar, as the row of its field says."""
         if slot.entry is None:
             return MODEL[slot.key].dimension if slot.section == "" else None
-        field = fields_of(slot.section, slot.entry.values).get(slot.key) or PART_KEYS[slot.key]
+        field = fields_of(slot.section, slot.entry.values).get(slot.key) or part_fields()[slot.key]
         return field.measured_in(slot.entry.values, slot.place, self._acts_on_length(slot, field))
 
     def _acts_on_length(self, slot: Slot, field: Field) -> bool:
