@@ -98,6 +98,8 @@ def read_unit(text: str) -> Unit:
     UnitError
         The text is not made of units, or of units with an offset (degC).
     """
+    if text and not text.strip():
+        raise UnitError(f"{quoted(text)} is not a unit", "leave it out where there is none")
     text = text.strip()
     if text in _MEANT:
         raise UnitError(f"{quoted(text)} is not a unit", f"write {_MEANT[text]}")

@@ -26,6 +26,8 @@ PLACES: dict[tuple[str, str], str | None] = {
     ("OUTPUT_FIELDS", "doc"): "outputs.y.doc",
     ("EVENT", "doc"): "events.low.doc",
     ("DISPLAY", "file"): "bodies.rod.display[0].file",
+    ("COMPONENT", "doc"): None,  # nothing of it stands in the model that a component becomes
+    ("COMPONENT", "file"): None,
     ("FUNCTION", "source"): None,
     ("FUNCTION", "python"): None,
     ("SOLID", "file"): None,
