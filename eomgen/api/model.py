@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
 from .. import pipeline
 from ..describe.builder import Builder
 from ..describe.sympy_face import name_of
+from ..describe.visit import copied
 from ..errors import UsageError
 from ..files.inline_pictures import picture_html, side_by_side
 from .equations import Equations, derive
@@ -109,7 +109,7 @@ class Model(Builder):
     ) -> Module:
         """Derive, generate and compile a module; see :meth:`~.equations.Equations.compile`."""
         module = self.derive(method, independent, baumgarte).compile(target, **options)
-        module.description = deepcopy(self._description)  # the model may change later
+        module.description = copied(self._description)  # the model may change later
         return module
 
 

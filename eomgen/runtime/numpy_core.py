@@ -89,8 +89,11 @@ class NumpyCore:
         """The constants handed to the blocks."""
         if self.precompute is None:
             return p
-        with np.errstate(all="ignore"):
-            c = np.asarray(self.precompute(p), dtype=float)
+        try:
+            with np.errstate(all="ignore"):
+                c = np.asarray(self.precompute(p), dtype=float)
+        except ArithmeticError:  # Python's own numbers raise where NumPy's become infinite: 1.0 / 0.0
+            c = np.array(np.nan)
         if not np.isfinite(c).all() and np.isfinite(p).all():
             raise error(f"the constants that follow from the parameters cannot be computed; p = {p}")
         return c

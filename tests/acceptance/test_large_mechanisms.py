@@ -177,7 +177,7 @@ def test_the_cylinders_of_the_excavator_follow_from_triangles(module: Any) -> No
     mod = module("excavator")
     for angles in ([0.5, -1.9, -0.6], [0.9, -1.4, -1.0], [0.2, -2.2, 0.2]):
         q, _, _ = mod.kinematics(angles)
-        lengths = [q[mod.q_names.index(f"leg{k}_length")] for k in (1, 2, 3)]
+        lengths = [q[mod.q_names.index(f"length_{k}")] for k in (1, 2, 3)]
         boom, stick = angles[0], angles[1]
         foot, under = np.array([0.6, -0.3]), np.array([2.0, 0.45])
         a, b = np.hypot(*foot), np.hypot(*under)

@@ -31,6 +31,7 @@ GROUPS = [
     ("prismatic", "constant_velocity", "point_on_curve"),
     ("cylindrical", "planar", "weld", "curve_slider"),
     ("surface_slider", "point_on_surface", "spherical"),
+    ("revolute", "translational", "spherical"),
 ]
 LARGE = ("revolute", "spherical", "universal", "free", "cylindrical")
 CASES = [(group, len(group), rotation) for group in GROUPS for rotation in ("euler_angles", "euler_parameters")

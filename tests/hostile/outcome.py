@@ -17,6 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
 
+import eomgen
 from eomgen.errors import EomgenError
 
 from .guard import PACKAGE, TEMPLATES, Escape, Guard
@@ -47,6 +48,14 @@ class Outcome(NamedTuple):
     seconds: float = 0.0
 
 
+def _load_libraries() -> None:
+    """What looks through the machine when it is first used: the fonts of pictures, the registry of units."""
+    model = eomgen.Model("first")
+    model.parameter("m", value=1, unit="lb")
+    model.revolute("hinge", model.ground, model.body("rod", mass="m", com=(0, 1, 0)), coordinate="q")
+    assert "no picture" not in model._repr_html_()
+
+
 class Runner:
     """Runs cases of any kind in this process, in a folder that is emptied when a case left something behind."""
 
@@ -59,6 +68,7 @@ class Runner:
         self.guard = Guard(str(self.folder), str(cache))
         self.warned: list[str] = []
         self.prepared: set[str] = set()
+        _load_libraries()
         sys.unraisablehook = self.ignored
         os.chdir(self.folder)
         signal.signal(signal.SIGALRM, _alarm)
