@@ -17,7 +17,7 @@ from .eigenvalue_rounding import stability_of_matrix
 from .linear import linearize
 from .linearization import Linearization
 from .stability import SecondOrder, stiffness_errors, verdict
-from .tables import as_html, as_text, number
+from .tables import as_html, as_text, number, without_noise
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -72,7 +72,15 @@ class Equilibrium:
     @property
     def facts(self) -> list[tuple[str, str]]:
         """Label and value of each line of the description."""
-        lines = [(name, f"{value:.10g}") for name, value in self.coordinates.items()]
+        layout = self.module.layout
+        units = [layout.unit(name) for name in self.coordinates]
+        typical = {"rad": 1.0, "m": layout.length}
+        sizes = [
+            max(abs(self.coordinates[name]), typical.get(unit, 0.0))
+            for name, unit in zip(self.coordinates, units, strict=True)
+        ]
+        shown = without_noise([*self.coordinates.values()], units, sizes)
+        lines = [(name, f"{value:.10g}") for name, value in zip(self.coordinates, shown, strict=True)]
         lines += [(f"{name} (solved)", f"{value:.10g}") for name, value in self.unknowns.items()]
         lines += [(f"support at {name}", f"{value:.6g}") for name, value in self.supports.items()]
         lines.append(("largest force left", f"{max(map(abs, self.forces.values()), default=0.0):.2g}"))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 
-from ..limits.descriptions import SHOWN_COMPLEX
+from ..files.terminal import aligned_rows
+from ..limits.descriptions import SHOWN, SHOWN_COMPLEX
 from ..texts import html_table
 
 
@@ -18,10 +20,29 @@ def number(value: complex, digits: int = 6) -> str:
     return f"{value.real:.{digits}g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.{digits}g}j"
 
 
+def without_noise(
+    values: Sequence[float], units: Sequence[str] | None = None, sizes: Sequence[float] | None = None
+) -> list[float]:
+    """Values for a table, 0 where one is nothing beside the largest of its unit.
+
+    Parameters
+    ----------
+    values : sequence of float
+    units : sequence of str, optional
+        Of each; one for all by default.
+    sizes : sequence of float, optional
+        What each value is like elsewhere, over a run for instance; by default the values themselves.
+    """
+    units = units or [""] * len(values)
+    largest = dict.fromkeys(units, 0.0)
+    for unit, size in zip(units, sizes if sizes is not None else values, strict=True):
+        largest[unit] = max(largest[unit], abs(size)) if isfinite(size) else largest[unit]
+    return [0.0 if abs(x) <= SHOWN * largest[unit] else float(x) for x, unit in zip(values, units, strict=True)]
+
+
 def as_text(title: str, facts: Sequence[tuple[str, str]]) -> str:
     """Several aligned lines."""
-    width = max((len(label) for label, _ in facts), default=0)
-    return "\n".join([title, *(f"  {label:<{width}}  {value}" for label, value in facts)])
+    return "\n".join([title, *aligned_rows(facts)])
 
 
 def as_html(title: str, facts: Sequence[tuple[str, str]]) -> str:

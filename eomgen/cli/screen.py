@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import sys
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -14,7 +13,7 @@ from typing import Any
 
 import click
 
-from ..limits.descriptions import SHOWN
+from ..files.terminal import aligned_rows, terminal_width
 from ..texts import visible
 
 WIDTH = 120  #: of tables that do not go to a terminal
@@ -41,37 +40,16 @@ def print_heading(text: str) -> None:
 
 
 def print_rows(rows: Sequence[tuple[str, str]]) -> None:
-    """Label and value pairs on stdout, aligned."""
-    width = max((len(label) for label, _ in rows), default=0) + 2
-    for label, value in rows:
-        say(f"  {label:<{width}}{value}")
-
-
-def without_noise(
-    values: Sequence[float], units: Sequence[str] | None = None, sizes: Sequence[float] | None = None
-) -> list[float]:
-    """Values for a table, 0 where one is nothing beside the largest of its unit.
-
-    Parameters
-    ----------
-    values : sequence of float
-    units : sequence of str, optional
-        Of each; one for all by default.
-    sizes : sequence of float, optional
-        What each value is like elsewhere, over a run for instance; by default the values themselves.
-    """
-    units = units or [""] * len(values)
-    largest = dict.fromkeys(units, 0.0)
-    for unit, size in zip(units, sizes if sizes is not None else values, strict=True):
-        largest[unit] = max(largest[unit], abs(size)) if isfinite(size) else largest[unit]
-    return [0.0 if abs(x) <= SHOWN * largest[unit] else float(x) for x, unit in zip(values, units, strict=True)]
+    """Label and value pairs on stdout, aligned; on a terminal, long values go on below."""
+    for line in aligned_rows(rows):
+        say(line)
 
 
 def print_table(header: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> None:
     """A table on stdout; the columns in ``right`` are aligned to the right, the last one wraps on a narrow terminal."""
     columns = list(zip(header, *rows, strict=True))
     widths = [max(map(len, column)) for column in columns]
-    room = shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
+    room = terminal_width() or WIDTH
     last = len(header) - 1
     if last not in right:
         widths[last] = max(min(widths[last], room - sum(widths[:last]) - 2 * last - 1), 20)

@@ -18,13 +18,15 @@ from ..files.writing import refuse_link
 from ..suggestions import closest
 from ..targets import TARGETS
 from .number_option import NumberRange
+from .sections import DERIVATION, INTEGRATION, ROBOTS, shared_option
 
 if TYPE_CHECKING:
     from ..api.model import Model
 
 model_argument = click.argument("model", metavar="MODEL", type=click.Path(path_type=Path))
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-method_option = click.option(
+method_option = shared_option(
+    DERIVATION,
     "--method",
     default="auto",
     show_default=True,
@@ -44,7 +46,8 @@ def _pair(ctx: click.Context, param: click.Parameter, value: str | None) -> tupl
     return alpha, beta
 
 
-baumgarte_option = click.option(
+baumgarte_option = shared_option(
+    DERIVATION,
     "--baumgarte",
     metavar="ALPHA,BETA",
     callback=_pair,
@@ -66,15 +69,16 @@ def _find_solver(ctx: click.Context, param: click.Parameter, value: str | None) 
 
 _TOLERANCE = NumberRange(min=0, min_open=True)
 _SOLVER = (
-    click.option(
+    shared_option(
+        INTEGRATION,
         "--solver",
         metavar="NAME",
         callback=_find_solver,
         help="Integrator: DOP853, RK45, RK23, Radau, Taylor, BDF, LSODA, or RK4 with --step.",
     ),
-    click.option("--step", type=_TOLERANCE, metavar="H", help="Size of the steps of RK4 in s."),
-    click.option("--rtol", type=_TOLERANCE, metavar="X", help="Relative tolerance of the integrator."),
-    click.option("--atol", type=_TOLERANCE, metavar="X", help="Absolute tolerance of the integrator."),
+    shared_option(INTEGRATION, "--step", type=_TOLERANCE, metavar="H", help="Size of the steps of RK4 in s."),
+    shared_option(INTEGRATION, "--rtol", type=_TOLERANCE, metavar="X", help="Relative tolerance of the integrator."),
+    shared_option(INTEGRATION, "--atol", type=_TOLERANCE, metavar="X", help="Absolute tolerance of the integrator."),
 )
 
 
@@ -94,7 +98,8 @@ def solver_options(verb: Callable[..., Any]) -> Callable[..., Any]:
 
 def target_option(*targets: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """``--target`` with these choices."""
-    return click.option(
+    return shared_option(
+        DERIVATION,
         "--target",
         type=click.Choice(list(targets)),
         default="cython",
@@ -108,7 +113,8 @@ def split_names(ctx: click.Context, param: click.Parameter, value: tuple[str, ..
     return tuple(name.strip() for words in value for name in words.split(",") if name.strip())
 
 
-independent_option = click.option(
+independent_option = shared_option(
+    DERIVATION,
     "--independent",
     multiple=True,
     callback=split_names,
@@ -117,7 +123,8 @@ independent_option = click.option(
 )
 
 
-native_option = click.option(
+native_option = shared_option(
+    DERIVATION,
     "--allow-native",
     is_flag=True,
     help="Compile and run the C (and Python) files that the model's native functions name; only for models you trust.",
@@ -139,37 +146,42 @@ def blaming_option(independent: tuple[str, ...]) -> Iterator[None]:
 
 _MIMIC, _ROTATIONS = ("independent", "coupling"), ("euler_angles", "euler_parameters")
 _ROBOT = (
-    click.option("--floating", is_flag=True, help="Robots (URDF): the base moves freely."),
-    click.option("--lock", multiple=True, metavar="JOINT[=VALUE]", help="Robots: hold a joint; repeat it for more."),
-    click.option(
+    shared_option(ROBOTS, "--floating", is_flag=True, help="The base moves freely (URDF)."),
+    shared_option(ROBOTS, "--lock", multiple=True, metavar="JOINT[=VALUE]", help="Hold a joint; repeat it for more."),
+    shared_option(
+        ROBOTS,
         "--mimic",
         type=click.Choice(["independent", "coupling"]),
-        help="Robots: joints that mimic others are tied by a coupling (the default), or independent.",
+        help="Joints that mimic others are tied by a coupling (the default), or independent.",
     ),
-    click.option(
+    shared_option(
+        ROBOTS,
         "--rotation",
         type=click.Choice(["euler_angles", "euler_parameters"]),
-        help="Robots: free and ball joints in euler_angles or euler_parameters.",
+        help="Free and ball joints in euler_angles or euler_parameters.",
     ),
-    click.option("--actuate", is_flag=True, help="Robots: an input tau_<joint> on every joint of one degree."),
-    click.option(
+    shared_option(ROBOTS, "--actuate", is_flag=True, help="An input tau_<joint> on every joint of one degree."),
+    shared_option(
+        ROBOTS,
         "--friction",
         type=NumberRange(min=0, min_open=True),
         metavar="VELOCITY",
-        help="Robots: dry friction of joints acts, smoothed below this velocity (rad/s or m/s).",
+        help="Dry friction of joints acts, smoothed below this velocity (rad/s or m/s).",
     ),
-    click.option("--symbolic", is_flag=True, help="Robots: masses and inertias become parameters."),
-    click.option(
+    shared_option(ROBOTS, "--symbolic", is_flag=True, help="Masses and inertias become parameters."),
+    shared_option(
+        ROBOTS,
         "--check-inertia",
         type=click.Choice(["error", "note", "off"]),
         help="Masses and inertias that no body can have, and motions without inertia: refuse, note, or take them.",
     ),
-    click.option(
+    shared_option(
+        ROBOTS,
         "--limits",
         type=click.Choice(["note", "stop", "off"]),
-        help="Robots: a run that passes a limit of a joint says so, stops push back there, or nothing happens.",
+        help="A run that passes a limit of a joint says so, stops push back there, or nothing happens.",
     ),
-    click.option("--assets", metavar="DIR", help="Robots (MJCF): the folder within which other files may be read."),
+    shared_option(ROBOTS, "--assets", metavar="DIR", help="The folder within which other files may be read (MJCF)."),
 )
 
 

@@ -11,6 +11,7 @@ from ..files.writing import save_figure
 from .failures import reports_failures
 from .plot import require_plotting
 from .screen import print_json, say
+from .sections import verb_command
 from .shared_options import json_option, load_model, model_argument, native_option, robot_options
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def _print_schema(context: click.Context) -> None:
     context.exit()
 
 
-@click.command()
+@verb_command()
 @model_argument
 @native_option
 @json_option

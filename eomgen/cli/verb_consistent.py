@@ -6,13 +6,15 @@ from typing import Any
 
 import click
 
+from ..analysis.tables import without_noise
 from ..errors import UsageError
 from .analysis import Prepared, analysis_options, time_option
-from .screen import print_heading, print_json, print_table, without_noise
+from .screen import print_heading, print_json, print_table
+from .sections import verb_command
 from .shared_options import parse_settings
 
 
-@click.command()
+@verb_command()
 @analysis_options
 @time_option
 @click.option("--weight", multiple=True, metavar="NAME=W", help="What a change of a coordinate or rate costs; else 1.")

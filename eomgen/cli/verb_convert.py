@@ -10,10 +10,11 @@ import click
 from ..files.writing import write_whole
 from .failures import reports_failures
 from .screen import print_json, say
+from .sections import verb_command
 from .shared_options import json_option, load_model, model_argument, require_folder, robot_options
 
 
-@click.command()
+@verb_command()
 @model_argument
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write to FILE.yaml instead of stdout.")
 @json_option

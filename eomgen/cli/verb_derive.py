@@ -9,6 +9,7 @@ import click
 
 from .failures import reports_failures
 from .screen import print_heading, print_json, print_table, say, stage
+from .sections import verb_command
 from .shared_options import (
     baumgarte_option,
     blaming_option,
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from ..api.equations import Equations
 
 
-@click.command()
+@verb_command()
 @model_argument
 @native_option
 @method_option

@@ -19,6 +19,7 @@ from ..shipped import shipped
 from ..texts import visible
 from .failures import TOOLCHAIN, reports_failures
 from .screen import print_json, readable_size, say
+from .sections import verb_command
 from .shared_options import json_option
 
 CORE = ("sympy", "numpy", "scipy", "cython", "jinja2", "click", "rich", "ruamel.yaml", "platformdirs", "defusedxml",
@@ -47,7 +48,7 @@ class Check(NamedTuple):
     needed: bool = True
 
 
-@click.command()
+@verb_command()
 @json_option
 @reports_failures
 def doctor(as_json: bool) -> None:

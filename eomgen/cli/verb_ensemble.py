@@ -18,6 +18,7 @@ from ..runtime.room import require_room
 from .analysis import Prepared, analysis_options
 from .number_option import Number, NumberRange
 from .screen import finite, print_heading, print_json, print_table, say, stage
+from .sections import verb_command
 from .shared_options import require_folder
 from .workspace_request import read_axes
 
@@ -28,7 +29,7 @@ SHOWN = 10  #: failures listed
 MOST_WORKERS = 4096  #: processes of a local cluster
 
 
-@click.command()
+@verb_command()
 @analysis_options
 @click.option(
     "--cases",

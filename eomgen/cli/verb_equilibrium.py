@@ -6,10 +6,11 @@ import click
 
 from .analysis import Prepared, analysis_options, pairs, time_option
 from .screen import print_json, say
+from .sections import verb_command
 from .shared_options import parse_settings
 
 
-@click.command()
+@verb_command()
 @analysis_options
 @time_option
 @click.option("--hold", multiple=True, metavar="NAME[=VALUE]", help="Coordinate that is held; repeat it for more.")

@@ -15,6 +15,7 @@ from ..syntax_trees import parse_module
 from .example_files import example_files
 from .failures import reports_failures
 from .screen import print_json, print_table, say
+from .sections import verb_command
 from .shared_options import json_option
 
 
@@ -30,7 +31,7 @@ def describe_example(file: Path) -> str:
     return found.group(1).strip().strip('"') if found else ""
 
 
-@click.command()
+@verb_command()
 @click.argument("name", required=False)
 @click.option("--force", is_flag=True, help="Overwrite a file of that name.")
 @json_option

@@ -10,6 +10,7 @@ import click
 from ..targets import TARGETS
 from .failures import reports_failures
 from .screen import print_json, say, stage
+from .sections import verb_command
 from .shared_options import (
     baumgarte_option,
     blaming_option,
@@ -24,7 +25,7 @@ from .shared_options import (
 )
 
 
-@click.command()
+@verb_command()
 @model_argument
 @native_option
 @click.option(

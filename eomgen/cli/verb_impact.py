@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import click
 
+from ..analysis.tables import without_noise
 from ..errors import UsageError
 from .analysis import Prepared, analysis_options, time_option
-from .screen import print_heading, print_json, print_rows, say, without_noise
+from .screen import print_heading, print_json, print_rows, say
+from .sections import verb_command
 from .shared_options import parse_settings
 
 
-@click.command()
+@verb_command()
 @analysis_options
 @time_option
 @click.option("--gap", multiple=True, metavar="NAME=E", help="Coordinate or output that closes, with its restitution.")

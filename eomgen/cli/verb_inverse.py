@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 import click
 
+from ..analysis.tables import without_noise
 from .analysis import Prepared, analysis_options, time_option
-from .screen import print_heading, print_json, print_rows, without_noise
+from .screen import print_heading, print_json, print_rows
+from .sections import verb_command
 from .shared_options import parse_settings
 
 
-@click.command()
+@verb_command()
 @analysis_options
 @time_option
 @click.option("--actuated", multiple=True, metavar="NAME", help="Driven coordinate or input; repeat it for more.")

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
+from ..analysis.tables import without_noise
 from ..errors import UsageError
 from .failures import reports_failures
 from .plot import Picture, check_columns, check_picture, find_paths, picture_options, plot_run
-from .screen import finite, print_heading, print_json, print_rows, print_table, say, stage, without_noise
+from .screen import finite, print_heading, print_json, print_rows, print_table, say, stage
+from .sections import verb_command
 from .shared_options import (
     blaming_option,
     independent_option,
@@ -36,7 +38,7 @@ COUNT = 201  #: points of a range unless it says
 SHOWN = 9  #: of them on the screen
 
 
-@click.command()
+@verb_command()
 @model_argument
 @native_option
 @independent_option

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import click
 
+from ..analysis.tables import without_noise
 from .analysis import Prepared, analysis_options, pairs, time_option
-from .screen import print_heading, print_json, print_table, say, without_noise
+from .screen import print_heading, print_json, print_table, say
+from .sections import verb_command
 
 
-@click.command()
+@verb_command()
 @analysis_options
 @time_option
 @click.option("--equilibrium", "at_rest", is_flag=True, help="About the equilibrium found from the initial position.")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import click
-
 from .analysis import Prepared, analysis_options, time_option
 from .screen import print_json, say
+from .sections import verb_command
 
 
-@click.command()
+@verb_command()
 @analysis_options
 @time_option
 def modes(work: Prepared, t: float, as_json: bool) -> None:

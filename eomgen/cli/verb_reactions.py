@@ -14,12 +14,13 @@ from ..limits.descriptions import SHOWN_FORCE
 from .analysis import Prepared, analysis_options, time_option
 from .number_option import Number
 from .screen import print_heading, print_json, print_table, say, stage
+from .sections import verb_command
 from .shared_options import require_folder
 
 COMPONENTS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
 
-@click.command()
+@verb_command()
 @analysis_options
 @time_option
 @click.option(

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..analysis.tables import without_noise
 from ..errors import UsageError
 from .failures import after_integration, reports_failures
 from .number_option import NumberRange
 from .plot import Picture, check_columns, check_picture, find_paths, picture_options, plot_run
-from .screen import finite, print_heading, print_json, print_rows, say, stage, without_noise
+from .screen import finite, print_heading, print_json, print_rows, say, stage
+from .sections import verb_command
 from .shared_options import (
     baumgarte_option,
     blaming_option,
@@ -44,7 +46,7 @@ TABLES = (".npz", ".csv")
 POINTS = 5  #: change points listed
 
 
-@click.command()
+@verb_command()
 @model_argument
 @native_option
 @method_option

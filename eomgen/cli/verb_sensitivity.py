@@ -10,10 +10,11 @@ from ..errors import UsageError
 from .analysis import Prepared, analysis_options
 from .number_option import NumberRange
 from .screen import finite, print_heading, print_json, print_table, say, stage
+from .sections import verb_command
 from .shared_options import require_folder
 
 
-@click.command()
+@verb_command()
 @analysis_options
 @click.option("--by", multiple=True, metavar="NAME", help="Parameter, input or initial value; all parameters if none.")
 @click.option("--end", type=NumberRange(min=0, min_open=True), metavar="T", help="End time in s.")

@@ -10,9 +10,10 @@ from .analysis import Prepared, analysis_options
 from .failures import BREACH
 from .number_option import NumberRange
 from .screen import print_json, say, stage
+from .sections import verb_command
 
 
-@click.command()
+@verb_command()
 @analysis_options
 @click.option("--states", type=click.IntRange(min=1), default=6, show_default=True, help="Number of random states.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random states.")

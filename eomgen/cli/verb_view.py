@@ -13,6 +13,7 @@ from ..errors import UsageError
 from .failures import after_integration, reports_failures
 from .number_option import NumberRange
 from .screen import print_json, say, stage
+from .sections import verb_command
 from .shared_options import (
     blaming_option,
     independent_option,
@@ -31,7 +32,7 @@ from .verb_kinematics import range_values, read_range
 from .verb_run import complete_parameters, sort_settings
 
 
-@click.command()
+@verb_command()
 @model_argument
 @click.option(
     "--range",
@@ -47,11 +48,13 @@ from .verb_run import complete_parameters, sort_settings
     metavar="FILE",
     help="Write FILE.html, .gif, .mp4, or a folder of PNG frames, instead of opening a browser.",
 )
-@click.option("--trace", multiple=True, callback=split_names, metavar="MARKER", help="Draw the way of a marker.")
+@click.option("--trace", multiple=True, callback=split_names, metavar="MARKER", help="Draw the path of a marker.")
 @click.option("--plot", multiple=True, callback=split_names, metavar="NAME", help="Draw columns along the animation.")
 @click.option("--forces", is_flag=True, help="Draw arrows of the forces in the joints.")
-@click.option("--speed", type=NumberRange(min=0, min_open=True), metavar="X", help="Seconds of the run a second.")
-@click.option("--fps", type=NumberRange(min=0, min_open=True), metavar="N", help="Frames a second; 25 by default.")
+@click.option(
+    "--speed", type=NumberRange(min=0, min_open=True), metavar="X", help="Seconds of motion shown in one second."
+)
+@click.option("--fps", type=NumberRange(min=0, min_open=True), metavar="N", help="Frames in one second; 25 by default.")
 @click.option(
     "--set",
     "settings",

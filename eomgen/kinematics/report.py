@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
-from textwrap import wrap
 from typing import Any
 
 from ..files.inline_pictures import picture_html, side_by_side
+from ..files.terminal import fold, terminal_width
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -20,8 +20,7 @@ from .mobility import Mobility
 from .notes import find_notes
 from .picture import draw, new_figure
 
-WIDTH = 110  #: of the lines of a report
-WHOLE_WORDS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
+WIDTH = 110  #: of the lines of a report, at most
 
 
 @dataclass(frozen=True)
@@ -109,10 +108,10 @@ class MechanismReport:
 
     def __str__(self) -> str:
         lines = [f"mechanism {self.name}"]
+        width = min(WIDTH, terminal_width() or WIDTH)
 
         def say(label: str, text: str) -> None:
-            space = " " * 24
-            lines.extend(wrap(text, WIDTH, initial_indent=f"  {label:<22}", subsequent_indent=space, **WHOLE_WORDS))
+            lines.extend(fold(text, width, f"  {label:<22}", " " * 24))
 
         if self.bodies:
             say("bodies", f"{len(self.bodies)}: {_list(self.bodies)}")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from math import isfinite, isnan, nan
-from textwrap import wrap
 from typing import Any, NamedTuple
+
+from ..files.terminal import fold, terminal_width
 
 WIDTH = 118  #: of the table
 NOT_REACHED = "not reached"  #: how the note of a check begins for which no time was left
@@ -78,11 +79,12 @@ class Verification(NamedTuple):
         rows = [HEADER, *(_cells(finding) for finding in self.findings)]
         widths = [max(len(row[k]) for row in rows) for k in range(len(HEADER) - 1)]
         lines = []
+        room = min(WIDTH, terminal_width() or WIDTH)
         for row, note in zip(rows, ("", *(f.note for f in self.findings)), strict=True):
             cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
             lines.append("  ".join([*cells, row[-1]]).rstrip())
             indent = " " * (widths[0] + 4)
-            lines += wrap(note, WIDTH, initial_indent=indent, subsequent_indent=indent)
+            lines += fold(note, room, indent, indent)
         return "\n".join(lines)
 
     def __str__(self) -> str:

@@ -9,6 +9,7 @@ import pytest
 
 from eomgen.cli.command import VERBS
 from eomgen.cli.example_files import example_files
+from eomgen.cli.sections import SHARED
 from eomgen.cli.verb_examples import describe_example
 
 from .conftest import EXAMPLES, Call
@@ -34,6 +35,21 @@ def test_every_verb_explains_itself(call: Call, verb: str) -> None:
     result = call(verb, "--help")
     assert result.code == 0
     assert "Usage: eomgen" in result.out
+
+
+@pytest.mark.parametrize("verb", [verb for verb in VERBS if verb != "cache"])
+def test_help_lists_the_options_of_the_verb_first(call: Call, verb: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    text = call(verb, "--help").out
+    assert max(map(len, text.splitlines())) <= 80
+    headings = [line[:-1] for line in text.splitlines() if line.endswith(":") and not line.startswith(" ")]
+    assert headings[0] == "Options"
+    assert headings[1:] == [section for section in SHARED if section in headings]
+    own = text.partition("\nOptions:\n")[2].partition("\n\n")[0]
+    assert "--target" not in own
+    assert "--method" not in own
+    assert "--floating" not in own
+    assert own.rstrip().endswith("Show this message and exit.")
 
 
 @pytest.mark.parametrize("path", MODELS, ids=lambda p: p.stem)
