@@ -11,6 +11,7 @@ import click
 
 from ..analysis.tables import without_noise
 from ..errors import UsageError
+from ..runtime.near_names import place_of_marker
 from .failures import after_integration, reports_failures
 from .number_option import NumberRange
 from .plot import Picture, check_columns, check_picture, find_paths, picture_options, plot_run
@@ -183,7 +184,8 @@ def sort_settings(
 ) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
     """Which settings are initial values, parameters and inputs; one namespace holds them all."""
     loops = [*module.loop_names, *(f"{name}_dot" for name in module.loop_names)]
-    groups = [[*module.x_names, *loops], module.p_names, module.u_names]
+    initial_names = [*module.x_names, *loops, *(name for name in module.y_names if name not in module.p_names)]
+    groups = [[*initial_names, *filter(place_of_marker, settings)], module.p_names, module.u_names]
     known = [name for group in groups for name in group]
     for name in settings:
         if name not in known:

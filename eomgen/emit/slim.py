@@ -24,6 +24,7 @@ LEFT_OUT = {
     "simulation/stalling": "runs whose steps lead nowhere",
     "runtime/change_points": "change_points",
     "runtime/tree_motion": "kinematics",
+    "runtime/wanted_outputs": "outputs and places of markers as initial values",
     "runtime/pickling": "pickling",
     "runtime/moving": "animate",
     "runtime/plotting": "plot",

@@ -26,7 +26,7 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
     ----------
     module : BoundModel
     grid : mapping
-        Values by the name of a parameter, an input, a coordinate or a rate: a list, or (low, high, count).
+        Values by the name of a parameter, an input, a coordinate, a rate or an output: a list, or (low, high, count).
     groups : tuple
         Initial values, parameters and inputs beside the grid, by name.
 
@@ -39,7 +39,8 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
     grid = without_dots(grid)
     if not grid:
         raise UsageError("grid has no names; give values by name, such as {'theta': (0, 1, 11)}")
-    states = (*module.x_names, *module.loop_names, *module.layout.loop_rates)
+    layout = module.layout
+    states = (*layout.x, *layout.loops, *layout.loop_rates, *layout.y)
     check_names("parameter, input, coordinate or rate", grid, (*module.p_names, *module.u_names, *states))
     for what, given in zip(("initial", "parameters", "inputs"), groups, strict=True):
         if given is not None and not isinstance(given, Mapping):

@@ -15,7 +15,7 @@ from ..errors import EomgenError, UsageError
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.given_start import last_state
-from ..runtime.near_names import check_names
+from ..runtime.near_names import check_names, place_of_marker
 from ..runtime.room import read_numbers, require_room
 from ..simulation.run_arguments import find_state
 
@@ -106,7 +106,8 @@ def collect_cases(
     states, values = None, {}
     if isinstance(initial, Mapping):
         values = {str(name): _numbers(f"initial {name}", x, lengths) for name, x in initial.items()}
-        known = (*module.x_names, *module.loop_names, *module.layout.loop_rates)
+        layout = module.layout
+        known = (*layout.x, *layout.loops, *layout.loop_rates, *layout.y, *filter(place_of_marker, values))
         check_names("coordinate or rate", values, known)
     elif initial is not None:
         states = _columns("initial", last_state(initial, module.x_names), module.x_names, lengths)

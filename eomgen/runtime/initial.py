@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError
+from ..errors import AssemblyError, UnavailableError
 from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
 from ..numeric.assembly_velocity import Rates, VelocityEquations, assemble_velocity
@@ -31,9 +31,12 @@ from .kernels import Kernels
 from .late_rank import require_rank
 from .near_names import UnknownNameError, unknown, without_dots
 
+if TYPE_CHECKING:
+    from .wanted_outputs import WantedRate
+
 
 class Given(NamedTuple):
-    """Values by the name of a coordinate, its rate, a loop coordinate or its rate."""
+    """Values by the name of a coordinate, its rate, a loop coordinate or its rate, an output or a marker's place."""
 
     positions: dict[str, float]
     rates: dict[str, float]
@@ -58,12 +61,14 @@ class Initial:
         self._loop = kernels.motion("loop_coordinates") if layout.n_loop_coordinates else None
         self.scales, self.place = layout.scales, layout.place_scales
         self.coordinates = layout.q + layout.loops
+        self.wanted_rates: dict[str, WantedRate] = {}
 
     def sort(self, values: Mapping[str, float]) -> Given:
         """Split values into positions and rates; raises UsageError for a name that is neither."""
         layout = self.layout
         rates = layout.v + layout.loop_rates
-        values = without_dots(values)
+        values = {self._admit(name): value for name, value in values.items()}
+        rates = rates + tuple(self.wanted_rates)
         for name in values:
             if name in layout.p:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")
@@ -72,9 +77,32 @@ class Initial:
                 what = "angular velocity; give that" if layout.quaternion_slots else "velocities; give those"
                 raise UnknownNameError(f"{name!r} follows from the {what} instead, of {wanted}")
             if name not in self.coordinates and name not in rates:
-                raise unknown("coordinate or rate", name, self.coordinates + rates)
+                raise unknown("coordinate or rate", name, self.coordinates + rates + layout.y)
         positions = {n: x for n, x in values.items() if n in self.coordinates}
         return Given(self.system.settle(positions), {n: x for n, x in values.items() if n in rates})
+
+    def _admit(self, name: str) -> str:
+        """The name as it is listed; outputs and places of markers become values that can be held."""
+        plain: str = next(iter(without_dots({name: 0.0})))
+        layout = self.layout
+        listed = (*self.coordinates, *layout.v, *layout.loop_rates, *layout.p, *layout.parameter_rates)
+        if plain in listed or plain in self.wanted_rates:
+            return plain
+        if name in self.coordinates:
+            return name
+        try:
+            from .wanted_outputs import WantedRate, find_wanted, with_wanted
+        except UnavailableError:
+            return plain
+        found = find_wanted(self.kernels, plain if plain in layout.y else name, self.t)
+        if found is None:
+            return plain
+        if isinstance(found, WantedRate):
+            self.wanted_rates[plain] = found
+        else:
+            self.system = with_wanted(self.system, [found])
+            self.coordinates += (found.name,)
+        return found.name
 
     # functions of q
 
@@ -130,7 +158,7 @@ class Initial:
         """
         layout = self.layout
         declared = self.sort(layout.initial).positions
-        if not layout.n_h and not any(name in layout.loops for name in (*declared, *given)):
+        if not layout.n_h and not any(name in self.system.cut.names for name in (*declared, *given)):
             return self.system.with_values(self.system.with_values(layout.q_reference, declared), given)
         if not given:
             later = self.later()
@@ -236,6 +264,7 @@ class Initial:
         for name, value in given.items():
             scale = layout.loop_scales[layout.loop_rates.index(name)] if name in layout.loop_rates else 1.0
             scale = self.scales.q[layout.v.index(name)] if name in layout.v else scale
+            scale = self.wanted_rates[name].scale if name in self.wanted_rates else scale
             row = self.gradients(q, name)[0]
             still = np.linalg.norm(basis @ row) < STILL * max(1.0, float(np.linalg.norm(row)))
             if still and abs(row @ driven) < UNMOVED and abs(value / scale) > SHORT:
@@ -258,26 +287,39 @@ class Initial:
             if name in layout.v:
                 indices.append(layout.v.index(name))
                 v[indices[-1]] = value
-        loops = [name for name in held if name in layout.loop_rates]
-        equations = None
-        if loops:
-            assert self._loop is not None
-            chosen = np.array([layout.loop_rates.index(name) for name in loops])
-            zero = np.zeros(layout.n_v)
-            y_t = self._loop(q, zero, zero, t=self.t)[1]
-            values = np.array([held[name] for name in loops])
-            y_q = self.system.cut.evaluate(q, self.t)[1]
-            equations = VelocityEquations(y_q[chosen], y_t[chosen], values, layout.loop_scales[chosen], loops)
         return assemble_velocity(
             self._C_q(q, t=self.t),
             self.rate(q),
             self.scales,
             guess=v,
             held=indices,
-            equations=equations,
+            equations=self._rate_equations(q, held),
             names=layout.v,
             labels=layout.constraint_labels,
         )
+
+    def _rate_equations(self, q: Array, held: Mapping[str, float]) -> VelocityEquations | None:
+        """The held rates that are no velocities of the tree: those of cut joints, and outputs."""
+        layout = self.layout
+        names = [name for name in held if name not in layout.v]
+        if not names:
+            return None
+        rows, offsets, scales = [], [], []
+        zero = np.zeros(layout.n_v)
+        for name in names:
+            if name in self.wanted_rates:
+                row, offset = self.wanted_rates[name].evaluate(q, self.t)
+                scale = self.wanted_rates[name].scale
+            else:
+                assert self._loop is not None
+                k = layout.loop_rates.index(name)
+                row, offset = self.system.cut.evaluate(q, self.t)[1][k], self._loop(q, zero, zero, t=self.t)[1][k]
+                scale = layout.loop_scales[k]
+            rows.append(row)
+            offsets.append(offset)
+            scales.append(scale)
+        values = np.array([held[name] for name in names])
+        return VelocityEquations(np.array(rows), np.array(offsets), values, np.array(scales), names)
 
     # which values can be held together
 
@@ -322,6 +364,9 @@ class Initial:
         layout = self.layout
         if name in layout.v:
             return [np.eye(layout.n_v)[layout.v.index(name)]]
+        if name in self.wanted_rates:
+            wanted = self.wanted_rates[name]
+            return [wanted.evaluate(q, self.t)[0] * self.scales.q / wanted.scale]
         if name in layout.loop_rates:
             name = layout.loops[layout.loop_rates.index(name)]
         return self.system.gradients(q, name)

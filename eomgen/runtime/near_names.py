@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from types import ModuleType
 from typing import Any
 
 from ..errors import MissingDependencyError, UsageError
 from ..texts import shown
+
+_PLACE = re.compile(r"([xyz])\((\w+(?:\.\w+)*)\)")
 
 
 class UnknownNameError(UsageError, KeyError):
@@ -20,6 +23,12 @@ class UnknownNameError(UsageError, KeyError):
 def without_dots(given: Mapping[Any, Any]) -> dict[Any, Any]:
     """Values by name; ``leg1.hip`` of an instance of a component is ``leg1_hip``."""
     return {name.replace(".", "_") if isinstance(name, str) else name: value for name, value in given.items()}
+
+
+def place_of_marker(name: object) -> tuple[str, str] | None:
+    """Direction and marker of a place such as ``x(rod.tip)``; None for other names."""
+    found = _PLACE.fullmatch(name.replace(" ", "")) if isinstance(name, str) else None
+    return (found[1], found[2]) if found else None
 
 
 def unknown(what: str, name: object, allowed: Iterable[str]) -> UnknownNameError:

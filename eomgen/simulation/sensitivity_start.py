@@ -83,6 +83,12 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
     initial = Initial(module.kernels, t)
     q, found = x[: layout.n_q], []
     declared, chosen = initial.sort(layout.initial), initial.sort(dict(given or {}))
+    listed = (*layout.x, *layout.loops, *layout.loop_rates)
+    if other := [name for part in chosen for name in part if name not in listed]:
+        raise UsageError(
+            f"the start is differentiated where coordinates and rates are held, not {', '.join(other)}; give the "
+            "coordinates that x0(...) finds for it"
+        )
     free = [layout.velocity_labels[i] for i in layout.independent] + list(layout.q)
     rates = [layout.v[i] for i in layout.independent] + list(layout.v)
     for first, second, rest, positions in (

@@ -1,0 +1,125 @@
+"""Initial values given as outputs and as places of markers, beside closed forms of the mechanisms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy import cos, pi, sin, sqrt
+
+import eomgen as eg
+from eomgen.errors import AssemblyError, UsageError
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture(scope="module", params=["numpy", "cython"])
+def crank(request: pytest.FixtureRequest) -> Any:
+    return eg.load(EXAMPLES / "slider_crank.yaml").compile(target=request.param)
+
+
+def crank_angle(r: float, length: float, s: float) -> float:
+    """The crank's angle at a place of the slider, by the law of cosines."""
+    return float(np.arccos((r * r + s * s - length * length) / (2.0 * r * s)))
+
+
+@pytest.mark.parametrize(("r", "s"), [(0.1, 0.42), (0.1, 0.31), (0.15, 0.25), (0.15, 0.48)])
+@pytest.mark.parametrize("name", ["pin_x", "x(rod.tip)", "x( rod.tip )"])
+def test_the_place_of_the_slider_sets_the_angle_of_the_crank(crank: Any, name: str, r: float, s: float) -> None:
+    x = crank.bind(p={"r": r}).x0({name: s})
+    assert x[0] == pytest.approx(crank_angle(r, 0.35, s), abs=1e-9)
+    assert x[2] == pytest.approx(s, abs=1e-11)
+    assert x[3] == 10.0  # the declared rate of the crank is kept
+
+
+def test_an_output_of_velocities_sets_the_speed(crank: Any) -> None:
+    x = crank.x0(pin_x=0.42, speed=1.0)
+    theta = crank_angle(0.1, 0.35, 0.42)
+    slope = -0.1 * sin(theta) - 0.1**2 * sin(theta) * cos(theta) / sqrt(0.35**2 - (0.1 * sin(theta)) ** 2)
+    np.testing.assert_allclose(x[[0, 3, 5]], [theta, 1.0 / slope, 1.0], rtol=1e-9)
+
+
+def test_runs_and_ensembles_start_there(crank: Any) -> None:
+    run = crank.simulate(0.05, initial={"pin_x": 0.40})
+    assert run["pin_x"][0] == pytest.approx(0.40, abs=1e-12)
+    many = crank.simulate_many(0.05, initial={"pin_x": np.array([0.40, 0.42])})
+    np.testing.assert_array_equal(many.x[:, 0], run.x[:, -1])
+    np.testing.assert_array_equal(many.x[:, 1], crank.simulate(0.05, initial={"pin_x": 0.42}).x[:, -1])
+
+
+def test_what_cannot_be_held_is_refused(crank: Any) -> None:
+    with pytest.raises(AssemblyError, match=r"pin_x = 0\.9.* nearby has pin_x = 0\.45"):
+        crank.x0(pin_x=0.9)
+    with pytest.raises(AssemblyError, match="2 values for 1 degree of freedom"):
+        crank.x0(pin_x=0.42, theta=0.1)
+    with pytest.raises(UsageError, match=r"no marker 'rod\.tp'; did you mean rod\.tip"):
+        crank.x0({"x(rod.tp)": 0.4})
+    with pytest.raises(UsageError, match="did you mean pin_x"):
+        crank.x0(pinx=0.4)
+    with pytest.raises(UsageError, match="held, not pin_x; give the coordinates"):
+        crank.sensitivities(["l"], (0, 0.01), initial={"pin_x": 0.42})
+
+
+def test_an_open_arm_reaches_a_point(tmp_path: Path) -> None:
+    """The two-link arm's inverse kinematics in closed form."""
+    m = eg.Model("arm")
+    upper = m.body("upper", mass=1, inertia={"zz": 0.1})
+    lower = m.body("lower", mass=1, inertia={"zz": 0.1})
+    tip = lower.marker("tip", at=(0.3, 0, 0))
+    m.revolute("A", m.ground, upper, coordinate="a")
+    m.revolute("B", upper.at(0.5, 0, 0), lower, coordinate="b")
+    m.output("height", tip.position[1])
+    m.output("energy_like", "a_dot**2")
+    m.output("pull", tip.acceleration[0])
+    m.initial(a=0.2, b=0.4)
+    mod = m.compile(target="numpy")
+    px, py = 0.4, 0.35
+    bend = np.arccos((px**2 + py**2 - 0.25 - 0.09) / (2 * 0.5 * 0.3))
+    shoulder = np.arctan2(py, px) - np.arctan2(0.3 * sin(bend), 0.5 + 0.3 * cos(bend))
+    np.testing.assert_allclose(mod.x0({"x(lower.tip)": px, "height": py})[:2], [shoulder, bend], atol=1e-10)
+    x = mod.x0(height=0.3)  # the first declared value has room beside it
+    np.testing.assert_allclose(x[:2], [0.2, np.arcsin((0.3 - 0.5 * sin(0.2)) / 0.3) - 0.2], atol=1e-10)
+    for name in ("energy_like", "pull"):
+        with pytest.raises(UsageError, match=f"the output '{name}' depends on .*cannot be an initial value"):
+            mod.x0({name: 1.0})
+
+
+@pytest.mark.parametrize("rotation", ["euler_angles", "euler_parameters"])
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_ball_joint_holds_the_height_of_a_marker(rotation: str, turned: bool) -> None:
+    """However its rotation is written, and in turned axes of the joint; the nearest such position turns about y."""
+    m = eg.Model("pendulum", gravity=(0, 0, -9.81))
+    rod = m.body("rod", mass=1, com=(0.5, 0, 0), inertia=(0.01, 0.1, 0.1))
+    end = rod.marker("end", at=(1, 0, 0))
+    frame = {"rpy": (0.3, -0.2, 0.5)} if turned else {}
+    m.spherical("ball", m.ground.at(0, 0, 0, **frame), rod.at(0, 0, 0, **frame), rotation=rotation)
+    m.output("height", end.position[2])
+    m.output("rise", end.velocity[2])
+    mod = m.compile(target="numpy")
+    for name in ("height", "z(rod.end)"):
+        x = mod.x0({name: -0.3, "rise": 0.7})
+        place = mod.poses(x[: mod.n_q])[0] @ [1, 0, 0, 1]
+        np.testing.assert_allclose(place[2], -0.3, atol=1e-12)
+        np.testing.assert_allclose(mod.outputs(0.0, x), [-0.3, 0.7], atol=1e-12)
+
+
+def test_a_moving_support_counts(tmp_path: Path) -> None:
+    """At another time the driven support is elsewhere, and its velocity is part of the output's."""
+    m = eg.Model("lift")
+    cage = m.body("cage", mass=1)
+    bob = m.body("bob", mass=1, inertia={"zz": 0.1})
+    tip = bob.marker("tip", at=(0, -1, 0))
+    m.prismatic("up", m.ground, cage, axis="y", coordinate="s")
+    m.revolute("hinge", cage, bob, coordinate="theta")
+    m.driver("drive", "up", "0.5*t")
+    m.output("speed", tip.velocity[1])
+    m.initial(theta=0.3)
+    mod = m.compile(target="numpy")
+    x = mod.x0({"y(bob.tip)": -0.3, "theta_dot": 0.0}, t=1.0)
+    names = list(mod.x_names)
+    assert x[names.index("s")] == pytest.approx(0.5)
+    assert 0.5 - cos(x[names.index("theta")]) == pytest.approx(-0.3, abs=1e-10)
+    y = mod.x0({"theta": pi / 3, "speed": 0.5 + 2.0 * sin(pi / 3)}, t=1.0)
+    assert y[names.index("theta_dot")] == pytest.approx(2.0, rel=1e-10)
