@@ -33,10 +33,13 @@ def test_the_judge_sees_what_grows() -> None:
 def test_nothing_grows_over_some_models() -> None:
     """Of the numpy target, without verification: that and compiled models belong to ``python -m hostile.soak``.
 
-    In a process of its own: here caches are full of other tests' models, which larger ones would replace.
+    Ninety models, however long they take, in a process of its own: here caches are full of other tests' models, which
+    larger ones would replace.
     """
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as process:
-        samples, wrong = process.submit(soak, 2.0, 300, print, every=0.0, verified=10**9, batch=10**9, most=90).result()
+        samples, wrong = process.submit(
+            soak, 20.0, 300, print, every=0.0, verified=10**9, batch=10**9, most=90
+        ).result()
     told = [str(sample) for sample in samples]
     assert wrong == []
     assert len(samples) >= LEAST, told
