@@ -240,7 +240,7 @@ def write(name: str) -> None:
     memory = io.BytesIO()
     figure.savefig(memory, dpi=100)
     plt.close("all")
-    colors = Image.open(memory).convert("RGB").quantize(64, dither=Image.Dither.NONE)
+    colors = Image.open(memory).convert("RGB").quantize(128, dither=Image.Dither.NONE)
     path = HERE / "pictures" / f"{name}.png"
     path.parent.mkdir(exist_ok=True)
     colors.save(path, optimize=True)
