@@ -246,3 +246,19 @@ def verification() -> Any:
     ax.set(xscale="log", xlabel="largest difference / limit")
     ax.invert_yaxis()
     return figure
+
+
+@picture
+def forms() -> Any:
+    """Operations of each method, from the table of the page."""
+    text = (DOCS / "forms.md").read_text(encoding="utf-8")
+    found = re.findall(r"^\| `(\w+)` \| [^|]*?, (\d+), [^|]* \| [^|]*?, ([\d,]+), [^|]* \|$", text, re.MULTILINE)
+    figure, ax = panels(size=(7.2, 2.8))
+    place = np.arange(len(found))
+    for k, name in enumerate(("slider-crank", "chain of 8 rods")):
+        drawn = ax.bar(place + 0.4 * k, [float(line[k + 1].replace(",", "")) for line in found], 0.38, label=name)
+        ax.bar_label(drawn, fmt="{:,.0f}", fontsize=7)
+    ax.set_xticks(place + 0.2, [line[0] for line in found], fontsize=7)
+    ax.set(ylabel="operations", yscale="log")
+    ax.legend(frameon=False, fontsize=8)
+    return figure
