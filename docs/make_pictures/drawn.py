@@ -178,3 +178,23 @@ def robots() -> Any:
     ax = example("arm.urdf").draw({"shoulder": -0.5, "elbow": 1.2})
     ax.figure.set_size_inches(5.0, 4.4)
     return ax
+
+
+@picture
+def generated_code() -> Any:
+    """From a model to a package that stands alone."""
+    figure, ax = panels(size=(7.2, 1.9))
+    boxes = (
+        ("model\nYAML, Python, URDF", "#cfe3f3"),
+        ("eomgen generate", "#fde2c4"),
+        ("package\nC code, Cython layer,\nPython calls, self-test", "#cfe9d6"),
+        ("any machine\nwith NumPy", "#e6e6e6"),
+    )
+    for k, (text, color) in enumerate(boxes):
+        look = {"boxstyle": "round,pad=0.6", "facecolor": color, "edgecolor": "0.4"}
+        ax.text(k, 0, text, ha="center", va="center", fontsize=8, bbox=look, zorder=2)
+    for k in range(len(boxes) - 1):
+        ax.annotate("", (k + 0.58, 0), (k + 0.38, 0), arrowprops={"arrowstyle": "->"}, zorder=3)
+    ax.set(xlim=(-0.5, 3.5), ylim=(-1, 1))
+    ax.axis("off")
+    return figure
