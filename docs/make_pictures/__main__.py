@@ -1,12 +1,14 @@
 """The pictures of the documentation, made from models by eomgen's public calls.
 
-``python docs/make_pictures`` writes all of them to ``docs/pictures``; names after it choose some.
+``python docs/make_pictures`` writes all of them to ``docs/pictures``; names after it choose some, ``--out DIR`` another
+folder.
 """
 
 from __future__ import annotations
 
+import argparse
 import io
-import sys
+from pathlib import Path
 
 import drawn  # noqa: F401  (its functions enter the table)
 import matplotlib.pyplot as plt
@@ -18,7 +20,7 @@ from tools import DOCS, PICTURES
 LARGEST = 60_000  #: bytes of one picture
 
 
-def write(name: str) -> None:
+def write(name: str, folder: Path) -> None:
     """Make one picture and store it in few colours."""
     made = PICTURES[name]()
     if not isinstance(made, Image.Image):
@@ -27,16 +29,21 @@ def write(name: str) -> None:
         figure.savefig(memory, dpi=100)
         plt.close("all")
         made = Image.open(memory).convert("RGB")
-    colors = made.quantize(128, dither=Image.Dither.NONE)
-    path = DOCS / "pictures" / f"{name}.png"
-    path.parent.mkdir(exist_ok=True)
-    colors.save(path, optimize=True)
+    path = folder / f"{name}.png"
+    made.quantize(128, dither=Image.Dither.NONE).save(path, optimize=True)
     size = path.stat().st_size
-    print(f"{path.relative_to(DOCS.parent)}  {size / 1000:.0f} kB")
+    print(f"{path}  {size / 1000:.0f} kB")
     if size > LARGEST:
         raise SystemExit(f"{path.name} has {size} bytes, more than {LARGEST}")
 
 
 if __name__ == "__main__":
-    for chosen in sys.argv[1:] or PICTURES:
-        write(chosen)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(PICTURES))
+    parser.add_argument("--out", type=Path, default=DOCS / "pictures")
+    chosen = parser.parse_args()
+    if unknown := set(chosen.names) - set(PICTURES):
+        parser.error(f"no pictures of these names: {', '.join(sorted(unknown))}")
+    chosen.out.mkdir(exist_ok=True)
+    for one in chosen.names or PICTURES:
+        write(one, chosen.out)
