@@ -1,0 +1,78 @@
+"""The documentation site builds without a warning; links lead somewhere, no network is asked, pages have pictures."""
+
+from __future__ import annotations
+
+import fcntl
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from site_pages import Page, Site
+
+pytestmark = pytest.mark.slow
+ROOT = Path(__file__).parents[2]
+#: Pages that Sphinx makes, without words of ours.
+LISTS = {"genindex", "search", "py-modindex"}
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Site:
+    """The site, built once by whichever process of the tests comes first."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base if worker_id == "master" else base.parent) / "site"
+    folder.mkdir(exist_ok=True)
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (folder / "result").exists():
+            words = ["-b", "html", "-W", "-n", "-q", "--keep-going", ROOT / "docs", folder / "html"]
+            built = subprocess.run([sys.executable, "-m", "sphinx", *words], capture_output=True, text=True)
+            (folder / "result").write_text(
+                f"{built.stdout}{built.stderr}" if built.returncode else "", encoding="utf-8"
+            )
+    said = (folder / "result").read_text(encoding="utf-8")
+    assert said == "", said
+    return Site(folder / "html")
+
+
+def test_all_links_within_the_site_lead_somewhere(site: Site) -> None:
+    assert len(site.pages) > 40
+    assert site.broken_links() == []
+
+
+def test_no_page_asks_a_network_for_anything(site: Site) -> None:
+    assert site.remote_sources() == []
+    formulas = [page for page in site.pages.values() if any(x.endswith("mathjax/tex-svg.js") for x in page.loaded)]
+    assert formulas, "no page draws formulas"
+
+
+def test_every_page_has_a_picture_or_says_why_not(site: Site) -> None:
+    reasons = tomllib.loads((ROOT / "docs" / "without_pictures.toml").read_text(encoding="utf-8"))["pages"]
+    without = {name.removesuffix(".html") for name, page in site.pages.items() if not page.pictures} - LISTS
+    assert without - set(reasons) == set(), "these pages need a picture, or a reason in docs/without_pictures.toml"
+    assert set(reasons) - without == set(), "these pages have a picture now, or are gone: take out their reasons"
+    assert all(len(reason) > 15 for reason in reasons.values())
+
+
+def test_the_check_finds_what_is_wrong(tmp_path: Path) -> None:
+    (tmp_path / "_static").mkdir()
+    (tmp_path / "_static" / "s.css").write_text(
+        '@import "//example.org/a.css"; p {background: url( "https://b.org/x" )}'
+    )
+    (tmp_path / "a.html").write_text(
+        '<article id="top"><a href="b.html#there">b</a><a href="b.html#gone">b</a><a href="c.html">c</a>'
+        '<a href="https://example.org">far</a><img src="none.png"></article><a href="#top">up</a>'
+        '<script src="https://cdn.example.org/x.js"></script><style>p {background: url(https://d.org/y)}</style>'
+    )
+    (tmp_path / "b.html").write_text('<h1 id="there">b</h1><link rel="canonical" href="https://example.org/b">')
+    found = Site(tmp_path)
+    assert found.broken_links() == [
+        "a.html: b.html#gone has no such anchor",
+        "a.html: c.html",
+        "a.html: none.png",
+    ]
+    remote = ["a.html: https://cdn.example.org/x.js", "a.html: https://d.org/y"]
+    assert sorted(found.remote_sources()) == [*remote, "s.css: //example.org/a.css", "s.css: https://b.org/x"]
+    assert Page(tmp_path / "a.html").pictures == ["none.png"]
+    assert Page(tmp_path / "b.html").pictures == []
