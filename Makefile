@@ -32,7 +32,7 @@ bench: $(VENV)/.installed-plot
 	@$(BIN)/python -m benchmarks.run $(BENCHMARKS)
 
 docs: $(VENV)/.installed-docs
-	@$(BIN)/sphinx-build -b html -W -n -q --keep-going docs docs/_build/html
+	@$(BIN)/sphinx-build -b html -W -n -q --keep-going -j 2 docs docs/_build/html
 	@echo docs/_build/html/index.html
 
 mutations: $(VENV)/.installed-test

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -17,6 +18,7 @@ project, author = "eomgen", "the authors of eomgen"
 version = release = eomgen.__version__
 copyright = "the authors of eomgen, BSD 3-clause licence"
 language = "en"
+smartquotes = False  # they make a dash of --option
 
 extensions = [
     "myst_nb",
@@ -26,6 +28,7 @@ extensions = [
     "sphinx_copybutton",
     "generated_references",
     "links_to_sources",
+    "public_methods",
 ]
 exclude_patterns = ["_build", "_extensions", "**.ipynb_checkpoints"]
 nitpicky = True
@@ -75,8 +78,12 @@ def copy_notebooks(app: Any) -> None:
 def leave_out_missing(app: Any, name: str, source: list[str]) -> None:
     """Take those patterns from the tables of contents that no page matches."""
     if name == "index":
-        lines = source[0].splitlines(keepends=True)
-        source[0] = "".join(x for x in lines if not x.endswith("*\n") or " " in x or any(HERE.glob(x[:-1] + ".md")))
+        source[0] = re.sub(
+            r"^(\w+)\*\n",
+            lambda found: found[0] if any(HERE.glob(f"{found[1]}*.md")) else "",
+            source[0],
+            flags=re.MULTILINE,
+        )
 
 
 def copy_mathjax(app: Any, failure: Exception | None) -> None:

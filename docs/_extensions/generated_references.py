@@ -96,8 +96,9 @@ def options_table(command: click.Command) -> Iterator[str]:
     context = click.Context(command)
     for option in command.get_params(context):
         record = option.get_help_record(context)
-        if record is not None:
-            yield f"| `{record[0]}` | {_cell(record[1])} |"
+        if record is not None and record[1]:
+            words = record[0].replace("|", "\\|")
+            yield f"| `{words}` | {_cell(record[1])} |"
     yield ""
 
 

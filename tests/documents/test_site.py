@@ -3,18 +3,54 @@
 from __future__ import annotations
 
 import fcntl
+import inspect
+import posixpath
+import re
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 from site_pages import Page, Site
+from sphinx.util.inventory import InventoryFile
+
+import eomgen
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 #: Pages that Sphinx makes, without words of ours.
 LISTS = {"genindex", "search", "py-modindex"}
+
+PUBLIC = set(eomgen.__all__) - {"__version__", "errors", "Model", "Signal"}
+#: What users hold: all their public names are documented.
+CLASSES = (
+    "eomgen.Model",
+    "eomgen.api.equations.Equations",
+    "eomgen.api.module.Module",
+    "eomgen.runtime.trajectory.Trajectory",
+    "eomgen.runtime.signals.Signal",
+    "eomgen.ensembles.ensemble.Ensemble",
+    "eomgen.simulation.impact_trajectory.ImpactRun",
+    "eomgen.simulation.integrator.Integrator",
+    "eomgen.simulation.sensitivity_result.Sensitivities",
+    "eomgen.runtime.minimal.Minimal",
+    "eomgen.runtime.canonical.Canonical",
+    "eomgen.simulation.dae_solution.Dae",
+    "eomgen.kinematics.report.MechanismReport",
+    "eomgen.analysis.kinematic_motion.KinematicAnalysis",
+    "eomgen.analysis.workspace.Workspace",
+    "eomgen.analysis.linearization.Linearization",
+    "eomgen.analysis.modes.Modes",
+    "eomgen.analysis.balanced.Equilibrium",
+    "eomgen.analysis.impact.Impact",
+    "eomgen.analysis.drive.ActuatorForces",
+    "eomgen.verification.finding.Verification",
+    "eomgen.describe.handles.BodyHandle",
+    "eomgen.describe.handles.MarkerHandle",
+    "eomgen.describe.handles.JointHandle",
+)
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +62,7 @@ def site(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Site:
     with (folder / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not (folder / "result").exists():
-            words = ["-b", "html", "-W", "-n", "-q", "--keep-going", ROOT / "docs", folder / "html"]
+            words = ["-b", "html", "-W", "-n", "-q", "--keep-going", "-j", "2", ROOT / "docs", folder / "html"]
             built = subprocess.run([sys.executable, "-m", "sphinx", *words], capture_output=True, text=True)
             (folder / "result").write_text(
                 f"{built.stdout}{built.stderr}" if built.returncode else "", encoding="utf-8"
@@ -53,6 +89,31 @@ def test_every_page_has_a_picture_or_says_why_not(site: Site) -> None:
     assert without - set(reasons) == set(), "these pages need a picture, or a reason in docs/without_pictures.toml"
     assert set(reasons) - without == set(), "these pages have a picture now, or are gone: take out their reasons"
     assert all(len(reason) > 15 for reason in reasons.values())
+
+
+def test_everything_public_is_documented(site: Site) -> None:
+    with (site.root / "objects.inv").open("rb") as file:
+        shown = {name for kind in InventoryFile.load(file, "", posixpath.join).values() for name in kind}
+    missing = [name for name in PUBLIC if f"eomgen.{name}" not in shown and f"eomgen.errors.{name}" not in shown]
+    silent = []
+    for path in CLASSES:
+        module, _, name = path.rpartition(".")
+        found = getattr(import_module(module), name)
+        own = parameters_in(inspect.getdoc(found) or "")
+        for word in dir(found):
+            if word.startswith("_") or word in own or hasattr(tuple, word):
+                continue
+            missing += [f"{path}.{word}"] * (f"{path}.{word}" not in shown)
+            silent += [f"{path}.{word}"] * (not inspect.getdoc(getattr(found, word)))
+    assert missing == [], "a page in docs/reference lacks these"
+    assert silent == [], "these have no docstring, and the docstring of their class does not tell of them"
+    limits = {path.stem for path in (ROOT / "eomgen" / "limits").glob("*.py")} - {"__init__"}
+    assert limits - {name.split(".")[2] for name in shown if name.startswith("eomgen.limits.")} == set()
+
+
+def parameters_in(doc: str) -> set[str]:
+    """Names that a docstring lists, as attributes or parameters."""
+    return {name for line in re.findall(r"^([a-z_, A-Z]+) : ", doc, re.MULTILINE) for name in line.split(", ")}
 
 
 def test_the_check_finds_what_is_wrong(tmp_path: Path) -> None:
