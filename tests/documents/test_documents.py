@@ -10,7 +10,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 import eomgen
 from eomgen import rotations
@@ -23,7 +25,8 @@ from eomgen.joints import JOINTS
 from eomgen.program import KERNELS
 
 ROOT = Path(__file__).parents[2]
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCS = ROOT / "docs"
+DOCUMENTS = [ROOT / "README.md", *sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)]
 
 
 def blocks(path: Path, language: str) -> list[str]:
@@ -48,6 +51,19 @@ def test_python_blocks_run_in_order(path: Path, here: Path) -> None:
     script.write_text("\n".join(blocks(path, "python")), encoding="utf-8")
     result = subprocess.run([sys.executable, "-W", "error", script], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
+    for name in re.findall(r"!\[[^\]]*\]\((?:\.\./)?pictures/([^)]+)\)", path.read_text(encoding="utf-8")):
+        if (here / name).exists():  # the block that saves it stands on the page
+            assert_same_picture(here / name, DOCS / "pictures" / name)
+
+
+def assert_same_picture(made: Path, stored: Path) -> None:
+    """Up to the fonts and lines of another version of matplotlib."""
+    one, two = Image.open(made), Image.open(stored)
+    assert abs(one.width - two.width) + abs(one.height - two.height) <= 8, "python docs/pictures_of_pages.py PAGE"
+    assert getattr(one, "n_frames", 1) == getattr(two, "n_frames", 1)
+    size = (one.width // 4, one.height // 4)
+    grey = [np.asarray(picture.convert("L").resize(size), dtype=float) for picture in (one, two)]
+    assert np.abs(grey[0] - grey[1]).mean() < 5, f"{stored.name} is not what the page makes now"
 
 
 @pytest.mark.slow
