@@ -58,11 +58,11 @@ def test_python_blocks_run_in_order(path: Path, here: Path) -> None:
 
 def assert_same_picture(made: Path, stored: Path) -> None:
     """Up to the fonts and lines of another version of matplotlib."""
-    one, two = Image.open(made), Image.open(stored)
-    assert abs(one.width - two.width) + abs(one.height - two.height) <= 8, "python docs/pictures_of_pages.py PAGE"
-    assert getattr(one, "n_frames", 1) == getattr(two, "n_frames", 1)
-    size = (one.width // 4, one.height // 4)
-    grey = [np.asarray(picture.convert("L").resize(size), dtype=float) for picture in (one, two)]
+    with Image.open(made) as one, Image.open(stored) as two:
+        assert abs(one.width - two.width) + abs(one.height - two.height) <= 8, "python docs/pictures_of_pages.py PAGE"
+        assert getattr(one, "n_frames", 1) == getattr(two, "n_frames", 1)
+        size = (one.width // 4, one.height // 4)
+        grey = [np.asarray(picture.convert("L").resize(size), dtype=float) for picture in (one, two)]
     assert np.abs(grey[0] - grey[1]).mean() < 5, f"{stored.name} is not what the page makes now"
 
 
