@@ -57,7 +57,7 @@ html_theme_options = {
     "light_css_variables": {"color-brand-primary": "#0b5394", "color-brand-content": "#0b5394"},
     "dark_css_variables": {"color-brand-primary": "#7db8f0", "color-brand-content": "#7db8f0"},
 }
-mathjax_path = "mathjax/tex-svg.js"
+mathjax_path = "mathjax/tex-svg-full.js"
 mathjax3_config = {"options": {"enableMenu": False}}
 copybutton_prompt_text = "$ "
 copybutton_only_copy_prompt_lines = True
@@ -94,7 +94,7 @@ def copy_mathjax(app: Any, failure: Exception | None) -> None:
             raise ModuleNotFoundError("pip install sphinx-mathjax-offline")
         folder = Path(app.outdir) / "_static" / "mathjax"
         folder.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(Path(found.origin).parent / "static" / "mathjax" / "tex-svg.js", folder / "tex-svg.js")
+        shutil.copyfile(Path(found.origin).parent / "static" / "mathjax" / "tex-svg-full.js", folder / "tex-svg-full.js")
 
 
 def setup(app: Any) -> None:

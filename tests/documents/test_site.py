@@ -13,6 +13,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from browser import Browser
 from site_pages import Page, Site
 from sphinx.util.inventory import InventoryFile
 
@@ -79,8 +80,19 @@ def test_all_links_within_the_site_lead_somewhere(site: Site) -> None:
 
 def test_no_page_asks_a_network_for_anything(site: Site) -> None:
     assert site.remote_sources() == []
-    formulas = [page for page in site.pages.values() if any(x.endswith("mathjax/tex-svg.js") for x in page.loaded)]
+    formulas = [page for page in site.pages.values() if any(x.endswith("mathjax/tex-svg-full.js") for x in page.loaded)]
     assert formulas, "no page draws formulas"
+
+
+def test_a_browser_draws_all_formulas_without_a_network(site: Site, tmp_path: Path) -> None:
+    with Browser(tmp_path) as browser:
+        for name in ("theory/index.html", "theory/special_topics.html"):
+            browser.open((site.root / name).as_uri())
+            browser.wait_for("document.readyState == 'complete' && document.querySelectorAll('mjx-container').length > 0")
+            drawn = browser.evaluate("document.querySelectorAll('mjx-container svg').length")
+            assert drawn >= browser.evaluate("document.querySelectorAll('.math').length") > 10
+            assert browser.evaluate("document.querySelectorAll('mjx-merror, [data-mml-node=merror]').length") == 0
+        assert (browser.requests, browser.complaints) == ([], [])
 
 
 def test_every_page_has_a_picture_or_says_why_not(site: Site) -> None:
