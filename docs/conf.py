@@ -94,7 +94,8 @@ def copy_mathjax(app: Any, failure: Exception | None) -> None:
             raise ModuleNotFoundError("pip install sphinx-mathjax-offline")
         folder = Path(app.outdir) / "_static" / "mathjax"
         folder.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(Path(found.origin).parent / "static" / "mathjax" / "tex-svg-full.js", folder / "tex-svg-full.js")
+        name = Path(mathjax_path).name
+        shutil.copyfile(Path(found.origin).parent / "static" / "mathjax" / name, folder / name)
 
 
 def setup(app: Any) -> None:

@@ -151,6 +151,21 @@ def test_the_pages_know_kernels_sequences_rotations_and_methods() -> None:
     assert set(CONSTRAINTS) == set(re.findall(r"^\| `m\.(\w+)` ", text["constraints"], re.MULTILINE))
 
 
+def test_numbers_of_the_comparison_are_those_measured() -> None:
+    text = (DOCS / "comparison.md").read_text(encoding="utf-8")
+    measured, number = 0, r"(?<![\w.,-])[0-9][0-9,]*(?:\.[0-9]+)?(?:e-?[0-9]+)?(?![\w,.]*[0-9])"
+    for part, source in re.findall(r"^## [^\n]*\n(.*?)\*Source: (\S+?\.md)", text, re.MULTILINE | re.DOTALL):
+        known = set(re.findall(number, (ROOT / source).read_text(encoding="utf-8")))
+        cells = [
+            cell.strip() for row in re.findall(r"^\|[^|]*\|(.*)\|$", part, re.MULTILINE) for cell in row.split("|")
+        ]
+        shown = {cell for cell in cells if re.fullmatch(r"[0-9.,]+", cell)} or set(re.findall(r"([0-9.]+) ns", part))
+        assert shown, source
+        assert shown - known == set(), source
+        measured += len(shown)
+    assert measured > 40
+
+
 def test_the_readme_shows_the_slider_crank_that_ships() -> None:
     (shown,) = blocks(ROOT / "README.md", "yaml")
     shipped = (ROOT / "examples" / "slider_crank.yaml").read_text(encoding="utf-8")

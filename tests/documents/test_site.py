@@ -88,7 +88,9 @@ def test_a_browser_draws_all_formulas_without_a_network(site: Site, tmp_path: Pa
     with Browser(tmp_path) as browser:
         for name in ("theory/index.html", "theory/special_topics.html"):
             browser.open((site.root / name).as_uri())
-            browser.wait_for("document.readyState == 'complete' && document.querySelectorAll('mjx-container').length > 0")
+            browser.wait_for(
+                "document.readyState == 'complete' && document.querySelectorAll('mjx-container').length > 0"
+            )
             drawn = browser.evaluate("document.querySelectorAll('mjx-container svg').length")
             assert drawn >= browser.evaluate("document.querySelectorAll('.math').length") > 10
             assert browser.evaluate("document.querySelectorAll('mjx-merror, [data-mml-node=merror]').length") == 0
