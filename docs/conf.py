@@ -27,6 +27,7 @@ extensions = [
     "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "generated_references",
+    "glossary_links",
     "links_to_sources",
     "public_methods",
 ]

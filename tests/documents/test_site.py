@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import html
 import inspect
 import posixpath
 import re
@@ -12,12 +13,19 @@ import tomllib
 from importlib import import_module
 from pathlib import Path
 
+import click
 import pytest
 from browser import Browser
 from site_pages import Page, Site
 from sphinx.util.inventory import InventoryFile
 
 import eomgen
+from eomgen.cli.command import VERBS
+from eomgen.cli.command import eomgen as eomgen_command
+from eomgen.constraints import CONSTRAINTS
+from eomgen.describe.fields import BODY, COMPONENT, MODEL, SIMULATION, joint_fields
+from eomgen.forces import FORCES
+from eomgen.joints import JOINTS
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
@@ -123,6 +131,37 @@ def test_everything_public_is_documented(site: Site) -> None:
     assert silent == [], "these have no docstring, and the docstring of their class does not tell of them"
     limits = {path.stem for path in (ROOT / "eomgen" / "limits").glob("*.py")} - {"__init__"}
     assert limits - {name.split(".")[2] for name in shown if name.startswith("eomgen.limits.")} == set()
+
+
+def test_references_hold_every_key_and_every_option(site: Site) -> None:
+    keys = {key for kinds in (FORCES, CONSTRAINTS) for kind in kinds.values() for key in kind.keys}
+    keys |= {
+        *JOINTS,
+        *FORCES,
+        *CONSTRAINTS,
+        *MODEL,
+        *BODY,
+        *SIMULATION,
+        *COMPONENT,
+        *(key for j in JOINTS for key in joint_fields(j)),
+    }
+    text = (site.root / "reference" / "model_file.html").read_text(encoding="utf-8")
+    assert {key for key in keys - {"type"} if f">{key}<" not in text} == set()
+    text = html.unescape((site.root / "reference" / "command_line.html").read_text(encoding="utf-8"))
+    words = {f"eomgen {verb}<" for verb in VERBS}
+    for verb in VERBS:
+        command = eomgen_command.get_command(click.Context(eomgen_command), verb)
+        assert command is not None
+        words |= {word for option in command.params for word in option.opts if word.startswith("-")}
+    assert {word for word in words if word not in text} == set()
+
+
+def test_terms_lead_to_the_glossary(site: Site) -> None:
+    pages = [name for name, page in site.pages.items() if any("glossary.html#term-" in link for link in page.links)]
+    assert len(pages) > 25
+    assert any(link == "#term-projection" for link in site.pages["glossary.html"].links)
+    twice = [link for link in site.pages["mobility.html"].links if link == "glossary.html#term-change-point"]
+    assert len(twice) == 1  # only the first use
 
 
 def parameters_in(doc: str) -> set[str]:
