@@ -76,15 +76,15 @@ def copy_notebooks(app: Any) -> None:
             shutil.copyfile(path, folder / name)
 
 
-def leave_out_missing(app: Any, name: str, source: list[str]) -> None:
-    """Take those patterns from the tables of contents that no page matches."""
-    if name == "index":
-        source[0] = re.sub(
-            r"^(\w+)\*\n",
-            lambda found: found[0] if any(HERE.glob(f"{found[1]}*.md")) else "",
-            source[0],
-            flags=re.MULTILINE,
-        )
+def fill_contents(app: Any, name: str, source: list[str]) -> None:
+    """Put into tables of contents what a pattern at the beginning of a line stands for, notebooks by their numbers."""
+
+    def pages(found: re.Match[str]) -> str:
+        names = [path.stem for path in (HERE / name).parent.glob(f"{found[1]}*") if path.suffix in (".md", ".ipynb")]
+        return "".join(f"{one}\n" for one in sorted(names, key=lambda one: (int(re.match(r"\d*", one)[0] or 0), one)))
+
+    if name in ("index", "tutorials/index"):
+        source[0] = re.sub(r"^([\w\[\]-]+)\*\n", pages, source[0], flags=re.MULTILINE)
 
 
 def copy_mathjax(app: Any, failure: Exception | None) -> None:
@@ -102,5 +102,5 @@ def copy_mathjax(app: Any, failure: Exception | None) -> None:
 def setup(app: Any) -> None:
     """Called by Sphinx."""
     app.connect("builder-inited", copy_notebooks)
-    app.connect("source-read", leave_out_missing)
+    app.connect("source-read", fill_contents)
     app.connect("build-finished", copy_mathjax)
