@@ -30,6 +30,7 @@ extensions = [
     "glossary_links",
     "links_to_sources",
     "public_methods",
+    "tutorial_list",
 ]
 exclude_patterns = ["_build", "_extensions", "**.ipynb_checkpoints"]
 nitpicky = True
