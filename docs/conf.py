@@ -9,10 +9,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpydoc.xref
+
 import eomgen
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_extensions"))
+
+from public_methods import documented_classes  # noqa: E402
 
 project, author = "eomgen", "the authors of eomgen"
 version = release = eomgen.__version__
@@ -47,6 +51,10 @@ autodoc_typehints = "none"
 autodoc_member_order = "groupwise"
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
+numpydoc_xref_param_type = True  # types that have a place in the reference are links, other words are words
+numpydoc_xref_ignore = "all"
+numpydoc.xref.DEFAULT_LINKS.clear()  # Python's and NumPy's own, whose pages would be asked for
+numpydoc_xref_aliases = documented_classes()
 
 # What a reader sees.  Formulas are drawn by a MathJax that lies beside the pages, in one file without fonts.
 html_theme = "furo"

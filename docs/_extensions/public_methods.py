@@ -75,8 +75,38 @@ class Limits(SphinxDirective):
         text = ""
         for found in pkgutil.iter_modules(eomgen_limits.__path__):
             name = f"eomgen.limits.{found.name}"
-            text += f"\n### {found.name}\n\n" + _rst([f".. automodule:: {name}", "   :members:"])
+            text += f"\n### {found.name}\n\n" + _rst(
+                [f".. automodule:: {name}", "   :members:", "   :member-order: bysource"]
+            )
         return self.parse_text_to_nodes(text, allow_section_headings=True)
+
+
+#: Classes that users make themselves; others come from calls, and how they are made is no matter of theirs.
+MADE_BY_USERS = (
+    "eomgen.Model",
+    "eomgen.runtime.signals.Signal",
+    "eomgen.compilation.options.Options",
+    "eomgen.robots.robot.RobotOptions",
+)
+
+
+def hide_construction(app: Any, what: str, name: str, found: Any, options: Any, signature: str, returns: str) -> Any:
+    """Leave out the arguments with which eomgen makes its results."""
+    return ("", None) if what == "class" and name not in MADE_BY_USERS else None
+
+
+def drop_aliases(app: Any, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
+    """Leave out what Python says of the fields of a named tuple."""
+    if lines and lines[0].startswith("Alias for field number"):
+        lines.clear()
+
+
+def documented_classes() -> dict[str, str]:
+    """Name of a class that has a place in the reference -> its path."""
+    texts = [path.read_text(encoding="utf-8") for path in (Path(__file__).parents[1] / "reference").glob("*.md")]
+    paths = [path for text in texts for path in re.findall(r"autoclass:: (\S+)", text)]
+    errors = {name: f"eomgen.errors.{name}" for name in eomgen.__all__ if name.endswith(("Error", "Interrupted"))}
+    return {path.rpartition(".")[2]: path for path in paths} | errors
 
 
 def resolve(app: Any, env: Any, node: Any, text: Any) -> Any:
@@ -112,4 +142,6 @@ def setup(app: Any) -> dict[str, bool]:
     app.add_directive("eomgen-methods", ElementMethods)
     app.add_directive("eomgen-limits", Limits)
     app.connect("missing-reference", resolve)
+    app.connect("autodoc-process-signature", hide_construction)
+    app.connect("autodoc-process-docstring", drop_aliases, priority=100)
     return {"parallel_read_safe": True}
