@@ -2,6 +2,7 @@
 # make test   ruff, mypy, then every test, fast ones first, on all processors; fails if anything was skipped
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
 # make lint   ruff and mypy alone
+# make docs   the documentation as a site, docs/_build/html/index.html; a warning is an error
 # make mutations  puts deliberate faults into a copy of the sources; fails if no test notices one (half an hour)
 # make fuzz   attacks the package with hostile files, texts, calls and objects: CASES=100000, or HOURS=8 with new ones;
 #             KINDS='yaml sympy' only these, JOBS=2 processes, OUT=DIR for what is found, RESULTS=1 writes the table
@@ -14,7 +15,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test bench lint mutations fuzz clean
+.PHONY: demo test bench lint docs mutations fuzz clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed-plot
@@ -30,6 +31,10 @@ lint: $(VENV)/.installed-test
 bench: $(VENV)/.installed-plot
 	@$(BIN)/python -m benchmarks.run $(BENCHMARKS)
 
+docs: $(VENV)/.installed-docs
+	@$(BIN)/sphinx-build -b html -W -n -q --keep-going -j 2 docs docs/_build/html
+	@echo docs/_build/html/index.html
+
 mutations: $(VENV)/.installed-test
 	@$(BIN)/python tests/mutations/run.py --jobs 2
 
@@ -38,10 +43,11 @@ fuzz: $(VENV)/.installed-test
 	  $(if $(JOBS),--jobs $(JOBS)) $(if $(OUT),--out $(abspath $(OUT))) $(if $(RESULTS),--results)
 
 clean:
-	@rm -rf $(VENV) build dist demo_output eomgen.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@rm -rf $(VENV) build dist demo_output docs/_build docs/tutorials/*.ipynb docs/tutorials/*.png eomgen.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-plot: EXTRAS := plot
+$(VENV)/.installed-docs: EXTRAS := docs
 $(VENV)/.installed-test: EXTRAS := test,dev
 
 # uv installs in seconds what takes pip a minute; where uv cannot be had or cannot reach the index, pip does it.

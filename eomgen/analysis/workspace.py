@@ -43,25 +43,25 @@ class Workspace:
         The coordinates of the grid and their values.
     of : tuple of str
         Outputs and coordinates.
-    values : (n_of, *shape) array
+    values : (n_of, ...) array
         Of them.
-    q : (n_q, *shape) array
+    q : (n_q, ...) array
         Positions, all on the branch of the initial one.
-    status : (*shape,) array of str
+    status : (...) array of str
         ``reached``; ``limits``: beyond limits, or within them and reached only through what is beyond; ``out of
         reach``: the loops do not close, or not on this branch.
-    jacobian : (n_of, n_over, *shape) array
+    jacobian : (n_of, n_over, ...) array
         dy/dx of ``of`` by ``over``, along the constraints.
-    smallest, largest : (*shape,) arrays
+    smallest, largest : (...) arrays
         Singular values of the Jacobian.
-    manipulability : (*shape,) array
+    manipulability : (...) array
         Their product, sqrt(det J J^T) (T. Yoshikawa, Manipulability of robotic mechanisms, 1985).
-    condition : (*shape,) array
+    condition : (...) array
         Their quotient, largest over smallest; infinite at a singular point.
-    quality : (*shape,) array
+    quality : (...) array
         Smallest over largest singular value of the scaled constraint Jacobian with the rows of the led coordinates: 0
         where the grid's coordinates do not determine the motion, 1 for an open chain.
-    singular : (*shape,) array of bool
+    singular : (...) array of bool
         Grid points at or beside a singular position.
     singularities : list of WorkspaceSingular
         Those positions, named.

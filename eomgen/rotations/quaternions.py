@@ -43,7 +43,7 @@ def conjugate_quaternion(e: Any) -> Any:
 
 
 def normalize_quaternion(e: Any) -> Any:
-    """e / |e|."""
+    """``e / |e|``."""
     listed = entries(e, 4, "a quaternion")
     size = sqrt(dot(listed, listed))
     return shaped([x / size for x in listed])

@@ -34,9 +34,9 @@ SAME = 1e-3  #: of a neighbourhood: dips closer together are one
 class ChangePoint(NamedTuple):
     """A moment at which the mechanism has more degrees of freedom than elsewhere."""
 
-    time: float  #: (s)
-    degrees_of_freedom: int  #: there
-    coordinates: dict[str, float]
+    time: float  #: when it is passed (s)
+    degrees_of_freedom: int  #: at that moment
+    coordinates: dict[str, float]  #: their values at that moment (m, rad)
 
     def __str__(self) -> str:
         shown = ", ".join(f"{name} = {value:.4g}" for name, value in list(self.coordinates.items())[:6])

@@ -237,7 +237,7 @@ class Trajectory:
 
     @property
     def energy_drift(self) -> float:
-        """max |E - E(0)| / max T, the measure of an energy that should be kept."""
+        """``max |E - E(0)| / max T``, the measure of an energy that should be kept."""
         T, _, energy = self.energies
         change, motion = float(np.abs(energy - energy[0]).max()), float(np.abs(T).max())
         return change / motion if motion else (0.0 if change == 0.0 else float("inf"))

@@ -10,7 +10,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 import eomgen
 from eomgen import rotations
@@ -23,7 +25,8 @@ from eomgen.joints import JOINTS
 from eomgen.program import KERNELS
 
 ROOT = Path(__file__).parents[2]
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCS = ROOT / "docs"
+DOCUMENTS = [ROOT / "README.md", *sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)]
 
 
 def blocks(path: Path, language: str) -> list[str]:
@@ -48,6 +51,19 @@ def test_python_blocks_run_in_order(path: Path, here: Path) -> None:
     script.write_text("\n".join(blocks(path, "python")), encoding="utf-8")
     result = subprocess.run([sys.executable, "-W", "error", script], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
+    for name in re.findall(r"!\[[^\]]*\]\((?:\.\./)?pictures/([^)]+)\)", path.read_text(encoding="utf-8")):
+        if (here / name).exists():  # the block that saves it stands on the page
+            assert_same_picture(here / name, DOCS / "pictures" / name)
+
+
+def assert_same_picture(made: Path, stored: Path) -> None:
+    """Up to the fonts and lines of another version of matplotlib."""
+    with Image.open(made) as one, Image.open(stored) as two:
+        assert abs(one.width - two.width) + abs(one.height - two.height) <= 8, "python docs/pictures_of_pages.py PAGE"
+        assert getattr(one, "n_frames", 1) == getattr(two, "n_frames", 1)
+        size = (one.width // 4, one.height // 4)
+        grey = [np.asarray(picture.convert("L").resize(size), dtype=float) for picture in (one, two)]
+    assert np.abs(grey[0] - grey[1]).mean() < 5, f"{stored.name} is not what the page makes now"
 
 
 @pytest.mark.slow
@@ -133,6 +149,21 @@ def test_the_pages_know_kernels_sequences_rotations_and_methods() -> None:
         ]
         assert shown == ", ".join(p.name if p.default is p.empty else f"{p.name}={p.default!r}" for p in taken), name
     assert set(CONSTRAINTS) == set(re.findall(r"^\| `m\.(\w+)` ", text["constraints"], re.MULTILINE))
+
+
+def test_numbers_of_the_comparison_are_those_measured() -> None:
+    text = (DOCS / "comparison.md").read_text(encoding="utf-8")
+    measured, number = 0, r"(?<![\w.,-])[0-9][0-9,]*(?:\.[0-9]+)?(?:e-?[0-9]+)?(?![\w,.]*[0-9])"
+    for part, source in re.findall(r"^## [^\n]*\n(.*?)\*Source: (\S+?\.md)", text, re.MULTILINE | re.DOTALL):
+        known = set(re.findall(number, (ROOT / source).read_text(encoding="utf-8")))
+        cells = [
+            cell.strip() for row in re.findall(r"^\|[^|]*\|(.*)\|$", part, re.MULTILINE) for cell in row.split("|")
+        ]
+        shown = {cell for cell in cells if re.fullmatch(r"[0-9.,]+", cell)} or set(re.findall(r"([0-9.]+) ns", part))
+        assert shown, source
+        assert shown - known == set(), source
+        measured += len(shown)
+    assert measured > 40
 
 
 def test_the_readme_shows_the_slider_crank_that_ships() -> None:

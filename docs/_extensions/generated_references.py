@@ -1,0 +1,135 @@
+"""Parts of reference pages that are made from the package: from its tables of fields, and from its command line.
+
+``{eomgen-keys} joints`` writes a table of keys for each type of a section, ``{eomgen-verbs}`` a section for each verb.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import click
+from docutils import nodes
+from sphinx.util.docutils import SphinxDirective
+
+from eomgen.cli.command import VERBS, eomgen
+from eomgen.constraints import CONSTRAINTS
+from eomgen.describe import fields as table
+from eomgen.describe.fields import KINDS, Field, Fields, joint_type
+from eomgen.forces import FORCES
+from eomgen.joints import JOINTS
+
+
+def _cell(text: str) -> str:
+    """A text in a cell of a table, letter for letter."""
+    for mark in "\\|*_<>[]`$":
+        text = text.replace(mark, f"\\{mark}")
+    return " ".join(text.split())
+
+
+def _default(field: Field) -> str:
+    if field.required:
+        return "needed"
+    if field.default is None or field.default == () or field.default == "":
+        return ""
+    value = list(field.default) if isinstance(field.default, tuple) else field.default
+    return f"`{str(value).lower() if isinstance(value, bool) else value}`"
+
+
+def keys_table(fields: Fields) -> Iterator[str]:
+    """The lines of a table of keys."""
+    yield from ("| key | holds | default | |", "|---|---|---|---|")
+    for key, field in fields.items():
+        holds = ", ".join(f"`{word}`" for word in field.choices) if field.choices else _cell(KINDS[field.kind])
+        yield f"| `{key}` | {holds} | {_default(field)} | {_cell(field.doc)} |"
+    yield ""
+
+
+def _sentence(text: str) -> str:
+    return _cell(f"{text[:1].upper()}{text[1:]}")
+
+
+def _plain(name: str) -> Fields:
+    """The keys of a section whose entries are all of one kind."""
+    found: Fields = getattr(table, name)
+    return found
+
+
+#: Word of the directive -> heading of each kind of entry, what it is, and its keys.
+def entries(section: str) -> Iterator[tuple[str, str, Fields]]:
+    """Heading, sentence and keys of each kind of entry of a section."""
+    if section == "joints":
+        for name in JOINTS:
+            kind = joint_type(name)
+            yield name, kind.doc.partition(": ")[2], {key: x for key, x in kind.keys.items() if key != "type"}
+    elif section in ("forces", "constraints"):
+        for name, kind in (FORCES if section == "forces" else CONSTRAINTS).items():
+            only = f"  Exactly one of {', '.join(kind.one_of)} is given." if kind.one_of else ""
+            yield name, kind.doc + only, dict(kind.keys)
+    elif section == "solids":
+        for name in table.SOLID:
+            yield name, "", {key: x for key, x in table.solid_fields(name).items() if key != "type"}
+    elif section == "functions":
+        for name, keys in table.FUNCTION.items():
+            yield name, "", keys
+    else:
+        yield "", "", _plain(section)
+
+
+class Keys(SphinxDirective):
+    """``{eomgen-keys} SECTION``."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """The nodes in place of the directive."""
+        lines: list[str] = []
+        for name, text, keys in entries(self.arguments[0]):
+            lines += [f"### {name}", "", _sentence(text), ""] if name else []
+            lines += keys_table(keys)
+        return self.parse_text_to_nodes("\n".join(lines), allow_section_headings=True)
+
+
+def options_table(command: click.Command) -> Iterator[str]:
+    """The lines of a table of the options of a verb."""
+    yield from ("| option | |", "|---|---|")
+    context = click.Context(command)
+    for option in command.get_params(context):
+        record = option.get_help_record(context)
+        if record is not None and record[1]:
+            words = record[0].replace("|", "\\|")
+            yield f"| `{words}` | {_cell(record[1])} |"
+    yield ""
+
+
+class Verbs(SphinxDirective):
+    """``{eomgen-verbs}``."""
+
+    def run(self) -> list[nodes.Node]:
+        """The nodes in place of the directive."""
+        lines: list[str] = []
+        for name in VERBS:
+            command = eomgen.get_command(click.Context(eomgen), name)
+            assert command is not None
+            lines += self._verb(f"eomgen {name}", command)
+        return self.parse_text_to_nodes("\n".join(lines), allow_section_headings=True)
+
+    def _verb(self, name: str, command: click.Command) -> Iterator[str]:
+        context = click.Context(command, info_name=name)
+        usage = command.get_usage(context).partition(": ")[2]
+        yield from (f"## {name}", "", "```text", " ".join(usage.split()), "```", "")
+        for part in (command.help or "").replace("\b", "").split("\n\n"):
+            yield from (_cell(part), "")
+        yield from options_table(command)
+        if isinstance(command, click.Group):
+            for word in command.list_commands(context):
+                inner = command.get_command(context, word)
+                if inner is not None:
+                    yield from self._verb(f"{name} {word}", inner)
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Called by Sphinx."""
+    app.add_directive("eomgen-keys", Keys)
+    app.add_directive("eomgen-verbs", Verbs)
+    return {"parallel_read_safe": True}
