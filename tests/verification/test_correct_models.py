@@ -85,6 +85,20 @@ def test_angular_momentum_turns_with_ground() -> None:
         assert found.ok, found
 
 
+def test_values_in_other_units_are_no_breach() -> None:
+    """A length in mm is declared as 200 and given at run time as 0.2."""
+    model = eg.Model("rod", gravity=(0, -9.81, 0))
+    l, F = model.parameter("l", 200, unit="mm"), model.input("F", 2, unit="kN")
+    mass = model.parameter("m", 500, unit="g")
+    rod = model.body("rod", mass=mass, com=(0, -l, 0), inertia={"zz": 0.01})
+    model.revolute("A", model.ground, rod)
+    model.force("pull", rod, (F, 0, 0))
+    found = variant_findings(model)
+    assert not [str(f) for f in found if not f.ok]
+    (given,) = [f for f in found if f.check.endswith("parameters at run time")]
+    assert not given.left_out
+
+
 @pytest.mark.parametrize("states", [0, -1, 1.5, True])
 def test_a_number_of_states_that_is_none_is_refused(states: object) -> None:
     with pytest.raises(UsageError, match="states"):

@@ -14,6 +14,7 @@ from ...describe.description import GROUND_NAME, DescribedEntry, Description
 from ...describe.placed_on import with_rpy
 from ...describe.plain_form import plain_description
 from ...describe.rewritten_texts import number_of
+from ...describe.units import read_unit
 from ...describe.visit import Visitor, visit
 
 #: Type of constraint -> the key whose marker is ground unless given.
@@ -35,6 +36,9 @@ def plain(model: Builder | Description) -> Description:
         for entry in result.sections[section]:
             for key in keys:
                 entry.values.pop(key, None)
+    for section in ("parameters", "inputs"):
+        for entry in result.sections[section]:
+            _convert_to_si(entry)
     if not any(entry.name == GROUND_NAME for entry in result.sections["bodies"]) and result.sections["bodies"]:
         result.add("bodies", GROUND_NAME, {})
     for entry in result.sections["bodies"]:
@@ -44,6 +48,13 @@ def plain(model: Builder | Description) -> Description:
         if side is not None and side not in entry.values and not (side == "on" and "marker" not in entry.values):
             entry.values[side] = GROUND_NAME
     return visit(result, _Placed(values_of(result)))
+
+
+def _convert_to_si(entry: DescribedEntry) -> None:
+    """A value in mm as one in m, so that values of a run and declared ones mean the same."""
+    unit, value = read_unit(entry.values.get("unit") or ""), entry.values.get("value")
+    if unit.size != 1.0 and value is not None:
+        entry.values |= {"value": number_of(value, {}) * unit.size, "unit": unit.si}
 
 
 def values_of(description: Description) -> dict[str, float]:
