@@ -62,6 +62,18 @@ def test_correct_models_have_no_breach(make: Callable[[], eg.Model]) -> None:
     assert found.ok, str(found)
 
 
+def test_a_muscle_in_other_units_is_no_breach() -> None:
+    """Its fastest shortening is 10 lengths in a second unless given, also where time is measured in ms."""
+    model = eg.Model("arm", gravity=(0, -9.81, 0))
+    arm = model.body("arm", mass=1, com=(0.15, 0, 0), inertia={"zz": 0.02})
+    model.revolute("elbow", model.ground, arm)
+    origin, insertion = model.ground.at(0, 0.3, 0), arm.at(0.05, 0, 0)
+    model.muscle("biceps", origin, insertion, activation=0.3, force_max=500, fiber_length=0.1, slack_length=0.2)
+    (found,) = variant_findings(model, only="units mm, t, ms")
+    assert not found.left_out, found
+    assert found.ok, found
+
+
 def test_events_that_reset_leave_runs_out_with_the_reason() -> None:
     runs = [f for f in verified(ball()).findings if f.check.startswith(("runs", "steppers"))]
     assert runs

@@ -16,6 +16,7 @@ from ...describe.plain_form import plain_description
 from ...describe.rewritten_texts import number_of
 from ...describe.units import read_unit
 from ...describe.visit import Visitor, visit
+from ...forces.muscle import SHORTENING
 
 #: Type of constraint -> the key whose marker is ground unless given.
 _ON_GROUND = {"rolling": "plane", "knife_edge": "on", "driver": "on"}
@@ -43,6 +44,9 @@ def plain(model: Builder | Description) -> Description:
         result.add("bodies", GROUND_NAME, {})
     for entry in result.sections["bodies"]:
         _write_placements(entry)
+    for entry in result.sections["forces"]:
+        if entry.values["type"] == "muscle":  # its default counts seconds
+            entry.values.setdefault("velocity_max", f"{SHORTENING}*({entry.values['fiber_length']})")
     for entry in result.sections["constraints"]:
         side = _ON_GROUND.get(entry.values["type"])
         if side is not None and side not in entry.values and not (side == "on" and "marker" not in entry.values):
