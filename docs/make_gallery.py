@@ -1,7 +1,7 @@
 """Draws the pictures of docs/gallery.md from the examples:  python docs/make_gallery.py [NAME ...]
 
-The page says all: a picture's name, whether it moves (.gif), and by the options of ``eomgen view`` how long the run is and
-which paths are drawn.
+The page says all: a picture's name, whether it moves (.gif), and by the options of ``eomgen view`` how long the run is
+and which paths are drawn.
 """
 
 from __future__ import annotations
@@ -23,12 +23,23 @@ from eomgen.show.writers import gif_bytes
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
-STILL, MOVING = 60.0, 42.0  #: dots in an inch
+STILL, MOVING = 70.0, 42.0  #: dots in an inch
 COLORS = 48  #: of a picture that stands still
 LASTS, FPS = 4.0, 10.0  #: seconds of a film, frames in a second
+SMOOTH = 6  #: times as many points for a path in a picture that stands still
+QUICK = ("furuta_pendulum", "quadrotor_load")  #: films of twice as many frames, for the sake of their paths
 AT = 0.3  #: part of the run after which the picture is taken
 #: Pictures taken at another part of the run.
-MOMENTS = {"double_pendulum": 0.9, "pendulum": 0.15, "slider_crank": 0.05, "cart_pendulum": 0.45, "bicycle": 0.9}
+MOMENTS = {
+    "bicycle": 0.1,
+    "cart_pendulum": 0.45,
+    "double_pendulum": 0.9,
+    "n_four_bar": 0.1,
+    "pendulum": 0.1,
+    "planetary_gear": 0.05,
+    "slider_crank": 0.05,
+    "spherical_pendulum": 0.9,
+}
 
 
 class Shown(NamedTuple):
@@ -68,16 +79,20 @@ def draw(shown: Shown) -> Path:
     robot: dict[str, Any] = {"limits": "off"} if shown.example.endswith(".urdf") else {}
     module = eg.load(EXAMPLES / shown.example, **robot).compile(target="numpy")
     trajectory = module.simulate(shown.options.end, dense_output=True)
-    span = float(trajectory.t[-1])
-    motion = sample(trajectory, lambda t: states_at(trajectory, module, t), FPS, span / LASTS)
-    scene = moving_scene(module, motion, False, False, shown.options.trace)
-    frames = Frames.of(scene, motion, (), MOVING if moving else STILL)
+    rate = FPS * (2 if file.stem in QUICK else 1 if moving else SMOOTH)
+    motion = sample(trajectory, lambda t: states_at(trajectory, module, t), rate, float(trajectory.t[-1]) / LASTS)
     if moving:
-        file.write_bytes(gif_bytes(frames))
+        scene = moving_scene(module, motion, False, False, shown.options.trace)
+        file.write_bytes(gif_bytes(Frames.of(scene, motion, (), MOVING)))
         return file
-    moment = round(MOMENTS.get(file.stem, AT) * (len(frames) - 1))
-    image = Image.fromarray(frames.image(moment)).quantize(COLORS, dither=Image.Dither.NONE)
-    image.save(file, optimize=True)
+    moment = round(MOMENTS.get(file.stem, AT) * (len(motion.t) - 1))
+    if not shown.options.trace:  # its surroundings alone, however far the mechanism goes
+        one, inputs = slice(moment, moment + 1), None if motion.u is None else motion.u[:, moment : moment + 1]
+        motion = motion._replace(t=motion.t[one], x=motion.x[:, one], u=inputs, words=motion.words[one])
+        moment = 0
+    scene = moving_scene(module, motion, False, False, shown.options.trace)
+    image = Image.fromarray(Frames.of(scene, motion, (), STILL).image(moment))
+    image.quantize(COLORS, dither=Image.Dither.NONE).save(file, optimize=True)
     return file
 
 
