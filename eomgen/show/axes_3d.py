@@ -12,7 +12,7 @@ from .scene import Item, Scene
 from .solids import Triangles
 
 ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees)
-ZOOM = 0.93  #: leaves room for the names of the axes
+ZOOM = 0.88  #: leaves room for the names of the axes
 COARSE = 4000  #: triangles of one item more than which are thinned out, as matplotlib draws them one by one
 
 
