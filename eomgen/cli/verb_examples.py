@@ -17,10 +17,8 @@ from ..suggestions import hint
 from ..syntax_trees import parse_module
 from .example_files import example_files
 from .failures import reports_failures
-from .screen import print_json, print_table, say
-from .sections import verb_command
-from .shared_options import json_option
 from .screen import print_json, print_table, say, stage
+from .sections import verb_command
 from .shared_options import json_option, target_option
 
 if TYPE_CHECKING:
