@@ -1,4 +1,4 @@
-"""Carvallo-Whipple bicycle: the canonical matrices, eigenvalues and stable speeds of the benchmark, then a ride."""
+"""Carvallo-Whipple bicycle: canonical matrices, eigenvalues and stable speeds, then a ride."""
 
 from pathlib import Path
 

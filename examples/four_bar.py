@@ -1,4 +1,4 @@
-"""Four-bar linkage: kinematics of the whole turn from the crank angle alone, against the closed form."""
+"""Four-bar linkage: kinematics of a turn from the crank angle alone, against the closed form."""
 
 import numpy as np
 

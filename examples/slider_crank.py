@@ -1,4 +1,4 @@
-"""Slider-crank with a closed loop, described in SymPy, compiled, and integrated in two ways (eomgen's README)."""
+"""Slider-crank described in SymPy, compiled, and integrated in two ways (eomgen's README)."""
 
 import numpy as np
 import scipy.integrate

@@ -1,4 +1,4 @@
-"""Two-link manipulator: symbolic equations, and the end effector's motion (Shabana, Computational Dynamics, 1.4)."""
+"""Two-link manipulator: equations and the end effector's motion (Shabana, 1.4)."""
 
 import numpy as np
 import sympy

@@ -33,7 +33,7 @@ VERBS = {
     "verify": "Compare a compiled model with everything independent of how it was made.",
     "generate": "Write a package that stands alone.",
     "convert": "Write a robot (URDF, MJCF) as a model file.",
-    "examples": "List the example models, or copy one here.",
+    "examples": "List the example models, copy one here, or run them all.",
     "doctor": "Say whether this installation can derive, compile and simulate.",
     "cache": "List, prune or clear the compiled modules.",
 }

@@ -96,13 +96,13 @@ def solver_options(verb: Callable[..., Any]) -> Callable[..., Any]:
     return wrapped
 
 
-def target_option(*targets: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def target_option(*targets: str, default: str = "cython") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """``--target`` with these choices."""
     return shared_option(
         DERIVATION,
         "--target",
         type=click.Choice(list(targets)),
-        default="cython",
+        default=default,
         show_default=True,
         help="; ".join(f"{target}: {TARGETS[target].about}" for target in targets) + ".",
     )

@@ -92,14 +92,14 @@ class Muscle(Force):
 
 
 #: Optimal lengths of the fibres in which they shorten in a second, at most: De Groote and others (2016).
-_SHORTENING = 10.0
+SHORTENING = 10.0
 
 
 def _muscle(e: Entry) -> Muscle | None:
     path, activation = read_path(e), e.law("activation")
     e.require("activation", activation, lambda a: 0 <= a <= 1, "an activation is 0 to 1")
     force_max, fiber_length, slack_length = (e.positive(k) for k in ("force_max", "fiber_length", "slack_length"))
-    velocity_max = e.positive("velocity_max") if "velocity_max" in e.values else _SHORTENING * fiber_length
+    velocity_max = e.positive("velocity_max") if "velocity_max" in e.values else SHORTENING * fiber_length
     pennation, damping = e.law("pennation"), e.law("damping")
     e.require("pennation", pennation, lambda x: abs(x) < 1.5707, "must be less than pi/2")
     if path is None:

@@ -12,6 +12,7 @@ from .scene import Item, Scene
 from .solids import Triangles
 
 ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees)
+ZOOM = 0.88  #: leaves room for the names of the axes
 COARSE = 4000  #: triangles of one item more than which are thinned out, as matplotlib draws them one by one
 
 
@@ -58,7 +59,7 @@ class Axes3DPicture:
             for k in (vertical, (vertical + 1) % 3):
                 limits[k] = limits[k][::-1]
         ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
-        ax.set_box_aspect(scene.high - scene.low)
+        ax.set_box_aspect(scene.high - scene.low, zoom=ZOOM)
         ax.set_xlabel("x (m)", fontsize=8)
         ax.set_ylabel("y (m)", fontsize=8)
         ax.set_zlabel("z (m)", fontsize=8)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..limits.pictures import SAME
 from .data import GROUND, Array, JointData, PictureData, PlacedFrame
-from .solids import Mesh, Triangles, box, rounded, solid, sphere, turned
+from .solids import ROUND, Mesh, Triangles, box, rounded, solid, sphere, turned
 
 SYMBOL = 0.02  #: of the extent of a mechanism: the size of a symbol
 OF_LINK = 0.16  #: and of the middle link's length, at most
@@ -225,7 +225,7 @@ def link_items(data: PictureData, points: list[Array], symbol: float, extent: fl
     items: list[Item] = []
     shaped = set()
     for shape in data.shapes:
-        mesh = solid(shape["kind"], shape["sizes"], BAR * symbol)
+        mesh = solid(shape["kind"], shape["sizes"], BAR * symbol, ROUND)
         body = shape["body"]
         if mesh is not None:
             shaped.add(body)

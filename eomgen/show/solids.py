@@ -13,6 +13,7 @@ Triangles = NDArray[np.int64]
 Mesh = tuple[Array, Triangles]
 
 AROUND = 20  #: corners of a circle
+ROUND = 48  #: those of the circles of a body's own shapes, which may be as large as the picture
 
 
 def box(size: Sequence[float]) -> Mesh:
@@ -45,9 +46,9 @@ def turned(radii: Sequence[float], heights: Sequence[float], around: int = AROUN
     return vertices, np.array(faces)
 
 
-def cylinder(radius: float, length: float) -> Mesh:
+def cylinder(radius: float, length: float, around: int = AROUND) -> Mesh:
     """A cylinder about z and its middle."""
-    return turned((radius, radius), (-length / 2, length / 2))
+    return turned((radius, radius), (-length / 2, length / 2), around)
 
 
 def sphere(radius: float) -> Mesh:
@@ -69,12 +70,15 @@ def cone(radius: float, length: float) -> Mesh:
     return turned((radius, 0.0), (0.0, length))
 
 
-def solid(kind: str, sizes: Sequence[float], thin: float) -> Mesh | None:
-    """The mesh of a shape by its kind; None where there is none.  ``thin`` (m) is the radius of what has none."""
+def solid(kind: str, sizes: Sequence[float], thin: float, around: int = AROUND) -> Mesh | None:
+    """The mesh of a shape by its kind; None where there is none.
+
+    ``thin`` (m) is the radius of what has none, ``around`` the number of corners of a cylinder's circles.
+    """
     if kind == "box":
         return box(sizes)
     if kind in ("cylinder", "tube"):
-        return cylinder(sizes[0], sizes[1])
+        return cylinder(sizes[0], sizes[1], around)
     if kind == "sphere":
         return sphere(sizes[0])
     if kind == "capsule":

@@ -125,6 +125,10 @@ def test_examples_list(call: Call) -> None:
     result = call("examples")
     assert result.code == 0
     assert all(name in result.out for name in ("slider_crank", "andrews_squeezer", "chain.py"))
+    listed = call("examples", "--json").json["examples"]
+    lines = result.out.splitlines()
+    for entry in listed:  # one line each
+        assert sum(line.split()[:1] == [entry["name"]] and entry["doc"] in line for line in lines) == 1, entry
 
 
 def test_examples_json(call: Call) -> None:

@@ -109,6 +109,25 @@ def test_every_example_draws_all_bodies_in_the_page(name: str) -> None:
     module.draw().figure.canvas.draw()
 
 
+@pytest.mark.parametrize("name", ["furuta_pendulum", "double_wishbone", "satellite"])
+def test_the_names_of_axes_are_not_cut_off(name: str) -> None:
+    ax = compiled(f"{name}.yaml").draw()
+    canvas = ax.figure.canvas
+    canvas.draw()
+    width, height = canvas.get_width_height()
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        box = axis.label.get_window_extent(canvas.get_renderer())
+        assert min(box.x0, box.y0, width - box.x1, height - box.y1) >= 0.0
+
+
+def test_a_flywheel_is_round() -> None:
+    scene = scene_of(compiled("engine.yaml"))
+    (wheel,) = [item for item in scene.items if (item.role, item.name) == ("shape", "crank")]
+    x, y = outline(wheel.points[:, :2]).T
+    area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
+    assert area == pytest.approx(np.pi * 0.085**2, rel=0.005)
+
+
 def test_branches_are_drawn_side_by_side() -> None:
     module = compiled("four_bar.yaml")
     panels = module.draw_branches()

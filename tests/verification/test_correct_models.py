@@ -62,6 +62,18 @@ def test_correct_models_have_no_breach(make: Callable[[], eg.Model]) -> None:
     assert found.ok, str(found)
 
 
+def test_a_muscle_in_other_units_is_no_breach() -> None:
+    """Its fastest shortening is 10 lengths in a second unless given, also where time is measured in ms."""
+    model = eg.Model("arm", gravity=(0, -9.81, 0))
+    arm = model.body("arm", mass=1, com=(0.15, 0, 0), inertia={"zz": 0.02})
+    model.revolute("elbow", model.ground, arm)
+    origin, insertion = model.ground.at(0, 0.3, 0), arm.at(0.05, 0, 0)
+    model.muscle("biceps", origin, insertion, activation=0.3, force_max=500, fiber_length=0.1, slack_length=0.2)
+    (found,) = variant_findings(model, only="units mm, t, ms")
+    assert not found.left_out, found
+    assert found.ok, found
+
+
 def test_events_that_reset_leave_runs_out_with_the_reason() -> None:
     runs = [f for f in verified(ball()).findings if f.check.startswith(("runs", "steppers"))]
     assert runs
@@ -83,6 +95,20 @@ def test_angular_momentum_turns_with_ground() -> None:
         (found,) = variant_findings(model, only=change)
         assert not found.left_out, found
         assert found.ok, found
+
+
+def test_values_in_other_units_are_no_breach() -> None:
+    """A length in mm is declared as 200 and given at run time as 0.2."""
+    model = eg.Model("rod", gravity=(0, -9.81, 0))
+    l, F = model.parameter("l", 200, unit="mm"), model.input("F", 2, unit="kN")
+    mass = model.parameter("m", 500, unit="g")
+    rod = model.body("rod", mass=mass, com=(0, -l, 0), inertia={"zz": 0.01})
+    model.revolute("A", model.ground, rod)
+    model.force("pull", rod, (F, 0, 0))
+    found = variant_findings(model)
+    assert not [str(f) for f in found if not f.ok]
+    (given,) = [f for f in found if f.check.endswith("parameters at run time")]
+    assert not given.left_out
 
 
 @pytest.mark.parametrize("states", [0, -1, 1.5, True])

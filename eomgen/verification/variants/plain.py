@@ -14,7 +14,9 @@ from ...describe.description import GROUND_NAME, DescribedEntry, Description
 from ...describe.placed_on import with_rpy
 from ...describe.plain_form import plain_description
 from ...describe.rewritten_texts import number_of
+from ...describe.units import read_unit
 from ...describe.visit import Visitor, visit
+from ...forces.muscle import SHORTENING
 
 #: Type of constraint -> the key whose marker is ground unless given.
 _ON_GROUND = {"rolling": "plane", "knife_edge": "on", "driver": "on"}
@@ -35,15 +37,28 @@ def plain(model: Builder | Description) -> Description:
         for entry in result.sections[section]:
             for key in keys:
                 entry.values.pop(key, None)
+    for section in ("parameters", "inputs"):
+        for entry in result.sections[section]:
+            _convert_to_si(entry)
     if not any(entry.name == GROUND_NAME for entry in result.sections["bodies"]) and result.sections["bodies"]:
         result.add("bodies", GROUND_NAME, {})
     for entry in result.sections["bodies"]:
         _write_placements(entry)
+    for entry in result.sections["forces"]:
+        if entry.values["type"] == "muscle":  # its default counts seconds
+            entry.values.setdefault("velocity_max", f"{SHORTENING}*({entry.values['fiber_length']})")
     for entry in result.sections["constraints"]:
         side = _ON_GROUND.get(entry.values["type"])
         if side is not None and side not in entry.values and not (side == "on" and "marker" not in entry.values):
             entry.values[side] = GROUND_NAME
     return visit(result, _Placed(values_of(result)))
+
+
+def _convert_to_si(entry: DescribedEntry) -> None:
+    """A value in mm as one in m, so that values of a run and declared ones mean the same."""
+    unit, value = read_unit(entry.values.get("unit") or ""), entry.values.get("value")
+    if unit.size != 1.0 and value is not None:
+        entry.values |= {"value": number_of(value, {}) * unit.size, "unit": unit.si}
 
 
 def values_of(description: Description) -> dict[str, float]:
