@@ -1,6 +1,7 @@
 # make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png and .gif
 # make test   ruff, mypy, then every test, fast ones first, on all processors; fails if anything was skipped
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
+# make notebooks  executes the notebooks anew and stores their outputs; NOTEBOOKS=FILE only this one
 # make lint   ruff and mypy alone
 # make mutations  puts deliberate faults into a copy of the sources; fails if no test notices one (half an hour)
 # make fuzz   attacks the package with hostile files, texts, calls and objects: CASES=100000, or HOURS=8 with new ones;
@@ -14,7 +15,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test bench lint mutations fuzz clean
+NOTEBOOKS := $(wildcard notebooks/*.ipynb)
+
+.PHONY: demo test bench notebooks lint mutations fuzz clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed-plot
@@ -29,6 +32,9 @@ lint: $(VENV)/.installed-test
 
 bench: $(VENV)/.installed-plot
 	@$(BIN)/python -m benchmarks.run $(BENCHMARKS)
+
+notebooks: $(VENV)/.installed-test
+	@$(BIN)/python notebooks/execute.py $(NOTEBOOKS)
 
 mutations: $(VENV)/.installed-test
 	@$(BIN)/python tests/mutations/run.py --jobs 2
