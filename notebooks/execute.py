@@ -71,7 +71,7 @@ def smaller(kind: str, picture: str) -> str:
         sheet = Image.new("RGB", (image.width, 4 * image.height))  # some of the frames, which have all colours
         for k in range(4):
             sheet.paste(frames[k * (len(frames) - 1) // 3], (0, k * image.height))
-        palette = sheet.quantize(32)
+        palette = sheet.quantize(64)
         first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
         first.save(buffer, format="GIF", save_all=True, append_images=rest, duration=times, loop=0, optimize=True)
     return base64.b64encode(buffer.getvalue()).decode()
