@@ -1,6 +1,7 @@
 # make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png and .gif
 # make test   ruff, mypy, then every test, fast ones first, on all processors; fails if anything was skipped
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
+# make notebooks  executes the notebooks anew and stores their outputs; NOTEBOOKS=FILE only this one
 # make lint   ruff and mypy alone
 # make docs   the documentation as a site, docs/_build/html/index.html; a warning is an error
 # make mutations  puts deliberate faults into a copy of the sources; fails if no test notices one (half an hour)
@@ -15,7 +16,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test bench lint docs mutations fuzz clean
+NOTEBOOKS := $(wildcard notebooks/*.ipynb)
+
+.PHONY: demo test bench notebooks lint docs mutations fuzz clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed-plot
@@ -34,6 +37,9 @@ bench: $(VENV)/.installed-plot
 docs: $(VENV)/.installed-docs
 	@$(BIN)/sphinx-build -b html -W -n -q --keep-going -j 2 docs docs/_build/html
 	@echo docs/_build/html/index.html
+
+notebooks: $(VENV)/.installed-test
+	@$(BIN)/python notebooks/execute.py $(NOTEBOOKS)
 
 mutations: $(VENV)/.installed-test
 	@$(BIN)/python tests/mutations/run.py --jobs 2

@@ -350,7 +350,9 @@ class Drivers:
 
     def _outputs(self, t: float, x: Array, u: Array, c: Array) -> Array:
         x = self._project(t, x, u, c)
-        if "system" in self.blocks:
+        if not self.layout.metadata.get("output_accelerations", True):  # positions and velocities need no masses
+            a = np.zeros(self.layout.n_v)
+        elif "system" in self.blocks:
             a = self._solve(t, x, u, c)[0]
         else:
             x_dot = self.blocks["rhs"](t, x, u, c) if "rhs" in self.blocks else self._rhs(t, x, u, c)

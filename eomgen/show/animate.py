@@ -12,7 +12,7 @@ from ..files.writing import whole_file
 from ..texts import shown
 from .film_frames import DPI, Frames
 from .scene import Scene
-from .shown_motion import ShownMotion, States, moving_scene, sample, with_arrows
+from .shown_motion import ShownMotion, States, moving_scene, sample, with_arrows, with_fine_traces
 from .writers import WRITERS, kind_of, require_kind
 
 
@@ -50,6 +50,8 @@ def animate(
     columns = {name: trajectory[name] for name in plot}  # unknown names fail before anything is drawn
     motion = sample(trajectory, states, fps, speed)
     scene = moving_scene(module, motion, names, axes, trace)
+    if trace and motion.t[0] != motion.t[-1]:
+        scene = with_fine_traces(scene, module, motion, states, trace)
     if forces:
         scene = with_arrows(scene, module, motion, forces)
     still = motion.t[0] == motion.t[-1]

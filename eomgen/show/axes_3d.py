@@ -8,7 +8,7 @@ import numpy as np
 
 from ..limits.pictures import NOTHING
 from .colors import color_of, style_of
-from .scene import Item, Scene
+from .scene import Item, Scene, passed
 from .solids import Triangles
 
 ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees)
@@ -74,9 +74,9 @@ class Axes3DPicture:
             points = item.at(poses, frame)
             if faces is not None:
                 artist.set_verts(points[faces])
-            elif item.role == "trace" and frame:
-                artist.set_data_3d(*points[: frame + 1].T)
             else:
+                if item.role == "trace":
+                    points = passed(points, frame, len(self.scene.frames))
                 artist.set_data_3d(*points.T)
         for label, text in zip(self.scene.labels, self.labels, strict=True):
             pose = poses[label.body]

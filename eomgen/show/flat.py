@@ -9,7 +9,7 @@ import numpy as np
 from ..limits.pictures import SAME
 from .colors import color_of, style_of
 from .data import Array
-from .scene import ROLES, Item, Scene
+from .scene import ROLES, Item, Scene, passed
 
 SPACE = 7.0  #: largest edge of a figure of its own (inch)
 LEAST = 2.8
@@ -86,11 +86,9 @@ class Flat:
             points = self.page(item.at(poses, frame))
             if item.faces is not None:
                 artist.set_xy(outline(points))
-            elif item.role == "trace":
-                artist.set_data(points[: frame + 1, 0], points[: frame + 1, 1])
-                if len(self.scene.frames) > 1 and frame == 0:
-                    artist.set_data(points[:, 0], points[:, 1])
             else:
+                if item.role == "trace":
+                    points = passed(points, frame, len(self.scene.frames))
                 artist.set_data(points[:, 0], points[:, 1])
         for label, text in zip(self.scene.labels, self.labels, strict=True):
             pose = poses[label.body]

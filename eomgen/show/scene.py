@@ -104,6 +104,14 @@ class Scene(NamedTuple):
     note: str = ""
 
 
+def passed(way: Array, frame: int, frames: int) -> Array:
+    """The part of a trace's points (n, 3) up to a frame; all of it at the first one."""
+    if frame == 0:
+        return way
+    done: Array = way[: frame * (len(way) - 1) // (frames - 1) + 1]
+    return done
+
+
 def move(pose: Array, points: Array) -> Array:
     """Points (n, 3) of a body in ground axes."""
     moved: Array = points @ pose[:3, :3].T + pose[:3, 3]

@@ -16,6 +16,7 @@ from .scene import Item, Scene, placed
 LONGEST = 12.0  #: seconds that an animation lasts, unless a speed is given
 SHORTEST = 3.0
 FRAMES = 1500  #: at most
+POINTS = 400  #: of the way of a marker, at least
 ARROW = 0.2  #: length of the longest arrow, of the picture's diagonal
 HEAD = 0.22  #: of an arrow's length
 BEFORE = 3.0  #: distance of arrows in front of a planar mechanism, in sizes of a symbol
@@ -94,6 +95,18 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
 def moving_scene(module: Any, motion: ShownMotion, names: bool | None, axes: bool, trace: Sequence[str]) -> Scene:
     """The scene over all frames."""
     return build_scene(module, motion.x[: module.n_q], motion.t, motion.u, names, axes, trace)
+
+
+def with_fine_traces(scene: Scene, module: Any, motion: ShownMotion, states: States, trace: Sequence[str]) -> Scene:
+    """The scene with the ways of markers through several points a frame, so that they look round at any rate."""
+    finer = int(np.ceil(POINTS / (len(motion.t) - 1)))
+    times = np.linspace(motion.t[0], motion.t[-1], finer * (len(motion.t) - 1) + 1)
+    x, u = states(times)
+    fine = build_scene(module, x[: module.n_q], times, u, False, False, trace)
+    ways = [item for item in fine.items if item.role == "trace"]
+    rest = [item for item in scene.items if item.role != "trace"]
+    low, high = np.minimum(scene.low, fine.low), np.maximum(scene.high, fine.high)
+    return scene._replace(items=[*rest, *ways], low=low, high=high)
 
 
 def with_arrows(scene: Scene, module: Any, motion: ShownMotion, joints: Sequence[str] | bool) -> Scene:

@@ -14,7 +14,7 @@ import eomgen as eg
 LED = {"theta": np.linspace(1.0, 1.0 + 2 * np.pi, 25), "theta_dot": 10.0, "theta_ddot": 3.0}
 
 
-def four_bar(mass: float) -> eg.Model:
+def four_bar(mass: float, second: str = "ax") -> eg.Model:
     m = eg.Model("four_bar")
     inertia = {"inertia": {"zz": mass}} if mass else {}
     a, b, c = (m.body(name, mass=mass, **inertia) for name in ("crank", "coupler", "rocker"))
@@ -23,7 +23,8 @@ def four_bar(mass: float) -> eg.Model:
     m.revolute("C", b.at(0.12, 0, 0), c.at(0.08, 0, 0))
     m.revolute("D", m.ground.at(0.1, 0, 0), c, coordinate="psi")
     m.output("px", b.at(0.05, 0, 0).position[0])
-    m.output("ax", b.at(0.05, 0, 0).acceleration[0])
+    point = b.at(0.05, 0, 0)
+    m.output(second, point.acceleration[0] if second == "ax" else point.velocity[0])
     m.guess(theta=1.0, bend=-0.7, psi=1.1)
     m.initial(theta=1.0)
     return m
@@ -54,6 +55,19 @@ def test_a_mechanism_without_mass_is_led(target: str) -> None:
     for call in (lambda: mod.rhs(0.0, x), lambda: mod.jacobian(0.0, x), lambda: mod.simulate(0.1), mod.linearize):
         with pytest.raises(eg.SingularMassMatrixError, match="kinematics only: .*crank, coupler, rocker; give those"):
             call()
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_outputs_of_positions_and_velocities_need_no_mass(target: str) -> None:
+    mod = four_bar(0, "vx").compile(target=target)
+    motion = mod.kinematic_analysis(**LED)
+    psi = freudenstein(LED["theta"])
+    along = (0.1 + 0.08 * np.cos(psi) - 0.04 * np.cos(LED["theta"])) / 0.12  # the coupler's direction, x
+    np.testing.assert_allclose(motion["px"], 0.04 * np.cos(LED["theta"]) + 0.05 * along, atol=1e-9)
+    at = np.linspace(1.0, 1.01, 11)
+    near = mod.kinematic_analysis(theta=at, theta_dot=10.0)
+    np.testing.assert_allclose(near["vx"][5], np.gradient(near["px"], at / 10.0, edge_order=2)[5], rtol=1e-5)
+    assert mod.outputs(0.0, mod.x0(theta=1.2)).shape == (2,)
 
 
 @pytest.mark.parametrize("method", ["lagrange", "recursive", "augmented", "newton_euler", "gibbs_appell", "hamilton"])

@@ -56,6 +56,28 @@ def test_a_gif_has_a_frame_for_every_step_of_time(run: Any, tmp_path: Path) -> N
     assert sum(durations) == 2100
 
 
+def test_ways_are_round_at_any_rate_of_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A crank that turns by 2 rad from frame to frame leaves a circle, not a polygon, and only behind itself."""
+    from eomgen.show import animate
+    from eomgen.show.scene import passed
+
+    m = eg.Model("crank")
+    crank = m.body("crank", mass=1.0, inertia={"zz": 1.0})
+    crank.marker("pin", at=(0.3, 0, 0))
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    scenes: list[Any] = []
+    monkeypatch.setattr(animate, "write", lambda file, scene, *rest: scenes.append(scene))
+    m.compile(target="numpy").simulate(3.0, initial={"theta_dot": 20.0}).animate(fps=10, speed=1, trace="crank.pin")
+    (way,) = [item.points for item in scenes[0].items if item.role == "trace"]
+    assert len(scenes[0].frames) == 31
+    middles = (way[1:] + way[:-1]) / 2
+    assert np.linalg.norm(way, axis=1) == pytest.approx(0.3, rel=1e-6)
+    assert np.linalg.norm(middles, axis=1) == pytest.approx(0.3, rel=0.01)
+    behind = passed(way, 4, 31)
+    assert behind[-1, :2] == pytest.approx([0.3 * np.cos(8.0), 0.3 * np.sin(8.0)], abs=1e-6)
+    assert passed(way, 30, 31).shape == passed(way, 0, 31).shape == way.shape
+
+
 def test_a_saved_run_asks_for_its_model(run: Any, module: Any, tmp_path: Path) -> None:
     loaded = eg.load_trajectory(run.save(tmp_path / "run.npz"))
     with pytest.raises(UsageError, match="give model=module"):
