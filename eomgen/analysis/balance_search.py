@@ -70,6 +70,6 @@ def _failure(search: Search, point: SearchPoint) -> EquilibriumError:
     worst = int(scaled.argmax())
     return EquilibriumError(
         f"{head}the generalized force along {names[worst]} is still {here.forces[worst]:.6g} at {where}; give "
-        "another guess, or hold a coordinate that nothing balances",
+        "another guess, or hold a coordinate that no force balances",
         left,
     )

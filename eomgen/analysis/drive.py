@@ -334,7 +334,7 @@ def _out_of_reach(layout: Layout, names: Sequence[str], B: Array, A: Array, t: f
     need = "1 degree of freedom needs" if layout.n_dof == 1 else f"{layout.n_dof} degrees of freedom need"
     where = f"t = {t:g}" + (f" (state {k})" if k is not None else "")
     return (
-        f"drives on {', '.join(names)} cannot make this motion at {where}: nothing drives a motion of "
+        f"drives on {', '.join(names)} cannot make this motion at {where}: no drive moves "
         f"{', '.join(moved[:4])}; {need} as many drives, "
         f"such as {', '.join(layout.velocity_labels[i] for i in layout.independent)}"
     )

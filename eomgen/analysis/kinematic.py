@@ -224,7 +224,9 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
     layout = module.layout
     initial: Initial = Initial(module.kernels, t)
     if len(names) > layout.n_dof:
-        raise UsageError(f"{', '.join(names)} cannot {'all ' * (len(names) > 1)}be led: {_freedom(module, q, t)}")
+        raise UsageError(
+            f"{', '.join(names)} cannot {'all ' * (len(names) > 1)}be prescribed: {_freedom(module, q, t)}"
+        )
     free = [layout.velocity_labels[i] for i in layout.independent if layout.velocity_labels[i] in layout.q]
     others = [name for name in [*free, *layout.q] if name not in names]
     values = dict.fromkeys(list(dict.fromkeys(others)), 0.0)
@@ -233,7 +235,7 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
         if name not in fine:
             place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, q, strict=True))
             raise PartitionError(
-                f"{name} cannot be led from the initial position ({place}): it stands still there whatever moves, or "
+                f"{name} cannot be prescribed from the initial position ({place}): it cannot move there, or "
                 "branches meet; give an initial position beside it",
                 t,
                 q,
@@ -243,7 +245,7 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
         module.layout.require_minimal_form()
         plural = "s" * (layout.n_dof != 1)
         raise UsageError(
-            f"{layout.n_dof} degree{plural} of freedom, and too few coordinates to lead them at this position"
+            f"{layout.n_dof} degree{plural} of freedom, but fewer coordinates can be prescribed at this position"
         )
     result = (*names, *held)
     Q = DrivenCoordinates(module, result).tangent(t, q, 0.0, np.zeros(len(result))).quality
@@ -274,7 +276,7 @@ def _freedom(module: BoundModel, q: Array, t: float) -> str:
         return f"{n} degree{'s' * (n > 1)} of freedom, at most {n}"
     gaps = [module.constraints(q, t=t + step, rows="all") for step in (0.0, 0.0137, 0.377, 1.0)]
     if any((gap != gaps[0]).any() for gap in gaps):
-        return "0 degrees of freedom, none is left to lead, the drivers move all; give t"
+        return "0 degrees of freedom: the drivers determine the whole motion; give t"
     return (
         "0 degrees of freedom: the mechanism is locked, and nothing drives it; take a constraint away, or free a joint"
     )

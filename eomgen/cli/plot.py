@@ -33,7 +33,7 @@ def require_plotting(file: Path, option: str = "--plot") -> None:
         raise MissingDependencyError(f"{option} needs matplotlib: pip install matplotlib") from error
     known = sorted(FigureCanvasBase.get_supported_filetypes())
     if file.suffix[1:].lower() not in known:
-        raise UsageError(f"{option} {file}: the ending says what kind of picture; there are .{', .'.join(known)}")
+        raise UsageError(f"{option} {file}: the ending of the name selects the kind of picture: .{', .'.join(known)}")
 
 
 def find_paths(mechanism: Mechanism) -> list[tuple[str, str]]:

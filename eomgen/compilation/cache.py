@@ -54,7 +54,7 @@ def cache_directory() -> Path:
     except (RuntimeError, OSError) as error:
         origin = f"EOMGEN_CACHE_DIR={chosen!r}: " if chosen else ""
         raise ToolchainError(
-            f"{origin}the cache directory cannot be told: {error}. Set EOMGEN_CACHE_DIR to a directory of your own"
+            f"{origin}the cache directory is not known: {error}. Set EOMGEN_CACHE_DIR to a directory of your own"
         ) from error
 
 

@@ -122,7 +122,7 @@ def _points(reader: Reader, path: str, given: Any) -> Array | None:
         reader.faults.add(f"{path}[{k + 1}]", f"{x[k + 1]:g} follows {x[k]:g}", "the points of a table increase")
         return None
     if not np.isfinite(x[-1] - x[0]) or (steps < APART * np.max(np.abs(x))).any():
-        reader.faults.add(path, "has points too near to each other, or too far apart, to be told apart in doubles")
+        reader.faults.add(path, "has points too close together, or too far apart, for double precision")
         return None
     return x
 

@@ -283,7 +283,7 @@ def _output(reader: Reader, entry: DescribedEntry) -> Output:
     if "expression" in entry.values:
         expression = reader.expression(f"{path}.expression", entry.values["expression"], OUTPUT)
     if unit.size != 1.0 and expression.value is not None:
-        faults.add(f"{path}.unit", "the unit of the plain number is not told", "name a parameter with a unit")
+        faults.add(f"{path}.unit", "the unit of the plain number is not known", "name a parameter with a unit")
     kind = reader.names.kinds.get(entry.name) if isinstance(entry.name, str) else None
     if kind in ("coordinate", "velocity", "acceleration", "multiplier"):
         if expression != reader.graph.symbol(entry.name):

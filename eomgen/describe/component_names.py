@@ -162,5 +162,5 @@ class Renaming(Visitor):
 
     def _foreign(self, name: str, slot: Slot, remedy: str) -> None:
         if self.closed and slot.entry is not None:
-            message = f"{name!r} is no name of the component, which knows its own only"
+            message = f"{name!r} is no name of the component, which knows only its own names"
             self.fault(f"{slot.entry.path}.{slot.key}", message, remedy)

@@ -203,7 +203,7 @@ def _looked_up(word: str, text: str) -> tuple[Dimension, float, bool]:
         raise UnitError(unknown, (f"did you mean {near[0]!r}? " if near else "") + _FORM) from error
     if not one._is_multiplicative:
         raise UnitError(
-            f"{quoted(word)}{of} has an offset, so that a product with it means nothing",
+            f"{quoted(word)}{of} has an offset, so that a product with it has no meaning",
             "give the temperature in K" if "[temperature]" in dict(unit.dimensionality) else "give it in an SI unit",
         )
     dimension = dimensions.NONE

@@ -36,7 +36,7 @@ MEANING = {
     BAD_PARAMETERS: "the constants that follow from the parameters cannot be computed",
     UNASSEMBLED: "the initial values cannot be assembled",
     FAILED: "the integration failed",
-    ZENO: "events that reset the state follow each other ever faster (Zeno), or a reset leads nowhere",
+    ZENO: "events that reset the state follow each other faster and faster (Zeno), or a reset repeats without an end",
     RESET_FAILED: MESSAGES[RESET_FAILED],
     LOST: "the worker that ran it failed",
 }

@@ -121,7 +121,9 @@ class Ensemble:
         if self._statistics:
             return np.asarray(self.reduced["mean"][row])
         if self.x is None:
-            raise UsageError(f"this ensemble kept what its reduction made ({', '.join(self.reduced)}), not {name!r}")
+            raise UsageError(
+                f"this ensemble kept only the results of its reduction ({', '.join(self.reduced)}), not {name!r}"
+            )
         states = self.x[:, None] if self.samples is None else self.samples
         if row < len(self.x):
             found = states[row]

@@ -71,7 +71,7 @@ def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> No
             remedy = "take it away"
             if used:
                 what = f"{label} {IDLE} with the declared {', '.join(used)}: its factors are 0 or cancel"
-                remedy = "declare values with which it acts, as freedoms are judged at these, or take it away"
+                remedy = "declare values with which it acts: they determine the degrees of freedom; or take it away"
             problems.append(kinematics.mechanism.problem(place_of(kinematics.mechanism, label), what, remedy))
     if problems:
         raise ModelError(problems)

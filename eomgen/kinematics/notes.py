@@ -57,8 +57,8 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
                 f"(conditioning {mobility.conditioning:.1g}); {name} would do better there ({value:.1g})"
             )
     notes += [
-        f"{name}: {', '.join(corners)} in a driver's value may make a corner, where its rate jumps: an impact that is "
-        "not computed; take a smooth motion, or impacts for what is meant to hit"
+        f"{name}: {', '.join(corners)} in a driver's value may make a corner, where its rate jumps: this is an impact, "
+        "which a driver does not compute; use a smooth motion, or events with restitution for a real impact"
         for name, corners in _drivers_with_corners(kinematics)
     ]
     notes += [

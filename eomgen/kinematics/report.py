@@ -148,7 +148,7 @@ class MechanismReport:
             away = f"after {tries}: one of several ways to close it; a guess says which"
             say("assembled", away if self.assembly_restarts else "on the branch next to the initial values and guess")
         if self.assumed:
-            lines.append("  some parameters have no value: the rank was judged with made-up ones")
+            lines.append("  some parameters have no value: random values were used to find the rank")
         lines += [f"  note: {note}" for note in self.notes]
         return "\n".join(lines)
 

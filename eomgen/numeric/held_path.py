@@ -111,10 +111,10 @@ def follow(system: ConstraintSystem, start: Array, held: Mapping[str, float], en
     last = continuation.points[-1]
     if timed:
         t = system.t + last.s * (path.end - system.t)
-        raise AssemblyError(f"the way from t = {system.t:.6g} to t = {path.end:.6g} s is blocked at t = {t:.6g} s")
+        raise AssemblyError(f"the path from t = {system.t:.6g} to t = {path.end:.6g} s is blocked at t = {t:.6g} s")
     if not continuation.blocked:
-        raise AssemblyError(f"the way is too winding: {TRIALS} steps lead through {100 * last.s:.0f} % of it")
+        raise AssemblyError(f"the path is too winding: {TRIALS} steps cover {100 * last.s:.0f} % of it")
     raise AssemblyError(
-        f"the way is blocked after {100 * last.s:.0f} % of it: there the loops stay open, or the mechanism jumps, as "
-        "at a dead centre of what is led; lead another coordinate, or give a position on the other side"
+        f"the path is blocked after {100 * last.s:.0f} % of it: there the loops cannot close, or the mechanism jumps, "
+        "as at a dead centre of the prescribed coordinate; prescribe another one, or give a position on the other side"
     )

@@ -31,5 +31,5 @@ def require_rank(kernels: Kernels, J: Array) -> None:
     if found > layout.rank:
         raise UsageError(
             f"with {', '.join(changed)} as given {found} constraint rows are independent, {layout.rank} with the "
-            "declared values, by which the degrees of freedom were judged; declare values with which they all act"
+            "declared values, which determine the degrees of freedom; declare values with which all of them act"
         )

@@ -35,7 +35,7 @@ def require_kind(path: Path) -> None:
     kind = kind_of(path)
     if kind not in (*WRITERS, ".html"):
         raise UsageError(
-            f"{path}: the ending says what kind of animation; there are .gif, .mp4, .html, "
+            f"{path}: the ending of the name selects the kind of animation: .gif, .mp4, .html, "
             "and a name without an ending is a folder for PNG frames"
         )
     if kind == ".html":

@@ -55,7 +55,9 @@ def follow_drivers(
     """
     if not is_driven(module) or _led_by_inputs(module, inputs, method):
         if method is not None:
-            raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
+            raise UsageError(
+                f"method 'kinematic' is for mechanisms without degrees of freedom; {module.name} has {module.n_dof}"
+            )
         return None
     if checkpoint is not None:
         raise UsageError(f"{module.name} is moved by its drivers, position by position: no checkpoint is kept")
@@ -65,7 +67,9 @@ def follow_drivers(
     forcing.attach(bound)
     watched = Events(module.layout, events)
     if watched.resets:
-        raise UsageError(f"{module.name} has no freedom: its drivers move it, and no event can reset its state")
+        raise UsageError(
+            f"{module.name} has no degree of freedom: its drivers move it, and no event can reset its state"
+        )
     listed = [event for event in watched.listed(bound, forcing) if event.direction != UNWATCHED]
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
     given = {key: value for key, value in options.items() if value is not None}

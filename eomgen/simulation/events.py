@@ -201,9 +201,9 @@ class Events:
     def crowded_near(t: float, count: int, names: Sequence[str]) -> ZenoError:
         """The same, of named events."""
         return ZenoError(
-            f"the events {', '.join(names)} follow each other ever faster near t = {t:.6g} s, after {count} resets "
-            "(Zeno), or a reset leads nowhere: end the run there (terminal: a number of times), let what comes to rest "
-            "stay in contact by a contact force, or reset otherwise"
+            f"the events {', '.join(names)} follow each other faster and faster near t = {t:.6g} s, after {count} "
+            "resets (Zeno), or a reset repeats without an end: end the run there (terminal: a number of times), use a "
+            "contact force for a body that comes to rest, or change the reset"
         )
 
 

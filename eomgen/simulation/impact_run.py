@@ -80,7 +80,9 @@ def simulate_impacts(
     most = read_count("most, the number of impacts,", most, 1)
     found, _ = check_gaps(module.layout, gaps)
     if not module.n_dof:
-        raise UsageError(f"{module.name} has no freedom: its drivers move it, and no impact can change its motion")
+        raise UsageError(
+            f"{module.name} has no degree of freedom: its drivers determine the motion, and no impact can change it"
+        )
     start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
     if end < start:
         raise UsageError(f"a run with impacts goes forward in time, not from {start:.6g} s to {end:.6g} s")

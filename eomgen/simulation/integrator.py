@@ -70,7 +70,9 @@ class Integrator:
         step: float | None = None,
     ) -> None:
         if not module.n_dof:
-            raise UsageError(f"{module.name} has no freedom to integrate: its drivers move it; simulate follows them")
+            raise UsageError(
+                f"{module.name} has no degree of freedom to integrate: its drivers determine the motion; use simulate"
+            )
         if Events(module.layout, None).resets:
             raise UsageError(f"events of {module.name} reset its state, and an integrator watches none; simulate it")
         self._given = (module, method, rtol, atol, max_step, first_step, step)

@@ -186,7 +186,8 @@ def _refuse_change_point(module: BoundModel, forcing: Forcing, t: float, x: Arra
     if singular_values(module, np.array([t]), x[:, None], u)[0, module.layout.rank - 1] < SINGULAR:
         raise NoDerivativeError(
             f"the run passes a change point at t = {t:.6g} s{place(module.layout.x, x)}: the mobility changes there, "
-            "and a small change of what the run is differentiated by closes or opens its way; end the run before"
+            "and a small change of a parameter may close or open the branch, so there is no derivative; end the run "
+            "before it"
         )
 
 

@@ -180,8 +180,8 @@ def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, co
     bad = np.flatnonzero(left > CONTRADICTION * np.maximum(1.0, np.abs(b).max(axis=0)))
     if bad.size:
         raise UsageError(
-            f"the start cannot follow a change of {columns.names[bad[0]]}: the constraints and the held values leave "
-            "no room for it; hold fewer values"
+            f"the start cannot follow a change of {columns.names[bad[0]]}: the constraints and the held values do "
+            "not allow it; hold fewer values"
         )
     return np.asarray(found)
 

@@ -126,6 +126,6 @@ def describe_crawl(crawl: Crawling, names: tuple[str, ...], end: float, method: 
     """The message of a run that crawls."""
     why = f": {steep}" if steep else ""
     return (
-        f"{method} gave up at t = {crawl.t:.9g} s of {end:.6g} s{place(names, crawl.x)}: its steps, {crawl.step:.1e} s "
-        f"on average, lead nowhere{why}; {REMEDY}"
+        f"{method} stopped at t = {crawl.t:.9g} s of {end:.6g} s{place(names, crawl.x)}: with steps "
+        f"of {crawl.step:.1e} s on average it makes no progress{why}; {REMEDY}"
     )

@@ -73,7 +73,7 @@ def test_what_it_refuses(mod: eg.Module) -> None:
     with pytest.raises(eg.UsageError, match="takes no option 'lband'"):
         mod.simulate(1.0, lband=1)
     pendulum = eg.load(models.EXAMPLES / "pendulum.yaml").compile(target="numpy")
-    with pytest.raises(eg.UsageError, match="'kinematic' is for mechanisms without freedom"):
+    with pytest.raises(eg.UsageError, match="'kinematic' is for mechanisms without degrees of freedom"):
         pendulum.simulate(1.0, method="kinematic")
 
 

@@ -143,7 +143,7 @@ def test_what_drivers_impose() -> None:
     mod = m.compile(target="numpy")
     with pytest.raises(eg.UsageError, match="gap a closes at the rate -2, which drivers or constraints impose"):
         mod.impact(0.0, mod.x0(), {"a": 0.5})
-    with pytest.raises(eg.UsageError, match="has no freedom"):
+    with pytest.raises(eg.UsageError, match="has no degree of freedom"):
         mod.simulate_impacts(1.0, {"a": 0.5})
 
 

@@ -219,7 +219,7 @@ def test_a_led_slider_stops_at_its_dead_centres(free_crank: eg.Module) -> None:
     assert stop.moving == ("theta", "bend")
     assert (len(part), part["s"][-1]) == (21, pytest.approx(0.4))  # the stop itself is one of the points
     assert np.isfinite(part.a[:, :-1]).all()
-    with pytest.raises(eg.PartitionError, match="s cannot be led from the initial position.*branches meet"):
+    with pytest.raises(eg.PartitionError, match="s cannot be prescribed from the initial position.*branches meet"):
         free_crank.kinematic_analysis(s=[0.4, 0.3], initial={"theta": 0.0})
 
 
@@ -242,7 +242,7 @@ def test_a_range_may_turn_back(free_crank: eg.Module) -> None:
     [
         ({}, "there is no range"),
         ({"theta": 0.1}, "there is no range"),
-        ({"theta": [0, 1], "s": [0.3, 0.4]}, "theta, s cannot all be led: 1 degree of freedom"),
+        ({"theta": [0, 1], "s": [0.3, 0.4]}, "theta, s cannot all be prescribed: 1 degree of freedom"),
         ({"thet": [0, 1]}, "no coordinate or rate 'thet'.*theta"),
         ({"theta": [0, 1], "s_dot": 1}, "s_dot is given, and no values of s"),
         ({"theta": [0, 1, 2], "theta_dot": [1, 2]}, "one length, not theta: 3, theta_dot: 2"),
@@ -258,7 +258,7 @@ def test_what_cannot_be_asked(free_crank: eg.Module, asked: dict[str, object], s
 
 
 def test_nothing_is_left_to_lead_where_drivers_move_all(crank: eg.Module) -> None:
-    with pytest.raises(eg.UsageError, match="the drivers move all; give t"):
+    with pytest.raises(eg.UsageError, match="the drivers determine the whole motion; give t"):
         crank.kinematic_analysis(theta=[0, 1])
 
 

@@ -326,7 +326,7 @@ def test_any_name_serves_a_reduction_of_ones_own(pendulum: Any, tmp_path: Path) 
     made = pendulum.simulate_many(1, angles(5), reduce=keep, store=tmp_path / "runs")
     assert set(made.reduced) == {"mean", "x", "file", "runs_t"}
     assert made.x is None
-    with pytest.raises(eg.UsageError, match="kept what its reduction made"):
+    with pytest.raises(eg.UsageError, match="kept only the results of its reduction"):
         made["theta1"]
     with pytest.raises(eg.UsageError, match="belongs to another ensemble: reduce differ"):
         pendulum.simulate_many(1, angles(5), reduce=lambda block: {"x": block.x[1]}, store=tmp_path / "runs")

@@ -130,7 +130,7 @@ def test_states_off_the_constraints_are_brought_onto_them_first(four_bar: Any) -
 
 
 def test_mechanisms_without_freedom_are_refused() -> None:
-    with pytest.raises(eg.UsageError, match="driven_slider_crank has no freedom"):
+    with pytest.raises(eg.UsageError, match="driven_slider_crank has no degree of freedom"):
         eg.load(EXAMPLES / "driven_slider_crank.yaml").compile().integrator()
 
 

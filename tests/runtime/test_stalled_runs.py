@@ -44,7 +44,7 @@ def test_a_friction_that_jumps_is_named(method: str, target: str) -> None:
     with pytest.raises(eg.SimulationError) as caught:
         module.simulate(5, method=method)
     words = str(caught.value)
-    assert words.startswith(f"{method} gave up at t = 0.10000")
+    assert words.startswith(f"{method} stopped at t = 0.10000")
     assert ", s_dot = " in words
     assert "the rate of s_dot changes by 20 where s_dot changes by" in words
     assert "jumps (smooth it)" in words
