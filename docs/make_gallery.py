@@ -23,7 +23,7 @@ from eomgen.show.writers import gif_bytes
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
-STILL, MOVING = 70.0, 42.0  #: dots in an inch
+STILL, MOVING, SPATIAL = 70.0, 42.0, 54.0  #: dots in an inch of a picture, of a film in the plane and of one in space
 COLORS = 48  #: of a picture that stands still
 LASTS, FPS = 4.0, 10.0  #: seconds of a film, frames in a second
 SMOOTH = 6  #: times as many points for a path in a picture that stands still
@@ -83,7 +83,7 @@ def draw(shown: Shown) -> Path:
     motion = sample(trajectory, lambda t: states_at(trajectory, module, t), rate, float(trajectory.t[-1]) / LASTS)
     if moving:
         scene = moving_scene(module, motion, False, False, shown.options.trace)
-        file.write_bytes(gif_bytes(Frames.of(scene, motion, (), MOVING)))
+        file.write_bytes(gif_bytes(Frames.of(scene, motion, (), SPATIAL if scene.view is None else MOVING)))
         return file
     moment = round(MOMENTS.get(file.stem, AT) * (len(motion.t) - 1))
     if not shown.options.trace:  # its surroundings alone, however far the mechanism goes
