@@ -71,7 +71,7 @@ def site(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Site:
     with (folder / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not (folder / "result").exists():
-            words = ["-b", "html", "-W", "-n", "-q", "--keep-going", "-j", "2", ROOT / "docs", folder / "html"]
+            words = ["-b", "html", "-W", "-n", "-q", "--keep-going", ROOT / "docs", folder / "html"]
             built = subprocess.run([sys.executable, "-m", "sphinx", *words], capture_output=True, text=True)
             (folder / "result").write_text(
                 f"{built.stdout}{built.stderr}" if built.returncode else "", encoding="utf-8"
