@@ -102,6 +102,8 @@ def test_a_browser_draws_all_formulas_without_a_network(site: Site, tmp_path: Pa
             drawn = browser.evaluate("document.querySelectorAll('mjx-container svg').length")
             assert drawn >= browser.evaluate("document.querySelectorAll('.math').length") > 10
             assert browser.evaluate("document.querySelectorAll('mjx-merror, [data-mml-node=merror]').length") == 0
+        browser.open((site.root / "search.html").as_uri() + "?q=spring")
+        browser.wait_for("document.querySelectorAll('#search-results li').length > 10")
         assert (browser.requests, browser.complaints) == ([], [])
 
 
