@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import re
 import shutil
 import sys
 from pathlib import Path
@@ -17,6 +16,7 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_extensions"))
 
 from public_methods import documented_classes  # noqa: E402
+from tutorial_list import notebooks  # noqa: E402
 
 project, author = "eomgen", "the authors of eomgen"
 version = release = eomgen.__version__
@@ -63,6 +63,7 @@ html_static_path = ["_static"]
 html_css_files = ["eomgen.css"]
 html_show_sourcelink = False
 html_copy_source = False
+html_show_search_summary = False  # it would fetch pages, which a browser refuses to pages that are files
 html_theme_options = {
     "light_css_variables": {"color-brand-primary": "#0b5394", "color-brand-content": "#0b5394"},
     "dark_css_variables": {"color-brand-primary": "#7db8f0", "color-brand-content": "#7db8f0"},
@@ -86,14 +87,9 @@ def copy_notebooks(app: Any) -> None:
 
 
 def fill_contents(app: Any, name: str, source: list[str]) -> None:
-    """Put into tables of contents what a pattern at the beginning of a line stands for, notebooks by their numbers."""
-
-    def pages(found: re.Match[str]) -> str:
-        names = [path.stem for path in (HERE / name).parent.glob(f"{found[1]}*") if path.suffix in (".md", ".ipynb")]
-        return "".join(f"{one}\n" for one in sorted(names, key=lambda one: (int(re.match(r"\d*", one)[0] or 0), one)))
-
-    if name in ("index", "tutorials/index"):
-        source[0] = re.sub(r"^([\w\[\]-]+)\*\n", pages, source[0], flags=re.MULTILINE)
+    """Put the notebooks into their table of contents, by their numbers."""
+    if name == "tutorials/index":
+        source[0] = source[0].replace("NOTEBOOKS", "\n".join(path.stem for path in notebooks()))
 
 
 def copy_mathjax(app: Any, failure: Exception | None) -> None:
