@@ -21,9 +21,9 @@ from ..limits.statics import SYMMETRIC
 from ..numeric import algebra
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
-from ..runtime.drawing import load_show
 from ..runtime.initial import Initial
 from ..runtime.room import read_numbers
+from ..runtime.show_parts import load_show
 from ..texts import html_text
 from .equilibrium import equilibrium
 from .linear import linearize

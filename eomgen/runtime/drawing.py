@@ -6,31 +6,12 @@ A generated package has no copy of that: its pictures need eomgen beside it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from ..errors import MissingDependencyError
+from .show_parts import load_show
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
-
-
-def load_show(part: str, purpose: str) -> ModuleType:
-    """A file of ``eomgen.show``.
-
-    Raises
-    ------
-    MissingDependencyError
-        This is a generated package, and eomgen is not installed.
-    """
-    for home in (f"{__package__.rpartition('.')[0]}.show", "eomgen.show"):
-        try:
-            return import_module(f"{home}.{part}")
-        except ModuleNotFoundError as error:
-            if error.name is None or not f"{home}.{part}".startswith(error.name):
-                raise
-    raise MissingDependencyError(f"{purpose} of a generated package needs eomgen beside it: pip install eomgen")
 
 
 def draw(

@@ -85,24 +85,13 @@ class Initial:
         """The name as it is listed; outputs and places of markers become values that can be held."""
         plain: str = next(iter(without_dots({name: 0.0})))
         layout = self.layout
-        listed = (*self.coordinates, *layout.v, *layout.loop_rates, *layout.p, *layout.parameter_rates)
-        if plain in listed or plain in self.wanted_rates:
+        if plain in (*self.coordinates, *layout.v, *layout.loop_rates, *layout.p, *layout.parameter_rates):
             return plain
-        if name in self.coordinates:
-            return name
         try:
-            from .wanted_outputs import WantedRate, find_wanted, with_wanted
+            from .wanted_outputs import admit
         except UnavailableError:
             return plain
-        found = find_wanted(self.kernels, plain if plain in layout.y else name, self.t)
-        if found is None:
-            return plain
-        if isinstance(found, WantedRate):
-            self.wanted_rates[plain] = found
-        else:
-            self.system = with_wanted(self.system, [found])
-            self.coordinates += (found.name,)
-        return found.name
+        return admit(self, name, plain)
 
     # functions of q
 
@@ -262,9 +251,7 @@ class Initial:
         basis = algebra.svd(J)[2][rank(J).rank :]
         driven = self._solve_rates(q, {}).v / self.scales.q  # what driven constraints impose
         for name, value in given.items():
-            scale = layout.loop_scales[layout.loop_rates.index(name)] if name in layout.loop_rates else 1.0
-            scale = self.scales.q[layout.v.index(name)] if name in layout.v else scale
-            scale = self.wanted_rates[name].scale if name in self.wanted_rates else scale
+            scale = self.scales.q[layout.v.index(name)] if name in layout.v else self._rate(q, name)[2]
             row = self.gradients(q, name)[0]
             still = np.linalg.norm(basis @ row) < STILL * max(1.0, float(np.linalg.norm(row)))
             if still and abs(row @ driven) < UNMOVED and abs(value / scale) > SHORT:
@@ -299,27 +286,20 @@ class Initial:
         )
 
     def _rate_equations(self, q: Array, held: Mapping[str, float]) -> VelocityEquations | None:
-        """The held rates that are no velocities of the tree: those of cut joints, and outputs."""
-        layout = self.layout
-        names = [name for name in held if name not in layout.v]
+        names = [name for name in held if name not in self.layout.v]
         if not names:
             return None
-        rows, offsets, scales = [], [], []
-        zero = np.zeros(layout.n_v)
-        for name in names:
-            if name in self.wanted_rates:
-                row, offset = self.wanted_rates[name].evaluate(q, self.t)
-                scale = self.wanted_rates[name].scale
-            else:
-                assert self._loop is not None
-                k = layout.loop_rates.index(name)
-                row, offset = self.system.cut.evaluate(q, self.t)[1][k], self._loop(q, zero, zero, t=self.t)[1][k]
-                scale = layout.loop_scales[k]
-            rows.append(row)
-            offsets.append(offset)
-            scales.append(scale)
-        values = np.array([held[name] for name in names])
-        return VelocityEquations(np.array(rows), np.array(offsets), values, np.array(scales), names)
+        rows, offsets, scales = (np.array(part) for part in zip(*(self._rate(q, n) for n in names), strict=True))
+        return VelocityEquations(rows, offsets, np.array([held[name] for name in names]), scales, names)
+
+    def _rate(self, q: Array, name: str) -> tuple[Array, float, float]:
+        """y_q, y_t and the typical size of a rate y' = y_q v + y_t of a cut joint, or of an output."""
+        if name in self.wanted_rates:
+            return self.wanted_rates[name].at(q, self.t)
+        assert self._loop is not None
+        k, zero = self.layout.loop_rates.index(name), np.zeros(self.layout.n_v)
+        y_t = self._loop(q, zero, zero, t=self.t)[1]
+        return self.system.cut.evaluate(q, self.t)[1][k], y_t[k], self.layout.loop_scales[k]
 
     # which values can be held together
 
@@ -365,8 +345,8 @@ class Initial:
         if name in layout.v:
             return [np.eye(layout.n_v)[layout.v.index(name)]]
         if name in self.wanted_rates:
-            wanted = self.wanted_rates[name]
-            return [wanted.evaluate(q, self.t)[0] * self.scales.q / wanted.scale]
+            row, _, scale = self._rate(q, name)
+            return [row * self.scales.q / scale]
         if name in layout.loop_rates:
             name = layout.loops[layout.loop_rates.index(name)]
         return self.system.gradients(q, name)

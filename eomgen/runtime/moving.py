@@ -9,9 +9,9 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .drawing import load_show
 from .near_names import unknown
 from .refined import states_at
+from .show_parts import load_show
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from ..files.inline_pictures import picture_html, side_by_side
 from ..kernel_table import KERNELS
 from ..texts import html_table, html_text
-from .drawing import load_show
 from .near_names import require
 from .plotting import choose, height, stack
+from .show_parts import load_show
 from .summary import facts, trajectory_facts
 
 if TYPE_CHECKING:

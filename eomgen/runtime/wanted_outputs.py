@@ -7,7 +7,7 @@ velocities, such as ``vx(rod.tip)``, of the velocities.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,10 +15,10 @@ from ..errors import UsageError
 from ..limits.runs import DIFFERENCE
 from ..numeric.constraint_system import ConstraintSystem, CutJoints
 from ..numeric.scales import Array
-from .drawing import load_show
 from .kernels import Kernels
 from .layout import Layout
 from .near_names import UnknownNameError, place_of_marker, unknown
+from .show_parts import load_show
 
 
 class WantedPosition(NamedTuple):
@@ -35,6 +35,28 @@ class WantedRate(NamedTuple):
     name: str
     scale: float
     evaluate: Callable[[Array, float], tuple[Array, float]]  #: (q, t) -> y_v (n,), y_0
+
+    def at(self, q: Array, t: float) -> tuple[Array, float, float]:
+        """y_v (n,), y_0 and the typical size."""
+        return (*self.evaluate(q, t), self.scale)
+
+
+def admit(initial: Any, name: str, plain: str) -> str:
+    """Make a name that is no coordinate a value that can be held, if it can be one; returns the name as it is listed.
+
+    ``initial`` is an :class:`~.initial.Initial`, ``plain`` the name of an instance's element without dots.
+    """
+    if plain in initial.wanted_rates or name in initial.coordinates:
+        return plain if plain in initial.wanted_rates else name
+    found = find_wanted(initial.kernels, plain if plain in initial.layout.y else name, initial.t)
+    if found is None:
+        return plain
+    if isinstance(found, WantedRate):
+        initial.wanted_rates[plain] = found
+    else:
+        initial.system = with_wanted(initial.system, [found])
+        initial.coordinates += (found.name,)
+    return found.name
 
 
 def find_wanted(kernels: Kernels, name: str, t: float) -> WantedPosition | WantedRate | None:

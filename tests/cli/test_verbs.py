@@ -232,7 +232,7 @@ def test_check_draws_the_mechanism(call: Call, tmp_path: Path) -> None:
 
 
 def test_rounding_of_zeros_is_shown_as_zero() -> None:
-    from eomgen.cli.screen import without_noise
+    from eomgen.analysis.tables import without_noise
 
     assert without_noise([1.0, -3e-20, 2e-3, float("nan")], ["m", "m", "rad", "m"])[:3] == [1.0, 0.0, 2e-3]
     assert without_noise([-3e-20, 1e-21]) == [-3e-20, 1e-21]  # all of a small machine
