@@ -34,7 +34,7 @@ EXTRAS = {
     "viz": ("animations as a page", ("matplotlib", "k3d")),
     "results": ("tables of results", ("pandas",)),
     "compiler": ("a C compiler from pip", ("ziglang",)),
-    "notebook": ("Jupyter notebooks", ("jupyterlab", "ipywidgets", "matplotlib", "k3d", "pandas")),
+    "notebook": ("Jupyter notebooks", ("jupyterlab", "ipywidgets", "matplotlib", "k3d", "pandas", "control")),
 }
 
 

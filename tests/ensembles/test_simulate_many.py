@@ -190,7 +190,7 @@ def test_no_runs_and_one_run(pendulum: Any) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"initial": {"theta3": 1.0}}, "did you mean theta1"),
+        ({"initial": {"theta3": 1.0}}, "did you mean theta2 or theta1"),
         ({"initial": {"theta1": [1.0, np.nan]}}, r"initial theta1 must be finite; entry \[1\] is nan"),
         ({"initial": np.zeros((3, 5))}, r"initial must have shape \(4,\) or \(4, k\)"),
         ({"initial": {"theta1": [1, 2]}, "parameters": {"g": [1, 2, 3]}}, "initial theta1: 2"),

@@ -89,7 +89,7 @@ BROKEN: list[tuple[str, str, str]] = [
     ("  law: {type: table, x: [0, 1, 2], y: [1, s, 3]}", "functions.law.y[1]", "the name 's' cannot stand here"),
     ("  law: {type: table, x: [0, 1, 2], y: [1, null, 3]}", "functions.law.y[1]", "has no value"),
     ("  law: {type: table, x: [0, 1, 2], y: [1, [2], 3]}", "functions.law.y[1]", "[2] is not a number"),
-    ("  law: {type: table, x: [0, 1e-300, 1], y: [1, 2, 3]}", "functions.law.x", "too near"),
+    ("  law: {type: table, x: [0, 1e-300, 1], y: [1, 2, 3]}", "functions.law.x", "too close"),
     ("  law: {type: table, x: [0, 1, 2], y: [1, 2]}", "functions.law.y", "has 2 values for 3 points"),
     ("  law: {type: table, kind: cubik, x: [0, 1], y: [1, 2]}", "functions.law.kind", "'cubik' is not known; did you"),
     ("  law: {type: table, extrapolation: no, x: [0, 1], y: [1, 2]}", "functions.law.extrapolation", "'no' is not"),

@@ -112,7 +112,7 @@ def number(r: random.Random) -> Any:
         return r.choice((1, -1)) * 10.0 ** r.uniform(-320, 308)
     if k == 2:
         return r.randint(-(10**6), 10**6)
-    return r.choice(VALUES) if k == 3 else r.choice(NUMBERS)
+    return copied(r.choice(VALUES)) if k == 3 else r.choice(NUMBERS)
 
 
 def change(
