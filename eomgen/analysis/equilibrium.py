@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import AssemblyError, UsageError
 from ..numeric.scales import Array
+from ..runtime.assembled import initial_of
 from ..runtime.initial import Initial
 from ..runtime.near_names import read_names, unknown
 from ..runtime.refusals import require_velocities
@@ -97,7 +98,7 @@ def equilibrium(
 
 def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) -> Array:
     """A closed position near the guess that has the held values."""
-    initial = Initial(module.kernels, t)
+    initial = initial_of(module.kernels, t, guess if isinstance(guess, Mapping) else ())
     if guess is None or isinstance(guess, Mapping):
         values = {name: read_value(name, value) for name, value in (guess or {}).items()}
         if initial.sort(values).rates:

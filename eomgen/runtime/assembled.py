@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -12,10 +12,10 @@ from ..errors import UsageError
 from ..limits.constraints import CHOSEN
 from ..numeric.scales import Array
 from .argument_names import both_names
-from .initial import Initial
+from .initial import Given, Initial
 from .kernels import Kernels
 from .layout import Layout
-from .near_names import require_mapping
+from .near_names import require_mapping, without_dots
 from .room import read_number, read_numbers, read_value
 
 
@@ -75,8 +75,7 @@ class Assembled:
             The values are not reached from the declared position without leaving its branch; the loops are then closed
             from the nearest guess.
         """
-        initial = self._initial(t, p, u)
-        given = initial.sort(_numbers(values, named))
+        initial, given = self._given(values, named, t, p, u)
         q = initial.assembled(given.positions)
         v = initial.velocities(q, given.rates if given.positions or given.rates else None)
         return np.concatenate([q, v])
@@ -112,12 +111,10 @@ class Assembled:
         AssemblyError
             The loops do not close.
         """
-        initial = self._initial(t, p, u)
-        values = _numbers(guess, named)
-        given = initial.sort(values)
+        initial, given = self._given(guess, named, t, p, u)
         if given.rates:
             raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; x0 takes rates too")
-        return initial.from_guess(given.positions) if values else initial.assembled({})
+        return initial.from_guess(given.positions) if given.positions else initial.assembled({})
 
     @both_names
     @np.errstate(all="ignore")
@@ -135,10 +132,9 @@ class Assembled:
 
         The search is bounded and repeats exactly; it may miss a branch.
         """
-        initial = self._initial(t, p, u)
-        given = initial.sort(_numbers(values, named)).positions
-        first = initial.assembled(given, rough=True)
-        return initial.branches(given or initial.sort(self.layout.initial).positions, first)
+        initial, given = self._given(values, named, t, p, u)
+        first = initial.assembled(given.positions, rough=True)
+        return initial.branches(given.positions or initial.sort(self.layout.initial).positions, first)
 
     @both_names
     @np.errstate(all="ignore")
@@ -165,8 +161,16 @@ class Assembled:
         there = initial.side(initial.reference())
         return 0 if abs(here) < CHOSEN else int(np.sign(here * (np.sign(there) or 1.0)))
 
-    def _initial(self, t: float, p: Any, u: Any) -> Initial:
-        """The assembly of this model with other parameters and inputs, if given.
+    def _given(self, values: Any, named: Any, t: float, p: Any, u: Any) -> tuple[Initial, Given]:
+        """The assembly to these values, and the values as positions and rates."""
+        if values is not None:
+            require_mapping("initial values", values)
+        numbers = {name: read_value(name, value) for name, value in {**(values or {}), **named}.items()}
+        initial = self._initial(t, p, u, numbers)
+        return initial, initial.sort(numbers)
+
+    def _initial(self, t: float, p: Any, u: Any, names: Iterable[str] = ()) -> Initial:
+        """The assembly of this model with other parameters and inputs, if given, to values of these names.
 
         Raises
         ------
@@ -179,11 +183,14 @@ class Assembled:
             if scalar and name in layout.q + layout.loops + layout.v:
                 kind = "velocity" if name in layout.v else "coordinate"
                 raise UsageError(f"{name}= gives the {what}; the {kind} {name!r} goes in a dict: {{{name!r}: ...}}")
-        return Initial((self if p is None and u is None else self.bind(p, u)).kernels, read_number("t", t))
+        kernels = (self if p is None and u is None else self.bind(p, u)).kernels
+        return initial_of(kernels, read_number("t", t), names)
 
 
-def _numbers(values: Mapping[str, float | str] | None, named: Mapping[str, float | str]) -> dict[str, float]:
-    if values is not None:
-        require_mapping("initial values", values)
-    merged = {**(values or {}), **named}
-    return {name: read_value(name, value) for name, value in merged.items()}
+def initial_of(kernels: Kernels, t: float, names: Iterable[str]) -> Initial:
+    """The assembly of a model to values of these names; outputs and places of markers may be among them."""
+    if not any("(" in name or name in kernels.layout.y for name in without_dots(dict.fromkeys(map(str, names)))):
+        return Initial(kernels, t)
+    from .wanted_outputs import WantedInitial
+
+    return WantedInitial(kernels, t, names)

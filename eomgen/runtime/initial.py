@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError, UnavailableError
+from ..errors import AssemblyError
 from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
 from ..numeric.assembly_velocity import Rates, VelocityEquations, assemble_velocity
@@ -31,12 +32,9 @@ from .kernels import Kernels
 from .late_rank import require_rank
 from .near_names import UnknownNameError, unknown, without_dots
 
-if TYPE_CHECKING:
-    from .wanted_outputs import WantedRate
-
 
 class Given(NamedTuple):
-    """Values by the name of a coordinate, its rate, a loop coordinate or its rate, an output or a marker's place."""
+    """Values by the name of a coordinate, its rate, a loop coordinate or its rate."""
 
     positions: dict[str, float]
     rates: dict[str, float]
@@ -61,14 +59,12 @@ class Initial:
         self._loop = kernels.motion("loop_coordinates") if layout.n_loop_coordinates else None
         self.scales, self.place = layout.scales, layout.place_scales
         self.coordinates = layout.q + layout.loops
-        self.wanted_rates: dict[str, WantedRate] = {}
 
     def sort(self, values: Mapping[str, float]) -> Given:
         """Split values into positions and rates; raises UsageError for a name that is neither."""
         layout = self.layout
         rates = layout.v + layout.loop_rates
-        values = {self._admit(name): value for name, value in values.items()}
-        rates = rates + tuple(self.wanted_rates)
+        values = without_dots(values)
         for name in values:
             if name in layout.p:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")
@@ -80,18 +76,6 @@ class Initial:
                 raise unknown("coordinate or rate", name, self.coordinates + rates + layout.y)
         positions = {n: x for n, x in values.items() if n in self.coordinates}
         return Given(self.system.settle(positions), {n: x for n, x in values.items() if n in rates})
-
-    def _admit(self, name: str) -> str:
-        """The name as it is listed; outputs and places of markers become values that can be held."""
-        plain: str = next(iter(without_dots({name: 0.0})))
-        layout = self.layout
-        if plain in (*self.coordinates, *layout.v, *layout.loop_rates, *layout.p, *layout.parameter_rates):
-            return plain
-        try:
-            from .wanted_outputs import admit
-        except UnavailableError:
-            return plain
-        return admit(self, name, plain)
 
     # functions of q
 
@@ -111,8 +95,7 @@ class Initial:
 
     def reference(self) -> Array:
         """The reference position, closed again for these parameters and this time."""
-        later = self.later()
-        if later is not None:
+        if (later := self.later()) is not None:
             return later
         declared = self.sort(self.layout.initial).positions
         try:
@@ -185,18 +168,14 @@ class Initial:
         favoured = [layout.velocity_labels[i] for i in layout.independent]
         ordered = {name: guess[name] for name in favoured if name in guess} | dict(guess)
         if set(guess) <= set(favoured):
-            try:
+            with suppress(AssemblyError):
                 return self.assembled(guess, rough=True)
-            except AssemblyError:
-                pass
         declared = {**self.sort(layout.guess).positions, **self.sort(layout.initial).positions}
         start = self.system.with_values(self.system.with_values(layout.q_reference, declared), guess)
         soft = self.compatible(start, {}, {**ordered, **{k: v for k, v in declared.items() if k not in guess}})
         for held in (soft, {k: v for k, v in soft.items() if k in guess}):
-            try:
+            with suppress(AssemblyError):
                 return self.system.close(start, held, restarts=0).q
-            except AssemblyError:
-                continue
         return self.system.close(start, {}).q
 
     def branches(self, given: Mapping[str, float], first: Array, tries: int = 60) -> list[Array]:
@@ -251,16 +230,15 @@ class Initial:
         basis = algebra.svd(J)[2][rank(J).rank :]
         driven = self._solve_rates(q, {}).v / self.scales.q  # what driven constraints impose
         for name, value in given.items():
-            scale = self.scales.q[layout.v.index(name)] if name in layout.v else self._rate(q, name)[2]
+            scale = self.scales.q[layout.v.index(name)] if name in layout.v else self.rate_equation(q, name)[2]
             row = self.gradients(q, name)[0]
             still = np.linalg.norm(basis @ row) < STILL * max(1.0, float(np.linalg.norm(row)))
             if still and abs(row @ driven) < UNMOVED and abs(value / scale) > SHORT:
                 moves = np.linalg.norm(basis, axis=0)
                 ordered = dict.fromkeys([*layout.independent, *np.argsort(-moves, kind="stable")])
                 others = [layout.v[i] for i in ordered if moves[i] > 0.1]
-                remedy = (
-                    f"give {' or '.join(others[:2])} instead, or another position" if others else "nothing can move"
-                )
+                instead = " or ".join(others[:2])
+                remedy = f"give {instead} instead, or another position" if others else "nothing can move"
                 raise AssemblyError(
                     f"{name} = {value:.6g} cannot be reached: the constraints hold that coordinate still here, as at "
                     f"a dead centre or across a blade{place(layout.q, q)}; {remedy}"
@@ -269,37 +247,30 @@ class Initial:
     def _solve_rates(self, q: Array, held: Mapping[str, float]) -> Rates:
         layout = self.layout
         v = np.zeros(layout.n_v)
-        indices = []
-        for name, value in held.items():
-            if name in layout.v:
-                indices.append(layout.v.index(name))
-                v[indices[-1]] = value
+        indices = [layout.v.index(name) for name in held if name in layout.v]
+        v[indices] = [held[name] for name in held if name in layout.v]
+        others = [name for name in held if name not in layout.v]
+        equations = None
+        if others:
+            y_q, y_t, scales = map(np.array, zip(*(self.rate_equation(q, name) for name in others), strict=True))
+            equations = VelocityEquations(y_q, y_t, np.array([held[name] for name in others]), scales, others)
         return assemble_velocity(
             self._C_q(q, t=self.t),
             self.rate(q),
             self.scales,
             guess=v,
             held=indices,
-            equations=self._rate_equations(q, held),
+            equations=equations,
             names=layout.v,
             labels=layout.constraint_labels,
         )
 
-    def _rate_equations(self, q: Array, held: Mapping[str, float]) -> VelocityEquations | None:
-        names = [name for name in held if name not in self.layout.v]
-        if not names:
-            return None
-        rows, offsets, scales = (np.array(part) for part in zip(*(self._rate(q, n) for n in names), strict=True))
-        return VelocityEquations(rows, offsets, np.array([held[name] for name in names]), scales, names)
-
-    def _rate(self, q: Array, name: str) -> tuple[Array, float, float]:
-        """y_q, y_t and the typical size of a rate y' = y_q v + y_t of a cut joint, or of an output."""
-        if name in self.wanted_rates:
-            return self.wanted_rates[name].at(q, self.t)
+    def rate_equation(self, q: Array, name: str) -> tuple[Array, float, float]:
+        """y_q (n,), y_t and the typical size of a rate y' = y_q v + y_t that is no velocity of the tree."""
+        layout, zero = self.layout, np.zeros(self.layout.n_v)
         assert self._loop is not None
-        k, zero = self.layout.loop_rates.index(name), np.zeros(self.layout.n_v)
-        y_t = self._loop(q, zero, zero, t=self.t)[1]
-        return self.system.cut.evaluate(q, self.t)[1][k], y_t[k], self.layout.loop_scales[k]
+        k, y_t = layout.loop_rates.index(name), self._loop(q, zero, zero, t=self.t)[1]
+        return self.system.cut.evaluate(q, self.t)[1][k], y_t[k], layout.loop_scales[k]
 
     # which values can be held together
 
@@ -317,8 +288,7 @@ class Initial:
         basis: Array = np.empty((0, len(scales.q)))
         if rows:
             stacked = np.array(rows)
-            count = rank(stacked).rank
-            basis = algebra.svd(stacked)[2][:count]
+            basis = algebra.svd(stacked)[2][: rank(stacked).rank]
         kept = {}
         for name, value in rest.items():
             added = basis
@@ -333,9 +303,8 @@ class Initial:
             else:
                 basis = added
                 kept[name] = value
-        whole = [
-            layout.q[i : i + 4] for i, _ in layout.quaternion_slots
-        ]  # Euler parameters are held together or not at all
+        # Euler parameters are held together or not at all
+        whole = [layout.q[i : i + 4] for i, _ in layout.quaternion_slots]
         torn = {name for four in whole if not all(name in kept for name in four) for name in four}
         return {name: value for name, value in kept.items() if name not in torn}
 
@@ -344,9 +313,6 @@ class Initial:
         layout = self.layout
         if name in layout.v:
             return [np.eye(layout.n_v)[layout.v.index(name)]]
-        if name in self.wanted_rates:
-            row, _, scale = self._rate(q, name)
-            return [row * self.scales.q / scale]
         if name in layout.loop_rates:
             name = layout.loops[layout.loop_rates.index(name)]
         return self.system.gradients(q, name)

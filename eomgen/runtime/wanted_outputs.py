@@ -6,8 +6,8 @@ velocities, such as ``vx(rod.tip)``, of the velocities.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,10 @@ from ..errors import UsageError
 from ..limits.runs import DIFFERENCE
 from ..numeric.constraint_system import ConstraintSystem, CutJoints
 from ..numeric.scales import Array
+from .initial import Given, Initial
 from .kernels import Kernels
 from .layout import Layout
-from .near_names import UnknownNameError, place_of_marker, unknown
+from .near_names import UnknownNameError, place_of_marker, unknown, without_dots
 from .show_parts import load_show
 
 
@@ -36,27 +37,48 @@ class WantedRate(NamedTuple):
     scale: float
     evaluate: Callable[[Array, float], tuple[Array, float]]  #: (q, t) -> y_v (n,), y_0
 
-    def at(self, q: Array, t: float) -> tuple[Array, float, float]:
-        """y_v (n,), y_0 and the typical size."""
-        return (*self.evaluate(q, t), self.scale)
 
+class WantedInitial(Initial):
+    """Assembly that can also hold the outputs and places of markers among some names.
 
-def admit(initial: Any, name: str, plain: str) -> str:
-    """Make a name that is no coordinate a value that can be held, if it can be one; returns the name as it is listed.
+    Parameters
+    ----------
+    kernels : Kernels
+    t : float
+        Time (s).
+    names : iterable of str
 
-    ``initial`` is an :class:`~.initial.Initial`, ``plain`` the name of an instance's element without dots.
+    Raises
+    ------
+    UsageError
+        An output that depends on accelerations, or on velocities otherwise than linearly; no such marker.
     """
-    if plain in initial.wanted_rates or name in initial.coordinates:
-        return plain if plain in initial.wanted_rates else name
-    found = find_wanted(initial.kernels, plain if plain in initial.layout.y else name, initial.t)
-    if found is None:
-        return plain
-    if isinstance(found, WantedRate):
-        initial.wanted_rates[plain] = found
-    else:
-        initial.system = with_wanted(initial.system, [found])
-        initial.coordinates += (found.name,)
-    return found.name
+
+    def __init__(self, kernels: Kernels, t: float, names: Iterable[str]) -> None:
+        super().__init__(kernels, t)
+        found = [one for one in (find_wanted(kernels, name, t) for name in names) if one is not None]
+        self.wanted_rates = {one.name: one for one in found if isinstance(one, WantedRate)}
+        positions = [one for one in found if isinstance(one, WantedPosition)]
+        self.wanted_positions = frozenset(one.name for one in positions)
+        self.system = with_wanted(self.system, positions)
+
+    def sort(self, values: Mapping[str, float]) -> Given:
+        places = {name: value for name, value in values.items() if place_of_marker(name)}
+        others = without_dots({name: value for name, value in values.items() if name not in places})
+        rates = {name: value for name, value in others.items() if name in self.wanted_rates}
+        positions = places | {name: value for name, value in others.items() if name in self.wanted_positions}
+        given = super().sort({n: x for n, x in others.items() if n not in positions and n not in rates})
+        return Given(given.positions | positions, given.rates | rates)
+
+    def rate_equation(self, q: Array, name: str) -> tuple[Array, float, float]:
+        wanted = self.wanted_rates.get(name)
+        return super().rate_equation(q, name) if wanted is None else (*wanted.evaluate(q, self.t), wanted.scale)
+
+    def gradients(self, q: Array, name: str) -> list[Array]:
+        if name not in self.wanted_rates:
+            return super().gradients(q, name)
+        row, _, scale = self.rate_equation(q, name)
+        return [row * self.scales.q / scale]
 
 
 def find_wanted(kernels: Kernels, name: str, t: float) -> WantedPosition | WantedRate | None:
@@ -69,7 +91,8 @@ def find_wanted(kernels: Kernels, name: str, t: float) -> WantedPosition | Wante
     """
     if found := place_of_marker(name):
         return _place(kernels, name, found[1], "xyz".index(found[0]))
-    return _output(kernels, name, t) if name in kernels.layout.y else None
+    plain = name.replace(".", "_") if isinstance(name, str) else name  # tip_x of an instance leg is leg.tip_x too
+    return _output(kernels, plain, t) if plain in kernels.layout.y else None
 
 
 def with_wanted(system: ConstraintSystem, wanted: Sequence[WantedPosition]) -> ConstraintSystem:

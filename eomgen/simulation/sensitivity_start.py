@@ -18,6 +18,7 @@ from ..numeric import algebra
 from ..numeric.projection import minimum_norm
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
+from ..runtime.near_names import place_of_marker
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -82,13 +83,12 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
     layout = module.layout
     initial = Initial(module.kernels, t)
     q, found = x[: layout.n_q], []
-    declared, chosen = initial.sort(layout.initial), initial.sort(dict(given or {}))
-    listed = (*layout.x, *layout.loops, *layout.loop_rates)
-    if other := [name for part in chosen for name in part if name not in listed]:
+    if outputs := [name for name in given or () if name in layout.y or place_of_marker(name)]:
         raise UsageError(
-            f"the start is differentiated where coordinates and rates are held, not {', '.join(other)}; give the "
+            f"the start is differentiated where coordinates and rates are held, not {', '.join(outputs)}; give the "
             "coordinates that x0(...) finds for it"
         )
+    declared, chosen = initial.sort(layout.initial), initial.sort(dict(given or {}))
     free = [layout.velocity_labels[i] for i in layout.independent] + list(layout.q)
     rates = [layout.v[i] for i in layout.independent] + list(layout.v)
     for first, second, rest, positions in (
