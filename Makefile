@@ -53,7 +53,7 @@ clean:
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-plot: EXTRAS := plot
-$(VENV)/.installed-docs: EXTRAS := docs
+$(VENV)/.installed-docs: EXTRAS := dev
 $(VENV)/.installed-test: EXTRAS := test,dev
 
 # uv installs in seconds what takes pip a minute; where uv cannot be had or cannot reach the index, pip does it.

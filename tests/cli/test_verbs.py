@@ -207,7 +207,7 @@ def test_every_extra_for_users_is_known_to_doctor() -> None:
     extras = project["optional-dependencies"]
     bare = {name: {text.partition(">")[0] for text in texts} for name, texts in extras.items()}
     assert {name: set(packages) for name, (_, packages) in EXTRAS.items()} == {
-        name: packages for name, packages in bare.items() if name not in ("test", "docs", "dev", "all")
+        name: packages for name, packages in bare.items() if name not in ("test", "dev", "all")
     }
     assert set(CORE) == {text.partition(">")[0] for text in project["dependencies"]}
 

@@ -94,8 +94,6 @@ CHANGES = {
     "shutil.unpack_archive": 2,
 }
 LOOKS = ("os.listdir", "os.scandir", "os.walk", "os.chdir", "glob.glob", "os.getxattr", "os.listxattr")
-#: Where installed packages are looked for, in the standard library and as a package of its own.
-PATH = ("importlib/metadata/__init__.py", "importlib_metadata/__init__.py")
 #: Python's own makers of classes, which run a text they wrote themselves.
 _STANDARD = ("dataclasses.py", "collections/__init__.py", "enum.py", "functools.py", "typing.py", "inspect.py")
 MAKERS = (
@@ -146,9 +144,11 @@ class Guard:
         if event in CHANGES:
             return next((f"{event} {p!r}" for p in args[: CHANGES[event]] if not self._own(p)), None)
         if event in LOOKS:
-            caller = sys._getframe(2).f_code.co_filename
-            if event == "os.listdir" and (caller == "<frozen importlib._bootstrap_external>" or caller.endswith(PATH)):
-                return None  # an import, or a search for an installed package, looks through the path
+            if (
+                event == "os.listdir"
+                and sys._getframe(2).f_code.co_filename == "<frozen importlib._bootstrap_external>"
+            ):
+                return None  # an import looks through the path
             return self._read(args[0], event)
         if event in ("subprocess.Popen", "os.posix_spawn"):
             return None if os.path.basename(str(args[0])) in self.programs else f"{event} {args[0]!r}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib.metadata
 import os
 import re
 import resource
@@ -49,11 +50,12 @@ class Outcome(NamedTuple):
 
 
 def _load_libraries() -> None:
-    """What looks through the machine when it is first used: the fonts of pictures, the registry of units."""
+    """What looks through the machine when it is first used: fonts, the registry of units, installed packages."""
     model = eomgen.Model("first")
     model.parameter("m", value=1, unit="lb")
     model.revolute("hinge", model.ground, model.body("rod", mass="m", com=(0, 1, 0)), coordinate="q")
     assert "no picture" not in model._repr_html_()
+    importlib.metadata.version("eomgen")
 
 
 class Runner:
