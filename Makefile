@@ -4,6 +4,7 @@
 # make notebooks  executes the notebooks anew and stores their outputs; NOTEBOOKS=FILE only this one
 # make lint   ruff and mypy alone
 # make docs   the documentation as a site, docs/_build/html/index.html; a warning is an error
+# make pictures  draws the stored pictures of the documentation anew: of pages, of their blocks, of the gallery
 # make mutations  puts deliberate faults into a copy of the sources; fails if no test notices one (half an hour)
 # make fuzz   attacks the package with hostile files, texts, calls and objects: CASES=100000, or HOURS=8 with new ones;
 #             KINDS='yaml sympy' only these, JOBS=2 processes, OUT=DIR for what is found, RESULTS=1 writes the table
@@ -18,7 +19,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
-.PHONY: demo test bench notebooks lint docs mutations fuzz clean
+.PHONY: demo test bench notebooks lint docs pictures mutations fuzz clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed-plot
@@ -37,6 +38,11 @@ bench: $(VENV)/.installed-plot
 docs: $(VENV)/.installed-docs
 	@$(BIN)/sphinx-build -b html -W -n -q --keep-going -j 2 docs docs/_build/html
 	@echo docs/_build/html/index.html
+
+pictures: $(VENV)/.installed-test
+	@$(BIN)/python docs/make_pictures
+	@$(BIN)/python docs/pictures_of_pages.py
+	@$(BIN)/python docs/make_gallery.py
 
 notebooks: $(VENV)/.installed-test
 	@$(BIN)/python notebooks/execute.py $(NOTEBOOKS)
