@@ -117,9 +117,11 @@ def _output(kernels: Kernels, name: str, t: float) -> WantedPosition | WantedRat
     n_q, n_v, k = layout.n_q, layout.n_v, layout.y.index(name)
     outputs, slopes = kernels.motion("motion_outputs"), kernels.motion("output_derivatives")
     zero = np.zeros(n_v)
-    probes = [slopes(layout.q_reference, v, zero, t=t)[k] for v in (zero, np.linspace(0.3, 1.1, n_v))]
-    by_v, by_a = (np.array([probe[a : a + n_v] for probe in probes]) for a in (n_q, n_q + n_v))
-    if by_a.any() or not np.allclose(*by_v):
+    # at one position a slope may vanish that counts elsewhere, as sin(q) does at 0
+    places = [layout.q_reference + turn * np.linspace(0.7, 1.3, n_q) for turn in (0.0, 0.3, -0.2)]
+    found = np.array([[slopes(q, v, zero, t=t)[k] for v in (zero, np.linspace(0.3, 1.1, n_v))] for q in places])
+    by_q, by_v, by_a = (np.nan_to_num(part) for part in np.split(found, (n_q, n_q + n_v, n_q + 2 * n_v), axis=-1)[:3])
+    if by_a.any() or not np.allclose(by_v[:, 0], by_v[:, 1]):
         on = "accelerations" if by_a.any() else "velocities, and not linearly"
         raise UsageError(f"the output {name!r} depends on {on}, so it cannot be an initial value; give coordinates")
 
@@ -129,14 +131,13 @@ def _output(kernels: Kernels, name: str, t: float) -> WantedPosition | WantedRat
     def rate(q: Array, t: float) -> tuple[Array, float]:
         return np.asarray(slopes(q, zero, zero, t=t)[k, n_q : n_q + n_v]), float(outputs(q, zero, zero, t=t)[k])
 
-    row = by_v[0] if by_v.any() else probes[0][:n_q]
-    scale = _scale(layout, layout.unit(name).removesuffix("/s"), row)
+    scale = _scale(layout, layout.unit(name).removesuffix("/s"), by_v if by_v.any() else by_q)
     return WantedRate(name, scale, rate) if by_v.any() else WantedPosition(name, scale, position)
 
 
-def _scale(layout: Layout, unit: str, gradient: Array) -> float:
+def _scale(layout: Layout, unit: str, slopes: Array) -> float:
     known = {"m": layout.length, "rad": 1.0}
-    return known.get(unit) or float(np.abs(gradient).max(initial=0.0)) or 1.0
+    return known.get(unit) or float(np.abs(slopes).max(initial=0.0)) or 1.0
 
 
 def _place(kernels: Kernels, name: str, marker: str, axis: int) -> WantedPosition:

@@ -123,3 +123,21 @@ def test_a_moving_support_counts(tmp_path: Path) -> None:
     assert 0.5 - cos(x[names.index("theta")]) == pytest.approx(-0.3, abs=1e-10)
     y = mod.x0({"theta": pi / 3, "speed": 0.5 + 2.0 * sin(pi / 3)}, t=1.0)
     assert y[names.index("theta_dot")] == pytest.approx(2.0, rel=1e-10)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.4])
+def test_an_output_is_one_of_velocities_wherever_it_begins(start: float) -> None:
+    """A hanging pendulum's end has no vertical velocity at its lowest place, whatever its rate."""
+    m = eg.Model("pendulum", gravity=(0, -9.81, 0))
+    rod = m.body("rod", mass=1, com=(0, -0.5, 0), inertia={"zz": 0.1})
+    m.revolute("hinge", m.ground, rod, coordinate="theta")
+    m.output("rise", rod.at(0, -1, 0).velocity[1])
+    m.output("work", "sin(theta)*theta_dot**2")
+    m.initial(theta=start)
+    mod = m.compile(target="numpy")
+    np.testing.assert_allclose(mod.x0(theta=0.5, rise=0.3), [0.5, 0.3 / sin(0.5)], rtol=1e-10)
+    with pytest.raises(UsageError, match="velocities, and not linearly"):
+        mod.x0(work=0.1)
+    if not start:
+        with pytest.raises(AssemblyError):
+            mod.x0(theta=0.0, rise=0.3)
