@@ -41,6 +41,7 @@ class Gear(Pair):
         return [PitchCircles(self.a, self.b, self.ratio)]
 
 
+@dataclass(frozen=True)
 class Belt(Pair):
     """A belt or chain that does not stretch or slip on two pulleys: r_a a = r_b b, with b reversed where it crosses.
 
@@ -48,9 +49,10 @@ class Belt(Pair):
     """
 
     type_name: ClassVar[str] = "belt"
+    radius: Expr | None = None  #: of the first pulley, for its picture; None where teeth are given
 
     def drawn(self) -> list[Seen]:
-        return [PitchCircles(self.a, self.b, self.ratio, belt=True)]
+        return [PitchCircles(self.a, self.b, self.ratio, belt=True, radius=self.radius)]
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,8 @@ def _belt(e: Entry) -> Belt | None:
     if pair is None or ratio is None:
         return None
     ratio = ratio if e.flag("crossed") else -ratio
-    return Belt(e.name, e.symbol(pair[0]), e.symbol(pair[1]), ratio, e.law("phase"))
+    radii = e.several("radii", 2) if "radii" in e.values else None
+    return Belt(e.name, e.symbol(pair[0]), e.symbol(pair[1]), ratio, e.law("phase"), radii[0] if radii else None)
 
 
 def _rack(e: Entry) -> Rack | None:

@@ -86,7 +86,8 @@ class PitchCircles(NamedTuple):
     """Two wheels on the axes of two joints, of angles a and b with ratio = r_b / r_a (negative: one is internal).
 
     Their radii follow from the distance of the axes.  Where a stands still, the joint of ``beside`` has its axis, and a
-    is part of what carries that joint.  ``belt``: the wheels do not touch, and a belt runs over them.
+    is part of what carries that joint.  ``belt``: the wheels do not touch, and a belt runs over them; ``radius`` (m) is
+    that of the first where it is known.
     """
 
     a: Expr
@@ -94,6 +95,7 @@ class PitchCircles(NamedTuple):
     ratio: Expr
     beside: Expr | None = None
     belt: bool = False
+    radius: Expr | None = None
 
 
 class Contour(NamedTuple):

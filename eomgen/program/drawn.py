@@ -170,7 +170,8 @@ def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, An
         if (a is None and beside is None) or b is None or not n.known([seen.ratio]):
             return None
         joints = {"a": a, "b": b, "beside": beside}
-        return {"kind": "circles", **joints, "ratio": n.number(seen.ratio), "belt": seen.belt}
+        radius = n.number(seen.radius) if seen.radius is not None and n.known([seen.radius]) else 0.0
+        return {"kind": "circles", **joints, "ratio": n.number(seen.ratio), "belt": seen.belt, "radius": radius}
     if isinstance(seen, RackAndPinion):
         pinion, rack = _owner(seen.pinion, owners), _owner(seen.rack, owners)
         if pinion is None or rack is None or not n.known([seen.radius]):

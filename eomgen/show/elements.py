@@ -183,7 +183,10 @@ def _wheel(name: str, marker: PlacedFrame, radius: float, symbol: float) -> list
 
 
 def _circles(data: PictureData, element: dict[str, Any], symbol: float, poses: Array) -> list[Item]:
-    """Pitch circles of two wheels whose axes are d apart: d = r_a + r_b outside, |r_a - r_b| inside."""
+    """Pitch circles of two wheels whose axes are d apart: d = r_a + r_b outside, |r_a - r_b| inside.
+
+    Pulleys whose radii are not given have 0.3 d at most.
+    """
     fixed = element["a"] is None  # then the wheel is part of what carries the joint beside
     a, b = data.joints[element["beside" if fixed else "a"]], data.joints[element["b"]]
     (turn, here), (_, there) = placed(poses, a.P), placed(poses, b.P)
@@ -193,7 +196,7 @@ def _circles(data: PictureData, element: dict[str, Any], symbol: float, poses: A
     if distance == 0.0 or abs(ratio) in (0.0, 1.0 if ratio < 0.0 and not element["belt"] else 0.0):
         return []
     if element["belt"]:
-        r_a = 0.3 * distance / max(1.0, abs(ratio))
+        r_a = float(element["radius"]) or 0.3 * distance / max(1.0, abs(ratio))
     else:
         r_a = distance / (1.0 + ratio) if ratio > 0.0 else distance / abs(1.0 - abs(ratio))
     r_b = abs(ratio) * r_a

@@ -78,3 +78,21 @@ def test_a_wire_from_a_table_is_drawn() -> None:
     wire = wire[np.isfinite(wire).all(axis=1)]
     assert wire[:, 1] == pytest.approx(wire[:, 0] ** 2, abs=1e-3)
     assert np.ptp(wire[:, 0]) > 1.0
+
+
+@pytest.mark.parametrize("crossed", [False, True])
+@pytest.mark.parametrize("given", ["radii", "radii by a parameter"])
+def test_pulleys_are_drawn_with_the_radii_that_are_given(crossed: bool, given: str) -> None:
+    m = eg.Model("belt")
+    first, second = (m.body(name, mass=1, inertia={"zz": 0.01}) for name in ("first", "second"))
+    m.revolute("A", m.ground, first, coordinate="a")
+    m.revolute("B", m.ground.at(0.4, 0, 0), second, coordinate="b")
+    if given == "radii":
+        m.belt("belt", "A", "B", radii=[0.06, 0.1], crossed=crossed)
+    else:
+        r = m.parameter("r", 0.06)
+        m.belt("belt", "A", "B", radii=[r, "r + 0.04"], crossed=crossed)
+    mod = m.compile(target="numpy")
+    discs = [points[:, :2] for points in lines(mod, "wheel", "belt", a=0.3) if np.isfinite(points).all()]
+    for disc, centre, radius in zip(discs, ([0, 0], [0.4, 0]), (0.06, 0.1), strict=True):
+        assert np.linalg.norm(disc - centre, axis=1).max() == pytest.approx(radius, rel=1e-9)
