@@ -130,11 +130,13 @@ class Assembled:
     ) -> list[Array]:
         """All positions (n_q,) found that hold the given values, that of :meth:`x0` first.
 
-        The search is bounded and repeats exactly; it may miss a branch.
+        Without any, the declared initial values are held.  Where the held values leave freedom, the independent
+        coordinates keep the values of the first position.  The search is bounded and repeats exactly; it may miss a
+        branch.
         """
         initial, given = self._given(values, named, t, p, u)
         first = initial.assembled(given.positions, rough=True)
-        return initial.branches(given.positions or initial.sort(self.layout.initial).positions, first)
+        return initial.branches(given.positions, first)
 
     @both_names
     @np.errstate(all="ignore")

@@ -87,14 +87,20 @@ def explore(model: BoundModel, /, x: Any = None) -> Any:
 
 
 def draw_branches(
-    model: BoundModel, /, values: Mapping[str, float] | None = None, *, t: float = 0.0, names: bool | None = None
+    model: BoundModel,
+    values: Mapping[str, float] | None = None,
+    /,
+    *,
+    t: float = 0.0,
+    names: bool | None = None,
+    **named: float | str,
 ) -> Any:
     """Draw every way in which the loops close with the given values, side by side in one scale.
 
     Parameters
     ----------
-    values : mapping of str to float, optional
-        Coordinates that are held; the declared initial ones by default.
+    values, **named : float
+        Coordinates that are held, as for :meth:`branches`; the declared initial ones by default.
     t, names
         As for :func:`draw`.
 
@@ -103,4 +109,4 @@ def draw_branches(
     array of matplotlib Axes
         In the order of ``module.branches``.
     """
-    return load_show("draw", "draw_branches").draw_branches(model, values, t=t, names=names)
+    return load_show("draw", "draw_branches").draw_branches(model, values, t=t, names=names, named=named)

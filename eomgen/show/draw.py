@@ -107,11 +107,11 @@ def new_artist(scene: Scene, pyplot: Any, ax: Any = None) -> Any:
 
 
 def draw_branches(
-    module: Any, values: Mapping[str, float] | None = None, *, t: float = 0.0, names: bool | None = None
+    module: Any, values: Mapping[str, float] | None, *, t: float, names: bool | None, named: Mapping[str, float | str]
 ) -> Any:
     """See :func:`eomgen.runtime.drawing.draw_branches`."""
     pyplot = matplotlib("pyplot", "draw_branches")
-    found: Sequence[Array] = module.branches(values or {}, t=t)
+    found: Sequence[Array] = module.branches(values, t=t, **named)
     scenes = [build_scene(module, q[:, None], t, names=names) for q in found]
     columns = min(3, len(scenes))
     rows = -(-len(scenes) // columns)
@@ -121,6 +121,6 @@ def draw_branches(
     for k, scene in enumerate(scenes):
         spatial = {} if scene.view is not None else {"projection": "3d"}
         ax = figure.add_subplot(rows, columns, k + 1, **spatial)
-        title = f"branch {k + 1}" + (" (the declared one)" if k == 0 and not values else "")
+        title = f"branch {k + 1}" + (" (the declared one)" if k == 0 and not (values or named) else "")
         panels.append(draw_scene(scene._replace(low=low, high=high), ax, title))
     return np.array(panels, dtype=object)
