@@ -14,7 +14,7 @@ from ..errors import UsageError
 from ..files.reading import open_plain
 from ..files.writing import save_figure, write_whole
 from ..runtime.near_names import require
-from ..runtime.room import require_room
+from ..runtime.room import read_value, require_room
 from .analysis import Prepared, analysis_options
 from .number_option import Number, NumberRange
 from .screen import finite, print_heading, print_json, print_table, say, stage
@@ -99,7 +99,7 @@ def ensemble(
         )  # fmt: skip
     if out is not None:
         if out.suffix == ".csv":
-            write_whole(out, found.to_pandas().to_csv(index=False))
+            write_whole(out, found.to_pandas(samples=times is not None and not statistics).to_csv(index=False))
         else:
             found.save(out)
     if plot is not None:
@@ -130,7 +130,7 @@ def _tell(work: Prepared, found: Ensemble, varied: list[str], files: list[str], 
 
 
 def _even(end: float, count: int) -> list[float]:
-    return [end * i / (count - 1) for i in range(count)]
+    return [end * (i / (count - 1)) for i in range(count)]  # the last is end itself
 
 
 def _cluster(given: str | None) -> int | str | None:
@@ -170,9 +170,9 @@ def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
         name, _, ends = words.partition("=")
         low, _, high = ends.partition(":")
         try:
-            limits = float(low), float(high)
-        except ValueError:
-            raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two numbers") from None
+            limits = read_value("LOW", low), read_value("HIGH", high)
+        except UsageError as error:
+            raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two numbers; {error}") from None
         if not (isfinite(limits[0]) and isfinite(limits[1]) and limits[0] <= limits[1]):
             raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two finite numbers in order")
         if name.strip() in drawn:
