@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib import import_module
 
@@ -76,7 +77,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
     cls=Verbs,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="`eomgen VERB --help` explains a verb.  Exit codes: 0 fine; 1 the model is at fault; 2 usage or file not "
-    "found; 3 compiler or package missing; 4 the integration failed.",
+    "found; 3 compiler or package missing; 4 the integration failed; 5 verify found a difference.",
 )
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version, help="Show it.")
 def eomgen() -> None:
@@ -94,6 +95,11 @@ def _check_words(words: Sequence[str]) -> None:
             raise click.UsageError(f"{word!a:.80} holds a character that no command line can; write it without")
 
 
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    """A warning without the place in Python, which is nothing of the user's."""
+    click.echo(f"warning: {visible(str(message))}", err=True)
+
+
 def run_command(arguments: Sequence[str] | None = None) -> int:
     """Parse and run a command line; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -102,7 +108,9 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     try:
         _check_words(words)
-        code = eomgen.main(words, prog_name="eomgen", standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            code = eomgen.main(words, prog_name="eomgen", standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:  # wrong options, unknown verbs, files that cannot be read
         vars(error)["message"] = visible(error.message)

@@ -323,7 +323,20 @@ def _parse_setting(word: str, option: str = "--set", example: str = "r=0.12") ->
     if not equals or not name or not text:
         raise UsageError(f"{option} {word}: write name=value, for example {option} {example}")
     try:
-        return name, float(text)
+        return name, parse_number(text)
+    except UsageError as error:
+        raise UsageError(f"{option} {word}: {error}") from None
+
+
+def parse_number(text: str) -> float:
+    """A number, or an expression of numbers such as ``pi/3``.
+
+    Raises
+    ------
+    UsageError
+    """
+    try:
+        return float(text)
     except ValueError:
         pass
     from ..describe.expressions import parse
@@ -336,7 +349,7 @@ def _parse_setting(word: str, option: str = "--set", example: str = "r=0.12") ->
     try:
         value = parse(text, Graph(), resolve).value
     except ExpressionError as error:
-        raise UsageError(f"{option} {word}: {error.message}; {error.remedy}") from None
+        raise UsageError(f"{error.message}; {error.remedy}") from None
     if value is None:
-        raise UsageError(f"{option} {word}: not a number")
-    return name, value
+        raise UsageError("not a number")
+    return value

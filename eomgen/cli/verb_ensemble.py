@@ -14,12 +14,12 @@ from ..errors import UsageError
 from ..files.reading import open_plain
 from ..files.writing import save_figure, write_whole
 from ..runtime.near_names import require
-from ..runtime.room import read_value, require_room
+from ..runtime.room import require_room
 from .analysis import Prepared, analysis_options
 from .number_option import Number, NumberRange
 from .screen import finite, print_heading, print_json, print_table, say, stage
 from .sections import verb_command
-from .shared_options import require_folder
+from .shared_options import parse_number, require_folder
 from .workspace_request import read_axes
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
         name, _, ends = words.partition("=")
         low, _, high = ends.partition(":")
         try:
-            limits = read_value("LOW", low), read_value("HIGH", high)
+            limits = parse_number(low), parse_number(high)
         except UsageError as error:
             raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two numbers; {error}") from None
         if not (isfinite(limits[0]) and isfinite(limits[1]) and limits[0] <= limits[1]):

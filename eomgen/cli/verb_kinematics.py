@@ -22,6 +22,7 @@ from .shared_options import (
     load_model,
     model_argument,
     native_option,
+    parse_number,
     parse_settings,
     require_folder,
     target_option,
@@ -158,13 +159,13 @@ def read_range(words: str) -> tuple[str, float, float, int | None]:
     if not equals or not name.strip() or len(parts) not in (2, 3):
         raise UsageError(f"--range {words}: write NAME=START:END[:COUNT], for example theta=0:2*pi:361")
     try:
-        numbers = parse_settings(tuple(f"{label}={part}" for label, part in zip(("START", "END"), parts, strict=False)))
+        start, end = (parse_number(part) for part in parts[:2])
         count = _count(parts[2]) if len(parts) == 3 else None
     except ValueError as error:  # a UsageError too
         raise UsageError(f"--range {words}: {error}") from None
     if count is not None and not 1 <= count <= 10_000_000:
         raise UsageError(f"--range {words}: the count is 1 to 10000000, not {count}")
-    return name.strip(), numbers["START"], numbers["END"], count
+    return name.strip(), start, end, count
 
 
 def _count(text: str) -> int:

@@ -97,6 +97,8 @@ def view(
     asked = [read_range(words) for words in ranges]
     if asked and (end is not None or solver):
         raise UsageError("--range moves the model without forces; --end and options of the integrator are for runs")
+    if any(count == 1 for *_, count in asked):
+        raise UsageError("an animation needs two positions: give --range a COUNT of at least 2")
     file = out if out is not None else Path(gettempdir()) / f"eomgen_{model.stem}.html"
     require_kind(file)
     require_folder("--out", None if out is None or not out.suffix else out)

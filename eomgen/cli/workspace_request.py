@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from ..files.writing import save_figure
 from .screen import finite
-from .shared_options import parse_settings
+from .shared_options import parse_number
 
 if TYPE_CHECKING:
     from ..analysis.workspace import Workspace
@@ -48,13 +48,13 @@ def read_axes(option: str, over: tuple[str, ...]) -> dict[str, Any]:
         if not equals or not name.strip() or len(parts) != 3:
             raise UsageError(f"{option} {words}: write NAME=LOW:HIGH:COUNT, for example theta=0:2*pi:73")
         try:
-            ends = parse_settings((f"LOW={parts[0]}", f"HIGH={parts[1]}"))
+            low, high = (parse_number(part) for part in parts[:2])
             count = int(parts[2])
         except ValueError as error:  # a UsageError too
             raise UsageError(f"{option} {words}: {error}") from None
         if name.strip() in grid:
             raise UsageError(f"{option} {words}: each name once")
-        grid[name.strip()] = (ends["LOW"], ends["HIGH"], count)
+        grid[name.strip()] = (low, high, count)
     return grid
 
 

@@ -32,6 +32,8 @@ Locate = Callable[[str, str], Expr]
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/()<>=! \t\r\n]")
 #: A number that runs into a word: Python reads it as two, with a warning of its own.
 _JOINED = re.compile(r"(?<![A-Za-z0-9_])[0-9.][0-9A-Za-z_.]*?(and|or|not|if|is|in|else)")
+#: A number with a unit: ``150 mm``, ``5cm``, ``30°``.
+_WITH_UNIT = re.compile(r"\s*([0-9.]+(?:e[+-]?[0-9]+)?)\s*(°|%|[A-Za-zµμ][A-Za-z0-9µμ*/^²³·-]*)\s*")
 _HINTS = {
     "^": "write ** for powers",
     "%": "there is no remainder",
@@ -101,6 +103,7 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         raise ExpressionError("the expression is empty", 1, allowed(), text)
     foreign = _FOREIGN.search(text)
     if foreign:
+        _refuse_unit(text)
         mark = foreign.group()
         raise ExpressionError(
             f"{mark!r} has no place in an expression", foreign.start() + 1, _HINTS.get(mark, allowed()), text
@@ -114,6 +117,7 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     try:
         tree = parse_statement(line[start:].rstrip() + "\n")
     except SyntaxError as error:
+        _refuse_unit(text)
         column = (error.offset or 1) + start
         raise ExpressionError(f"not a valid expression ({error.msg})", column, allowed(), text) from None
     except (ValueError, MemoryError, RecursionError):
@@ -122,6 +126,16 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
         raise ExpressionError("a statement, not an expression", start + 1, allowed(), text)
     return _Walker(text, start, graph, resolve, locate, any_function).walk(body[0].value, 0)
+
+
+def _refuse_unit(text: str) -> None:
+    """Raise ExpressionError if the text is a number with a unit."""
+    measured = _WITH_UNIT.fullmatch(text)
+    if measured is not None:
+        number, unit = measured.groups()
+        angle = unit.lower() in ("deg", "degree", "degrees", "°")
+        remedy = f"write deg({number})" if angle else "write the number in SI units; a parameter may have another unit"
+        raise ExpressionError("a number with a unit is not an expression", measured.start(2) + 1, remedy, text)
 
 
 def names_in(text: str) -> list[str]:

@@ -224,7 +224,7 @@ class Ensemble:
     def _varied(self) -> dict[str, Array]:
         """The parameters, inputs and initial values (k,) that differ between the runs."""
         cases, module = self._cases, self._module
-        found = {}
+        found: dict[str, Array] = {}
         for names, rows in ((module.p_names, cases.p), (module.u_names, cases.u)):
             found |= dict(zip(names, rows, strict=True)) if rows.ndim > 1 else {}
         starts = cases.values if cases.states is None else dict(zip(module.x_names, cases.states, strict=True))

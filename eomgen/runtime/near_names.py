@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from types import ModuleType
 from typing import Any
 
@@ -23,6 +23,12 @@ class UnknownNameError(UsageError, KeyError):
 def without_dots(given: Mapping[Any, Any]) -> dict[Any, Any]:
     """Values by name; ``leg1.hip`` of an instance of a component is ``leg1_hip``."""
     return {name.replace(".", "_") if isinstance(name, str) else name: value for name, value in given.items()}
+
+
+def plain_name(name: object, known: Container[str]) -> Any:
+    """The name, or that of ``leg1.hip`` as ``leg1_hip``, if only this is known."""
+    plain = name.replace(".", "_") if isinstance(name, str) else name
+    return plain if name not in known and plain in known else name
 
 
 def place_of_marker(name: object) -> tuple[str, str] | None:

@@ -11,7 +11,7 @@ from ..errors import UsageError
 from ..limits.pictures import FAINT
 from ..numeric.scales import Array
 from ..texts import visible
-from .near_names import read_names, require, unknown
+from .near_names import plain_name, read_names, require, unknown
 from .refined import FINE, refined, states_at
 
 if TYPE_CHECKING:
@@ -68,8 +68,10 @@ def choose(
     UsageError
         Unknown names, or wishes that do not go together.
     """
-    names = (*names, *(() if y is None else read_names("y", y)))
     known = ("t", *trajectory.names)
+    asked = [one for name in names for one in read_names("a column", name)]  # a list of names is taken too
+    names = tuple(plain_name(name, known) for name in (*asked, *(() if y is None else read_names("y", y))))
+    x = plain_name(x, known)
     for name in (*names, *(() if x is None else (x,))):  # unknown names fail before a figure opens
         if name not in known:
             raise unknown("column", name, known)

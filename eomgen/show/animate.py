@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..texts import shown
-from .film_frames import DPI, Frames
+from .film_frames import DPI, MOST_DOTS, Frames
 from .scene import Scene
 from .shown_motion import ShownMotion, States, moving_scene, sample, with_arrows, with_fine_traces
 from .writers import WRITERS, kind_of, require_kind
@@ -30,6 +30,7 @@ def animate(
     file: Path | str | None = None,
     *,
     states: States,
+    columns: Callable[[tuple[str, ...]], tuple[Any, dict[str, Any]]],
     fps: float = 25.0,
     speed: float | None = None,
     trace: Sequence[str] | str = (),
@@ -47,7 +48,8 @@ def animate(
     forces = (forces,) if isinstance(forces, str) else forces
     if not isinstance(forces, bool | list | tuple):
         raise UsageError(f"forces must be True, a joint or a list of joints, not {shown(forces)}")
-    columns = {name: trajectory[name] for name in plot}  # unknown names fail before anything is drawn
+    for name in plot:  # unknown names fail before anything is drawn
+        trajectory[name]
     motion = sample(trajectory, states, fps, speed)
     scene = moving_scene(module, motion, names, axes, trace)
     if trace and motion.t[0] != motion.t[-1]:
@@ -55,9 +57,9 @@ def animate(
     if forces:
         scene = with_arrows(scene, module, motion, forces)
     still = motion.t[0] == motion.t[-1]
-    over = motion.over if still else trajectory.t
-    units = trajectory.units
-    curves = [ShownColumn(f"{n} ({units[n]})" if units.get(n) else n, over, values) for n, values in columns.items()]
+    times, values = columns(plot) if plot else (trajectory.t, {})
+    over, units = motion.over if still else times, trajectory.units
+    curves = [ShownColumn(f"{n} ({units[n]})" if units.get(n) else n, over, row) for n, row in values.items()]
     return write(file, scene, motion, curves, dpi)
 
 
@@ -69,6 +71,8 @@ def write(
     dpi: float = DPI,
 ) -> Any:
     """Write an animation as its ending says; without a file, something that a notebook shows."""
+    if isinstance(dpi, bool) or not isinstance(dpi, int | float) or not 1.0 <= dpi <= MOST_DOTS:
+        raise UsageError(f"dpi must be a number from 1 to {MOST_DOTS:g}, not {shown(dpi)}")
     path = None if file is None else as_path("file", file)
     kind = "" if path is None else kind_of(path)
     if path is None or kind == ".html":

@@ -14,6 +14,7 @@ from .scene import Scene
 from .shown_motion import ShownMotion
 
 DPI = 80  #: of the frames
+MOST_DOTS = 1200.0  #: in an inch
 BELOW = 1.7  #: height of the plot below (inch)
 SPACE = (6.4, 5.6)  #: of a spatial mechanism (inch)
 

@@ -119,3 +119,10 @@ def test_cubics_take_the_later_state_after_a_reset() -> None:
     for way in (1.0, -1.0):  # backwards too
         found = cubic_between(way * t, x, way * slopes, way * times)
         assert found[0] == pytest.approx(part * (1.0 - part), abs=1e-14)
+
+
+def test_names_may_be_given_as_a_list(run: Any) -> None:
+    ax = run.plot(["theta", "B"])
+    assert [line.get_label() for line in ax.lines] == ["theta", "B"]
+    with pytest.raises(UsageError, match="a column must be a name or a list of names, not 3"):
+        run.plot(3)

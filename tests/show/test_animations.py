@@ -19,6 +19,7 @@ from PIL import Image
 import eomgen as eg
 from eomgen.cli.command import eomgen
 from eomgen.errors import MissingDependencyError, UsageError
+from eomgen.show import animate as eomgen_animate
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -210,3 +211,25 @@ def test_a_range_at_one_time_moves_in_a_page_too(module: Any, tmp_path: Path) ->
     assert '"words": ["theta = 0.000 rad", "theta = 0.250 rad"' in text
     clock = json.loads(re.search(r'"clock": (\[[^]]*\])', text)[1])  # type: ignore[index]
     assert len(set(clock)) == 5
+
+
+@pytest.mark.parametrize("dpi", ["x", 0, True, 1e6, float("nan")])
+def test_dots_are_a_sensible_number(run: Any, tmp_path: Path, dpi: Any) -> None:
+    with pytest.raises(UsageError, match="dpi must be a number from 1 to 1200"):
+        run.animate(tmp_path / "a.gif", dpi=dpi)
+
+
+def test_a_model_in_place_of_a_module_is_told(run: Any, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"model must be a module, as Model.compile\(\) returns"):
+        run.animate(tmp_path / "a.gif", model=eg.load(EXAMPLES / "slider_crank.yaml"))
+
+
+def test_curves_beside_an_animation_are_smooth(module: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Between the few steps of a run they follow the motion, as traj.plot does."""
+    shown: list[Any] = []
+    monkeypatch.setattr(eomgen_animate, "write", lambda file, scene, motion, curves, dpi: shown.extend(curves))
+    module.simulate(0.2).animate(tmp_path / "a.gif", plot="pin_x")
+    (curve,) = shown
+    exact = module.simulate(0.2, t_eval=curve.over)["pin_x"]
+    assert len(curve.over) > 500
+    assert curve.values == pytest.approx(exact, abs=1e-5)
