@@ -28,7 +28,7 @@ from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .cam_turns import check_turns
-from .check_dimensions import check_dimensions
+from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
 from .dotted_names import undotted
@@ -123,6 +123,7 @@ def build(description: Description) -> Mechanism:
         check_connected(bodies, joints, faults)
     if faults:
         raise ModelError(faults.sorted())
+    outputs = with_units(reader, joints, outputs)
     described = len(bodies)
     bodies, joints = (*bodies, *contacts.bodies), (*joints, *contacts.joints)
     return Mechanism(

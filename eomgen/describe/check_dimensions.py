@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..elements.dimensions import ENERGY, FORCE, INERTIA, LENGTH, MASS, NONE, SPEED, SPIN, STIFFNESS, TIME, Dimension
@@ -18,7 +19,7 @@ from ..graph.traverse import reachable
 from ..operations import OPERATIONS
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MODEL, Field, acts_on_length, fields_of, part_fields
-from .mechanism import LEVEL_DIMENSIONS, JointSpec
+from .mechanism import LEVEL_DIMENSIONS, TURNING, JointSpec, Output
 from .scope import ENERGIES, RATES
 from .units import Unit, si_text
 from .values import Reader
@@ -87,8 +88,37 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
             wanted = units[entry.path].dimension
         if steps and steps[0] in ("initial", "guess", "reset"):
             wanted = names.get(str(steps[-1]), Known(None)).dimension
-        for message, remedy in check.faults(expression, wanted):
+        certain = section == "outputs" and check.is_certain(expression)
+        for message, remedy in check.faults(expression, wanted, certain):
             reader.faults.add(path, message, remedy)
+
+
+def with_units(reader: Reader, joints: tuple[JointSpec, ...], outputs: tuple[Output, ...]) -> tuple[Output, ...]:
+    """Outputs with the SI unit that follows from their expressions, where none is given and no number hides one.
+
+    A rate and a plain number have no unit, unless the expression is a sum of angles or of their rates.
+    """
+    names = _names(reader, reader.units, joints)
+    turned = {c for j in joints for c, k in zip(j.coordinates, j.joint.coordinates, strict=True) if k.kind == "angle"}
+    angles = {name + suffix for name in turned for suffix in RATES}
+    turns = {name: q.level in TURNING or (q.level == 0 and q.axis == 3) for name, q in reader.quantities.items()}
+    angles |= {name for name, turn in turns.items() if turn}
+    check = _Check(reader.graph, names)
+    found = []
+    for output in outputs:
+        faulty = bool(list(check.faults(output.expression, None)))
+        own = check.known[output.expression.id].dimension
+        if not output.unit and own is not None and not faulty:
+            nodes = [reader.graph.nodes[i] for i in reachable(reader.graph, [output.expression.id])]
+            sums = {node[0] for node in nodes} <= {"sym", "neg", "add", "sub"}
+            symbols = {str(node[1]) for node in nodes if node[0] == "sym"}
+            angle = sums and symbols <= angles
+            if sums and symbols <= {f"{name}()" for name in ENERGIES}:
+                output = replace(output, unit="J")
+            elif angle or (own != NONE and own.times(SPIN, -1) != NONE):
+                output = replace(output, unit=si_text(own, "rad" if angle else ""))
+        found.append(output)
+    return tuple(found)
 
 
 def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, ...]) -> dict[str, Known]:
@@ -152,11 +182,17 @@ class _Check:
         self.known: dict[int, Known] = {}
         self.wrong: dict[int, tuple[str, str]] = {}
 
-    def faults(self, expression: Expr, wanted: Dimension | None) -> Iterator[tuple[str, str]]:
+    def is_certain(self, expression: Expr) -> bool:
+        """Whether it is made of quantities alone, as ``x(tip) - s``, so that no number or law can hide a unit."""
+        nodes = [self.graph.nodes[i] for i in reachable(self.graph, [expression.id])]
+        known = all(self.names.get(str(node[1]), Known(None)).dimension for node in nodes if node[0] == "sym")
+        return known and {node[0] for node in nodes} <= {"sym", "neg", "add", "sub", "mul", "div"}
+
+    def faults(self, expression: Expr, wanted: Dimension | None, certain: bool = False) -> Iterator[tuple[str, str]]:
         """Message and remedy of each fault of an expression.
 
         Where no given unit is in it, only sums are checked: in ``-rate**3`` or ``exp(-t)`` a factor of 1 has what unit
-        it needs.
+        it needs.  In an output that is ``certain`` there is no such factor.
         """
         nodes = reachable(self.graph, [expression.id])
         for i in nodes:
@@ -165,7 +201,7 @@ class _Check:
         found = [self.wrong[i] for i in nodes if i in self.wrong]
         yield from found
         result = self.known[expression.id]
-        if found or wanted is None or result.dimension is None or not result.declared:
+        if found or wanted is None or result.dimension is None or not (result.declared or certain):
             return
         if not result.dimension.alike(wanted):
             message = (

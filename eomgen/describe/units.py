@@ -132,7 +132,7 @@ def si_text(dimension: Dimension, text: str = "") -> str:
     angle = bool(re.search(r"\b(rad|deg|degree|degrees|rev|rpm|turn|revolution|[a-z]*rad)\b", text))
     written = _WRITTEN.get(dimension)
     if written is None:
-        powers = list(zip(_BASES, dimension, strict=True))
+        powers = sorted(zip(_BASES, dimension, strict=True), key=lambda pair: pair[0] != "kg")  # kg*m^2
         over = "*".join(_powered(base, power) for base, power in powers if power > 0)
         under = "/".join(_powered(base, -power) for base, power in powers if power < 0)
         written = over + (f"/{under}" if under else "")
