@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -349,3 +350,51 @@ def test_springs_on_a_coordinate_know_its_dimension() -> None:
             with pytest.raises(eg.ModelError) as caught:
                 m.mechanism()
             assert [p.path for p in caught.value.problems] == ["forces.s.stiffness"]
+
+
+def swing() -> eg.Model:
+    m = eg.Model("swing")
+    length = m.parameter("l", 2, unit="m")
+    m.parameter("k", 3)
+    rod, bead = m.body("rod", mass=1, inertia={"zz": 1}), m.body("bead", mass=1, inertia={"zz": 1})
+    rod.marker("tip", at=(length, 0, 0))
+    m.revolute("hinge", m.ground, rod, coordinate="th")
+    m.prismatic("slide", rod, bead, axis="x", coordinate="s")
+    return m
+
+
+@pytest.mark.parametrize(
+    ("expression", "unit"),
+    [
+        ("x(rod.tip)", "m"), ("-vy(bead) + s_dot", "m/s"), ("ax(bead)", "m/s^2"), ("hypot(x(bead), y(bead))", "m"),
+        ("sqrt(x(bead)**2 + y(bead)**2)", "m"), ("s*l", "m^2"), ("x(rod.tip) - 0.15", "m"), ("-th", "rad"),
+        ("th_dot", "rad/s"), ("wz(bead)", "rad/s"), ("total_energy", "J"), ("2*s", ""), ("k*s", ""), ("s/l", ""),
+        ("s_dot/l", ""), ("1000*x(bead)", ""), ("sin(th)", ""),
+    ],
+)  # fmt: skip
+def test_an_output_has_the_unit_that_is_certain(expression: str, unit: str) -> None:
+    m = swing()
+    m.output("y1", expression)
+    assert m.derive().compile(target="numpy").layout.unit("y1") == unit
+
+
+@pytest.mark.parametrize(
+    ("expression", "unit", "told"),
+    [
+        ("th", "mm", "th is a number or an angle, and a length (m) belongs here"),
+        ("x(rod.tip) - s", "deg", "is a length (m), and a number or an angle belongs here"),
+        ("th_dot", "m/s", "th_dot is a rate (1/s), and a speed (m/s) belongs here"),
+    ],
+)
+def test_an_output_of_another_dimension_is_told(expression: str, unit: str, told: str) -> None:
+    m = swing()
+    m.output("y1", expression, unit=unit)
+    with pytest.raises(eg.ModelError, match=re.escape(told)):
+        m.derive()
+
+
+def test_numbers_and_laws_may_hide_a_unit_of_an_output() -> None:
+    m = swing()
+    m.output("force", "-40*s", unit="N")
+    m.output("lift", "sin(th)", unit="mm")
+    assert m.compile(target="numpy").outputs(0.0, [0.5, 0.2, 0.0, 0.0]) == pytest.approx([-8.0, 1e3 * np.sin(0.5)])
