@@ -11,6 +11,7 @@ import click
 
 from ..analysis.tables import without_noise
 from ..errors import UsageError
+from ..limits.descriptions import RESTING
 from ..runtime.near_names import place_of_marker
 from .failures import after_integration, reports_failures
 from .number_option import NumberRange
@@ -250,8 +251,9 @@ def _energy_rows(energy: EnergyBalance | None, uncounted: Sequence[str]) -> list
         return [("energy", "not known: the equations have no kinetic_energy")]
     change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
     if energy.work is not None and energy.power_balance not in (None, energy.drift):
+        work = without_noise([energy.work, energy.initial, energy.final])[0]
         return [
-            ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J"),
+            ("energy", f"{change}; work of forces and inputs {work:.9g} J"),
             ("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"),
         ]
     kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
@@ -291,4 +293,8 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None, uncou
     units = [trajectory.units.get(name, "") for name in names]
     sizes = [float(max(trajectory[name].max(), -trajectory[name].min())) for name in names]
     final = without_noise([trajectory[name][-1] for name in names], units, sizes)
+    error, states = header["atol"] or 0.0, set(trajectory.x_names)
+    for k, name in enumerate(names):  # a state that rests, to the error that the integrator admits
+        if name in states and abs(final[k]) <= error and sizes[k] <= RESTING * error:
+            final[k] = 0.0
     print_rows([(name, f"{x: .9g} {unit}") for name, x, unit in zip(names, final, units, strict=True)])

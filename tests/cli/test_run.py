@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -158,3 +159,19 @@ def test_a_run_without_work_keeps_no_steps_between() -> None:
         if damping is not None:
             model.torsional_damper("d", "hinge", damping=damping)
         assert counts_work(model.derive()) is wanted
+
+
+def test_what_rests_is_told_as_resting(call: Call, model_file: Callable[[str], Path]) -> None:
+    """A leg that falls freely keeps its angle; what the integrator leaves of its rate is not a result."""
+    file = model_file(
+        "name: falling\ngravity: [0, -9.81, 0]\n"
+        "bodies: {hull: {mass: 5}, leg: {mass: 0.1, com: [0.13, 0, 0], inertia: {zz: 0.001}}}\n"
+        "joints: {lift: {type: prismatic, between: [ground, hull], axis: y, coordinate: h}, "
+        "hip: {type: revolute, between: [hull, leg], coordinate: a}}\n"
+        "forces: {spring: {type: joint_spring, joint: hip, stiffness: 40, rest: -0.4}}\n"
+        "initial: {a: -0.4}\nsimulation: {end: 0.5}\n"
+    )
+    lines = call("run", file, "--target", "numpy").out.splitlines()
+    assert any(line.split() == ["a_dot", "0", "rad/s"] for line in lines)
+    assert any(line.split() == ["h_dot", "-4.905", "m/s"] for line in lines)
+    assert any(line.endswith("work of forces and inputs 0 J") or "kept to" in line for line in lines)
