@@ -23,7 +23,7 @@ class Revolute(Joint):
     """Turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
 
     type_name: ClassVar[str] = "revolute"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (0.75, 2.2)),))
+    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (0.75, 2.5)),))
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:

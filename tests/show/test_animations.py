@@ -6,6 +6,7 @@ import importlib.util
 import json
 import re
 import shutil
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,16 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
 from click.testing import CliRunner
+from matplotlib.figure import Figure
 from PIL import Image
 
 import eomgen as eg
 from eomgen.cli.command import eomgen
 from eomgen.errors import MissingDependencyError, UsageError
 from eomgen.show import animate as eomgen_animate
+from eomgen.show.animate import ShownColumn
+from eomgen.show.film_frames import Frames, draw_curves
+from eomgen.show.shown_motion import moving_scene, sample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -233,3 +238,49 @@ def test_curves_beside_an_animation_are_smooth(module: Any, monkeypatch: pytest.
     exact = module.simulate(0.2, t_eval=curve.over)["pin_x"]
     assert len(curve.over) > 500
     assert curve.values == pytest.approx(exact, abs=1e-5)
+
+
+def test_a_title_fits_a_narrow_picture() -> None:
+    m = eg.Model("a_weight_on_a_very_long_rail", gravity=(0, -9.81, 0))
+    m.prismatic("fall", m.ground, m.body("weight", mass=1), axis="y", coordinate="h")
+    mod = m.compile(target="numpy")
+    motion = sample(mod.simulate(1.0), lambda t: (mod.simulate(1.0, t_eval=t).x, None), 5, 0.25)
+    frames = Frames.of(moving_scene(mod, motion, None, False, ())._replace(note="longest arrow 1.23e+04 N"), motion)
+    box = frames.titles[0].get_window_extent(frames.canvas.get_renderer())
+    assert 0 <= box.x0 < box.x1 <= frames.canvas.get_width_height()[0]
+
+
+def test_curves_over_a_range_name_its_unit(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    turn = module.kinematic_analysis(theta=np.linspace(0, 6, 9))
+    motion = sample(turn, lambda t: (turn.x, None), 25, None)
+    ax = Figure().add_subplot()
+    draw_curves(ax, [ShownColumn("s (m)", motion.over, turn["s"])], motion)
+    assert ax.get_xlabel() == "theta (rad)"
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium")
+def test_a_page_fits_a_narrow_window(run: Any, tmp_path: Path) -> None:
+    pytest.importorskip("k3d")
+    file = run.animate(tmp_path / "run.html", names=False)
+    with Browser(tmp_path / "profile", size=(420, 760)) as browser:
+        browser.open(file.as_uri())
+        browser.wait_for("document.getElementById('words') && document.getElementById('words').textContent !== ''")
+        end = time.monotonic() + 30
+        while True:  # until the mechanism is drawn
+            drawn = (browser.picture()[60:600] < 200).any(axis=(0, 2))
+            if drawn.sum() > 50 and not drawn[:3].any() and not drawn[-3:].any():
+                break
+            assert time.monotonic() < end, "the mechanism reaches beyond the window"
+            time.sleep(0.5)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium")
+def test_a_page_says_what_it_lacks(run: Any, tmp_path: Path) -> None:
+    pytest.importorskip("k3d")
+    file = run.animate(tmp_path / "run.html", names=False)
+    with Browser(tmp_path / "profile") as browser:
+        script = "HTMLCanvasElement.prototype.getContext = () => null;"
+        browser.call("Page.addScriptToEvaluateOnNewDocument", source=script)
+        browser.open(file.as_uri())
+        browser.wait_for("document.getElementById('missing') !== null")
+        assert "needs WebGL 2" in browser.evaluate("document.getElementById('missing').textContent")
