@@ -106,7 +106,9 @@ def test_a_workspace(call: Call, model_file: Callable[[str], Path], tmp_path: Pa
     assert found["range"]["x"] == pytest.approx([-0.8, 0.8])
     assert len(found["singular"]) == 74
     table = np.genfromtxt(tmp_path / "ws.csv", delimiter=",", names=True, usecols=range(4))
-    assert table["x_m"] == pytest.approx(0.5 * np.cos(table["q1_rad"]) + 0.3 * np.cos(table["q1_rad"] + table["q2_rad"]))
+    assert table["x_m"] == pytest.approx(
+        0.5 * np.cos(table["q1_rad"]) + 0.3 * np.cos(table["q1_rad"] + table["q2_rad"])
+    )
     assert (tmp_path / "ws.png").stat().st_size > 10_000
     result = call("kinematics", path, *FAST, *words, "--within-limits")
     assert result.code == 0
