@@ -8,6 +8,7 @@ import numpy as np
 
 from ..limits.pictures import NOTHING
 from .colors import color_of, style_of
+from .flat import joined_limits
 from .scene import Item, Scene, passed
 from .solids import Triangles
 
@@ -30,6 +31,12 @@ class Axes3DPicture:
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
         self.scene, self.ax = scene, ax
+        vertical = int(np.argmax(np.abs(scene.up)))
+        limits = [(scene.low[k], scene.high[k]) for k in range(3)]
+        if scene.up[vertical] < 0.0:  # two axes are turned round, so that right hands stay right
+            for k in (vertical, (vertical + 1) % 3):
+                limits[k] = limits[k][::-1]
+        limits = joined_limits(ax, "xyz", limits)
         self.artists: list[tuple[Item, Any, Triangles | None]] = []
         light = np.array([0.4, -0.5, 0.77])
         for item in scene.items:
@@ -53,13 +60,8 @@ class Axes3DPicture:
             ax.text(0, 0, 0, f" {label.text}", fontsize=8, color=color_of(label), parse_math=False, zorder=50)
             for label in scene.labels
         ]
-        vertical = int(np.argmax(np.abs(scene.up)))
-        limits = [(scene.low[k], scene.high[k]) for k in range(3)]
-        if scene.up[vertical] < 0.0:  # two axes are turned round, so that right hands stay right
-            for k in (vertical, (vertical + 1) % 3):
-                limits[k] = limits[k][::-1]
         ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
-        ax.set_box_aspect(scene.high - scene.low, zoom=ZOOM)
+        ax.set_box_aspect(np.abs(np.diff(limits)[:, 0]), zoom=ZOOM)
         ax.set_xlabel("x (m)", fontsize=8)
         ax.set_ylabel("y (m)", fontsize=8)
         ax.set_zlabel("z (m)", fontsize=8)

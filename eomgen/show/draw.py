@@ -48,7 +48,8 @@ def draw_scene(scene: Scene, ax: Any = None, title: str | None = None) -> Any:
     pyplot = matplotlib("pyplot", "draw") if ax is None else None
     artist = new_artist(scene, pyplot, ax)
     artist.show(0)
-    artist.ax.set_title(scene.name if title is None else title, fontsize=10, parse_math=False)
+    if title is not None or not artist.ax.get_title():
+        artist.ax.set_title(scene.name if title is None else title, fontsize=10, parse_math=False)
     return artist.ax
 
 

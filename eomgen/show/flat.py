@@ -37,6 +37,7 @@ class Flat:
 
         assert scene.view is not None
         self.scene, self.ax = scene, ax
+        limits = joined_limits(ax, "xy", [(scene.low[k], scene.high[k]) for k in (0, 1)])
         self.artists: list[tuple[Item, Any]] = []
         for item in sorted(scene.items, key=lambda item: ROLES.index(item.role)):
             style, depth = style_of(item.role), 2 + ROLES.index(item.role)
@@ -64,11 +65,10 @@ class Flat:
             for label in scene.labels
         ]
         ax.set_aspect("equal", adjustable="box")
-        ax.set_xlim(scene.low[0], scene.high[0])
-        ax.set_ylim(scene.low[1], scene.high[1])
+        ax.set(xlim=limits[0], ylim=limits[1])
         right, up = (_axis_name(scene.view[k]) for k in (0, 1))
-        ax.set_xlabel(f"{right} (m)")
-        ax.set_ylabel(f"{up} (m)")
+        ax.set_xlabel(ax.get_xlabel() or f"{right} (m)")
+        ax.set_ylabel(ax.get_ylabel() or f"{up} (m)")
         ax.tick_params(labelsize=8)
         ax.set_axisbelow(True)
         ax.grid(alpha=0.25)
@@ -93,6 +93,19 @@ class Flat:
         for label, text in zip(self.scene.labels, self.labels, strict=True):
             pose = poses[label.body]
             text.xy = tuple(self.page((pose[:3, :3] @ label.point + pose[:3, 3])[None])[0])
+
+
+def joined_limits(ax: Any, axes: str, limits: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Limits that a picture needs, wide enough for what is on the axes already and turned round where theirs are."""
+    found = []
+    for name, own in zip(axes, limits, strict=True):
+        theirs = (
+            getattr(ax, f"get_{name}lim")() if ax.has_data() or not getattr(ax, f"get_autoscale{name}_on")() else own
+        )
+        low, high = min(*own, *theirs), max(*own, *theirs)
+        turned = own[0] > own[1] or theirs[0] > theirs[1]
+        found.append((high, low) if turned else (low, high))
+    return found
 
 
 def _axis_name(direction: Array) -> str:

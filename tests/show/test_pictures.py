@@ -79,6 +79,42 @@ def test_a_planar_mechanism_is_true_to_scale_and_a_spatial_one_in_space(module: 
     assert size / size[0] == pytest.approx(box / box[0], rel=1e-9)
 
 
+def test_what_stands_on_given_axes_stays_visible(module: Any) -> None:
+    ax = pyplot.figure().add_subplot()
+    ax.plot([-2.0, 0.1], [0.0, 1.5])
+    ax.set_title("mine")
+    ax.set_xlabel("way (m)")
+    scene = scene_of(module)
+    module.draw(ax=ax)
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    assert left <= -2.0 < 1.5 <= top
+    assert right >= scene.high[0]
+    assert bottom <= scene.low[1]
+    assert (ax.get_aspect(), ax.get_title(), ax.get_xlabel()) == (1.0, "mine", "way (m)")
+    before = module.draw({"theta": 0.3}).get_xlim()
+    assert before == pytest.approx((scene.low[0], scene.high[0]))  # axes of its own fit the mechanism
+    hanging = pyplot.figure().add_subplot()
+    hanging.set_ylim(3.0, 1.0)  # downwards, and set by hand
+    module.draw(ax=hanging)
+    assert hanging.get_ylim()[0] == 3.0
+    assert hanging.get_ylim()[1] <= scene.low[1]
+
+
+def test_what_stands_on_given_axes_in_space_stays_visible() -> None:
+    bicycle = compiled("bicycle.yaml")
+    alone = bicycle.draw()
+    ax = pyplot.figure().add_subplot(projection="3d")
+    ax.plot([5.0, 6.0], [0.0, 0.0], [-3.0, -2.0])
+    bicycle.draw(ax=ax)
+    assert max(ax.get_xlim()) >= 6.0
+    assert min(ax.get_zlim()) <= -3.0
+    assert max(ax.get_zlim()) == pytest.approx(max(alone.get_zlim()))
+    low, high = ax.get_zlim()
+    assert low > high  # z is down, as alone
+    size = np.array([np.ptp(limits) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())])
+    assert size / size[0] == pytest.approx(np.asarray(ax._box_aspect) / ax._box_aspect[0], rel=1e-9)
+
+
 def test_down_is_down() -> None:
     """Gravity along x: x points down the page; against z (z down): the vertical axis is turned round."""
     m = eg.Model("hanging", gravity=(9.81, 0, 0))
