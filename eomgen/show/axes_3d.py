@@ -8,12 +8,15 @@ import numpy as np
 
 from ..limits.pictures import NOTHING
 from .colors import color_of, style_of
+from .data import Array
 from .flat import joined_limits
+from .label_places import NAME_STYLE, NAMES, name_offsets
 from .scene import Item, Scene, passed
 from .solids import Triangles
 
 ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees)
 ZOOM = 0.88  #: leaves room for the names of the axes
+IN_FRONT = 1e6  #: place of names over solids, of which each has a place of its own
 COARSE = 4000  #: triangles of one item more than which are thinned out, as matplotlib draws them one by one
 
 
@@ -56,10 +59,6 @@ class Axes3DPicture:
             collection.set_edgecolor("none")
             ax.add_collection3d(collection)
             self.artists.append((item, collection, item.faces))
-        self.labels = [
-            ax.text(0, 0, 0, f" {label.text}", fontsize=8, color=color_of(label), parse_math=False, zorder=50)
-            for label in scene.labels
-        ]
         ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
         ax.set_box_aspect(np.abs(np.diff(limits)[:, 0]), zoom=ZOOM)
         ax.set_xlabel("x (m)", fontsize=8)
@@ -68,6 +67,29 @@ class Axes3DPicture:
         ax.tick_params(labelsize=7)
         ax.view_init(ELEVATION, AZIMUTH, vertical_axis="xyz"[vertical])
         ax.locator_params(nbins=5)
+        self.labels = self._names()
+
+    def _names(self) -> list[Any]:
+        """Names on a light ground beside what they name, clear of the drawing as it is seen at first."""
+        from matplotlib.transforms import offset_copy
+        from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+        scene, ax = self.scene, self.ax
+        ax.apply_aspect()
+        matrix = ax.get_proj()
+
+        def page(points: Array) -> Array:
+            return np.column_stack(proj_transform(*points.T, matrix)[:2])
+
+        made = []
+        for label, offset in zip(scene.labels, name_offsets(scene, ax, page), strict=True):
+            color = NAMES if label.role == "joint" else color_of(label)
+            text = ax.text(
+                *label.at(scene.frames[0]), label.text, **NAME_STYLE, color=color, parse_math=False, zorder=IN_FRONT
+            )
+            text.set_transform(offset_copy(ax.transData, ax.figure, x=offset[0], y=offset[1], units="points"))
+            made.append(text)
+        return made
 
     def show(self, frame: int) -> None:
         """Move everything to a frame."""
@@ -81,5 +103,4 @@ class Axes3DPicture:
                     points = passed(points, frame, len(self.scene.frames))
                 artist.set_data_3d(*points.T)
         for label, text in zip(self.scene.labels, self.labels, strict=True):
-            pose = poses[label.body]
-            text.set_position_3d(pose[:3, :3] @ label.point + pose[:3, 3])
+            text.set_position_3d(label.at(poses))

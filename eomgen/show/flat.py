@@ -9,6 +9,7 @@ import numpy as np
 from ..limits.pictures import SAME
 from .colors import color_of, style_of
 from .data import Array
+from .label_places import NAME_STYLE, NAMES, name_offsets, outline
 from .scene import ROLES, Item, Scene, passed
 
 SPACE = 7.0  #: largest edge of a figure of its own (inch)
@@ -50,20 +51,6 @@ class Flat:
                 patch.set(facecolor=style.face or color, edgecolor=style.edge or color, alpha=style.alpha)
                 ax.add_patch(patch)
                 self.artists.append((item, patch))
-        self.labels = [
-            ax.annotate(
-                label.text,
-                (0, 0),
-                xytext=(6, 6) if label.role == "joint" else (0, -11),
-                textcoords="offset points",
-                fontsize=8,
-                color="0.25" if label.role == "joint" else color_of(label),
-                zorder=20,
-                parse_math=False,
-                annotation_clip=True,
-            )
-            for label in scene.labels
-        ]
         ax.set_aspect("equal", adjustable="box")
         ax.set(xlim=limits[0], ylim=limits[1])
         right, up = (_axis_name(scene.view[k]) for k in (0, 1))
@@ -72,6 +59,26 @@ class Flat:
         ax.tick_params(labelsize=8)
         ax.set_axisbelow(True)
         ax.grid(alpha=0.25)
+        self.labels = self._names()
+
+    def _names(self) -> list[Any]:
+        """Names on a light ground beside what they name, clear of the drawing of the first frame."""
+        scene, ax = self.scene, self.ax
+        ax.apply_aspect()
+        return [
+            ax.annotate(
+                label.text,
+                (0, 0),
+                xytext=tuple(offset),
+                textcoords="offset points",
+                **NAME_STYLE,
+                color=NAMES if label.role == "joint" else color_of(label),
+                zorder=20,
+                parse_math=False,
+                annotation_clip=True,
+            )
+            for label, offset in zip(scene.labels, name_offsets(scene, ax, self.page), strict=True)
+        ]
 
     def page(self, points: Array) -> Array:
         """Points (n, 2) on the page."""
@@ -91,8 +98,7 @@ class Flat:
                     points = passed(points, frame, len(self.scene.frames))
                 artist.set_data(points[:, 0], points[:, 1])
         for label, text in zip(self.scene.labels, self.labels, strict=True):
-            pose = poses[label.body]
-            text.xy = tuple(self.page((pose[:3, :3] @ label.point + pose[:3, 3])[None])[0])
+            text.xy = tuple(self.page(label.at(poses)[None])[0])
 
 
 def joined_limits(ax: Any, axes: str, limits: list[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -114,24 +120,3 @@ def _axis_name(direction: Array) -> str:
     if abs(direction[k]) < 1.0 - SAME:
         return "right" if k == 0 else "up"
     return ("" if direction[k] > 0.0 else "-") + "xyz"[k]
-
-
-def outline(points: Array) -> Array:
-    """Corners (m, 2) of the convex hull of points (n, 2), in order (Andrew's monotone chain)."""
-    order = np.unique(points.round(12), axis=0)
-    if len(order) < 3:
-        return order
-
-    def chain(several: Array) -> list[Array]:
-        found: list[Array] = []
-        for p in several:
-            while len(found) > 1 and _turn(found[-2], found[-1], p) <= 0.0:
-                found.pop()
-            found.append(p)
-        return found[:-1]
-
-    return np.array(chain(order) + chain(order[::-1]))
-
-
-def _turn(a: Array, b: Array, c: Array) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

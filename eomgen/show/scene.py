@@ -71,6 +71,10 @@ class Label(NamedTuple):
     point: Array
     role: str
 
+    def at(self, poses: Array) -> Array:
+        """The point (3,) in ground axes at poses (n_bodies + 1, 4, 4)."""
+        return move(poses[self.body], self.point)
+
 
 class Scene(NamedTuple):
     """All that is to be drawn.

@@ -10,12 +10,13 @@ import matplotlib
 import matplotlib.pyplot as pyplot
 import numpy as np
 import pytest
+from matplotlib.path import Path as Line
 
 import eomgen as eg
 from eomgen.errors import MissingDependencyError, UsageError
 from eomgen.show import optional
 from eomgen.show.build_scene import build_scene
-from eomgen.show.flat import outline
+from eomgen.show.label_places import outline
 from eomgen.show.scene import Scene
 
 matplotlib.use("agg")
@@ -154,6 +155,46 @@ def test_the_names_of_axes_are_not_cut_off(name: str) -> None:
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         box = axis.label.get_window_extent(canvas.get_renderer())
         assert min(box.x0, box.y0, width - box.x1, height - box.y1) >= 0.0
+
+
+def boxes_of_names(ax: Any) -> dict[str, Any]:
+    """Where each name stands on the drawn page, with its light ground."""
+    renderer = ax.figure.canvas.get_renderer()
+    return {text.get_text(): text.get_bbox_patch().get_window_extent(renderer) for text in ax.texts}
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "four_bar", "cart_pendulum", "chebyshev"])
+def test_names_stand_beside_bars_and_hatching(name: str) -> None:
+    module = compiled(f"{name}.yaml")
+    scene = scene_of(module)
+    ax = module.draw()
+    ax.figure.canvas.draw()
+    boxes = boxes_of_names(ax)
+    assert set(boxes) == {label.text for label in scene.labels}
+    for item in scene.items:
+        if item.role not in ("link", "hatch"):
+            continue
+        corners = item.at(scene.frames[0]) @ scene.view[:2].T
+        solid = item.faces is not None
+        pieces = [outline(corners)] if solid else np.split(corners, np.flatnonzero(np.isnan(corners[:, 0])))
+        if solid and item.name == "coupler":
+            continue  # a plate is not a bar; its name may stand on it
+        for piece in pieces:
+            line = Line(ax.transData.transform(piece[np.isfinite(piece[:, 0])]), closed=solid)
+            for text, box in boxes.items():
+                assert not line.intersects_bbox(box, filled=solid), (text, item.role, item.name)
+    for text, box in boxes.items():
+        assert not any(box.overlaps(other) for word, other in boxes.items() if word != text)
+
+
+def test_names_stand_over_solids_in_space() -> None:
+    ax = compiled("furuta_pendulum.yaml").draw()
+    ax.figure.canvas.draw()
+    boxes = boxes_of_names(ax)
+    assert len(boxes) == 4
+    assert min(text.zorder for text in ax.texts) > max(one.zorder for one in ax.collections)
+    for text, box in boxes.items():
+        assert not any(box.overlaps(other) for word, other in boxes.items() if word != text)
 
 
 def test_a_flywheel_is_round() -> None:
