@@ -170,7 +170,7 @@ class BodyHandle(MarkerHandle):
 
 
 def placed_markers(given: Any) -> Any:
-    """Markers by name in the form in which :meth:`BodyHandle.marker` keeps them; what is no mapping is left as it is."""
+    """Markers by name as :meth:`BodyHandle.marker` keeps them; what is no mapping is left as it is."""
     if not isinstance(given, Mapping):
         return given
     found = []

@@ -11,9 +11,10 @@ from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..texts import shown
 from .film_frames import DPI, Frames
+from .player import InlineFilm, InlinePage
 from .scene import Scene
 from .shown_motion import ShownMotion, States, moving_scene, sample, with_arrows, with_fine_traces
-from .writers import WRITERS, kind_of, require_kind
+from .writers import FILMS, WRITERS, kind_of, require_target
 
 
 class ShownColumn(NamedTuple):
@@ -30,6 +31,7 @@ def animate(
     file: Path | str | None = None,
     *,
     states: States,
+    format: str | None = None,
     fps: float = 25.0,
     speed: float | None = None,
     trace: Sequence[str] | str = (),
@@ -40,8 +42,7 @@ def animate(
     dpi: float = DPI,
 ) -> Any:
     """See :meth:`eomgen.runtime.trajectory.Trajectory.animate`."""
-    if file is not None:
-        require_kind(as_path("file", file))
+    require_target(file, format)
     trace = (trace,) if isinstance(trace, str) else tuple(trace)
     plot = (plot,) if isinstance(plot, str) else tuple(plot)
     forces = (forces,) if isinstance(forces, str) else forces
@@ -58,7 +59,7 @@ def animate(
     over = motion.over if still else trajectory.t
     units = trajectory.units
     curves = [ShownColumn(f"{n} ({units[n]})" if units.get(n) else n, over, values) for n, values in columns.items()]
-    return write(file, scene, motion, curves, dpi)
+    return write(file, scene, motion, curves, dpi, format)
 
 
 def write(
@@ -67,13 +68,15 @@ def write(
     motion: ShownMotion,
     curves: Sequence[ShownColumn] = (),
     dpi: float = DPI,
+    format: str | None = None,
 ) -> Any:
     """Write an animation as its ending says; without a file, something that a notebook shows."""
+    if format in FILMS:
+        return InlineFilm(FILMS[format](Frames.of(scene, motion, curves, dpi)), format)
     path = None if file is None else as_path("file", file)
     kind = "" if path is None else kind_of(path)
     if path is None or kind == ".html":
         from .browser import page
-        from .player import InlinePage
 
         text = page(scene, motion, curves)
         if path is None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import importlib.util
+import io
 import json
 import re
 import shutil
@@ -54,6 +56,36 @@ def test_a_gif_has_a_frame_for_every_step_of_time(run: Any, tmp_path: Path) -> N
             durations.append(image.info["duration"])
     assert frames == 21  # 1 s at half speed, 10 in a second, both ends
     assert sum(durations) == 2100
+
+
+def test_a_gif_without_a_file_is_shown_by_a_notebook(run: Any, tmp_path: Path) -> None:
+    shown = run.animate(format="gif", fps=4, dpi=30)
+    file = run.animate(tmp_path / "run.gif", fps=4, dpi=30)
+    assert bytes(shown) == shown.data == file.read_bytes()
+    found = re.fullmatch('<img alt="animation" src="data:image/gif;base64,(.*)">', shown._repr_html_())
+    assert found is not None
+    with Image.open(io.BytesIO(base64.b64decode(found[1]))) as image:
+        assert image.n_frames == 13  # 1 s in 3 s, 4 in a second, both ends
+    swing = pendulum_modes().animate(1, format="gif", fps=4, dpi=30)
+    with Image.open(io.BytesIO(bytes(swing))) as image:
+        assert image.n_frames == 8
+    assert "<html" in str(run.animate(format="html", fps=4)).lower()
+
+
+def test_a_format_is_not_a_file(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("gif", ".gif", "mp4"):
+        with pytest.raises(UsageError, match=f"such as 'run.{name[-3:]}', or format='{name[-3:]}' without a file"):
+            run.animate(name)
+    with pytest.raises(UsageError, match="format= is for an animation without a file"):
+        run.animate("run.gif", format="gif")
+    with pytest.raises(UsageError, match="format must be one of 'gif', 'mp4', 'html', not 'png'"):
+        run.animate(format="png")
+    assert list(tmp_path.iterdir()) == []
+
+
+def pendulum_modes() -> Any:
+    return eg.load(EXAMPLES / "pendulum.yaml").compile(target="numpy").modes({"theta": 0.0})
 
 
 def test_ways_are_round_at_any_rate_of_frames(monkeypatch: pytest.MonkeyPatch) -> None:
