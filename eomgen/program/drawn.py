@@ -35,6 +35,9 @@ class _Numbers:
         self.places = {p.name: ("p", k) for k, p in enumerate(mechanism.parameters)}
         self.places |= {name: ("s", k) for k, name in enumerate(RUNNING)}
         self.declared = {p.name: p.value for p in mechanism.parameters if p.value is not None}
+        coordinates = [spec.joint.coordinates for spec in mechanism.joints]
+        #: joints whose first coordinate is a length
+        self.sliding = {k for k, found in enumerate(coordinates) if found and found[0].kind == "length"}
         self.kept: list[Expr] = []
 
     def number(self, x: Expr) -> Any:
@@ -179,8 +182,11 @@ def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, An
         return {"kind": "rack", "a": pinion, "b": rack, "radius": n.number(seen.radius)}
     if isinstance(seen, LiftCurve):
         cam, follower = _owner(seen.cam, owners), _owner(seen.follower, owners)
-        lift = n.curve(substitute([seen.lift], {seen.parameter: n.graph.symbol(RUNNING[0])}), 0.0, 2.0 * math.pi)
-        if cam is None or follower is None or lift is None or not n.known([seen.phase]):
+        if cam is None or follower is None or not n.known([seen.phase]):
+            return None
+        span = (None, None) if cam in n.sliding else (0.0, 2.0 * math.pi)
+        lift = n.curve(substitute([seen.lift], {seen.parameter: n.graph.symbol(RUNNING[0])}), *span)
+        if lift is None:
             return None
         return {"kind": "lift", "a": cam, "b": follower, "phase": n.number(seen.phase), "point": [*lift, 0.0, 0.0]}
     assert isinstance(seen, Contour)
@@ -188,7 +194,9 @@ def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, An
     curve = n.curve(point, seen.low, seen.high)
     if curve is None:
         return None
-    return {"kind": "contour", "marker": n.marker(seen.marker), "point": curve, "low": seen.low, "high": seen.high}
+    ends = {"low": seen.low, "high": seen.high}
+    held = {} if seen.follower is None else {"stops": [_stop(n, seen.follower)], "face": seen.face}
+    return {"kind": "contour", "marker": n.marker(seen.marker), "point": curve, **ends, **held}
 
 
 def _owner(x: Expr | None, owners: Mapping[str, int]) -> int | None:

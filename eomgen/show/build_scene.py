@@ -67,7 +67,7 @@ def build_scene(
     items = link_items(data, points, symbol, extent)
     items += joint_items(data, view, up, symbol, frames, known)
     items += wall_items(data, view, symbol, frames[0])
-    items += element_items(data, view, symbol, frames[0])
+    items += element_items(data, view, symbol, frames)
     if axes:
         items += frame_items(data, symbol)
     for name, marker in zip(trace, tracked, strict=True):
