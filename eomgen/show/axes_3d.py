@@ -17,7 +17,6 @@ from .solids import Triangles
 ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees)
 ZOOM = 0.88  #: leaves room for the names of the axes
 IN_FRONT = 1e6  #: place of names over solids, of which each has a place of its own
-COARSE = 4000  #: triangles of one item more than which are thinned out, as matplotlib draws them one by one
 
 
 class Axes3DPicture:

@@ -64,7 +64,7 @@ def build_scene(
     points = attachments(data)
     symbol, extent = symbol_size(data, points, frames[0])
     known = {name: q[k] for k, name in enumerate(layout.q)}
-    items = link_items(data, points, symbol, extent)
+    items = link_items(data, points, symbol, extent, getattr(module, "description", None))
     items += joint_items(data, view, up, symbol, frames, known)
     items += wall_items(data, view, symbol, frames[0])
     items += element_items(data, view, symbol, frames)

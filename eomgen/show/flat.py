@@ -34,6 +34,8 @@ class Flat:
     """
 
     def __init__(self, scene: Scene, ax: Any) -> None:
+        from matplotlib.collections import PolyCollection
+        from matplotlib.colors import to_rgb
         from matplotlib.patches import Polygon
 
         assert scene.view is not None
@@ -46,6 +48,11 @@ class Flat:
             if item.faces is None:
                 line = ax.plot([], [], color=color, linewidth=style.width, zorder=depth, solid_capstyle="round")[0]
                 self.artists.append((item, line))
+            elif not item.convex:
+                tint = 1.0 - style.alpha * (1.0 - np.array(to_rgb(color)))  # in place of layers that shine through
+                triangles = PolyCollection([], closed=True, zorder=depth, facecolor=tint, edgecolor=tint, linewidth=0.4)
+                ax.add_collection(triangles, autolim=False)
+                self.artists.append((item, triangles))
             else:
                 patch = Polygon(np.zeros((3, 2)), closed=True, zorder=depth, linewidth=style.width)
                 patch.set(facecolor=style.face or color, edgecolor=style.edge or color, alpha=style.alpha)
@@ -91,7 +98,9 @@ class Flat:
         poses = self.scene.frames[frame]
         for item, artist in self.artists:
             points = self.page(item.at(poses, frame))
-            if item.faces is not None:
+            if item.faces is not None and not item.convex:
+                artist.set_verts(points[item.faces])
+            elif item.faces is not None:
                 artist.set_xy(outline(points))
             else:
                 if item.role == "trace":
