@@ -15,6 +15,7 @@ import numpy as np
 from ..describe.mechanism import JointSpec, Mechanism
 from ..elements.looks import Contour, Drawn, LiftCurve, PitchCircles, RackAndPinion, Seen, Wheel
 from ..errors import UsageError
+from ..forces import Force
 from ..frames import Frame, Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
@@ -108,10 +109,11 @@ def describe_picture(mechanism: Mechanism) -> dict[str, Any] | None:
     n = _Numbers(mechanism)
     joints = [_joint(n, spec) for spec in mechanism.joints]
     owners = {name: k for k, spec in enumerate(mechanism.joints) for name in spec.coordinates}
-    things = [(f.name, f.drawn()) for f in mechanism.forces] + [(c.name, c.drawn()) for c in mechanism.constraints]
+    things = [(f.name, f.drawn(), _push(n, f)) for f in mechanism.forces]
+    things += [(c.name, c.drawn(), {}) for c in mechanism.constraints]
     elements = [
-        {"name": name, **found}
-        for name, every in things
+        {"name": name, **found, **(push if len(found.get("stops", ())) > 1 else {})}
+        for name, every, push in things
         for seen in every
         if (found := _element(n, seen, owners)) is not None
     ]
@@ -158,6 +160,13 @@ def _joint(n: _Numbers, spec: JointSpec) -> dict[str, Any]:
         if curve is not None:
             found["guide"] = {"point": curve, "running": len(shape.parameters)}
     return found
+
+
+def _push(n: _Numbers, force: Force) -> dict[str, Any]:
+    """The force along a way over its length and rate, where it depends on these and parameters alone."""
+    law = force.push(*(n.graph.symbol(name) for name in RUNNING))
+    found = None if law is None else n.curve([law])
+    return {} if found is None else {"point": [*found, 0.0, 0.0]}
 
 
 def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, Any] | None:

@@ -310,7 +310,7 @@ class Trajectory:
         plot : str or sequence of str
             Columns to draw over time under the mechanism, with a line where it is.
         forces : bool, str or sequence of str
-            Arrows of the forces that all joints, or those named, exert on their successors.
+            Arrows of all forces, or of those named: of joints on their successors, of springs and dampers on bodies.
         names, axes : bool
             As for ``module.draw``.
         dpi : float

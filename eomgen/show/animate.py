@@ -11,9 +11,10 @@ from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..texts import shown
 from .film_frames import DPI, Frames
+from .force_arrows import with_arrows
 from .player import InlineFilm, InlinePage
 from .scene import Scene
-from .shown_motion import ShownMotion, States, moving_scene, sample, with_arrows, with_fine_traces
+from .shown_motion import ShownMotion, States, moving_scene, sample, with_fine_traces
 from .writers import FILMS, WRITERS, kind_of, require_target
 
 
@@ -47,7 +48,9 @@ def animate(
     plot = (plot,) if isinstance(plot, str) else tuple(plot)
     forces = (forces,) if isinstance(forces, str) else forces
     if not isinstance(forces, bool | list | tuple):
-        raise UsageError(f"forces must be True, a joint or a list of joints, not {shown(forces)}")
+        raise UsageError(
+            f"forces must be True, the name of a joint, spring or damper, or a list of names, not {shown(forces)}"
+        )
     columns = {name: trajectory[name] for name in plot}  # unknown names fail before anything is drawn
     motion = sample(trajectory, states, fps, speed)
     scene = moving_scene(module, motion, names, axes, trace)

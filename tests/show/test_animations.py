@@ -193,7 +193,8 @@ def hanging(angle: float = 0.0) -> Any:
 
 def test_arrows_are_the_forces_of_joints() -> None:
     """At rest the hinge holds 2 kg; let go at a right angle it holds nothing at first, and pulls inwards later."""
-    from eomgen.show.shown_motion import moving_scene, sample, with_arrows
+    from eomgen.show.force_arrows import with_arrows
+    from eomgen.show.shown_motion import moving_scene, sample
 
     for angle, force in ((0.0, np.array([0.0, 2 * 9.81])), (np.pi / 2, None)):
         traj = hanging(angle)
@@ -214,8 +215,41 @@ def test_arrows_are_the_forces_of_joints() -> None:
             expected = (inwards * along).T
             longest = np.linalg.norm(expected, axis=1).max()
             assert ways / np.linalg.norm(ways, axis=1).max() == pytest.approx(expected / longest, abs=1e-6)
-    with pytest.raises(UsageError, match="no joint 'hing'"):
+    with pytest.raises(UsageError, match="no joint, spring or damper 'hing' .* there are hinge"):
         with_arrows(scene, module, motion, ("hing",))
+
+
+def test_arrows_are_the_forces_of_springs_and_dampers() -> None:
+    """On each body at an end: -k (s - s0), of the free length 0.4, and -c s', away from the other end."""
+    from eomgen.show.force_arrows import with_arrows
+    from eomgen.show.shown_motion import moving_scene, sample
+
+    m = eg.Model("two", gravity=(0, -9.81, 0))
+    k = m.parameter("k", 80.0)
+    upper, lower = m.body("upper", mass=1.0), m.body("lower", mass=2.0)
+    m.prismatic("A", m.ground, upper, axis="y", coordinate="a")
+    m.prismatic("B", m.ground, lower, axis="y", coordinate="b")
+    m.spring("coil", lower, upper, stiffness=k, length=0.4)
+    m.damper("pot", m.ground.at(0.0, 1.0, 0.0), upper, damping="3 + k/80")
+    m.torque("lift", "B", "k/4*t")
+    traj = m.compile(target="numpy").simulate(0.5, initial={"a": 0.3, "b": -0.3, "a_dot": 0.5}, dense_output=True)
+    module = traj.columns.module
+    motion = sample(traj, lambda t: (traj.at(t).x, None), 20.0, 1.0)
+    x = dict(zip(module.x_names, motion.x, strict=True))
+    scene = with_arrows(moving_scene(module, motion, False, False, ()), module, motion, ["coil", "pot"])
+    found = [(item.name, item.path[:, 1, 1] - item.path[:, 0, 1], item.path[:, 0, 1]) for item in scene.items
+             if item.role == "arrow" and item.path is not None]  # fmt: skip
+    push, drag = -80.0 * (x["a"] - x["b"] - 0.4), -4.0 * x["a_dot"]
+    longest = max(np.abs(push).max(), np.abs(drag).max())
+    assert scene.note == f"longest arrow {longest:.4g} N"
+    scale = max(np.abs(ways).max() for _, ways, _ in found) / longest
+    expected = [("coil", push, x["a"]), ("coil", -push, x["b"]), ("pot", drag, x["a"])]  # ground has no arrow
+    for (name, ways, tails), (element, force, place) in zip(found, expected, strict=True):
+        assert name == element
+        assert ways == pytest.approx(scale * force, abs=1e-6 * scale * longest)
+        assert tails == pytest.approx(place, abs=1e-12)
+    named = with_arrows(moving_scene(module, motion, False, False, ()), module, motion, True)
+    assert {item.name for item in named.items if item.role == "arrow"} == {"A", "B", "coil", "pot"}
 
 
 def test_frames_and_films(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
