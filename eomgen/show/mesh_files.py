@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
-from ..files.path_names import beside
+from ..files.path_names import as_name, beside
 from ..files.reading import open_plain
 from ..limits.files import MESH
 from ..limits.pictures import NOTHING
+from ..texts import shown, visible
 from .data import Array
 from .solids import Mesh, Triangles
 
@@ -26,8 +27,8 @@ PACKAGE = "package://"
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
-def mesh_of(shape: Mapping[str, Any], body: str, description: Any) -> Mesh | None:
-    """The mesh of a shape in metres, axes of its frame; with a warning None where it cannot be drawn.
+def mesh_of(shape: Mapping[str, Any], body: str, description: Any, quiet: bool = False) -> Mesh | None:
+    """The mesh of a shape in metres, axes of its frame; None, with a warning unless ``quiet``, if it cannot be drawn.
 
     Parameters
     ----------
@@ -38,10 +39,11 @@ def mesh_of(shape: Mapping[str, Any], body: str, description: Any) -> Mesh | Non
         Of the model: a file is looked up from the folder of the model file, and lies in it or below.
     """
     try:
-        vertices, faces = read_mesh(_located(str(shape["file"]), description))
+        vertices, faces = read_mesh(_located(as_name("file", shape["file"]), description))
     except (UsageError, OSError) as error:
-        why = error.strerror if isinstance(error, OSError) else str(error)
-        warnings.warn(f"the mesh {shape['file']!r} of {body} is not drawn: {why}", stacklevel=2)
+        why = visible(str(error.strerror if isinstance(error, OSError) else error), lines=False)
+        if not quiet:
+            warnings.warn(f"the mesh {shown(shape['file'])} of {body} is not drawn: {why}", stacklevel=2)
         return None
     scale = np.asarray(shape["sizes"], dtype=float)
     return vertices * scale, faces if scale.prod() > 0.0 else faces[:, ::-1]

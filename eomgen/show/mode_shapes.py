@@ -96,7 +96,7 @@ def swinging_gif(module: Any, x: Array, shapes: Sequence[tuple[Array, str]]) -> 
     """Several modes side by side, as a GIF."""
     figures = matplotlib("figure", "a picture")
     count = round(FPS * PERIOD)
-    made = [mode_scene(module, x, shape, count, names=False) for shape in shapes]
+    made = [mode_scene(module, x, shape, count, names=False, quiet=True) for shape in shapes]
     figure = figures.Figure(figsize=(CELL * len(made), CELL + 0.3), dpi=72, layout="constrained")
     frames = Frames(figure, made[0][1])
     for k, ((scene, _), (_, title)) in enumerate(zip(made, shapes, strict=True)):

@@ -237,16 +237,24 @@ def symbol_mesh(shape: str, sizes: list[float], axis: str, symbol: float) -> Mes
 
 
 def link_items(
-    data: PictureData, points: list[Array], symbol: float, extent: float, description: Any = None
+    data: PictureData,
+    points: list[Array],
+    symbol: float,
+    extent: float,
+    description: Any = None,
+    quiet: bool = False,
 ) -> list[Item]:
-    """Bodies: the shapes that they were given, else bars and plates between what is attached to them."""
+    """Bodies: the shapes that they were given, else bars and plates between what is attached to them.
+
+    ``description`` of the model tells where files of meshes lie; ``quiet``: without warnings about them.
+    """
     items: list[Item] = []
     shaped = set()
     for shape in data.shapes:
         body = shape["body"]
         name = "ground" if body == GROUND else data.bodies[body]
         if shape["kind"] == "mesh":
-            mesh = mesh_of(shape, name, description)
+            mesh = mesh_of(shape, name, description, quiet)
         else:
             mesh = solid(shape["kind"], shape["sizes"], BAR * symbol, ROUND)
         if mesh is not None:

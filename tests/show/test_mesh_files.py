@@ -170,6 +170,13 @@ def test_meshes_of_a_robot_lie_beside_its_file(tmp_path: Path) -> None:
     assert np.ptp(shape.points, axis=0) == pytest.approx([0.4, 0.2, 0.1], abs=1e-6)
 
 
+def test_a_notebook_shows_a_model_without_a_warning(tmp_path: Path) -> None:
+    (tmp_path / "lever.yaml").write_text(MODEL)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert "data:image/png" in eg.load(tmp_path / "lever.yaml").compile(target="numpy")._repr_html_()
+
+
 def test_too_large_files_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from eomgen.show import mesh_files
 
