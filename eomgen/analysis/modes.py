@@ -128,7 +128,8 @@ class Modes:
         file : str or Path, optional
             ``.gif``, ``.mp4``, ``.html`` or a folder for frames, as of a trajectory; a k3d plot by default.
         **options
-            ``names``, ``axes``, ``trace``, ``fps``, ``dpi`` as of :meth:`~..runtime.trajectory.Trajectory.animate`.
+            ``format``, ``names``, ``axes``, ``trace``, ``fps``, ``dpi`` as of
+            :meth:`~..runtime.trajectory.Trajectory.animate`.
 
         Raises
         ------

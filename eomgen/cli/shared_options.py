@@ -270,9 +270,9 @@ def _missing(path: Path) -> str:
         return f"{path} is {what}, no plain file; " + (
             "name a model file in it" if path.is_dir() else "copy what it gives into a file"
         )
-    from .example_files import example_names
+    from ..shipped import example_files
 
-    if path.stem in example_names():
+    if path.stem in example_files():
         return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"
     here = path.parent if path.parent.is_dir() else Path()
     names = [p.name for p in here.iterdir() if p.suffix in (".yaml", ".yml", ".urdf", ".xml")]

@@ -13,9 +13,9 @@ import click
 
 from ..errors import UsageError
 from ..files.writing import write_whole
+from ..shipped import example_files, find_example
 from ..suggestions import hint
 from ..syntax_trees import parse_module
-from .example_files import example_files
 from .failures import reports_failures
 from .screen import print_json, print_table, say, stage
 from .sections import verb_command
@@ -106,7 +106,7 @@ def _row(run: ExampleRun) -> list[str]:
 
 
 def _copy(name: str, found: dict[str, Path], force: bool) -> Path:
-    file = found.get(name) or found.get(name.removesuffix(".yaml")) or found.get(f"{name}.urdf")
+    file = find_example(name, found)
     if file is None:
         near = hint(name, found, quoted=False) or f"there are: {', '.join(found)}"
         raise UsageError(f"no example {name!r}; {near}")

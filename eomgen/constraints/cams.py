@@ -27,10 +27,10 @@ from .profiles import Profile
 CAM_ANGLE = "theta"
 
 
-def _polar(cam: Marker, contour: Profile) -> Contour:
-    """The contour r(theta) about the axis of a cam."""
+def _polar(cam: Marker, contour: Profile, follower: Marker, face: bool = False) -> Contour:
+    """The contour r(theta) about the axis of a cam, and the marker that is held to it."""
     a, r = contour.local, contour.expression
-    return Contour(cam, (r * cos(a), r * sin(a), a.graph.zero), a, 0.0, 2.0 * math.pi)
+    return Contour(cam, (r * cos(a), r * sin(a), a.graph.zero), a, 0.0, 2.0 * math.pi, follower, face)
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class KnifeContact(Constraint):
     contour: Profile
 
     def drawn(self) -> list[Seen]:
-        return [_polar(self.cam, self.contour)]
+        return [_polar(self.cam, self.contour, self.follower)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         x, y, _ = view.relative(self.cam, self.follower).position
@@ -87,7 +87,7 @@ class FlatSupport(Constraint):
         a, h = self.support.local, self.support.expression
         slope = self.support.slope(a)
         x, y = h * cos(a) - slope * sin(a), h * sin(a) + slope * cos(a)
-        return [Contour(self.cam, (x, y, a.graph.zero), a, 0.0, 2.0 * math.pi)]
+        return [Contour(self.cam, (x, y, a.graph.zero), a, 0.0, 2.0 * math.pi, self.follower, True)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         face = view.relative(self.cam, self.follower)
@@ -110,7 +110,7 @@ class _Contact(Constraint):
     angle: Expr
 
     def drawn(self) -> list[Seen]:
-        return [_polar(self.cam, self.contour)]
+        return [_polar(self.cam, self.contour, self.follower)]
 
     def polar(self, view: ConstraintView) -> tuple[Expr, Expr, Frame]:
         """r, r' and the follower's marker in the axes (e_r, e_theta, axis) of the contact point."""
@@ -158,6 +158,9 @@ class FlatContact(_Contact):
     """
 
     type_name: ClassVar[str] = "cam_flat_face"
+
+    def drawn(self) -> list[Seen]:
+        return [_polar(self.cam, self.contour, self.follower, face=True)]
 
     def toward(self, follower: Frame) -> tuple[Expr, Expr]:
         return follower.rotation[0][2], follower.rotation[1][2]

@@ -89,7 +89,8 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
         if steps and steps[0] in ("initial", "guess", "reset"):
             wanted = names.get(str(steps[-1]), Known(None)).dimension
         certain = section == "outputs" and check.is_certain(expression)
-        for message, remedy in check.faults(expression, wanted, certain):
+        mass = _plain_mass(entry) if wanted == INERTIA and section == "bodies" else 0.0
+        for message, remedy in check.faults(expression, wanted, certain, mass):
             reader.faults.add(path, message, remedy)
 
 
@@ -174,6 +175,15 @@ def _field(section: str, entry: DescribedEntry | None, steps: list[Any]) -> tupl
     return row, entry.values
 
 
+def _plain_mass(entry: DescribedEntry | None) -> float:
+    """The mass of a body where it is a plain number, else 0."""
+    try:
+        mass = float(entry.values["mass"]) if entry is not None else 0.0
+    except (KeyError, TypeError, ValueError):
+        return 0.0
+    return mass if math.isfinite(mass) else 0.0
+
+
 class _Check:
     """The dimensions of the nodes of a graph, and what is wrong with them."""
 
@@ -188,7 +198,9 @@ class _Check:
         known = all(self.names.get(str(node[1]), Known(None)).dimension for node in nodes if node[0] == "sym")
         return known and {node[0] for node in nodes} <= {"sym", "neg", "add", "sub", "mul", "div"}
 
-    def faults(self, expression: Expr, wanted: Dimension | None, certain: bool = False) -> Iterator[tuple[str, str]]:
+    def faults(
+        self, expression: Expr, wanted: Dimension | None, certain: bool = False, mass: float = 0.0
+    ) -> Iterator[tuple[str, str]]:
         """Message and remedy of each fault of an expression.
 
         Where no given unit is in it, only sums are checked: in ``-rate**3`` or ``exp(-t)`` a factor of 1 has what unit
@@ -203,11 +215,36 @@ class _Check:
         result = self.known[expression.id]
         if found or wanted is None or result.dimension is None or not (result.declared or certain):
             return
+        if mass and result.dimension.alike(wanted.times(MASS, -1)) and self.holds_mass(expression.id, mass):
+            return
         if not result.dimension.alike(wanted):
             message = (
                 f"{written(self.graph, expression.id)} is {named(result.dimension)}, and {named(wanted)} belongs here"
             )
             yield message, self._remedy(nodes, f"give {named(wanted)}")
+
+    def holds_mass(self, i: int, mass: float, factor: float = 1.0) -> bool:
+        """Whether the mass of a body, given as a plain number, is among the factors of its inertia.
+
+        Of a body of ``mass: 4`` the moment ``4*l**2/12`` is in order: 4 is its mass and not a ratio of a formula.
+        """
+        kind, *operands = self.graph.nodes[i]
+        if kind in ("add", "sub"):
+            return any(self.holds_mass(k, mass, factor) for k in operands)
+        sums = []
+        pairs = [(i, 1)]
+        while pairs:
+            k, power = pairs.pop()
+            kind, *operands = self.graph.nodes[k]
+            if kind in ("mul", "div"):
+                pairs += [(operands[0], power), (operands[1], -power if kind == "div" else power)]
+            elif kind == "const" and operands[0]:
+                factor *= float(operands[0]) ** power
+            elif kind in ("add", "sub") and power == 1:
+                sums.append(k)
+        if sums:
+            return any(self.holds_mass(k, mass, factor) for k in sums)
+        return any(math.isclose(factor, ratio * mass) for ratio in _RATIOS)
 
     def _remedy(self, nodes: list[int], first: str) -> str:
         """What would be right, and the given units that led there."""

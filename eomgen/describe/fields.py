@@ -157,7 +157,7 @@ PLACED: Fields = {"body": Field("name", "a body or ground", required=True), **MA
 SHAPES = ("mesh", "box", "cylinder", "sphere", "capsule")
 DISPLAY: Fields = {
     "shape": Field("choice", "kind of shape", required=True, choices=SHAPES),
-    "file": Field("text", "file of a mesh, as the robot's file names it; it is not read"),
+    "file": Field("text", "file of a mesh (STL or OBJ), read when the model is drawn"),
     "scale": Field("vector", "scale of a mesh"),
     "size": Field("vector", "edges of a box (m)"),
     "radius": Field("number", "radius (m)"),

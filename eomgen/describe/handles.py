@@ -169,6 +169,18 @@ class BodyHandle(MarkerHandle):
         return MarkerHandle(self.model, f"{self.name}.{name}")
 
 
+def placed_markers(given: Any) -> Any:
+    """Markers by name as :meth:`BodyHandle.marker` keeps them; what is no mapping is left as it is."""
+    if not isinstance(given, Mapping):
+        return given
+    found = []
+    for name, place in given.items():
+        if isinstance(place, Mapping):
+            place = {**place, **_turned(place.get("axes"), place.get("matrix"))}
+        found.append((name, place))
+    return found
+
+
 def _turned(axes: Mapping[str, Any] | None, matrix: Any) -> dict[str, Any]:
     """Keys of a place for axes and matrix, those that are given."""
     rows = None if matrix is None else items(matrix)

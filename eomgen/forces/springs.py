@@ -34,8 +34,11 @@ class Spring(Force):
         if isinstance(self.path, Line) and self.rest.is_zero:
             # linear in the distance, so that the markers may meet
             return self.path.pair(view, vec.scale(-self.stiffness, self.path.reach(view)))
-        value, _ = self.path.measure(view)
-        return self.path.loads(view, -self.stiffness * (value - self.rest))
+        value, rate = self.path.measure(view)
+        return self.path.loads(view, self.push(value, rate))
+
+    def push(self, value: Expr, rate: Expr) -> Expr:
+        return -self.stiffness * (value - self.rest)
 
     def drawn(self) -> list[Seen]:
         return [self.path.drawn(COIL, SPIRAL)]
@@ -59,8 +62,11 @@ class Damper(Force):
     damping: Expr
 
     def loads(self, view: View) -> list[Load]:
-        _, rate = self.path.measure(view)
-        return self.path.loads(view, -self.damping * rate)
+        value, rate = self.path.measure(view)
+        return self.path.loads(view, self.push(value, rate))
+
+    def push(self, value: Expr, rate: Expr) -> Expr:
+        return -self.damping * rate
 
     def drawn(self) -> list[Seen]:
         return [self.path.drawn(DASHPOT, TURNING_DASHPOT)]

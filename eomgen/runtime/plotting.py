@@ -12,7 +12,7 @@ from ..limits.pictures import FAINT
 from ..numeric.scales import Array
 from ..texts import visible
 from .near_names import plain_name, read_names, require, unknown
-from .refined import FINE, refined, states_at
+from .refined import FINE, refined, refined_energy, states_at
 
 if TYPE_CHECKING:
     from .protocols import TrajectoryLike
@@ -235,7 +235,7 @@ def _phases(trajectory: TrajectoryLike, names: tuple[str, ...], _: str | None) -
 
 def _energy(trajectory: TrajectoryLike, names: tuple[str, ...], x: str | None) -> tuple[list[Curves], str]:
     """Kinetic, potential and total energy, and the change of the total."""
-    t, (T, V, E) = trajectory.t, trajectory.energies
+    t, (T, V, E) = refined_energy(trajectory)
     parts = [("kinetic", t, T), ("potential", t, V), ("total", t, E)]
     return [Curves("energy (J)", parts), Curves("change of total (J)", [("total", t, E - E[0])])], "t (s)"
 

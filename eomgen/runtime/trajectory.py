@@ -296,7 +296,9 @@ class Trajectory:
         file : str or Path, optional
             ``.gif`` and ``.mp4`` are pictures by matplotlib; ``.html`` is one page with a time slider that can be
             turned and zoomed and needs no network (k3d); a name without an ending is a folder for PNG frames.
-            Without a file a page comes back that a notebook shows.
+            Without a file a page comes back that a notebook shows, or what ``format`` says.
+        format : {'gif', 'mp4', 'html'}, optional
+            Of an animation without a file: a GIF or a film that a notebook shows; its ``data`` are the bytes.
         model : Module, optional
             Of a trajectory that was read from a file: the module it was made with.
         fps : float
@@ -308,7 +310,7 @@ class Trajectory:
         plot : str or sequence of str
             Columns to draw over time under the mechanism, with a line where it is.
         forces : bool, str or sequence of str
-            Arrows of the forces that all joints, or those named, exert on their successors.
+            Arrows of all forces, or of those named: of joints on their successors, of springs and dampers on bodies.
         names, axes : bool
             As for ``module.draw``.
         dpi : float
@@ -316,7 +318,7 @@ class Trajectory:
 
         Returns
         -------
-        Path of the file, or the page, whose text ``str`` gives
+        Path of the file, or the page, whose text ``str`` gives, or the film, whose bytes ``bytes`` gives
 
         Raises
         ------

@@ -11,9 +11,11 @@ from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..texts import shown
 from .film_frames import DPI, MOST_DOTS, Frames
+from .force_arrows import with_arrows
+from .player import InlineFilm, InlinePage
 from .scene import Scene
-from .shown_motion import ShownMotion, States, moving_scene, sample, with_arrows, with_fine_traces
-from .writers import WRITERS, kind_of, require_kind
+from .shown_motion import ShownMotion, States, moving_scene, sample, with_fine_traces
+from .writers import FILMS, WRITERS, kind_of, require_target
 
 
 class ShownColumn(NamedTuple):
@@ -31,6 +33,7 @@ def animate(
     *,
     states: States,
     columns: Callable[[tuple[str, ...]], tuple[Any, dict[str, Any]]],
+    format: str | None = None,
     fps: float = 25.0,
     speed: float | None = None,
     trace: Sequence[str] | str = (),
@@ -41,13 +44,14 @@ def animate(
     dpi: float = DPI,
 ) -> Any:
     """See :meth:`eomgen.runtime.trajectory.Trajectory.animate`."""
-    if file is not None:
-        require_kind(as_path("file", file))
+    require_target(file, format)
     trace = (trace,) if isinstance(trace, str) else tuple(trace)
     plot = (plot,) if isinstance(plot, str) else tuple(plot)
     forces = (forces,) if isinstance(forces, str) else forces
     if not isinstance(forces, bool | list | tuple):
-        raise UsageError(f"forces must be True, a joint or a list of joints, not {shown(forces)}")
+        raise UsageError(
+            f"forces must be True, the name of a joint, spring or damper, or a list of names, not {shown(forces)}"
+        )
     for name in plot:  # unknown names fail before anything is drawn
         trajectory[name]
     motion = sample(trajectory, states, fps, speed)
@@ -60,7 +64,7 @@ def animate(
     times, values = columns(plot) if plot else (trajectory.t, {})
     over, units = motion.over if still else times, trajectory.units
     curves = [ShownColumn(f"{n} ({units[n]})" if units.get(n) else n, over, row) for n, row in values.items()]
-    return write(file, scene, motion, curves, dpi)
+    return write(file, scene, motion, curves, dpi, format)
 
 
 def write(
@@ -69,15 +73,17 @@ def write(
     motion: ShownMotion,
     curves: Sequence[ShownColumn] = (),
     dpi: float = DPI,
+    format: str | None = None,
 ) -> Any:
     """Write an animation as its ending says; without a file, something that a notebook shows."""
     if isinstance(dpi, bool) or not isinstance(dpi, int | float) or not 1.0 <= dpi <= MOST_DOTS:
         raise UsageError(f"dpi must be a number from 1 to {MOST_DOTS:g}, not {shown(dpi)}")
+    if format in FILMS:
+        return InlineFilm(FILMS[format](Frames.of(scene, motion, curves, dpi)), format)
     path = None if file is None else as_path("file", file)
     kind = "" if path is None else kind_of(path)
     if path is None or kind == ".html":
         from .browser import page
-        from .player import InlinePage
 
         text = page(scene, motion, curves)
         if path is None:

@@ -48,7 +48,8 @@ def draw_scene(scene: Scene, ax: Any = None, title: str | None = None) -> Any:
     pyplot = matplotlib("pyplot", "draw") if ax is None else None
     artist = new_artist(scene, pyplot, ax)
     artist.show(0)
-    artist.ax.set_title(scene.name if title is None else title, fontsize=10, parse_math=False)
+    if title is not None or not artist.ax.get_title():
+        artist.ax.set_title(scene.name if title is None else title, fontsize=10, parse_math=False)
     return artist.ax
 
 
@@ -66,9 +67,9 @@ def figure_of(scene: Scene) -> Any:
     return made
 
 
-def figure_at(module: Any) -> Any:
+def figure_at(module: Any, quiet: bool = False) -> Any:
     """A figure without a window, of the declared initial position."""
-    scene = build_scene(module, position(module, None, 0.0)[:, None])
+    scene = build_scene(module, position(module, None, 0.0)[:, None], quiet=quiet)
     figure = figure_of(scene)
     draw_scene(scene, figure.axes[0])
     return figure
@@ -76,7 +77,7 @@ def figure_at(module: Any) -> Any:
 
 def small_figure(module: Any) -> Any:
     """The same in the size that suits a notebook."""
-    figure = figure_at(module)
+    figure = figure_at(module, quiet=True)
     figure.set_size_inches(SMALL * figure.get_size_inches() / figure.get_size_inches().max())
     return figure
 

@@ -41,6 +41,32 @@ class InlinePage:
         return f'<iframe style="{style}" srcdoc="{escape(self.text, quote=True)}"></iframe>'
 
 
+class InlineFilm:
+    """A GIF or a film that a notebook shows.
+
+    Attributes
+    ----------
+    data : bytes
+        The file, as it would be written.
+    format : {'gif', 'mp4'}
+    """
+
+    def __init__(self, data: bytes, format: str) -> None:
+        self.data, self.format = data, format
+
+    def __bytes__(self) -> bytes:
+        return self.data
+
+    def __repr__(self) -> str:
+        return f"<InlineFilm: {self.format} of {len(self.data) / 1e6:.2f} MB>"
+
+    def _repr_html_(self) -> str:
+        text = b64encode(self.data).decode()
+        if self.format == "gif":
+            return f'<img alt="animation" src="data:image/gif;base64,{text}">'
+        return f'<video controls loop autoplay muted src="data:video/{self.format};base64,{text}"></video>'
+
+
 def curves_html(motion: ShownMotion, curves: Sequence[Any]) -> str:
     """The curves as one picture, with a line over it; the ends of its axes stand in its data."""
     figure = matplotlib("figure", "curves beside an animation").Figure((9.0, PLOT / 100), dpi=200, layout="constrained")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from eomgen.cli import verb_examples
-from eomgen.cli.example_files import example_files
+from eomgen.shipped import example_files
 
 from .conftest import EXAMPLES, Call
 

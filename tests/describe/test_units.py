@@ -154,6 +154,27 @@ forces:
     assert [(p.path, p.line) for p in caught.value.problems] == [("bodies.b.mass", 6), ("forces.t.value", 13)]
 
 
+@pytest.mark.parametrize(
+    ("mass", "inertia", "size"),  # of l = 0.6, in parts of l^2
+    [
+        (4, "4*l**2/12", 1 / 3), (4, "l**2*4/12", 1 / 3), ("4", "l**2/3", 1 / 3), (1, "l**2/12", 1 / 12),
+        (4, "4*(l**2 + 0.1*l**2)/12", 1.1 / 3), (4, "4*l**2/12 + 4*l**2/4", 4 / 3), (4, "m*l**2/12", 1 / 3),
+        (4, "l**2/12", None), (2.5, "l**2/12", None), (4, "4*l/12", None), ("m", "4*l**2/12", None),
+    ],
+)  # fmt: skip
+def test_a_number_in_an_inertia_may_be_the_mass_of_the_body(mass: object, inertia: str, size: float | None) -> None:
+    m = eg.Model("rod")
+    m.parameter("l", 0.6, unit="m")
+    m.parameter("m", 4.0, unit="kg")
+    m.revolute("A", m.ground, m.body("rod", mass=mass, com=("l/2", 0, 0), inertia={"zz": inertia}))
+    if size is not None:  # about the pin: Steiner's theorem
+        about = m.compile(target="numpy").mass_matrix([0.0])[0, 0]
+        assert about == pytest.approx(size * 0.36 + float(str(mass)) * 0.09, rel=1e-14)
+    else:
+        with pytest.raises(eg.ModelError, match="a moment of inertia .* belongs here"):
+            m.compile(target="numpy")
+
+
 def test_a_model_without_units_is_not_checked() -> None:
     m = eg.Model("free")
     b = m.body("b", mass=1, inertia=(0, 0, 1))

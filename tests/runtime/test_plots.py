@@ -13,7 +13,7 @@ import pytest
 
 import eomgen as eg
 from eomgen.errors import UsageError
-from eomgen.runtime.refined import cubic_between
+from eomgen.runtime.refined import cubic_between, monotone_slopes
 
 matplotlib.use("agg")
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -74,6 +74,35 @@ def test_energy_and_residuals(run: Any) -> None:
     assert position.lines[0].get_ydata().max() < 1e-9
     with pytest.raises(UsageError, match="no constraints"):
         pendulum(end=0.1).plot(kind="residuals")
+
+
+def test_the_energy_between_the_steps_drifts_no_more_than_at_them() -> None:
+    run = pendulum(2.0)  # 110 steps of about a fortieth of a swing; the cubics between them are off by 7e-4 J
+    E = -9.81 * np.cos(2.0)  # of the closed form, at rest at 2 rad
+    at_steps = run["energy"]
+    drift = float(np.ptp(at_steps))
+    assert drift < 1e-8
+    curve = run.plot("energy").lines[0].get_ydata()
+    assert len(curve) > 5 * len(at_steps)
+    assert np.abs(curve - E).max() <= np.abs(at_steps - E).max() + 1e-13
+    parts, change = run.plot(kind="energy")
+    assert np.ptp(change.lines[0].get_ydata()) <= drift + 1e-13
+    t, kinetic = parts.lines[0].get_xydata().T
+    assert len(t) == len(curve)  # and smooth
+    swing = np.interp(t, *run.plot("theta").lines[0].get_xydata().T)
+    assert kinetic == pytest.approx(9.81 * (np.cos(swing) - np.cos(2.0)), abs=1e-3)  # T = m g l (cos - cos 2)
+
+
+def test_a_curve_without_extremes_between_its_points_is_that_of_scipy() -> None:
+    from scipy.interpolate import PchipInterpolator
+
+    t = np.linspace(0.0, 3.0, 13)
+    for y in (np.sin(3.0 * t), np.full(13, 2.0), np.where(t < 1.5, 0.0, 1.0)):
+        slopes = monotone_slopes(t, y)
+        assert slopes[1:-1] == pytest.approx(PchipInterpolator(t, y).derivative()(t)[1:-1], abs=1e-13)
+    # a jump at t = 1 begins a new curve
+    twice, steps = np.array([0.0, 1.0, 1.0, 2.0]), np.array([0.0, 1.0, 5.0, 3.0])
+    assert monotone_slopes(twice, steps) == pytest.approx([1.0, 1.0, -2.0, -2.0])
 
 
 def test_sixty_columns_leave_the_axes_their_room() -> None:

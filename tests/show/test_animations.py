@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import importlib.util
+import io
 import json
 import re
 import shutil
@@ -60,6 +62,36 @@ def test_a_gif_has_a_frame_for_every_step_of_time(run: Any, tmp_path: Path) -> N
             durations.append(image.info["duration"])
     assert frames == 21  # 1 s at half speed, 10 in a second, both ends
     assert sum(durations) == 2100
+
+
+def test_a_gif_without_a_file_is_shown_by_a_notebook(run: Any, tmp_path: Path) -> None:
+    shown = run.animate(format="gif", fps=4, dpi=30)
+    file = run.animate(tmp_path / "run.gif", fps=4, dpi=30)
+    assert bytes(shown) == shown.data == file.read_bytes()
+    found = re.fullmatch('<img alt="animation" src="data:image/gif;base64,(.*)">', shown._repr_html_())
+    assert found is not None
+    with Image.open(io.BytesIO(base64.b64decode(found[1]))) as image:
+        assert image.n_frames == 13  # 1 s in 3 s, 4 in a second, both ends
+    swing = pendulum_modes().animate(1, format="gif", fps=4, dpi=30)
+    with Image.open(io.BytesIO(bytes(swing))) as image:
+        assert image.n_frames == 8
+    assert "<html" in str(run.animate(format="html", fps=4)).lower()
+
+
+def test_a_format_is_not_a_file(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("gif", ".gif", "mp4"):
+        with pytest.raises(UsageError, match=f"such as 'run.{name[-3:]}', or format='{name[-3:]}' without a file"):
+            run.animate(name)
+    with pytest.raises(UsageError, match="format= is for an animation without a file"):
+        run.animate("run.gif", format="gif")
+    with pytest.raises(UsageError, match="format must be one of 'gif', 'mp4', 'html', not 'png'"):
+        run.animate(format="png")
+    assert list(tmp_path.iterdir()) == []
+
+
+def pendulum_modes() -> Any:
+    return eg.load(EXAMPLES / "pendulum.yaml").compile(target="numpy").modes({"theta": 0.0})
 
 
 def test_ways_are_round_at_any_rate_of_frames(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,7 +199,8 @@ def hanging(angle: float = 0.0) -> Any:
 
 def test_arrows_are_the_forces_of_joints() -> None:
     """At rest the hinge holds 2 kg; let go at a right angle it holds nothing at first, and pulls inwards later."""
-    from eomgen.show.shown_motion import moving_scene, sample, with_arrows
+    from eomgen.show.force_arrows import with_arrows
+    from eomgen.show.shown_motion import moving_scene, sample
 
     for angle, force in ((0.0, np.array([0.0, 2 * 9.81])), (np.pi / 2, None)):
         traj = hanging(angle)
@@ -188,8 +221,41 @@ def test_arrows_are_the_forces_of_joints() -> None:
             expected = (inwards * along).T
             longest = np.linalg.norm(expected, axis=1).max()
             assert ways / np.linalg.norm(ways, axis=1).max() == pytest.approx(expected / longest, abs=1e-6)
-    with pytest.raises(UsageError, match="no joint 'hing'"):
+    with pytest.raises(UsageError, match="no joint, spring or damper 'hing' .* there are hinge"):
         with_arrows(scene, module, motion, ("hing",))
+
+
+def test_arrows_are_the_forces_of_springs_and_dampers() -> None:
+    """On each body at an end: -k (s - s0), of the free length 0.4, and -c s', away from the other end."""
+    from eomgen.show.force_arrows import with_arrows
+    from eomgen.show.shown_motion import moving_scene, sample
+
+    m = eg.Model("two", gravity=(0, -9.81, 0))
+    k = m.parameter("k", 80.0)
+    upper, lower = m.body("upper", mass=1.0), m.body("lower", mass=2.0)
+    m.prismatic("A", m.ground, upper, axis="y", coordinate="a")
+    m.prismatic("B", m.ground, lower, axis="y", coordinate="b")
+    m.spring("coil", lower, upper, stiffness=k, length=0.4)
+    m.damper("pot", m.ground.at(0.0, 1.0, 0.0), upper, damping="3 + k/80")
+    m.torque("lift", "B", "k/4*t")
+    traj = m.compile(target="numpy").simulate(0.5, initial={"a": 0.3, "b": -0.3, "a_dot": 0.5}, dense_output=True)
+    module = traj.columns.module
+    motion = sample(traj, lambda t: (traj.at(t).x, None), 20.0, 1.0)
+    x = dict(zip(module.x_names, motion.x, strict=True))
+    scene = with_arrows(moving_scene(module, motion, False, False, ()), module, motion, ["coil", "pot"])
+    found = [(item.name, item.path[:, 1, 1] - item.path[:, 0, 1], item.path[:, 0, 1]) for item in scene.items
+             if item.role == "arrow" and item.path is not None]  # fmt: skip
+    push, drag = -80.0 * (x["a"] - x["b"] - 0.4), -4.0 * x["a_dot"]
+    longest = max(np.abs(push).max(), np.abs(drag).max())
+    assert scene.note == f"longest arrow {longest:.4g} N"
+    scale = max(np.abs(ways).max() for _, ways, _ in found) / longest
+    expected = [("coil", push, x["a"]), ("coil", -push, x["b"]), ("pot", drag, x["a"])]  # ground has no arrow
+    for (name, ways, tails), (element, force, place) in zip(found, expected, strict=True):
+        assert name == element
+        assert ways == pytest.approx(scale * force, abs=1e-6 * scale * longest)
+        assert tails == pytest.approx(place, abs=1e-12)
+    named = with_arrows(moving_scene(module, motion, False, False, ()), module, motion, True)
+    assert {item.name for item in named.items if item.role == "arrow"} == {"A", "B", "coil", "pot"}
 
 
 def test_frames_and_films(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

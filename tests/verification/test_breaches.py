@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.integrate
 
 import eomgen as eg
 import eomgen.emit
@@ -246,3 +247,46 @@ def test_a_step_of_lower_order(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(check_runs, "step", third_order)
     assert found_by(module.verify(states=3)) == {"steppers: order of RK4"}
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("shaper", [("J: {value: 20", "J: {value: 4"), ("v_0: {value: 0.3", "v_0: {value: 0.02")]),
+        ("watt_six_bar", [("initial: {theta: 4,", "initial: {theta: 0.5,")]),
+    ],
+)
+def test_an_order_that_a_fast_term_hides(
+    name: str, changes: list[tuple[str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """DOP853 has lost its error in rounding before its order shows: a right step passes, a wrong one is found."""
+    text = (EXAMPLES / f"{name}.yaml").read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    file = tmp_path / f"{name}.yaml"
+    file.write_text(text)
+    module = eg.load(file).compile()
+    check = "steppers: order of DOP853"
+    assert check not in found_by(module.verify(states=3, seconds=1.0))
+
+    class Wrong(scipy.integrate.DOP853):
+        """A weight that is off by 1e-4 leaves no order."""
+
+        B = scipy.integrate.DOP853.B * np.where(np.arange(12) == 8, 1.0 + 1e-4, 1.0)
+
+    right = check_runs.integrator
+
+    def wrong(model: Any, method: str, **options: Any) -> Any:
+        if method != "DOP853":
+            return right(model, method=method, **options)
+
+        def run(t: float, x: Any, h: float) -> Any:
+            solver = Wrong(model.rhs, t, x, t + 2.0 * h, rtol=1e6, atol=1e6, first_step=h, max_step=h)
+            solver.step()
+            return model.project(solver.y, t=t + h)
+
+        return run
+
+    monkeypatch.setattr(check_runs, "integrator", wrong)
+    assert check in found_by(module.verify(states=3, seconds=1.0))
