@@ -298,7 +298,7 @@ def test_a_model_in_place_of_a_module_is_told(run: Any, tmp_path: Path) -> None:
 def test_curves_beside_an_animation_are_smooth(module: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Between the few steps of a run they follow the motion, as traj.plot does."""
     shown: list[Any] = []
-    monkeypatch.setattr(eomgen_animate, "write", lambda file, scene, motion, curves, dpi: shown.extend(curves))
+    monkeypatch.setattr(eomgen_animate, "write", lambda file, scene, motion, curves, dpi, format: shown.extend(curves))
     module.simulate(0.2).animate(tmp_path / "a.gif", plot="pin_x")
     (curve,) = shown
     exact = module.simulate(0.2, t_eval=curve.over)["pin_x"]
