@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
 
-from ..equations import GIVEN, METHODS
+from ..equations import METHODS
 from ..equations.reduction import VelocityTransformation, transform_velocities
 from ..equations.tree_equations import TreeEquations
 from ..errors import UnavailableError
@@ -111,6 +111,10 @@ class Quantities:
         """B^T (Q - M c) of forces Q on the tree."""
         return self.transformation.force(self.tree.mass_matrix, right) if self._embeds else tuple(right)
 
+    def along_independent(self, row: Sequence[Expr]) -> Row:
+        """B^T x: derivatives by the velocities of the tree -> by the independent ones."""
+        return self.transformation.project(row) if self._embeds else tuple(row)
+
     def _require_separate(self, what: str) -> None:
         if self.kinematics.mechanism.given is not None:
             raise UnavailableError(f"{what} are not known apart: given equations tell their sum alone, which is force")
@@ -138,8 +142,7 @@ class Quantities:
     @cached_property
     def forces(self) -> dict[str, Row]:
         """Generalized forces (n_dof,) by force element."""
-        project = self.transformation.project if self._embeds else tuple
-        return {name: project(force) for name, force in self.tree_forces.items()}
+        return {name: self.along_independent(force) for name, force in self.tree_forces.items()}
 
     @cached_property
     def total_force(self) -> Row:
@@ -226,8 +229,3 @@ class Quantities:
         """Coordinates of cut joints as functions of the tree's."""
         loop = self.kinematics.loop_coordinates
         return dict(zip(loop.names, loop.values, strict=True))
-
-    @property
-    def given(self) -> bool:
-        """Whether the equations were given."""
-        return self.tree.method == GIVEN
