@@ -1,7 +1,8 @@
-"""What equations show, evaluated through SymPy's lambdify at numbers: the other side of every comparison."""
+"""What equations show, evaluated through SymPy at numbers: the other side of every comparison."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -24,13 +25,33 @@ def number(equations: Any, name: str, values: Mapping[str, float], part: str | N
 
 
 def evaluate(named: list[tuple[Any, Any]], flat: list[Any], values: Mapping[str, float]) -> np.ndarray:
-    """Expressions with named parts at numbers."""
-    if not flat:
-        return np.zeros(0)
-    symbols = [sympy.Symbol(name) for name in values]
-    function = sympy.lambdify(symbols, flat, "numpy", cse=lambda given, **_: (named, list(given)))
-    with np.errstate(all="ignore"):  # branches of a Piecewise that are not taken are evaluated too
-        return np.array(function(*values.values()), dtype=float)
+    """Expressions with named parts at numbers, each part of an expression once."""
+    known: dict[Any, Any] = {sympy.Symbol(name): float(value) for name, value in values.items()}
+    for symbol, expression in named:
+        known[symbol] = _value(expression, known)
+    return np.array([float(_value(x, known)) for x in flat])
+
+
+def _value(expression: Any, known: dict[Any, Any]) -> Any:
+    """The value of an expression: sums, products and powers of floats here, all else as SymPy evaluates it."""
+    if expression in known:
+        return known[expression]
+    if not expression.args:
+        value = float(expression) if expression.is_number else expression  # true of a Piecewise
+    else:
+        parts = [_value(part, known) for part in expression.args]
+        plain = all(type(part) is float for part in parts)
+        if plain and expression.is_Add:
+            value = math.fsum(parts)
+        elif plain and expression.is_Mul:
+            value = math.prod(parts)
+        elif plain and expression.is_Pow and (parts[0] > 0 or (parts[0] < 0 and parts[1].is_integer())):
+            value = parts[0] ** parts[1]
+        else:
+            value = expression.func(*(sympy.Float(x) if type(x) is float else x for x in parts))
+            value = float(value) if value.is_Number and value.is_finite else value
+    known[expression] = value
+    return value
 
 
 def state_values(module: Any, x: np.ndarray, t: float) -> dict[str, float]:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from ..graph.core import Expr
 
 READABLE = 400  #: operations an expression, on average, up to which expressions are written out
+LONGEST = 20_000  #: operations of all of them together
 
 
 class Written(NamedTuple):
@@ -31,7 +32,7 @@ def is_short(expressions: Sequence[Expr]) -> bool:
     """Whether expressions are written out whole."""
     from ..graph.sympy_raise import inlined_size
 
-    return inlined_size(expressions) <= READABLE * len(expressions)
+    return inlined_size(expressions) <= min(READABLE * len(expressions), LONGEST)
 
 
 def write(expressions: Sequence[Expr], symbols: Callable[[str], Any] | None = None, prefix: str = "z") -> Written:
