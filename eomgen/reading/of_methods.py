@@ -65,7 +65,8 @@ def hamiltonian(quantities: Quantities) -> Expr:
     for x, rate in zip(moved, solve_symmetric(tree.mass_matrix, moved), strict=True):
         total = total + x * rate
     found = 0.5 * total - at_rest + tree.potential_energy
-    numbers = quantities.numbers | dict(zip(kinematics.names, quantities.mobility.q_reference, strict=True))
+    places = enumerate(quantities.mobility.q_reference)  # somewhere else: coordinates may be singular at the reference
+    numbers = quantities.numbers | dict(zip(kinematics.names, (x + 0.3 + 0.1 * k for k, x in places), strict=True))
     if not math.isfinite(float(evaluate([found], numbers | dict.fromkeys(momentum_names(kinematics), 1.0))[0])):
         raise UnavailableError(
             "the mass matrix of the spanning tree has no inverse, so that H is no function of the momenta; give every "
