@@ -136,27 +136,35 @@ def unknown_names(quantities: Quantities) -> tuple[str, ...]:
     return (*names, *(f"lambda_{k + 1}" for k in range(left)))
 
 
-def body_velocities(quantities: Quantities) -> tuple[Rows, Rows]:
-    """B_b (6 n_b, n_dof) and M_b (6 n_b, 6 n_b) of M = B_b^T M_b B_b (Shabana, sec. 5.7).
+def body_velocities(quantities: Quantities) -> Rows:
+    """B_b (6 n_b, n_dof) of M = B_b^T M_b B_b (Shabana, sec. 5.7).
 
     The six velocities of a body are that of its centre of mass in ground axes, then its angular velocity in body axes.
     """
-    kinematics, graph = quantities.kinematics, quantities.graph
-    if kinematics.mechanism.bare:
-        raise UnavailableError("there are no bodies: the model is a Lagrangian or given equations")
-    motion, bodies = kinematics.motion, kinematics.mechanism.bodies
+    _require_bodies(quantities)
+    motion, v = quantities.kinematics.motion, list(quantities.kinematics.v)
     velocities: list[Expr] = []
-    size = 6 * len(bodies)
-    mass = [[graph.zero] * size for _ in range(size)]
-    for k, body in enumerate(bodies):
-        marker = quantities.markers[body.name]
+    for body in quantities.kinematics.mechanism.bodies:
         velocities += quantities.velocity(body.name).center_of_mass
-        velocities += motion.turning_of(marker, own_axes=True, rate=False)
+        velocities += motion.turning_of(quantities.markers[body.name], own_axes=True, rate=False)
+    entries = jacobian(velocities, v)
+    zero = quantities.graph.zero
+    rows = [[entries.get((i, j), zero) for j in range(len(v))] for i in range(len(velocities))]
+    return tuple(quantities.along_independent(row) for row in rows)
+
+
+def body_mass_matrix(quantities: Quantities) -> Rows:
+    """M_b (6 n_b, 6 n_b), mass and inertia body by body."""
+    _require_bodies(quantities)
+    bodies = quantities.kinematics.mechanism.bodies
+    mass = [[quantities.graph.zero] * (6 * len(bodies)) for _ in range(6 * len(bodies))]
+    for k, body in enumerate(bodies):
         for i in range(3):
             mass[6 * k + i][6 * k + i] = body.mass
-            for j in range(3):
-                mass[6 * k + 3 + i][6 * k + 3 + j] = body.inertia[i][j]
-    n = len(kinematics.v)
-    entries = jacobian(velocities, list(kinematics.v))
-    rows = [[entries.get((i, j), graph.zero) for j in range(n)] for i in range(size)]
-    return tuple(quantities.along_independent(row) for row in rows), tuple(map(tuple, mass))
+            mass[6 * k + 3 + i][6 * k + 3 : 6 * k + 6] = body.inertia[i]
+    return tuple(map(tuple, mass))
+
+
+def _require_bodies(quantities: Quantities) -> None:
+    if quantities.kinematics.mechanism.bare:
+        raise UnavailableError("there are no bodies: the model is a Lagrangian or given equations")

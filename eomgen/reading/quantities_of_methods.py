@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..graph.core import Expr
 from .bodies_apart import BodiesApart
 from .near_state import linearize
-from .of_methods import block_system, body_velocities, gibbs_function, hamiltonian, momentum_names, momentum_rates
+from .of_methods import (
+    block_system,
+    body_mass_matrix,
+    body_velocities,
+    gibbs_function,
+    hamiltonian,
+    momentum_names,
+    momentum_rates,
+)
 from .put_in import read_values
 from .quantities import Quantities
 from .writes_quantities import WritesQuantities
@@ -152,31 +160,18 @@ class QuantitiesOfMethods(WritesQuantities):
         return ByName("joint of the tree", BodiesApart(Quantities(*self.fresh())).joints, make)
 
     @cached_property
-    def _bodies(self) -> tuple[Any, Any]:
-        import sympy
-
-        n, size = self.mobility.n_dof, 6 * len(self.kinematics.mechanism.bodies)
-
-        def choose(quantities: Quantities) -> list[Expr]:
-            return [x for matrix in body_velocities(quantities) for row in matrix for x in row]
-
-        written = self._write("body_velocity_transformation", choose, "b_")
-        self._named["body_mass_matrix"] = self._named["body_velocity_transformation"]
-        return sympy.Matrix(size, n, written[: size * n]), sympy.Matrix(size, size, written[size * n :])
-
-    @property
     def body_velocity_transformation(self) -> Any:
         """B_b (6 n_b, n) of the velocities of all bodies by those of ``independent``.
 
         Of each body the velocity of its centre of mass in ground axes, then its angular velocity in body axes.
         ``B_b.T * body_mass_matrix * B_b`` is ``mass_matrix``, less the inertia of drives.
         """
-        return self._bodies[0]
+        return self._matrix("body_velocity_transformation", body_velocities, self.mobility.n_dof)
 
-    @property
+    @cached_property
     def body_mass_matrix(self) -> Any:
         """M_b (6 n_b, 6 n_b): mass and inertia of each body, for the velocities of ``body_velocity_transformation``."""
-        return self._bodies[1]
+        return self._matrix("body_mass_matrix", body_mass_matrix, 6 * len(self.kinematics.mechanism.bodies))
 
     def linearize(self, at: Mapping[Any, Any] | None = None, *, equilibrium: bool = False) -> SymbolicLinearization:
         """The equations of motion near a state, x' = A x + B u, in symbols.
