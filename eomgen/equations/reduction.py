@@ -7,6 +7,7 @@ modules eliminate numerically with pivoting.  Here the pivots are fixed, chosen 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
@@ -27,26 +28,58 @@ def reduce_to_independent(
     values : mapping
         Numbers of the parameters, inputs and t, by which pivots are judged.
     """
+    if mobility.n_dof == len(kinematics.v):
+        return equations.mass_matrix, tuple(-h for h in equations.bias)
+    found = transform_velocities(kinematics, mobility, values)
+    return found.mass_matrix(equations.mass_matrix), found.force(equations.mass_matrix, [-h for h in equations.bias])
+
+
+class VelocityTransformation(NamedTuple):
+    """v = B v_i + b and a = B a_i + c: the velocities of the tree by the independent ones, and their rates.
+
+    ``matrix`` is B (n_v, n_dof), row by row; ``offset`` is b (n_v,), what drivers and other prescribed motions add;
+    ``acceleration_offset`` is c (n_v,).
+    """
+
+    matrix: Rows
+    offset: tuple[Expr, ...]
+    acceleration_offset: tuple[Expr, ...]
+
+    def project(self, forces: Sequence[Expr]) -> tuple[Expr, ...]:
+        """B^T Q: generalized forces of the tree along the independent velocities."""
+        return tuple(_dot(column, forces) for column in zip(*self.matrix, strict=True))
+
+    def mass_matrix(self, mass: Rows) -> Rows:
+        """B^T M B."""
+        columns = list(zip(*self.matrix, strict=True))
+        weighted = [[_dot(row, column) for row in mass] for column in columns]
+        return tuple(tuple(_dot(column, other) for other in weighted) for column in columns)
+
+    def force(self, mass: Rows, right: Sequence[Expr]) -> tuple[Expr, ...]:
+        """B^T (Q - M c)."""
+        rest = [-f + _dot(row, self.acceleration_offset) for f, row in zip(right, mass, strict=True)]
+        return tuple(-x for x in self.project(rest))
+
+
+def transform_velocities(
+    kinematics: Kinematics, mobility: Mobility, values: Mapping[str, float]
+) -> VelocityTransformation:
+    """B, b and c of the independent velocities of the mobility, with pivots judged by numbers as above."""
     graph, n = kinematics.graph, len(kinematics.v)
     free = [kinematics.velocity_labels.index(name) for name in mobility.independent]
     bound = [j for j in range(n) if j not in free]
-    if not bound:
-        return equations.mass_matrix, tuple(-h for h in equations.bias)
-    solved = _eliminate(kinematics, mobility, bound, values)
+    c = kinematics.constraints
+    rows = [[*c.jacobian[i], c.gamma[i], c.time_derivative[i]] for i in mobility.independent_rows]
+    solved = eliminate(kinematics, mobility, rows, bound, values) if bound else {}
     unit = {j: k for k, j in enumerate(free)}
-    velocity = [  # B, row by row
-        [graph.one if unit.get(j) == k else graph.zero for k in range(len(free))]
+    matrix = [
+        tuple(graph.one if unit[j] == k else graph.zero for k in range(len(free)))
         if j in unit
-        else [-solved[j][i] for i in free]
+        else tuple(-solved[j][i] for i in free)
         for j in range(n)
     ]
-    particular = [graph.zero if j in unit else -solved[j][n] for j in range(n)]
-    mass = equations.mass_matrix
-    weighted = [[_dot(mass[i], [row[k] for row in velocity]) for k in range(len(free))] for i in range(n)]
-    rest = [equations.bias[i] + _dot(mass[i], particular) for i in range(n)]
-    columns = [[row[k] for row in velocity] for k in range(len(free))]
-    matrix = tuple(tuple(_dot(c, [row[k] for row in weighted]) for k in range(len(free))) for c in columns)
-    return matrix, tuple(-_dot(c, rest) for c in columns)
+    rest = [(graph.zero, graph.zero) if j in unit else (-solved[j][n], -solved[j][n + 1]) for j in range(n)]
+    return VelocityTransformation(tuple(matrix), tuple(b for _, b in rest), tuple(c for c, _ in rest))
 
 
 def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
@@ -56,14 +89,17 @@ def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
     return total
 
 
-def _eliminate(
-    kinematics: Kinematics, mobility: Mobility, bound: Sequence[int], values: Mapping[str, float]
+def eliminate(
+    kinematics: Kinematics,
+    mobility: Mobility,
+    given: Sequence[Sequence[Expr]],
+    bound: Sequence[int],
+    values: Mapping[str, float],
 ) -> dict[int, list[Expr]]:
-    """Gauss-Jordan on the independent rows of [C_q | gamma] for the dependent columns, column -> its solved row."""
-    c = kinematics.constraints
+    """Gauss-Jordan on given rows, as many as there are columns ``bound`` to solve for: column -> its solved row."""
     at = dict(values) | dict(zip(kinematics.names, mobility.q_reference, strict=True))
     at |= dict.fromkeys(kinematics.velocity_names, 0.0)
-    rows = [[*c.jacobian[i], c.gamma[i]] for i in mobility.independent_rows]
+    rows = [list(row) for row in given]
     numbers = [[float(x) for x in evaluate(row, at)] for row in rows]
     left = list(range(len(rows)))
     pivots: dict[int, int] = {}  # column -> row
