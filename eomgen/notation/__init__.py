@@ -1,0 +1,10 @@
+"""Notation: the name of a quantity -> how it is printed: LaTeX, text, HTML, MathML, Matplotlib's mathtext.
+
+``theta1`` is printed as ``\\theta_1``, ``m_c`` as ``m_c``, ``bend`` as ``\\mathrm{bend}``, ``theta1_dot`` as
+``\\dot{\\theta}_1``.  A model may give the LaTeX of a name itself (``latex=``); all other forms follow from it.
+Exported packages carry these files, which import neither NumPy nor SymPy.
+"""
+
+from .notation import Notation as Notation
+from .reading import NotationError as NotationError
+from .reading import read_latex as read_latex
