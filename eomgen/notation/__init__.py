@@ -6,5 +6,7 @@ Exported packages carry these files, which import neither NumPy nor SymPy.
 """
 
 from .notation import Notation as Notation
+from .notation import dotted as dotted
+from .notation import with_instance as with_instance
 from .reading import NotationError as NotationError
 from .reading import read_latex as read_latex

@@ -21,8 +21,8 @@ _SPECIAL = re.compile(r"[^ A-Za-z0-9_%#&+\-=*/().,:;|!\[\]?]")
 #: Beginnings of names of two or three letters that are symbols with their axes: forces, moments, velocities, ...
 _AXES = re.compile(r"([A-Za-z])([xyz]{1,2}|[XYZ]{1,2})\Z")
 #: Two small letters that are a word.
-_WORDS = ("ab", "ad", "am", "an", "as", "at", "be", "by", "do", "ex", "go", "he", "hi", "id", "if", "in", "is", "it", "me",
-          "my", "no", "of", "oh", "ok", "on", "or", "so", "to", "up", "us", "we")  # fmt: skip
+_WORDS = ("ab", "ad", "am", "an", "as", "at", "be", "by", "do", "ex", "go", "he", "hi", "id", "if", "in", "is", "it",
+          "me", "my", "no", "of", "oh", "ok", "on", "or", "so", "to", "up", "us", "we")  # fmt: skip
 _MOTIONS = {"v": "v", "a": "a", "w": r"\omega"}
 _DOTTED = {"dot": 1, "ddot": 2}
 #: Other spellings, as Python keeps ``lambda`` for itself.

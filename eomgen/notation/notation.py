@@ -8,7 +8,7 @@ from typing import Any
 
 from .names import latex_of, literal, split_rate
 from .printing import html_form, mathml_form, mathtext_form, text_form
-from .reading import Accent, Node, head_of, read_latex, spaced
+from .reading import Accent, Node, NotationError, Row, Scripts, head_of, read_latex, spaced
 from .signs import DOTS
 
 _FORMS: dict[str, Callable[[Node], str]] = {
@@ -29,6 +29,9 @@ class Notation:
         are printed as they are, upright.
     latex : mapping of str to str, optional
         LaTeX that a model gives for some of them; rates follow, with a dot over the first letter.
+    instances : mapping of str to str, optional
+        Instances of components and the prefixes of their names, which become subscripts: ``leg1_theta`` is printed as
+        ``\theta_{\mathrm{leg1}}``.
 
     Examples
     --------
@@ -39,8 +42,14 @@ class Notation:
     ('\\theta_1(t)', 'θ₁', '<i>m</i><sub><i>c</i></sub>')
     """
 
-    def __init__(self, names: Iterable[str] = (), latex: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        names: Iterable[str] = (),
+        latex: Mapping[str, str] | None = None,
+        instances: Mapping[str, str] | None = None,
+    ) -> None:
         self.given = {name: spaced(text) for name, text in (latex or {}).items()}
+        self.instances = instances or {}
         self.names = tuple(dict.fromkeys(names))
         self._sources: dict[str, str] = {}
         self._texts: dict[str, str] = {}  #: of those whose text would be another's name
@@ -51,7 +60,7 @@ class Notation:
         """The notation of a module or a trajectory, from its metadata."""
         keys = ("q_names", "v_names", "loop_names", "u_names", "p_names", "y_names")
         names = [name for key in keys for name in metadata.get(key, ())]
-        return cls(names, metadata.get("latex"))
+        return cls(names, metadata.get("latex"), metadata.get("instances"))
 
     def latex(self, name: str, of_time: bool = False) -> str:
         r"""LaTeX, without dollars: ``\theta_1``; as a function of time ``\theta_1(t)``."""
@@ -92,8 +101,15 @@ class Notation:
             return self.given[name]
         stem, order = split_rate(name)
         if not order:
-            return latex_of(name)
+            return latex_of(self._with_dots(name))
         return dotted(self._source(stem), order) if order < len(DOTS) else literal(name)
+
+    def _with_dots(self, name: str) -> str:
+        """The name of something in an instance with a dot after the instance: ``leg1.theta``."""
+        for instance, prefix in self.instances.items():
+            if prefix and name.startswith(prefix) and name != prefix:
+                return f"{instance}.{name.removeprefix(prefix)}"
+        return name
 
     def _keep_apart(self) -> None:
         """Find what every name is printed from, so that no two look alike: given LaTeX first, rates last."""
@@ -117,7 +133,7 @@ class Notation:
             return 0
         if split_rate(name)[1]:
             return 3
-        return 1 if _printed("text", latex_of(name)) == name else 2
+        return 1 if _printed("text", self._wanted(name)) == name else 2
 
 
 def dotted(latex: str, order: int) -> str:
@@ -136,6 +152,30 @@ def dotted(latex: str, order: int) -> str:
     if isinstance(head, Accent) and head.accent in DOTS and order + DOTS.index(head.accent) < len(DOTS):
         body, order = head.body, order + DOTS.index(head.accent)
     return f"{latex[: head.start]}\\{DOTS[order]}{{{latex[body.start : body.end]}}}{latex[head.end :]}"
+
+
+def with_instance(latex: str, instance: str) -> str:
+    r"""LaTeX with the name of an instance as a further subscript: ``m_{c}`` -> ``m_{c,\mathrm{leg1}}``.
+
+    What is not the LaTeX of a symbol stays as it is.
+    """
+    latex = spaced(latex)
+    try:
+        tree = read_latex(latex)
+    except NotationError:  # told when the model is checked
+        return latex
+    while isinstance(tree, Row) and len(tree.parts) > 1:
+        head = head_of(tree) or tree.parts[0]
+        tree = next(part for part in tree.parts if part.end >= head.end)
+    word = literal(instance)
+    if not isinstance(tree, Scripts):
+        return f"{latex[: tree.end]}_{{{word}}}{latex[tree.end :]}"
+    if tree.sub is None:
+        return f"{latex[: tree.base.end]}_{{{word}}}{latex[tree.base.end :]}"
+    start, end = tree.sub.start, tree.sub.end
+    sub = f"{latex[start:end]},{word}"
+    braced = latex[start - 1] == "{"
+    return f"{latex[:start]}{sub if braced else f'{{{sub}}}'}{latex[end:]}"
 
 
 @cache

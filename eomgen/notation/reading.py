@@ -11,6 +11,7 @@ from functools import cache
 from typing import NamedTuple
 
 from ..suggestions import hint
+from ..texts import visible
 from .signs import ACCENTS, GREEK, LETTERS, PLAIN, SIGNS, SPACES, STYLES, SWITCHES
 
 LONGEST = 120  #: characters of a symbol's LaTeX
@@ -101,7 +102,7 @@ def read_latex(text: str) -> Node:
         raise NotationError(f"the LaTeX of a symbol has {len(text)} characters", f"at most {LONGEST}")
     text = spaced(text)
     if text.endswith("\\") and not text.endswith("\\\\"):
-        raise NotationError(f"{text!r} ends in a backslash", "take it away")
+        raise NotationError(f"{_shown(text)} ends in a backslash", "take it away")
     return _Reader(text).whole()
 
 
@@ -110,20 +111,24 @@ def spaced(text: str) -> str:
     return " ".join(text.split())
 
 
+def _shown(text: str) -> str:
+    return f"'{visible(text, lines=False)}'"
+
+
 class _Reader:
     """Reads tokens from left to right."""
 
     def __init__(self, text: str) -> None:
         self.text, self.tokens = text, [(m[0], m.start()) for m in _TOKEN.finditer(text)]
-        self.place = 0
+        self.place, self.shown = 0, _shown(text)
 
     def whole(self) -> Node:
         found = self.row("", False, 0)
         if self.place < len(self.tokens):
-            raise NotationError(f"{self.text!r} has a '}}' without its '{{'", "write as many { as }")
+            raise NotationError(f"{self.shown} has a '}}' without its '{{'", "write as many { as }")
         if not isinstance(found, Row) or found.parts:
             return found
-        raise NotationError(f"{self.text!r} shows nothing", "write a letter, for example \\theta_1")
+        raise NotationError(f"{self.shown} shows nothing", "write a letter, for example \\theta_1")
 
     def peek(self) -> str:
         return self.tokens[self.place][0] if self.place < len(self.tokens) else ""
@@ -135,7 +140,7 @@ class _Reader:
     def row(self, closing: str, text_mode: bool, depth: int) -> Node:
         """Parts up to a closing brace, which is left."""
         if depth > DEEPEST:
-            raise NotationError(f"{self.text!r} has groups within groups", f"at most {DEEPEST} of them")
+            raise NotationError(f"{self.shown} has groups within groups", f"at most {DEEPEST} of them")
         parts: list[Node] = []
         start = self.offset
         while (token := self.peek()) and token != "}":
@@ -153,14 +158,14 @@ class _Reader:
                 continue
             parts.append(self.part(text_mode, depth))
         if closing and self.peek() != closing:
-            raise NotationError(f"{self.text!r} has a '{{' without its '}}'", "write as many { as }")
+            raise NotationError(f"{self.shown} has a '{{' without its '}}'", "write as many { as }")
         return parts[0] if len(parts) == 1 else Row(tuple(parts), start, self.offset)
 
     def part(self, text_mode: bool, depth: int) -> Node:
         """A symbol with its scripts."""
         start = self.offset
-        if self.peek() in ("_", "^", "'"):
-            raise NotationError(f"{self.text!r} has {self.peek()!r} with nothing before it", "write a letter before it")
+        if self.peek() in ("_", "^", "'") and not text_mode:
+            raise NotationError(f"{self.shown} has {self.peek()!r} with nothing before it", "write a letter before it")
         base = self.single(text_mode, depth)
         sub: Node | None = None
         sup: Node | None = None
@@ -179,7 +184,7 @@ class _Reader:
             elif token == "^" and sup is None and not primes:
                 sup = self.argument("^", False, depth)
             else:
-                raise NotationError(f"{self.text!r} has {token!r} twice", "put them together, as in l_{1,2}")
+                raise NotationError(f"{self.shown} has {token!r} twice", "put them together, as in l_{1,2}")
         if sub is None and sup is None and not primes:
             return base
         return Scripts(base, sub, sup, primes, start, self.offset)
@@ -202,11 +207,11 @@ class _Reader:
     def refuse(self, token: str, text_mode: bool) -> None:
         greek = next((word for word, sign in GREEK.items() if sign == token), "")
         if greek:
-            raise NotationError(f"{self.text!r} has the letter {token}", f"write \\{greek}")
+            raise NotationError(f"{self.shown} has the letter {token}", f"write \\{greek}")
         if text_mode and token in "_^'":
-            raise NotationError(f"{self.text!r} has {token!r} in \\text", "write \\mathrm in place of \\text")
+            raise NotationError(f"{self.shown} has {token!r} in \\text", "write \\mathrm in place of \\text")
         what = f"{token!r}" if token.isprintable() else f"the character U+{ord(token):04X}"
-        raise NotationError(f"{self.text!r} has {what}, which no symbol has", "letters, digits, _ ^ { } and commands")
+        raise NotationError(f"{self.shown} has {what}, which no symbol has", "letters, digits, _ ^ { } and commands")
 
     def command(self, word: str, start: int, text_mode: bool, depth: int) -> Node:
         end = self.offset
@@ -215,7 +220,7 @@ class _Reader:
         if word in SIGNS:
             return Sign(f"\\{word}", SIGNS[word], False, start, end)
         if text_mode:
-            raise NotationError(f"{self.text!r} has \\{word} in \\text", "write \\mathrm in place of \\text")
+            raise NotationError(f"{self.shown} has \\{word} in \\text", "write \\mathrm in place of \\text")
         if word in LETTERS:
             return Sign(f"\\{word}", LETTERS[word], True, start, start + len(word) + 1)
         if word in STYLES:
@@ -228,19 +233,19 @@ class _Reader:
             return Fraction(above, self.argument("\\frac", False, depth), start, self.offset)
         near = hint(word, (*LETTERS, *STYLES, *ACCENTS, *SIGNS, "frac"))
         allowed = "Greek letters, accents such as \\dot and \\vec, styles such as \\mathrm"
-        raise NotationError(f"{self.text!r} has \\{word}, which no symbol has", near or allowed)
+        raise NotationError(f"{self.shown} has \\{word}, which no symbol has", near or allowed)
 
     def argument(self, of: str, text_mode: bool, depth: int) -> Node:
         """A group or a single letter, which a script or a command is of."""
         while self.peek().isspace():
             self.place += 1
         if self.peek() in ("", "}", "_", "^", "'"):
-            raise NotationError(f"{self.text!r} has {of} with nothing after it", f"write {of}{{...}}")
+            raise NotationError(f"{self.shown} has {of} with nothing after it", f"write {of}{{...}}")
         found = self.single(text_mode, depth)
         if isinstance(found, Row) and len(found.parts) == 1:
             found = found.parts[0]  # the braces belong to the command
         if found == Row((), found.start, found.end):
-            raise NotationError(f"{self.text!r} has {of}{{}} around nothing", "leave it out")
+            raise NotationError(f"{self.shown} has {of}{{}} around nothing", "leave it out")
         return found
 
 
