@@ -16,8 +16,8 @@ _PART = re.compile(r"([A-Za-z]+?)(\d+)([A-Za-z]?)\Z", re.ASCII)
 _OF_MARKER = re.compile(r"([vaw]?)([xyz])\((.+)\)\Z")
 _ENTRY = re.compile(r"(.+)\[(\d+)\]\Z")
 _CALL = re.compile(r"(\w+)\((.*)\)\Z", re.ASCII)
-_ESCAPED = re.compile(r"[_%#&]")
-_SPECIAL = re.compile(r"[^ A-Za-z0-9_%#&+\-=*/().,:;|!\[\]?]")
+_ESCAPED = re.compile(r"[_%]")
+_SPECIAL = re.compile(r"[^ A-Za-z0-9_%+\-=*/().,:;|!\[\]?]")
 #: Beginnings of names of two or three letters that are symbols with their axes: forces, moments, velocities, ...
 _AXES = re.compile(r"([A-Za-z])([xyz]{1,2}|[XYZ]{1,2})\Z")
 #: Two small letters that are a word.
@@ -43,7 +43,7 @@ def split_rate(name: str) -> tuple[str, int]:
 
 def literal(name: str, style: str = "mathrm") -> str:
     """The name itself, upright, in LaTeX; what LaTeX does not hold is shown by its number."""
-    shown = _SPECIAL.sub(lambda c: f"(U+{ord(c[0]):04X})", visible(name, lines=False))
+    shown = _SPECIAL.sub(lambda c: f"(U+{ord(c[0]):04X})", visible(name, lines=False)) or "?"
     return rf"\{style}{{{_ESCAPED.sub(lambda c: chr(92) + c[0], shown)}}}".replace(" ", r"\ ")
 
 
@@ -103,7 +103,7 @@ def _first(word: str) -> tuple[str, list[str]]:
 def _letter(word: str) -> str | None:
     """One letter, Latin or Greek."""
     word = _SPELLED.get(word, word)
-    return rf"\{word}" if word in GREEK else word if len(word) == 1 and word.isalpha() else None
+    return rf"\{word}" if word in GREEK or word == "ell" else word if len(word) == 1 and word.isalpha() else None
 
 
 def _sub(part: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any
@@ -11,6 +12,7 @@ from .printing import html_form, mathml_form, mathtext_form, text_form
 from .reading import Accent, Node, NotationError, Row, Scripts, head_of, read_latex, spaced
 from .signs import DOTS
 
+_WORD = re.compile(r"\\mathrm\{([A-Za-z0-9.]{2,})\}\Z")
 _FORMS: dict[str, Callable[[Node], str]] = {
     "text": text_form,
     "html": html_form,
@@ -58,7 +60,7 @@ class Notation:
     @classmethod
     def of(cls, metadata: Mapping[str, Any]) -> Notation:
         """The notation of a module or a trajectory, from its metadata."""
-        keys = ("q_names", "v_names", "loop_names", "u_names", "p_names", "y_names")
+        keys = ("q_names", "v_names", "loop_names", "u_names", "p_names", "parameters", "y_names")
         names = [name for key in keys for name in metadata.get(key, ())]
         return cls(names, metadata.get("latex"), metadata.get("instances"))
 
@@ -79,8 +81,9 @@ class Notation:
         return self._form("mathml", name)
 
     def mathtext(self, name: str) -> str:
-        r"""A label of Matplotlib, dollars included: ``$\theta_1$``."""
-        return f"${self._form('mathtext', name)}$"
+        r"""A label of Matplotlib, dollars included: ``$\theta_1$``; words without more are plain text."""
+        source = self._source(name)
+        return word[1] if (word := _WORD.match(source)) else f"${_printed('mathtext', source)}$"
 
     def symbol_names(self, symbols: Iterable[Any]) -> dict[Any, str]:
         """SymPy symbols -> LaTeX, for ``sympy.latex(expression, symbol_names=...)``."""

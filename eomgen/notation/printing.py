@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
+from collections.abc import Iterable
 
 from ..texts import html_text
 from .reading import Accent, Fraction, Node, Row, Scripts, Sign, Styled
 from .signs import ACCENTS, DOTS, OVER, PRIME, RAISED, SUBSCRIPTS, SUPERSCRIPTS
 
+_COMMAND = re.compile(r"\\[A-Za-z]+\Z")
 #: Accents of one letter that terminals show as one character, or nearly so.
 _COMBINED = ("dot", "ddot", "hat", "bar", "tilde")
 _HTML_STYLES = {"bf": "b", "textbf": "b", "it": "i", "textit": "i", "tt": "code"}
@@ -56,8 +59,10 @@ def _text(node: Node) -> str:
         case Scripts():
             found = _text(node.base)
             if node.sub is not None:
-                sub = _text(node.sub).replace(",", "_").replace(" ", "")
-                found += sub.translate(SUBSCRIPTS) if sub.isdecimal() and sub.isascii() else f"_{sub}"
+                first, *others = _text(node.sub).replace(" ", "").split(",")
+                digits = [part.isascii() and part.isdecimal() for part in (first, *others)]
+                low = digits[0] and (len(digits) == 1 or not all(digits))  # l_1_2 is not l_1, then 2
+                found += "_".join([first.translate(SUBSCRIPTS) if low else f"_{first}", *others])
             if node.sup is not None:
                 sup = _text(node.sup)
                 plain = sup.isascii() and sup.lstrip("+-").isdecimal()
@@ -166,9 +171,9 @@ def mathtext_form(node: Node) -> str:
                 return _MATHTEXT_SPACES[node.latex]
             if node.text == " ":
                 return r"\ "
-            return f"{node.latex} " if len(node.latex) > 2 else node.latex
+            return node.latex
         case Row():
-            return "".join(map(_group, node.parts)) if len(node.parts) != 1 else mathtext_form(node.parts[0])
+            return _side_by_side(map(_group, node.parts)) if len(node.parts) != 1 else mathtext_form(node.parts[0])
         case Styled():
             return rf"\math{_MATHTEXT_STYLES.get(node.style, node.style)}{{{mathtext_form(node.body)}}}"
         case Accent():
@@ -183,6 +188,15 @@ def mathtext_form(node: Node) -> str:
             if node.sup is not None:
                 found += f"^{{{mathtext_form(node.sup)}}}"
             return found + "'" * node.primes
+
+
+def _side_by_side(parts: Iterable[str]) -> str:
+    """Parts in a row; a command ends before a letter."""
+    found = ""
+    for part in parts:
+        apart = part[:1].isalpha() and _COMMAND.search(found)
+        found += f" {part}" if apart else part
+    return found
 
 
 def _group(node: Node) -> str:

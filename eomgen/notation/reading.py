@@ -16,7 +16,8 @@ from .signs import ACCENTS, GREEK, LETTERS, PLAIN, SIGNS, SPACES, STYLES, SWITCH
 
 LONGEST = 120  #: characters of a symbol's LaTeX
 DEEPEST = 8  #: groups within groups
-_TOKEN = re.compile(r"\\(?:[A-Za-z]+ *|.)|\s+|.", re.DOTALL)
+_TOKEN = re.compile(r"\\(?:[A-Za-z]+ *|.)| +|.", re.DOTALL)
+_SPACES = re.compile("[ \t\r\n]+")
 _TEXT = ("text", "textbf", "textit")
 
 
@@ -108,7 +109,7 @@ def read_latex(text: str) -> Node:
 
 def spaced(text: str) -> str:
     """The text with single spaces, as an empty line would end a formula."""
-    return " ".join(text.split())
+    return _SPACES.sub(" ", text).strip(" ")
 
 
 def _shown(text: str) -> str:
@@ -126,7 +127,7 @@ class _Reader:
         found = self.row("", False, 0)
         if self.place < len(self.tokens):
             raise NotationError(f"{self.shown} has a '}}' without its '{{'", "write as many { as }")
-        if not isinstance(found, Row) or found.parts:
+        if _shows(found):
             return found
         raise NotationError(f"{self.shown} shows nothing", "write a letter, for example \\theta_1")
 
@@ -151,7 +152,7 @@ class _Reader:
                 body = self.row(closing, text_mode, depth + 1)
                 parts.append(Styled(word, body, begin, self.offset))
                 break
-            if token.isspace():
+            if token[0] == " ":
                 self.place += 1
                 if text_mode:
                     parts.append(Sign(" ", " ", start=self.offset, end=self.offset))
@@ -171,7 +172,7 @@ class _Reader:
         sup: Node | None = None
         primes = 0
         while True:
-            while self.peek().isspace() and not text_mode:
+            while self.peek()[:1] == " " and not text_mode:
                 self.place += 1
             token = self.peek()
             if text_mode or token not in ("_", "^", "'") or not token:
@@ -237,14 +238,14 @@ class _Reader:
 
     def argument(self, of: str, text_mode: bool, depth: int) -> Node:
         """A group or a single letter, which a script or a command is of."""
-        while self.peek().isspace():
+        while self.peek()[:1] == " ":
             self.place += 1
         if self.peek() in ("", "}", "_", "^", "'"):
             raise NotationError(f"{self.shown} has {of} with nothing after it", f"write {of}{{...}}")
         found = self.single(text_mode, depth)
         if isinstance(found, Row) and len(found.parts) == 1:
             found = found.parts[0]  # the braces belong to the command
-        if found == Row((), found.start, found.end):
+        if not _shows(found):
             raise NotationError(f"{self.shown} has {of}{{}} around nothing", "leave it out")
         return found
 
@@ -263,6 +264,15 @@ def head_of(node: Node) -> Node | None:
     if len(found) > 1 and isinstance(found[0], Sign) and found[0].latex in ("\\Delta", "\\delta", "\\partial"):
         return found[1]  # a change of what comes after it
     return found[0] if found else None
+
+
+def _shows(node: Node) -> bool:
+    """Whether there is a letter, a digit or a sign."""
+    if isinstance(node, Sign):
+        return bool(node.text.strip())
+    if isinstance(node, Row):
+        return any(map(_shows, node.parts))
+    return _shows(node.base if isinstance(node, Scripts) else node.above if isinstance(node, Fraction) else node.body)
 
 
 def _is_word(node: Node) -> bool:

@@ -23,7 +23,7 @@ LETTERS = {**GREEK, "ell": "ℓ", "hbar": "ħ", "imath": "ı", "jmath": "ȷ", "n
 SIGNS = {
     "prime": "′", "star": "⋆", "ast": "∗", "dagger": "†", "circ": "∘", "bullet": "•", "infty": "∞", "parallel": "∥",
     "perp": "⊥", "cdot": "·", "times": "×", "pm": "±", "mp": "∓", "to": "→", "rightarrow": "→", "leftarrow": "←",
-    "uparrow": "↑", "downarrow": "↓", "ldots": "…", "dots": "…", "_": "_", "%": "%", "#": "#", "&": "&",
+    "uparrow": "↑", "downarrow": "↓", "ldots": "…", "dots": "…", "_": "_", "%": "%",
 }  # fmt: skip
 
 PRIME = SIGNS["prime"]
