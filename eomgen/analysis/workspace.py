@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import UsageError
 from ..files.inline_pictures import picture_html
 from ..files.writing import whole_file
-from ..notation import Notation
+from ..notation.notation import Notation
 from ..numeric import algebra
 from ..numeric.counts import read_count
 from ..numeric.scales import Array

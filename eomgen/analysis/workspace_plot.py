@@ -7,8 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import UsageError
-from ..notation import Notation
 from ..notation.labels import label
+from ..notation.notation import Notation
 from ..runtime.near_names import require
 
 MARKS = {"stop": ("x", "tab:red"), "change point": ("^", "tab:orange"), "outputs": (".", "black")}

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import MissingDependencyError, UsageError
 from ..files.writing import save_figure
-from ..notation import Notation
+from ..notation.notation import Notation
 from .shared_options import split_names
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..notation.names import rate_of as rate_of
-from ..notation.names import split_rate as split_rate
+from ..notation.latex_of_names import rate_of as rate_of
+from ..notation.latex_of_names import split_rate as split_rate
 
 
 def chains(names: Iterable[str]) -> dict[str, list[str]]:

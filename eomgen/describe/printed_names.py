@@ -7,7 +7,7 @@ from typing import Any
 
 from ..graph.shown import quoted, shown
 from ..notation import NotationError, read_latex
-from ..notation.reading import spaced
+from ..notation.latex_tree import spaced
 from .description import items
 from .names import nearest
 from .sympy_face import name_of

@@ -6,8 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..notation import Notation
 from ..notation.labels import TIME, label
+from ..notation.notation import Notation
 from ..numeric.counts import read_count
 from ..runtime.near_names import require
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
-from ..notation import Notation
+from ..notation.notation import Notation
 from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown
 from ..runtime.origin import origin, plain, spell_input

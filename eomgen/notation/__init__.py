@@ -5,8 +5,8 @@
 Exported packages carry these files, which import neither NumPy nor SymPy.
 """
 
+from .latex_tree import NotationError as NotationError
+from .latex_tree import read_latex as read_latex
 from .notation import Notation as Notation
 from .notation import dotted as dotted
 from .notation import with_instance as with_instance
-from .reading import NotationError as NotationError
-from .reading import read_latex as read_latex

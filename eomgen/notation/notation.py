@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from .names import latex_of, literal, split_rate
+from .latex_of_names import latex_of, literal, split_rate
+from .latex_tree import Accent, Group, Node, NotationError, Scripts, head_of, read_latex, spaced
 from .printing import html_form, mathml_form, mathtext_form, text_form
-from .reading import Accent, Node, NotationError, Row, Scripts, head_of, read_latex, spaced
 from .signs import DOTS
 
 _WORD = re.compile(r"\\mathrm\{([A-Za-z0-9.]{2,})\}\Z")
@@ -167,7 +167,7 @@ def with_instance(latex: str, instance: str) -> str:
         tree = read_latex(latex)
     except NotationError:  # told when the model is checked
         return latex
-    while isinstance(tree, Row) and len(tree.parts) > 1:
+    while isinstance(tree, Group) and len(tree.parts) > 1:
         head = head_of(tree) or tree.parts[0]
         tree = next(part for part in tree.parts if part.end >= head.end)
     word = literal(instance)

@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Iterable
 
 from ..texts import html_text
-from .reading import Accent, Fraction, Node, Row, Scripts, Sign, Styled
+from .latex_tree import Accent, Fraction, Group, Node, Scripts, Sign, Styled
 from .signs import ACCENTS, DOTS, OVER, PRIME, RAISED, SUBSCRIPTS, SUPERSCRIPTS
 
 _COMMAND = re.compile(r"\\[A-Za-z]+\Z")
@@ -33,7 +33,7 @@ def _without_primes(node: Node) -> tuple[Node, int]:
     if isinstance(node, Scripts):
         base, primes = _without_primes(node.base)
         return node._replace(base=base), primes
-    if isinstance(node, Row) and node.parts:
+    if isinstance(node, Group) and node.parts:
         first, primes = _without_primes(node.parts[0])
         return node._replace(parts=(first, *node.parts[1:])), primes
     if isinstance(node, Accent) and node.accent in DOTS and (node.accent == "dddot" or len(_text(node.body)) > 1):
@@ -45,7 +45,7 @@ def _text(node: Node) -> str:
     match node:
         case Sign():
             return node.text
-        case Row():
+        case Group():
             return "".join(map(_text, node.parts))
         case Styled():
             return _text(node.body)
@@ -81,7 +81,7 @@ def html_form(node: Node, upright: bool = False) -> str:
         case Sign():
             text = html_text(node.text)
             return f"<i>{text}</i>" if node.letter and not upright else text
-        case Row():
+        case Group():
             return "".join(html_form(part, upright) for part in node.parts)
         case Styled():
             body = html_form(node.body, True)
@@ -121,12 +121,12 @@ def mathml_form(node: Node, style: str = "") -> str:
     match node:
         case Sign():
             return _token(node, style)
-        case Row():
+        case Group():
             return f"<mrow>{_tokens(node, style)}</mrow>"
         case Styled():
             return (
                 f"<mrow>{_tokens(node.body, node.style)}</mrow>"
-                if isinstance(node.body, Row)
+                if isinstance(node.body, Group)
                 else mathml_form(node.body, node.style)
             )
         case Accent():
@@ -145,7 +145,7 @@ def mathml_form(node: Node, style: str = "") -> str:
             return f"<msub>{base}{sub}</msub>" if sub else f"<msup>{base}{sup}</msup>"
 
 
-def _tokens(node: Row, style: str) -> str:
+def _tokens(node: Group, style: str) -> str:
     """Parts of a row; letters of a word in one token."""
     if style and all(isinstance(part, Sign) for part in node.parts):
         return _token(Sign("", "".join(map(_text, node.parts)), True), style)
@@ -172,7 +172,7 @@ def mathtext_form(node: Node) -> str:
             if node.text == " ":
                 return r"\ "
             return node.latex
-        case Row():
+        case Group():
             return _side_by_side(map(_group, node.parts)) if len(node.parts) != 1 else mathtext_form(node.parts[0])
         case Styled():
             return rf"\math{_MATHTEXT_STYLES.get(node.style, node.style)}{{{mathtext_form(node.body)}}}"
@@ -200,4 +200,4 @@ def _side_by_side(parts: Iterable[str]) -> str:
 
 
 def _group(node: Node) -> str:
-    return f"{{{mathtext_form(node)}}}" if isinstance(node, Row | Scripts) else mathtext_form(node)
+    return f"{{{mathtext_form(node)}}}" if isinstance(node, Group | Scripts) else mathtext_form(node)

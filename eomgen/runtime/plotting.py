@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.pictures import FAINT
-from ..notation import Notation
 from ..notation.labels import TIME, label
+from ..notation.notation import Notation
 from ..numeric.scales import Array
 from .near_names import read_names, require, unknown
 from .refined import FINE, refined, states_at

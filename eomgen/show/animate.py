@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
-from ..notation import Notation
 from ..notation.labels import label
+from ..notation.notation import Notation
 from ..texts import shown
 from .film_frames import DPI, Frames
 from .scene import Scene

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.pictures import NOTHING, ROUNDED, SAME
-from ..notation import Notation
 from ..notation.labels import TIME, label
+from ..notation.notation import Notation
 from .build_scene import build_scene
 from .data import GROUND, Array, read_picture
 from .scene import Item, Scene, placed

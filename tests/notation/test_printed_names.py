@@ -9,7 +9,7 @@ import pytest
 from matplotlib.mathtext import MathTextParser
 
 from eomgen.notation import Notation
-from eomgen.notation.names import rate_of, split_rate
+from eomgen.notation.latex_of_names import rate_of, split_rate
 
 #: Name -> LaTeX, text.
 NAMES = {

@@ -39,7 +39,7 @@ class Sign(NamedTuple):
     end: int = 0
 
 
-class Row(NamedTuple):
+class Group(NamedTuple):
     """Parts side by side."""
 
     parts: tuple[Node, ...]
@@ -85,7 +85,7 @@ class Fraction(NamedTuple):
     end: int = 0
 
 
-Node = Sign | Row | Styled | Accent | Scripts | Fraction
+Node = Sign | Group | Styled | Accent | Scripts | Fraction
 
 
 @cache
@@ -160,7 +160,7 @@ class _Reader:
             parts.append(self.part(text_mode, depth))
         if closing and self.peek() != closing:
             raise NotationError(f"{self.shown} has a '{{' without its '}}'", "write as many { as }")
-        return parts[0] if len(parts) == 1 else Row(tuple(parts), start, self.offset)
+        return parts[0] if len(parts) == 1 else Group(tuple(parts), start, self.offset)
 
     def part(self, text_mode: bool, depth: int) -> Node:
         """A symbol with its scripts."""
@@ -197,7 +197,7 @@ class _Reader:
         if token == "{":
             body = self.row("}", text_mode, depth + 1)
             self.place += 1
-            return Row((body,), start, self.offset)
+            return Group((body,), start, self.offset)
         if token[0] == "\\":
             return self.command(token[1:].strip() or " ", start, text_mode, depth)
         if token.isascii() and (token.isalnum() or token in PLAIN):
@@ -243,7 +243,7 @@ class _Reader:
         if self.peek() in ("", "}", "_", "^", "'"):
             raise NotationError(f"{self.shown} has {of} with nothing after it", f"write {of}{{...}}")
         found = self.single(text_mode, depth)
-        if isinstance(found, Row) and len(found.parts) == 1:
+        if isinstance(found, Group) and len(found.parts) == 1:
             found = found.parts[0]  # the braces belong to the command
         if not _shows(found):
             raise NotationError(f"{self.shown} has {of}{{}} around nothing", "leave it out")
@@ -270,13 +270,13 @@ def _shows(node: Node) -> bool:
     """Whether there is a letter, a digit or a sign."""
     if isinstance(node, Sign):
         return bool(node.text.strip())
-    if isinstance(node, Row):
+    if isinstance(node, Group):
         return any(map(_shows, node.parts))
     return _shows(node.base if isinstance(node, Scripts) else node.above if isinstance(node, Fraction) else node.body)
 
 
 def _is_word(node: Node) -> bool:
     """Whether letters, digits and signs stand side by side."""
-    if isinstance(node, Row):
+    if isinstance(node, Group):
         return all(isinstance(part, Sign) for part in node.parts)
     return isinstance(node, Sign)
