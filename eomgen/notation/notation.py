@@ -69,7 +69,7 @@ class Notation:
         return self._form("latex", name) + ("(t)" if of_time else "")
 
     def text(self, name: str, of_time: bool = False) -> str:
-        """Unicode for terminals: ``θ₁``, ``θ̇₁``, ``bend'``."""
+        """Unicode for terminals: ``θ₁``, ``θ₁'`` of its rate, ``m_c``."""
         return self._form("text", name) + ("(t)" if of_time else "")
 
     def html(self, name: str) -> str:

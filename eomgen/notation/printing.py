@@ -11,8 +11,6 @@ from .latex_tree import Accent, Fraction, Group, Node, Scripts, Sign, Styled
 from .signs import ACCENTS, DOTS, OVER, PRIME, RAISED, SUBSCRIPTS, SUPERSCRIPTS
 
 _COMMAND = re.compile(r"\\[A-Za-z]+\Z")
-#: Accents of one letter that terminals show as one character, or nearly so.
-_COMBINED = ("dot", "ddot", "hat", "bar", "tilde")
 _HTML_STYLES = {"bf": "b", "textbf": "b", "it": "i", "textit": "i", "tt": "code"}
 _MATHML_STYLES = {
     "rm": "normal", "text": "normal", "bf": "bold", "textbf": "bold", "it": "italic", "textit": "italic",
@@ -23,20 +21,22 @@ _MATHTEXT_SPACES = {"\\!": "", "\\quad": r"\quad "}
 
 
 def text_form(node: Node) -> str:
-    """Unicode for terminals: ``θ̇₁``, ``m_c``; derivatives of words by primes, ``bend'``."""
+    """Unicode for terminals: ``θ₁``, ``m_c``; derivatives by primes, ``θ₁'``.
+
+    Common fonts of terminals set a combining dot over the character after a Greek letter, so there are no dots.
+    """
     bare, primes = _without_primes(node)
     return _text(bare) + "'" * primes
 
 
 def _without_primes(node: Node) -> tuple[Node, int]:
-    """The tree without dots over a word, and how many they were; they stand after all else."""
+    """The tree without the dots over its head, and how many they were; as primes they stand after all else."""
     if isinstance(node, Scripts):
         base, primes = _without_primes(node.base)
         return node._replace(base=base), primes
-    if isinstance(node, Group) and node.parts:
-        first, primes = _without_primes(node.parts[0])
-        return node._replace(parts=(first, *node.parts[1:])), primes
-    if isinstance(node, Accent) and node.accent in DOTS and (node.accent == "dddot" or len(_text(node.body)) > 1):
+    if isinstance(node, Group) and len(node.parts) == 1:
+        return _without_primes(node.parts[0])
+    if isinstance(node, Accent) and node.accent in DOTS:
         return node.body, DOTS.index(node.accent)
     return node, 0
 
@@ -51,9 +51,10 @@ def _text(node: Node) -> str:
             return _text(node.body)
         case Accent():
             body = _text(node.body)
-            if node.accent in _COMBINED and len(body) == 1:
-                return unicodedata.normalize("NFC", body + ACCENTS[node.accent])
-            return body + "'" * DOTS.index(node.accent) if node.accent in DOTS else body
+            if node.accent in DOTS:
+                return body + "'" * DOTS.index(node.accent)
+            whole = unicodedata.normalize("NFC", body + ACCENTS[node.accent])
+            return whole if len(whole) == 1 else body
         case Fraction():
             return f"{_grouped(node.above)}/{_grouped(node.below)}"
         case Scripts():
@@ -102,13 +103,12 @@ def html_form(node: Node, upright: bool = False) -> str:
 
 
 def _html_accent(node: Accent, upright: bool) -> str:
-    """One letter with its accent as a character; over a word a sign in the middle."""
-    body = _text(node.body)
-    if len(body) == 1:
-        letter = html_text(unicodedata.normalize("NFC", body + ACCENTS[node.accent]))
+    """One letter with its accent where there is such a character; else a sign above the middle."""
+    letter = unicodedata.normalize("NFC", _text(node.body) + ACCENTS[node.accent])
+    if len(letter) == 1:
         return letter if upright or isinstance(node.body, Styled) else f"<i>{letter}</i>"
     over = (
-        "position:absolute;left:0;right:0;top:-0.55em;text-align:center;line-height:1;font-style:normal;"
+        "position:absolute;left:0;right:0;top:-0.28em;text-align:center;line-height:1;font-style:normal;"
         "pointer-events:none"
     )
     sign = html_text(OVER[node.accent])

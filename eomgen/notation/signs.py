@@ -39,7 +39,7 @@ ACCENTS = {
 }  # fmt: skip
 #: Accents -> the sign over a letter in MathML.
 OVER = {
-    "dot": "˙", "ddot": "¨", "dddot": "⃛", "hat": "^", "widehat": "^", "bar": "¯", "overline": "¯", "tilde": "~",
+    "dot": "˙", "ddot": "¨", "dddot": "˙˙˙", "hat": "^", "widehat": "^", "bar": "¯", "overline": "¯", "tilde": "~",
     "widetilde": "~", "vec": "→", "breve": "˘", "check": "ˇ", "acute": "´", "grave": "`", "mathring": "˚",
     "underline": "_",
 }  # fmt: skip
