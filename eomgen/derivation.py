@@ -16,6 +16,7 @@ from .kinematics import Kinematics
 from .kinematics.mobility import Mobility
 from .kinematics.report import MechanismReport, report
 from .kinematics.state import acceleration_name
+from .notation.notation import Notation
 from .records import dataclass
 from .texts import html_text
 
@@ -158,6 +159,15 @@ class Derivation:
         """Named subexpressions of a large mass matrix and force, in order: (symbol, expression); empty when small."""
         return self._raised[0]
 
+    @cached_property
+    def notation(self) -> Notation:
+        """How names are printed: ``.latex("theta1_dot")``, ``.text(name)``, ``.html(name)``, ``.mathtext(name)``."""
+        k = self.kinematics
+        outputs = [output.name for output in k.mechanism.outputs]
+        rates = [*k.velocity_names, *map(acceleration_name, k.velocity_names)]
+        names = [*k.names, *k.loop_coordinates.names, *k.parameter_names, *k.input_names, *outputs, *rates]
+        return Notation(names, k.mechanism.latex, k.mechanism.instances)
+
     # -- display
     def __str__(self) -> str:
         lines = [f"equations of {self.name}, method {self.method}, independent {', '.join(self.independent) or 'none'}"]
@@ -185,5 +195,9 @@ class Derivation:
         import sympy
 
         rates = [sympy.Symbol(name) for name in self.accelerations]
-        left = f"{sympy.latex(self.mass_matrix)} {sympy.latex(sympy.Matrix(rates))}"
-        return f"$\\displaystyle {left} = {sympy.latex(self.force)}$"
+        symbols = self.mass_matrix.free_symbols | self.force.free_symbols | {*rates}
+        names = self.notation.symbol_names(symbols)
+        left, vector, right = (
+            sympy.latex(part, symbol_names=names) for part in (self.mass_matrix, sympy.Matrix(rates), self.force)
+        )
+        return f"$\\displaystyle {left} {vector} = {right}$"
