@@ -113,5 +113,9 @@ class Derivation(Readable):
         import sympy
 
         rates = [sympy.Symbol(name) for name in self.acceleration_names]
-        left = f"{sympy.latex(self.mass_matrix)} {sympy.latex(sympy.Matrix(rates))}"
-        return f"$\\displaystyle {left} = {sympy.latex(self.force)}$"
+        symbols = self.mass_matrix.free_symbols | self.force.free_symbols | {*rates}
+        names = self.notation.symbol_names(symbols)
+        left, vector, right = (
+            sympy.latex(part, symbol_names=names) for part in (self.mass_matrix, sympy.Matrix(rates), self.force)
+        )
+        return f"$\\displaystyle {left} {vector} = {right}$"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
+from ..notation.notation import Notation
 from .put_in import read_values
 from .quantities import Quantities
 from .quantities_of_methods import QuantitiesOfMethods
@@ -43,6 +44,15 @@ class Readable(QuantitiesOfMethods):
     def constraint_names(self) -> tuple[str, ...]:
         """Names of the rows of ``constraint_jacobian``, such as ``C.r_x`` of joint C; nonholonomic ones last."""
         return tuple(self.kinematics.constraints.labels[i] for i in self.mobility.independent_rows)
+
+    @cached_property
+    def notation(self) -> Notation:
+        """How names are printed: ``.latex("theta1_dot")``, ``.text(name)``, ``.html(name)``, ``.mathtext(name)``."""
+        k = self.kinematics
+        outputs = [output.name for output in k.mechanism.outputs]
+        rates = [*k.velocity_names, *map(acceleration_name, k.velocity_names)]
+        names = [*k.names, *k.loop_coordinates.names, *k.parameter_names, *k.input_names, *outputs, *rates]
+        return Notation(names, k.mechanism.latex, k.mechanism.instances)
 
     # -- symbols ------------------------------------------------------------------------------------------------------
     @property

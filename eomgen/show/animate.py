@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
+from ..notation.labels import label
+from ..notation.notation import Notation
 from ..texts import shown
 from .film_frames import DPI, Frames
 from .scene import Scene
@@ -17,7 +19,7 @@ from .writers import WRITERS, kind_of, require_kind
 
 
 class ShownColumn(NamedTuple):
-    """A column of the run that is drawn along: its name and unit, and its values over what goes on."""
+    """A column of the run that is drawn along: its name as it is printed and unit, its values over what goes on."""
 
     label: str
     over: Any
@@ -56,8 +58,8 @@ def animate(
         scene = with_arrows(scene, module, motion, forces)
     still = motion.t[0] == motion.t[-1]
     over = motion.over if still else trajectory.t
-    units = trajectory.units
-    curves = [ShownColumn(f"{n} ({units[n]})" if units.get(n) else n, over, values) for n, values in columns.items()]
+    printed, units = Notation.of(trajectory.metadata).mathtext, trajectory.units
+    curves = [ShownColumn(label(printed(n), units.get(n, "")), over, values) for n, values in columns.items()]
     return write(file, scene, motion, curves, dpi)
 
 
