@@ -15,7 +15,7 @@ from .kinematics import Kinematics
 from .kinematics.mobility import Mobility
 from .kinematics.report import MechanismReport, report
 from .reading import Quantities, Readable
-from .reading.written import READABLE
+READABLE = 400
 from .records import dataclass
 from .texts import html_text
 

@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from ..equations import METHODS
-from ..equations.reduction import VelocityTransformation, transform_velocities
+from ..equations.reduction import Names, VelocityTransformation, transform_velocities
 from ..equations.tree_equations import TreeEquations
 from ..errors import UnavailableError
 from ..frames import GROUND, Frame, Marker
@@ -92,6 +92,27 @@ class Quantities:
     def transformation(self) -> VelocityTransformation:
         """v = B v_i + b, a = B a_i + c."""
         return transform_velocities(self.kinematics, self.mobility, self.numbers)
+
+    @cached_property
+    def named(self) -> list[tuple[str, Expr]]:
+        """Names of what loops give, which stand in ``mass_matrix_by_names`` and ``force_by_names``, with their values."""
+        return self._by_names[0].given
+
+    @cached_property
+    def _by_names(self) -> tuple[Names, VelocityTransformation]:
+        names = Names(self.kinematics, self.mobility.independent)
+        return names, transform_velocities(self.kinematics, self.mobility, self.numbers, names)
+
+    @cached_property
+    def mass_matrix_by_names(self) -> Rows:
+        """M (n_dof, n_dof) in the names of B's entries, as the book writes it: B^T M B."""
+        return self._by_names[1].mass_matrix(self.tree.mass_matrix) if self._embeds else self.tree.mass_matrix
+
+    @cached_property
+    def force_by_names(self) -> Row:
+        """M v_i' (n_dof,) in the names of the entries of B and c."""
+        right = tuple(-h for h in self.tree.bias)
+        return self._by_names[1].force(self.tree.mass_matrix, right) if self._embeds else right
 
     @cached_property
     def mass_matrix(self) -> Rows:

@@ -97,7 +97,12 @@ class Readable(QuantitiesOfMethods):
         import sympy
 
         n = self.mobility.n_dof
-        written = self._write("mass_matrix", lambda s: [*(x for row in s.mass_matrix for x in row), *s.force], "z")
+        written = self._write(
+            "mass_matrix",
+            lambda s: [*(x for row in s.mass_matrix_by_names for x in row), *s.force_by_names],
+            "z",
+            lambda s: s.named,
+        )
         named = self._named["force"] = self._named["mass_matrix"]
         return named, sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, 1, written[n * n :])
 

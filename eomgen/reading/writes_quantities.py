@@ -48,17 +48,34 @@ class WritesQuantities(ABC):
         """Intermediates of what was written, by quantity."""
         return {}
 
-    def _write(self, name: str, choose: Callable[[Quantities], Sequence[Expr]], prefix: str = "") -> list[Any]:
+    def _write(
+        self,
+        name: str,
+        choose: Callable[[Quantities], Sequence[Expr]],
+        prefix: str = "",
+        given: Callable[[Quantities], Sequence[tuple[str, Expr]]] | None = None,
+    ) -> list[Any]:
         """Expressions of the quantities in SymPy; their named parts are kept under the name.
 
         Each is formed in a copy of its own, so that what is read depends on the model alone.
         """
-        expressions = list(choose(Quantities(*self.fresh())))
+        quantities = Quantities(*self.fresh())
+        expressions = list(choose(quantities))
+        names = list(given(quantities)) if given is not None else []
+        expressions += [x for _, x in names]
         for values in self._put_in:
             expressions = put_in(expressions, values)
-        named, written = write(expressions, self._symbol, prefix or f"{name.replace('.', '_')}_")
+        count = len(expressions) - len(names)
+        names = [(known, x) for (known, _), x in zip(names, expressions[count:], strict=True)]
+        prefix = prefix or f"{name.replace('.', '_')}_"
+        named, written = write(expressions[:count], self._symbol, prefix, names, self._rates)
         self._named[name] = named
         return written
+
+    @cached_property
+    def _rates(self) -> frozenset[str]:
+        v = self.kinematics.velocity_names
+        return frozenset((*v, *map(acceleration_name, v)))
 
     def _matrix(self, name: str, choose: Callable[[Quantities], Sequence[Sequence[Expr]]], columns: int) -> Any:
         import sympy

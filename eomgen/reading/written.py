@@ -1,17 +1,15 @@
-"""Stage reading, written: graph expressions -> SymPy expressions, small ones whole, large ones with named parts.
+"""Stage reading, written: graph expressions -> SymPy expressions short to read, large ones with named parts.
 
 Everything that a user reads as SymPy comes through :func:`write`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, NamedTuple
 
 from ..graph.core import Expr
-
-READABLE = 400  #: operations an expression, on average, up to which expressions are written out
-LONGEST = 20_000  #: operations of all of them together
+from ..simplify import simplify
 
 
 class Written(NamedTuple):
@@ -28,14 +26,13 @@ class Written(NamedTuple):
     expressions: list[Any]
 
 
-def is_short(expressions: Sequence[Expr]) -> bool:
-    """Whether expressions are written out whole."""
-    from ..graph.sympy_raise import inlined_size
-
-    return inlined_size(expressions) <= min(READABLE * len(expressions), LONGEST)
-
-
-def write(expressions: Sequence[Expr], symbols: Callable[[str], Any] | None = None, prefix: str = "z") -> Written:
+def write(
+    expressions: Sequence[Expr],
+    symbols: Callable[[str], Any] | None = None,
+    prefix: str = "z",
+    given: Sequence[tuple[str, Expr]] = (),
+    rates: Collection[str] = (),
+) -> Written:
     """Expressions of one graph in SymPy.
 
     Parameters
@@ -45,16 +42,14 @@ def write(expressions: Sequence[Expr], symbols: Callable[[str], Any] | None = No
         Name -> the SymPy symbol, or function of time, that stands for it; plain symbols by default.
     prefix : str, optional
         Named parts are called ``z0``, ``z1``, ...
+    given : sequence of (str, Expr), optional
+        Names that stand in the expressions already, and what they stand for, in order.
+    rates : collection of str, optional
+        Names of velocities and accelerations.
 
     Returns
     -------
     Written
     """
-    import sympy
-
-    from ..graph.sympy_raise import raise_inline, raise_named
-
-    symbols = sympy.Symbol if symbols is None else symbols
-    if is_short(expressions):
-        return Written([], raise_inline(expressions, symbols))
-    return Written(*raise_named(expressions, symbols, prefix))
+    form = simplify(expressions, given, rates, prefix)
+    return Written([], []) if form is None else Written(*form.sympy(symbols))

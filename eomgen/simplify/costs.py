@@ -1,8 +1,8 @@
-"""Stage reading: how long an expression is for a reader: operations and characters together."""
+"""Stage simplify: how long an expression is for a reader: operations and characters together."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection
 from fractions import Fraction
 
 from .atoms import Atoms, Monomial, Number, Poly
@@ -16,9 +16,9 @@ NESTED = 6.0  #: parentheses in parentheses
 class Costs:
     """Lengths of what is made of a table of atoms."""
 
-    def __init__(self, atoms: Atoms, roles: Mapping[str, str] | None = None) -> None:
+    def __init__(self, atoms: Atoms, rates: Collection[str] = ()) -> None:
         self.atoms = atoms
-        self.roles = roles or {}
+        self.rates = rates
         self._of: dict[int, float] = {}
         self._roles_of: dict[int, frozenset[str]] = {}
         self._products: dict[Monomial, float] = {}
@@ -54,8 +54,7 @@ class Costs:
         if found is None:
             kind, what = self.atoms.table[atom]
             if kind in ("sym", "name"):
-                role = self.roles.get(what)
-                found = frozenset({role} if role == "rate" else ())
+                found = frozenset({"rate"} if what in self.rates else ())
             elif kind == "pi":
                 found = frozenset()
             else:

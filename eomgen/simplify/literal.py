@@ -1,4 +1,4 @@
-"""Stage reading: nodes of a graph -> products of sums as the derivation formed them, nothing multiplied out."""
+"""Stage simplify: nodes of a graph -> products of sums as the derivation formed them, nothing multiplied out."""
 
 from __future__ import annotations
 

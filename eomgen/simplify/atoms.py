@@ -1,4 +1,4 @@
-"""Stage reading: what polynomials are made of: symbols, sines and cosines, other calls, sums in denominators and roots."""
+"""Stage simplify: what polynomials are made of: symbols, sines and cosines, other calls, sums in denominators and roots."""
 
 from __future__ import annotations
 

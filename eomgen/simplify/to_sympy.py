@@ -1,4 +1,4 @@
-"""Stage reading: factored polynomials -> SymPy expressions."""
+"""Stage simplify: factored polynomials -> SymPy expressions."""
 
 from __future__ import annotations
 

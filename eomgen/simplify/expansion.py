@@ -1,4 +1,4 @@
-"""Stage reading: nodes of a graph -> polynomials in atoms, multiplied out as far as that stays short."""
+"""Stage simplify: nodes of a graph -> polynomials in atoms, multiplied out as far as that stays short."""
 
 from __future__ import annotations
 

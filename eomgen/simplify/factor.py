@@ -1,4 +1,4 @@
-"""Stage reading: a polynomial -> sums of products of sums, short to read.
+"""Stage simplify: a polynomial -> sums of products of sums, short to read.
 
 Common factors are taken out greedily, the one that shortens most first; what several products share is taken out once
 more.  This is algebraic factoring as of logic synthesis (R. K. Brayton and C. McMullen, The decomposition and
@@ -7,7 +7,7 @@ factorization of Boolean expressions, ISCAS 1982), with a length for readers as 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable
 from functools import reduce
 
 from .atoms import Atoms, Frozen, Monomial, Number, Poly, Work, add, common, freeze, inverse, join, multiply, ratio, scaled
@@ -25,10 +25,10 @@ class Factoring:
     A factored sum is a polynomial whose atoms may be factored sums, of kind ``factor``.
     """
 
-    def __init__(self, atoms: Atoms, work: Work, roles: Mapping[str, str] | None = None) -> None:
+    def __init__(self, atoms: Atoms, work: Work, rates: Collection[str] = ()) -> None:
         self.atoms = atoms
         self.work = work
-        self.costs = Costs(atoms, roles)
+        self.costs = Costs(atoms, rates)
         self._known: dict[Frozen, Poly] = {}
 
     def factored(self, poly: Poly) -> Poly:

@@ -1,4 +1,4 @@
-"""Stage reading: sums of products of sines and cosines -> few terms, as a hand would join them.
+"""Stage simplify: sums of products of sines and cosines -> few terms, as a hand would join them.
 
 The terms of a polynomial are taken together by what stands beside their sines and cosines; of each such group, by itself
 a polynomial in sines and cosines with numbers, several forms are made and the shortest is kept.
