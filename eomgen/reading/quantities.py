@@ -23,6 +23,7 @@ from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
 from .applied_forces import forces_by_element, without_forces
+from .written import is_short
 
 Row = tuple[Expr, ...]
 Rows = tuple[Row, ...]
@@ -94,9 +95,12 @@ class Quantities:
         return transform_velocities(self.kinematics, self.mobility, self.numbers)
 
     @cached_property
-    def named(self) -> list[tuple[str, Expr]]:
-        """Names of what loops give, which stand in ``mass_matrix_by_names`` and ``force_by_names``, with their values."""
-        return self._by_names[0].given
+    def motion(self) -> tuple[list[Expr], list[tuple[str, Expr]]]:
+        """M row by row and M v_i', and names that stand in them for what loops give, with their values, where long."""
+        whole = [*(x for row in self.mass_matrix for x in row), *self.force]
+        if is_short(whole):
+            return whole, []
+        return [*(x for row in self.mass_matrix_by_names for x in row), *self.force_by_names], self._by_names[0].given
 
     @cached_property
     def _by_names(self) -> tuple[Names, VelocityTransformation]:

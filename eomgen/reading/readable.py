@@ -97,12 +97,7 @@ class Readable(QuantitiesOfMethods):
         import sympy
 
         n = self.mobility.n_dof
-        written = self._write(
-            "mass_matrix",
-            lambda s: [*(x for row in s.mass_matrix_by_names for x in row), *s.force_by_names],
-            "z",
-            lambda s: s.named,
-        )
+        written = self._write("mass_matrix", lambda s: s.motion[0], "z", lambda s: s.motion[1])
         named = self._named["force"] = self._named["mass_matrix"]
         return named, sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, 1, written[n * n :])
 

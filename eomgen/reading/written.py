@@ -9,7 +9,11 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any, NamedTuple
 
 from ..graph.core import Expr
-from ..simplify import simplify
+from ..simplify import WHOLE, simplify
+
+
+READABLE = 400  #: operations an expression, on average, up to which expressions are written out
+LONGEST = 20_000  #: operations of all of them together
 
 
 class Written(NamedTuple):
@@ -24,6 +28,13 @@ class Written(NamedTuple):
 
     intermediates: list[tuple[Any, Any]]
     expressions: list[Any]
+
+
+def is_short(expressions: Sequence[Expr]) -> bool:
+    """Whether expressions are written out whole."""
+    from ..graph.sympy_raise import inlined_size
+
+    return inlined_size(expressions) <= min(READABLE * len(expressions), LONGEST)
 
 
 def write(
@@ -51,5 +62,5 @@ def write(
     -------
     Written
     """
-    form = simplify(expressions, given, rates, prefix)
+    form = simplify(expressions, given, rates, prefix, *([WHOLE] if not given and is_short(expressions) else []))
     return Written([], []) if form is None else Written(*form.sympy(symbols))

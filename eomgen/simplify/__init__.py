@@ -3,6 +3,6 @@
 The forms are for reading; compiled code keeps its own.
 """
 
-from .form import Form, simplify
+from .form import WHOLE, Form, simplify
 
-__all__ = ["Form", "simplify"]
+__all__ = ["WHOLE", "Form", "simplify"]

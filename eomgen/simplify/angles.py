@@ -6,7 +6,8 @@ a polynomial in sines and cosines with numbers, several forms are made and the s
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 from .atoms import ONE, Atoms, Frozen, Monomial, Number, Poly, Work, add, freeze, inverse, join, multiply, ratio, scaled
 from .costs import Costs
@@ -39,7 +40,7 @@ class Angles:
             return quarter(kind, factor)
         return {((self.atoms.id(kind, freeze(angle)), 1),): factor}
 
-    def _quarter_turns(self, angle: Poly):  # type: ignore[no-untyped-def]
+    def _quarter_turns(self, angle: Poly) -> Callable[[str, int], Poly] | None:
         """Of angle = rest + k pi / 2: what gives its sine or cosine; None where there is no such part."""
         pi = ((self.atoms.id("pi", ""), 1),)
         turns = angle.get(pi)
@@ -88,6 +89,10 @@ class Angles:
         yield group
         if len(group) > GROUP:
             return
+        below = self._denominator(group)
+        if below:  # over the common denominator
+            above = multiply(group, {inverse(below): 1})
+            yield multiply(self._group(above) if len(above) > 1 else above, {below: 1})
         yield self._joined(group)
         for full in ("sin", "cos"):
             reduced = self._reduced(group, full)
@@ -100,6 +105,15 @@ class Angles:
                 yield reduced
                 yield self._joined(reduced)
             yield self._joined(split)
+
+    @staticmethod
+    def _denominator(group: Poly) -> Monomial:
+        lowest: dict[int, Any] = {}
+        for monomial in group:
+            for atom, n in monomial:
+                if n < lowest.get(atom, 0):
+                    lowest[atom] = n
+        return tuple(sorted(lowest.items()))
 
     def _reduced(self, group: Poly, full: str) -> Poly:
         """With the squares of the other function replaced by 1 - full^2: a normal form of what has single angles."""
@@ -122,8 +136,9 @@ class Angles:
         """With the sines and cosines of sums written in those of their parts."""
         result: Poly = {}
         for monomial, x in group.items():
-            term: Poly = {ONE: x}
-            for atom, n in monomial:
+            below = tuple(f for f in monomial if f[1] < 0)
+            term: Poly = {below: x}
+            for atom, n in (f for f in monomial if f[1] > 0):
                 kind, angle = self.atoms.table[atom]
                 for _ in range(int(n)):
                     term = multiply(term, self._parts(kind, angle))
@@ -191,10 +206,11 @@ class Angles:
                 yield from self._squares(rest, a, kinds)
 
     def _pairs(self, monomial: Monomial) -> Iterator[tuple[Monomial, int, int]]:
-        for i, (a, n) in enumerate(monomial):
+        above = [f for f in monomial if f[1] > 0]
+        for i, (a, n) in enumerate(above):
             if n >= 2:
                 yield join(monomial, ((a, -2),)), a, a
-            for b, _ in monomial[i + 1 :]:
+            for b, _ in above[i + 1 :]:
                 yield join(monomial, inverse(((a, 1), (b, 1)))), a, b
 
     def _product(self, rest: Monomial, *factors: tuple[str, Frozen]) -> Monomial:

@@ -23,11 +23,11 @@ from .factor import Factoring
 from .inline import EACH, NAME, Named, inlined
 from .literal import Literal
 
-SIZES = (1, 6, 16, 40, 120, 10**9)  #: operations up to which what is shared is written out each time, one attempt each
+WHOLE = (10**9,)
+SIZES = (1, 6, 16, 40, 120, *WHOLE)
 ALONE = 30  #: operations of what is used once beyond which it gets a name in the first attempt
 WRITTEN = 4_000  #: operations beyond which an attempt is not made
 WORK = 100_000  #: products of terms in all attempts together
-PLAIN = 800.0  #: length of what needs no names in any case
 SHARED = 1.35  #: how much longer what needs no names may be
 
 
@@ -75,7 +75,13 @@ class Form:
         return named, [raising.expression(p) for p in self.polys]
 
 
-def simplify(exprs: Sequence[Expr], given: Sequence[tuple[str, Expr]] = (), rates: Collection[str] = (), prefix: str = "z") -> Form | None:
+def simplify(
+    exprs: Sequence[Expr],
+    given: Sequence[tuple[str, Expr]] = (),
+    rates: Collection[str] = (),
+    prefix: str = "z",
+    sizes: Sequence[int] = SIZES,
+) -> Form | None:
     """The shortest form found of expressions; None of no expressions.
 
     Parameters
@@ -86,6 +92,8 @@ def simplify(exprs: Sequence[Expr], given: Sequence[tuple[str, Expr]] = (), rate
         Names of velocities and accelerations; sums of them are read more easily than sums of them and other quantities.
     prefix : str, optional
         Other names are ``z0``, ``z1``, ...
+    sizes : sequence of int, optional
+        Operations up to which what is shared is written out each time, one attempt each; ``WHOLE`` writes out all.
     """
     graph = common_graph([*exprs, *(x for _, x in given)])
     if graph is None:
@@ -94,7 +102,7 @@ def simplify(exprs: Sequence[Expr], given: Sequence[tuple[str, Expr]] = (), rate
     best: Form | None = None
     work = Work(WORK)
     seen: set[tuple[int, ...]] = set()
-    for size in SIZES:
+    for size in sizes:
         cuts, total = _shared(graph, roots, size)
         if cuts in seen:
             continue
@@ -102,8 +110,7 @@ def simplify(exprs: Sequence[Expr], given: Sequence[tuple[str, Expr]] = (), rate
             break
         seen.add(cuts)
         form = _Attempt(graph, work, rates).form(exprs, given, cuts, prefix)
-        allowed = best.cost if best and form.named else max(SHARED * best.cost, PLAIN) if best else math.inf
-        if form.cost <= allowed:
+        if best is None or form.cost <= best.cost * (1.0 if form.named else SHARED):
             best = form
         if work.left <= 0:
             break
