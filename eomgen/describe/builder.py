@@ -69,12 +69,13 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         constraints: Sequence[Any] = (),
         parameters: Mapping[Any, Any] | None = None,
         inputs: Mapping[Any, Any] | None = None,
+        latex: Mapping[Any, str] | None = None,
     ) -> Self:
         """A model from a bare Lagrangian; see :func:`eomgen.describe.lagrangian.describe_lagrangian`."""
         from .lagrangian import describe_lagrangian
 
         return cls.from_description(
-            describe_lagrangian(name, L, coordinates, forces, dissipation, constraints, parameters, inputs)
+            describe_lagrangian(name, L, coordinates, forces, dissipation, constraints, parameters, inputs, latex)
         )
 
     @classmethod

@@ -8,7 +8,7 @@ from typing import Any
 from ..graph.shown import quoted, shown
 from ..notation import NotationError, read_latex
 from ..notation.latex_tree import spaced
-from .description import items
+from .description import Description, items
 from .names import nearest
 from .sympy_face import name_of
 from .values import Reader
@@ -50,3 +50,12 @@ def take_coordinates_latex(reader: Reader, path: str, coordinates: Sequence[str]
         for k, (name, text) in enumerate(zip(coordinates, listed, strict=False)):
             if text is not None:
                 take_latex(reader, path if isinstance(given, str) else f"{path}[{k}]", name, text)
+
+
+def give_latex(description: Description, section: str, latex: Mapping[Any, str] | None) -> None:
+    """Put the LaTeX of names where each is described: parameters, inputs, else coordinates of the section."""
+    entries = {e.name: e for place in ("parameters", "inputs") for e in description.sections[place]}
+    for key, text in (latex or {}).items():
+        name = name_of(key)
+        home = entries[name].values if name in entries else description.values[section].setdefault("latex", {})
+        home["latex" if name in entries else name] = text

@@ -231,3 +231,20 @@ parameters: {k: 4}
 equations: {coordinates: [q], mass_matrix: [[1]], forcing: [-k*q], latex: \xi}
 """
     assert dict(model(text).mechanism().latex) == {"q": r"\xi"}
+
+
+def test_lagrangians_and_equations_of_python_take_a_mapping_of_any_name() -> None:
+    import sympy
+
+    q, q_dot, k = sympy.symbols("q q_dot k")
+    given = {q: r"\varphi", k: "k_s", "u": r"\mu"}
+    names = {"q": r"\varphi", "k": "k_s", "u": r"\mu"}
+    swing = eg.Model.from_lagrangian(
+        "swing", q_dot**2 / 2 - k * q**2 / 2, [q], forces=["u"], inputs={"u": 0}, latex=given
+    )
+    assert dict(swing.mechanism().latex) == names
+    spring = eg.Model.from_equations("spring", [q], [[1]], ["u - k*q"], inputs={"u": 0}, latex=given)
+    assert dict(spring.mechanism().latex) == names
+    assert swing.derive().notation.latex("q_ddot") == r"\ddot{\varphi}"
+    with pytest.raises(eg.ModelError, match="no coordinate 'z'"):
+        eg.Model.from_equations("spring", [q], [[1]], ["-q"], latex={"z": "z"}).mechanism()
