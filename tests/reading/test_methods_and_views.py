@@ -233,6 +233,12 @@ def test_functions_of_time_are_those_of_sympy() -> None:
     assert sp.simplify(a.center_of_mass - place.diff(t, 2) / 2) == sp.zeros(3, 1)
 
 
+def test_the_coordinate_of_a_cut_joint_is_a_sum_of_angles() -> None:
+    equations = eg.load(EXAMPLES / "slider_crank.yaml").derive()
+    assert list(equations.loop_coordinates) == ["C"]
+    assert sp.expand(equations.loop_coordinates["C"] + sp.Symbol("theta") + sp.Symbol("B")) == 0
+
+
 # -- bare Lagrangians and given equations -----------------------------------------------------------------------------
 
 
