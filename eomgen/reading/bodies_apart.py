@@ -23,7 +23,7 @@ from .quantities import Quantities, Row
 METHODS_OF_BODIES = ("newton_euler", "amalgamated")
 
 
-class Balance(NamedTuple):
+class BodyBalance(NamedTuple):
     """One body: rates of its momenta, and what acts on it, each (3,).
 
     ``inertia_force`` m a_c = ``force``; ``inertia_moment`` J alpha + omega x J omega = ``moment``.
@@ -59,14 +59,14 @@ class BodiesApart:
         pose = self.kinematics.poses.link(self.links[body])
         return vec.add(pose.position, vec.times(pose.rotation, self.kinematics.links[self.links[body]].com))
 
-    def balance(self, name: str) -> Balance:
+    def balance(self, name: str) -> BodyBalance:
         """The equations of a body."""
         body = next(k for k, b in enumerate(self.kinematics.mechanism.bodies) if b.name == name)
         force, moment = self._weight_and_elements(body)
         for wrench in (*self._from_joints(body), *self._from_cut_joints(body)):
             moment, force = vec.add(moment, wrench[0]), vec.add(force, wrench[1])
         rate, turning = self._inertia(name, body)
-        return Balance(rate, force, turning, moment)
+        return BodyBalance(rate, force, turning, moment)
 
     def _inertia(self, name: str, body: int) -> tuple[Vec3, Vec3]:
         """m a_c, and J alpha + omega x J omega."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from ..describe.input_names import split_rate
@@ -16,9 +17,6 @@ def dynamic_symbols(kinematics: Kinematics) -> Callable[[str], Any]:
     Velocities that are no rates of coordinates (``ball_wx``), inputs, momenta and multipliers are functions of time as
     well; parameters are plain symbols; t is ``dynamicsymbols._t``.
     """
-    import sympy
-    from sympy.physics.mechanics import dynamicsymbols
-
     orders: dict[str, tuple[str, int]] = {name: (name, 0) for name in kinematics.names}
     loop = kinematics.loop_coordinates.names
     for name in (*kinematics.names, *loop):
@@ -32,12 +30,16 @@ def dynamic_symbols(kinematics: Kinematics) -> Callable[[str], Any]:
         orders[name] = (base, order) if base in inputs else (name, 0)
     orders |= {f"p_{label}": (f"p_{label}", 0) for label in kinematics.velocity_labels}
 
-    def symbol(name: str) -> Any:
-        if name == "t":
-            return dynamicsymbols._t
-        if name not in orders:
-            return sympy.Symbol(name)
-        base, order = orders[name]
-        return dynamicsymbols(base, order)
+    return partial(_function_of_time, orders)
 
-    return symbol
+
+def _function_of_time(orders: Mapping[str, tuple[str, int]], name: str) -> Any:
+    import sympy
+    from sympy.physics.mechanics import dynamicsymbols
+
+    if name == "t":
+        return dynamicsymbols._t
+    if name not in orders:
+        return sympy.Symbol(name)
+    base, order = orders[name]
+    return dynamicsymbols(base, order)

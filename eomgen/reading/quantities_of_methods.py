@@ -133,14 +133,13 @@ class QuantitiesOfMethods(WritesQuantities):
         """
         from .named_parts import ByName
 
-        def make(name: str) -> FreeBody:
-            written = self._write(f"free_bodies.{name}", lambda s: [x for p in BodiesApart(s).balance(name) for x in p])
-            left, right = [*written[:3], *written[6:9]], [*written[3:6], *written[9:]]
-            equations = _equations(left, right)
-            return FreeBody(equations[:3], equations[3:])
-
         BodiesApart(Quantities(*self.fresh()))  # refuses other methods now
-        return ByName("body", [body.name for body in self.kinematics.mechanism.bodies], make)
+        return ByName("body", [body.name for body in self.kinematics.mechanism.bodies], self._free_body)
+
+    def _free_body(self, name: str) -> FreeBody:
+        written = self._write(f"free_bodies.{name}", lambda s: [x for p in BodiesApart(s).balance(name) for x in p])
+        equations = _equations([*written[:3], *written[6:9]], [*written[3:6], *written[9:]])
+        return FreeBody(equations[:3], equations[3:])
 
     @cached_property
     def joint_forces(self) -> ByName[list[Any]]:
@@ -151,13 +150,14 @@ class QuantitiesOfMethods(WritesQuantities):
         """
         from .named_parts import ByName
 
-        def make(name: str) -> list[Any]:
-            written = self._write(
-                f"joint_forces.{name}", lambda s: [x for pair in BodiesApart(s).along_joint(name) for x in pair]
-            )
-            return _equations(written[::2], written[1::2])
+        joints = BodiesApart(Quantities(*self.fresh())).joints  # refuses other methods
+        return ByName("joint of the tree", joints, self._joint_force)
 
-        return ByName("joint of the tree", BodiesApart(Quantities(*self.fresh())).joints, make)
+    def _joint_force(self, name: str) -> list[Any]:
+        written = self._write(
+            f"joint_forces.{name}", lambda s: [x for pair in BodiesApart(s).along_joint(name) for x in pair]
+        )
+        return _equations(written[::2], written[1::2])
 
     @cached_property
     def body_velocity_transformation(self) -> Any:

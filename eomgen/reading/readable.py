@@ -7,14 +7,14 @@ values are put in; :class:`ReadingView` is the same derivation with other answer
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
 from ..notation.notation import Notation
 from .put_in import read_values
-from .quantities import Quantities
+from .quantities import PointMotion, Quantities
 from .quantities_of_methods import QuantitiesOfMethods
 from .writes_quantities import Derived
 
@@ -190,39 +190,42 @@ class Readable(QuantitiesOfMethods):
         """Pose (4, 4) of each body and named marker in ground axes: ``poses["rod"]``, ``poses["rod.tip"]``."""
         from .named_parts import ByName
 
-        return ByName("body or marker", self._places, lambda n: self._matrix(f"poses.{n}", lambda s: s.pose(n), 4))
+        return ByName("body or marker", self._places, self._pose)
+
+    def _pose(self, name: str) -> Any:
+        return self._matrix(f"poses.{name}", lambda s: s.pose(name), 4)
 
     @cached_property
     def velocities(self) -> ByName[SpatialMotion]:
         """Velocity of each body and named marker, ground axes: ``velocities["rod"].angular``, ``.linear`` ..."""
-        return self._spatial("velocities", Quantities.velocity)
+        from .named_parts import ByName
+
+        return ByName("body or marker", self._places, partial(self._spatial, "velocities", Quantities.velocity))
 
     @cached_property
     def accelerations(self) -> ByName[SpatialMotion]:
         """Acceleration of each body and named marker, ground axes: ``accelerations["rod"].angular``, ``.linear`` ..."""
-        return self._spatial("accelerations", Quantities.acceleration)
+        from .named_parts import ByName
 
-    def _spatial(self, what: str, of: Callable[[Quantities, str], Any]) -> ByName[SpatialMotion]:
+        return ByName("body or marker", self._places, partial(self._spatial, "accelerations", Quantities.acceleration))
+
+    def _spatial(self, what: str, of: Callable[[Quantities, str], PointMotion], name: str) -> SpatialMotion:
         import sympy
 
-        from .named_parts import ByName, SpatialMotion
+        from .named_parts import SpatialMotion
 
-        def make(name: str) -> SpatialMotion:
-            written = self._write(f"{what}.{name}", lambda s: [x for part in of(s, name) for x in part])
-            return SpatialMotion(*(sympy.Matrix(3, 1, written[k : k + 3]) for k in (0, 3, 6)))
-
-        return ByName("body or marker", self._places, make)
+        written = self._write(f"{what}.{name}", lambda s: [x for part in of(s, name) for x in part])
+        return SpatialMotion(*(sympy.Matrix(3, 1, written[k : k + 3]) for k in (0, 3, 6)))
 
     @cached_property
     def loop_coordinates(self) -> ByName[Any]:
         """Coordinates of the joints that close loops, as functions of ``q``: ``loop_coordinates["s"]``."""
         from .named_parts import ByName
 
-        return ByName(
-            "coordinate of a cut joint",
-            self.kinematics.loop_coordinates.names,
-            lambda n: self._write(f"loop_coordinates.{n}", lambda s: [s.loop_coordinates[n]])[0],
-        )
+        return ByName("coordinate of a cut joint", self.kinematics.loop_coordinates.names, self._loop_coordinate)
+
+    def _loop_coordinate(self, name: str) -> Any:
+        return self._write(f"loop_coordinates.{name}", lambda s: [s.loop_coordinates[name]])[0]
 
     # -- the same with other symbols or values ------------------------------------------------------------------------
     def with_dynamicsymbols(self) -> ReadingView:

@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from .atoms import ONE, Atoms, Frozen, Monomial, Number, Poly, Work, add, freeze, inverse, join, multiply, ratio, scaled
+from .atoms import ONE, TURNS, Atoms, Frozen, Monomial, Number, Poly, Work, add, freeze, inverse, join, multiply, ratio, scaled
 from .costs import Costs
 
 GROUP = 48  #: terms of a group beyond which only its own terms are joined
-TURNS = ("sin", "cos")
 
 
 class Angles:

@@ -14,6 +14,8 @@ Poly = dict[Monomial, Number]  #: coefficient of each monomial, none of them zer
 Frozen = tuple[tuple[Monomial, Number], ...]  #: a Poly as a key, by rising monomial
 
 ONE: Monomial = ()
+TURNS = ("sin", "cos")
+SUMS = ("sum", "factor")  #: kinds of atoms that are one polynomial
 SMALL = 1000  #: denominators up to which a number is written as a fraction
 
 
@@ -23,8 +25,8 @@ class Atom(NamedTuple):
     Attributes
     ----------
     kind : str
-        ``sym``, ``pi``, ``sin``, ``cos``, ``sum`` (a polynomial that stands in a denominator or under a root), ``name``
-        (an intermediate), or an operation of :mod:`eomgen.operations` or a declared function.
+        ``sym``, ``pi``, ``sin``, ``cos``, ``sum`` (a polynomial that stands in a denominator or under a root), ``factor``
+        (a sum in a product), ``name`` (an intermediate), or an operation of :mod:`eomgen.operations` or a declared function.
     what : Any
         The name of a symbol; the Frozen angle of a sine; the Frozen operands of another call.
     """
@@ -48,6 +50,14 @@ class Atoms:
             found = self._ids[atom] = len(self.table)
             self.table.append(atom)
         return found
+
+    def inside(self, atom: int) -> set[int]:
+        """The atoms that an atom is made of, all of smaller numbers."""
+        kind, what = self.table[atom]
+        if kind in ("sym", "name", "pi"):
+            return set()
+        parts = [what] if kind in (*TURNS, *SUMS) else what
+        return {a for part in parts for monomial, _ in part for a, _ in monomial}
 
     def poly(self, kind: str, what: Any) -> Poly:
         """The polynomial of one atom."""

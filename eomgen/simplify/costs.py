@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from fractions import Fraction
 
-from .atoms import Atoms, Monomial, Number, Poly
+from .atoms import TURNS, Atoms, Monomial, Number, Poly
 
 OPERATION = 4.0  #: characters that an operation weighs: textbooks write about so many an operation
 SUM = 2.0  #: parentheses
@@ -19,16 +19,15 @@ class Costs:
     def __init__(self, atoms: Atoms, rates: Collection[str] = ()) -> None:
         self.atoms = atoms
         self.rates = rates
-        self._of: dict[int, float] = {}
-        self._roles_of: dict[int, frozenset[str]] = {}
+        self._of: list[float] = []
+        self._roles_of: list[frozenset[str]] = []
         self._products: dict[Monomial, float] = {}
 
     def of_atom(self, atom: int) -> float:
         """An atom by itself."""
-        found = self._of.get(atom)
-        if found is None:
-            found = self._of[atom] = self._atom(atom)
-        return found
+        while len(self._of) <= atom:  # those inside an atom have smaller numbers: no recursion, calls may be nested deep
+            self._of.append(self._atom(len(self._of)))
+        return self._of[atom]
 
     def _atom(self, atom: int) -> float:
         kind, what = self.atoms.table[atom]
@@ -50,19 +49,12 @@ class Costs:
         return frozenset(role for a, _ in monomial for role in self._roles(a))
 
     def _roles(self, atom: int) -> frozenset[str]:
-        found = self._roles_of.get(atom)
-        if found is None:
-            kind, what = self.atoms.table[atom]
-            if kind in ("sym", "name"):
-                found = frozenset({"rate"} if what in self.rates else ())
-            elif kind == "pi":
-                found = frozenset()
-            else:
-                parts = [what] if kind in ("sin", "cos", "sum", "factor") else what
-                found = frozenset(r for part in parts for m, _ in part for r in self.roles_of(m))
-                found |= {"turn"} if kind in ("sin", "cos") else set()
-            self._roles_of[atom] = found
-        return found
+        while len(self._roles_of) <= atom:
+            kind, what = self.atoms.table[len(self._roles_of)]
+            found = {"rate"} if kind in ("sym", "name") and what in self.rates else {"turn"} if kind in TURNS else set()
+            found.update(r for part in self.atoms.inside(len(self._roles_of)) for r in self._roles_of[part])
+            self._roles_of.append(frozenset(found))
+        return self._roles_of[atom]
 
     def of_power(self, atom: int, n: Fraction | int) -> float:
         """A power of an atom, without the sign that joins it to its neighbours."""

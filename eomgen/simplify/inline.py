@@ -74,15 +74,17 @@ def _put_in(expansion: Expansion, factoring: Factoring, poly: Poly, atom: int, v
 
 
 def _uses(expansion: Expansion, poly: Poly, atom: int) -> bool:
-    return any(a == atom or _inside(expansion, a, atom) for m in poly for a, _ in m)
-
-
-def _inside(expansion: Expansion, outer: int, atom: int) -> bool:
-    kind, what = expansion.atoms.table[outer]
-    if kind in ("sym", "name", "pi"):
-        return False
-    parts = [what] if kind in ("sin", "cos", "sum", "factor") else what
-    return any(_uses(expansion, dict(part), atom) for part in parts)
+    """Whether an atom stands in a polynomial, at any depth."""
+    seen: set[int] = set()
+    stack = [a for m in poly for a, _ in m]
+    while stack:
+        a = stack.pop()
+        if a == atom:
+            return True
+        if a > atom and a not in seen:  # what is inside has smaller numbers
+            seen.add(a)
+            stack.extend(expansion.atoms.inside(a))
+    return False
 
 
 def _can_replace(expansion: Expansion, poly: Poly, atom: int, value: Poly) -> bool:
@@ -90,7 +92,7 @@ def _can_replace(expansion: Expansion, poly: Poly, atom: int, value: Poly) -> bo
         for a, n in m:
             if a == atom and (n != int(n) or (n < 0 and len(value) != 1)):
                 return False
-            if a != atom and _inside(expansion, a, atom):
+            if a != atom and _uses(expansion, {((a, 1),): 1}, atom):
                 return False
     return True
 

@@ -38,10 +38,15 @@ class Raising:
         return sympy.Mul(_number(x), *factors)
 
     def _atom(self, atom: int) -> Any:
-        found = self._made.get(atom)
-        if found is None:
-            found = self._made[atom] = self._raised(atom)
-        return found
+        if atom not in self._made:
+            stack, needed = [atom], {atom}
+            while stack:  # from the inside out, as calls may be nested deep
+                new = self.atoms.inside(stack.pop()).difference(needed, self._made)
+                needed |= new
+                stack += new
+            for a in sorted(needed):
+                self._made[a] = self._raised(a)
+        return self._made[atom]
 
     def _raised(self, atom: int) -> Any:
         kind, what = self.atoms.table[atom]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -233,6 +235,12 @@ def test_functions_of_time_are_those_of_sympy() -> None:
     assert sp.simplify(a.center_of_mass - place.diff(t, 2) / 2) == sp.zeros(3, 1)
 
 
+def test_the_coordinate_of_a_cut_joint_is_a_sum_of_angles() -> None:
+    equations = eg.load(EXAMPLES / "slider_crank.yaml").derive()
+    assert list(equations.loop_coordinates) == ["C"]
+    assert sp.expand(equations.loop_coordinates["C"] + sp.Symbol("theta") + sp.Symbol("B")) == 0
+
+
 # -- bare Lagrangians and given equations -----------------------------------------------------------------------------
 
 
@@ -286,3 +294,16 @@ def test_what_is_read_depends_on_the_model_alone_and_changes_nothing() -> None:
     assert first.intermediates == other.intermediates
     assert first.force == other.force
     assert emit_numpy(build(first, "numpy")) == emit_numpy(build(other, "numpy"))
+
+
+def test_what_is_read_goes_through_pickle_and_copy() -> None:
+    for equations in (pendulum().derive("newton_euler"), pendulum().derive("newton_euler").with_dynamicsymbols()):
+        for name in ("poses", "velocities", "accelerations", "free_bodies", "joint_forces", "loop_coordinates"):
+            dict(getattr(equations, name))
+        total = equations.generalized_forces
+        for twin in (pickle.loads(pickle.dumps(equations)), copy.deepcopy(equations)):
+            assert twin.T == equations.T
+            assert twin.poses["rod"] == equations.poses["rod"]
+            assert twin.generalized_forces == total
+            assert twin.generalized_forces["motor"] == total["motor"]
+            assert twin.velocities["rod"] == equations.velocities["rod"]
