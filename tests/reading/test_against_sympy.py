@@ -28,10 +28,9 @@ def same(ours: Any, theirs: Any) -> None:
     assert ours.shape == theirs.shape
     kinds = (sp.Derivative, sp.core.function.AppliedUndef, sp.Symbol)
     parts = sorted({part for matrix in (ours, theirs) for part in matrix.atoms(*kinds)} - {t}, key=str)
-    for seed in (3, 8):
-        values = {part: sp.Rational(37 * (k + seed) % 89 + 11, 53) for k, part in enumerate(parts)}
-        for a, b in zip(ours, theirs, strict=True):  # derivatives are met before what they are of
-            assert abs(sp.N(a.xreplace(values) - b.xreplace(values), 30)) < sp.Float("1e-25")
+    values = {part: sp.Rational(37 * (k + 3) % 89 + 11, 53) for k, part in enumerate(parts)}
+    for a, b in zip(ours, theirs, strict=True):  # derivatives are met before what they are of
+        assert abs(sp.N(a.xreplace(values) - b.xreplace(values), 30)) < sp.Float("1e-25")
 
 
 def method_of(L: Any, q: list[Any], **more: Any) -> LagrangesMethod:
