@@ -182,7 +182,9 @@ def _blocks(given: Sequence[Sequence[Expr]], bound: Sequence[int]) -> list[tuple
     blocks = []
     while waiting:
         known = [[b for b in range(len(bound)) if b not in done and b not in group] for group in waiting]
-        ready = next(g for g, later in zip(waiting, known, strict=True) if not any(needs[a][b] for a in g for b in later))
+        ready = next(
+            g for g, later in zip(waiting, known, strict=True) if not any(needs[a][b] for a in g for b in later)
+        )
         waiting.remove(ready)
         done.update(ready)
         blocks.append(([row_of[k] for k in ready], [bound[k] for k in ready]))

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 from ..graph.core import Expr
 from ..simplify import WHOLE, simplify
 
-
 READABLE = 400  #: operations an expression, on average, up to which expressions are written out
 LONGEST = 20_000  #: operations of all of them together
 

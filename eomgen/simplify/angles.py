@@ -9,7 +9,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from .atoms import ONE, TURNS, Atoms, Frozen, Monomial, Number, Poly, Work, add, freeze, inverse, join, multiply, ratio, scaled
+from .atoms import (
+    ONE,
+    TURNS,
+    Atoms,
+    Frozen,
+    Monomial,
+    Number,
+    Poly,
+    Work,
+    add,
+    freeze,
+    inverse,
+    join,
+    multiply,
+    ratio,
+    scaled,
+)
 from .costs import Costs
 
 GROUP = 48  #: terms of a group beyond which only its own terms are joined
@@ -119,7 +135,9 @@ class Angles:
         result = dict(group)
         while True:
             for monomial, x in result.items():
-                square = next((f for f in monomial if f[1] >= 2 and self.atoms.table[f[0]].kind not in (full, "sum")), None)
+                square = next(
+                    (f for f in monomial if f[1] >= 2 and self.atoms.table[f[0]].kind not in (full, "sum")), None
+                )
                 if square is not None and self._turns(square[0]):
                     break
             else:

@@ -25,7 +25,9 @@ class Costs:
 
     def of_atom(self, atom: int) -> float:
         """An atom by itself."""
-        while len(self._of) <= atom:  # those inside an atom have smaller numbers: no recursion, calls may be nested deep
+        while (
+            len(self._of) <= atom
+        ):  # those inside an atom have smaller numbers: no recursion, calls may be nested deep
             self._of.append(self._atom(len(self._of)))
         return self._of[atom]
 

@@ -9,7 +9,24 @@ from math import gcd, lcm
 from ..graph.core import Graph
 from ..graph.traverse import reachable
 from .angles import Angles
-from .atoms import ONE, Atoms, Monomial, Number, Poly, Work, add, common, constant, freeze, inverse, join, multiply, number, ratio, scaled
+from .atoms import (
+    ONE,
+    Atoms,
+    Monomial,
+    Number,
+    Poly,
+    Work,
+    add,
+    common,
+    constant,
+    freeze,
+    inverse,
+    join,
+    multiply,
+    number,
+    ratio,
+    scaled,
+)
 
 MANY = 24  #: terms beyond which the sines and cosines of a sum are joined before it is used
 
@@ -78,14 +95,21 @@ class Expansion:
 
     def _settled(self, a: Poly) -> Poly:
         """With sums to whole positive powers multiplied out again."""
-        for monomial, x in a.items():
-            for atom, n in monomial:
-                if n >= 1 and self.atoms.table[atom].kind == "sum":
-                    rest = add(a, {monomial: x}, -1)
-                    left = tuple((k, p) for k, p in monomial if k != atom)
-                    left = tuple(sorted((*left, (atom, n - 1)))) if n != 1 else left
-                    return self._settled(add(rest, multiply({left: x}, dict(self.atoms.table[atom].what))))
-        return a
+        result: Poly = {}
+        waiting = [a]
+        while waiting:
+            done: Poly = {}
+            for monomial, x in waiting.pop().items():
+                power = next((f for f in monomial if f[1] >= 1 and self.atoms.table[f[0]].kind == "sum"), None)
+                if power is None:
+                    done[monomial] = x
+                    continue
+                below = join(monomial, ((power[0], -1),))
+                base = dict(self.atoms.table[power[0]].what)
+                self.work.spend(len(base))
+                waiting.append(multiply({below: x}, base))
+            result = add(result, done) if result else done
+        return result
 
     def _over(self, a: Poly, b: Poly) -> Poly:
         b = self.angles.simplified(b)

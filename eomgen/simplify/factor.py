@@ -10,7 +10,22 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from functools import reduce
 
-from .atoms import Atoms, Frozen, Monomial, Number, Poly, Work, add, common, freeze, inverse, join, multiply, ratio, scaled
+from .atoms import (
+    Atoms,
+    Frozen,
+    Monomial,
+    Number,
+    Poly,
+    Work,
+    add,
+    common,
+    freeze,
+    inverse,
+    join,
+    multiply,
+    ratio,
+    scaled,
+)
 from .costs import SUM, Costs
 from .expansion import content
 

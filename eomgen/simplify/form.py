@@ -52,7 +52,11 @@ class Form:
     def cost(self) -> float:
         """The length for a reader."""
         costs = self.factoring.costs
-        return sum(costs.of_terms(p) for _, p in self.named) + NAME * len(self.named) + sum(map(costs.of_terms, self.polys))
+        return (
+            sum(costs.of_terms(p) for _, p in self.named)
+            + NAME * len(self.named)
+            + sum(map(costs.of_terms, self.polys))
+        )
 
     def sympy(self, symbols: Callable[[str], Any] | None = None) -> tuple[list[tuple[Any, Any]], list[Any]]:
         """Named intermediates, each a symbol and its expression, and expressions.

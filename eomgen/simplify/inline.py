@@ -13,9 +13,7 @@ EACH = 40  #: products of terms for one expression, by its length
 Named = list[tuple[int, Poly]]  #: the atom of each name and what it stands for
 
 
-def inlined(
-    expansion: Expansion, factoring: Factoring, named: Named, polys: list[Poly]
-) -> tuple[Named, list[Poly]]:
+def inlined(expansion: Expansion, factoring: Factoring, named: Named, polys: list[Poly]) -> tuple[Named, list[Poly]]:
     """Without names that are not worth it."""
     costs = factoring.costs.of_terms
     every = [*named, *((-1, poly) for poly in polys)]
