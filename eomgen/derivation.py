@@ -14,8 +14,7 @@ from .graph.count import Operations, count
 from .kinematics import Kinematics
 from .kinematics.mobility import Mobility
 from .kinematics.report import MechanismReport, report
-from .reading import Quantities, Readable
-READABLE = 400
+from .reading import Readable
 from .records import dataclass
 from .texts import html_text
 
@@ -104,11 +103,7 @@ class Derivation(Readable):
         return f"<pre style='font-family:monospace'>{html_text(str(self))}</pre>"
 
     def _repr_latex_(self) -> str | None:
-        from .graph.sympy_raise import inlined_size
-
-        quantities = Quantities(*self.fresh())
-        flat = [*(x for row in quantities.mass_matrix for x in row), *quantities.force]
-        if inlined_size(flat) > READABLE:
+        if self.intermediates:
             return None
         import sympy
 

@@ -164,7 +164,7 @@ def eliminate(
             row = dict(zip(others, values_of_row, strict=True))
             if names is not None:
                 row = {k: names.entry(j, k, x) for k, x in row.items()}
-            solved[j] = [row[k] if k in row else one if k == j else zero for k in range(len(given[0]))]
+            solved[j] = [row.get(k, one if k == j else zero) for k in range(len(given[0]))]
     return solved
 
 
@@ -178,15 +178,12 @@ def _blocks(given: Sequence[Sequence[Expr]], bound: Sequence[int]) -> list[tuple
     needs = [[filled[row_of[a]][b] for b in range(len(bound))] for a in range(len(bound))]
     _, labels = connected_components(csr_array(needs), directed=True, connection="strong")
     waiting = [[k for k, label in enumerate(labels) if label == one] for one in sorted(set(labels.tolist()))]
-    done: set[int] = set()
+    left = set(range(len(bound)))
     blocks = []
     while waiting:
-        known = [[b for b in range(len(bound)) if b not in done and b not in group] for group in waiting]
-        ready = next(
-            g for g, later in zip(waiting, known, strict=True) if not any(needs[a][b] for a in g for b in later)
-        )
+        ready = next(group for group in waiting if not any(needs[a][b] for a in group for b in left - {*group}))
         waiting.remove(ready)
-        done.update(ready)
+        left -= {*ready}
         blocks.append(([row_of[k] for k in ready], [bound[k] for k in ready]))
     return blocks
 

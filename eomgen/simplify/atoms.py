@@ -1,4 +1,4 @@
-"""Stage simplify: what polynomials are made of: symbols, sines and cosines, other calls, sums in denominators and roots."""
+"""Stage simplify: what polynomials are made of: symbols, sines, cosines, other calls, sums under fractions and roots."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ class Atom(NamedTuple):
     Attributes
     ----------
     kind : str
-        ``sym``, ``pi``, ``sin``, ``cos``, ``sum`` (a polynomial that stands in a denominator or under a root), ``factor``
-        (a sum in a product), ``name`` (an intermediate), or an operation of :mod:`eomgen.operations` or a declared function.
+        ``sym``, ``pi``, ``sin``, ``cos``, ``sum`` (a polynomial that stands in a denominator or under a root),
+        ``factor`` (a sum in a product), ``name`` (an intermediate), an operation of :mod:`eomgen.operations`, or a
+        declared function.
     what : Any
         The name of a symbol; the Frozen angle of a sine; the Frozen operands of another call.
     """
@@ -67,8 +68,7 @@ class Atoms:
 def number(value: float) -> tuple[Number, bool]:
     """A double as it was probably meant, and whether it is that many times pi.
 
-    The fraction with a denominator up to 1000, or the multiple of pi, whose double this is; a decimal of few digits; else
-    the double itself.
+    The fraction with a denominator up to 1000, or the multiple of pi, whose double this is; else the double itself.
     """
     near = Fraction(value).limit_denominator(SMALL)
     if abs(near.numerator) < 10**15 and near.numerator / near.denominator == value:

@@ -181,7 +181,7 @@ def divided(a: Poly, b: Poly) -> Poly | None:
     """a / b where b, a sum without common factor, divides a; else None."""
     if len(a) < len(b):
         return None
-    factor = {shared(a): 1}
+    factor: Poly = {shared(a): 1}
     rest = multiply(a, {inverse(shared(a)): 1})
     lead = max(b, key=_order)
     result: Poly = {}

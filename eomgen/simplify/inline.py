@@ -21,19 +21,14 @@ def inlined(expansion: Expansion, factoring: Factoring, named: Named, polys: lis
     for k in range(len(named)):
         atom, value = every[k]
         users = [n for n in range(k + 1, len(every)) if _uses(expansion, every[n][1], atom)]
-        head = _costliest(expansion, value) if len(value) == 1 and len(users) > 1 else None
-        if head is not None:  # a product is named without its symbols and numbers, which may cancel
-            name = {((atom, 1),): 1}
-            for n in users:
-                put = _put_in(expansion, factoring, every[n][1], atom, multiply(name, head[1]))
-                if put is None:
-                    break
-            else:
-                for n in users:
-                    put = _put_in(expansion, factoring, every[n][1], atom, multiply(name, head[1]))
-                    every[n] = (every[n][0], put or {})
-                value = head[0]
-                every[k] = (atom, value)
+        if len(value) == 1 and len(users) > 1:  # named without its symbols and numbers, which may cancel
+            inner, outer = _parted(expansion, value)
+            moved = multiply({((atom, 1),): 1}, outer)
+            put = [_put_in(expansion, factoring, every[n][1], atom, moved) for n in users]
+            if inner != value and all(p is not None for p in put):
+                for n, p in zip(users, put, strict=True):
+                    every[n] = (every[n][0], p or {})
+                every[k] = (atom, value := inner)
         tried = None
         if len(value) == 1 or len(users) == 1:
             tried = [_put_in(expansion, factoring, every[n][1], atom, value) for n in users]
@@ -49,14 +44,12 @@ def inlined(expansion: Expansion, factoring: Factoring, named: Named, polys: lis
     return [every[k] for k in kept], [p for a, p in every if a < 0]
 
 
-def _costliest(expansion: Expansion, value: Poly) -> tuple[Poly, Poly] | None:
-    """A single term as a product of what is worth a name, and of symbols and numbers; None where there are none."""
+def _parted(expansion: Expansion, value: Poly) -> tuple[Poly, Poly]:
+    """A single term as a product of what is worth a name, and of symbols and numbers."""
     ((monomial, x),) = value.items()
     plain = tuple(f for f in monomial if expansion.atoms.table[f[0]].kind in ("sym", "pi"))
     rest = tuple(f for f in monomial if f not in plain)
-    if not rest or (not plain and x == 1):
-        return None
-    return {rest: 1}, {plain: x}
+    return ({rest: 1}, {plain: x}) if rest else (value, {(): 1})
 
 
 def _put_in(expansion: Expansion, factoring: Factoring, poly: Poly, atom: int, value: Poly) -> Poly | None:
