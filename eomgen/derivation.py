@@ -6,27 +6,24 @@ from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 from .equations import TreeEquations
-from .equations.reduction import reduce_to_independent
 from .graph.core import Expr
 from .graph.count import Operations, count
 from .kinematics import Kinematics
 from .kinematics.mobility import Mobility
 from .kinematics.report import MechanismReport, report
-from .kinematics.state import acceleration_name
+from .reading import Readable
 from .records import dataclass
 from .texts import html_text
 
 if TYPE_CHECKING:
     from .program.choice import Choice
 
-READABLE = 400  #: operations up to which equations are shown written out
-
 
 @dataclass(frozen=True)
-class Derivation:
+class Derivation(Readable):
     """What a derivation gives; :class:`~.api.equations.Equations` says what its attributes are."""
 
     kinematics: Kinematics = field(repr=False)
@@ -55,17 +52,6 @@ class Derivation:
     def method(self) -> str:
         """Name of the method of derivation."""
         return self.tree.method
-
-    @property
-    def independent(self) -> tuple[str, ...]:
-        """Names of the independent coordinates."""
-        return self.mobility.independent
-
-    @property
-    def accelerations(self) -> tuple[str, ...]:
-        """Names of the accelerations that ``mass_matrix`` and ``force`` are for."""
-        k = self.kinematics
-        return tuple(acceleration_name(k.velocity_names[k.velocity_labels.index(n)]) for n in self.independent)
 
     @cached_property
     def report(self) -> MechanismReport:
@@ -99,65 +85,6 @@ class Derivation:
         system = self.tree.system
         return None if system is None else (len(system.unknowns), len(system.places))
 
-    # -- SymPy's side -------------------------------------------------------------------------------------------------
-    def _symbols(self, names: Sequence[str]) -> tuple[Any, ...]:
-        import sympy
-
-        return tuple(sympy.Symbol(name) for name in names)
-
-    @property
-    def q(self) -> tuple[Any, ...]:
-        """Coordinates of the spanning tree, SymPy symbols."""
-        return self._symbols(self.kinematics.names)
-
-    @property
-    def v(self) -> tuple[Any, ...]:
-        """Velocities of the spanning tree, SymPy symbols."""
-        return self._symbols(self.kinematics.velocity_names)
-
-    @property
-    def parameters(self) -> tuple[Any, ...]:
-        """Parameters, SymPy symbols."""
-        return self._symbols(self.kinematics.parameter_names)
-
-    @cached_property
-    def _embedded(self) -> tuple[tuple[tuple[Expr, ...], ...], tuple[Expr, ...]]:
-        m = self.kinematics.mechanism
-        values = {p.name: 1.0 + 0.1 * k if p.value is None else p.value for k, p in enumerate(m.parameters)}
-        values |= {u.name: u.value for u in m.inputs} | {"t": 0.0}
-        return reduce_to_independent(self.kinematics, self.mobility, self.tree, values)
-
-    @cached_property
-    def _raised(self) -> tuple[list[tuple[Any, Any]], Any, Any]:
-        import sympy
-
-        from .graph.sympy_raise import inlined_size, raise_inline, raise_named
-
-        matrix, force = self._embedded
-        flat = [*(x for row in matrix for x in row), *force]
-        if inlined_size(flat) <= READABLE * len(flat):
-            named: list[tuple[Any, Any]] = []
-            raised = raise_inline(flat)
-        else:
-            named, raised = raise_named(flat)
-        n = len(force)
-        return named, sympy.Matrix(n, n, raised[: n * n]), sympy.Matrix(n, 1, raised[n * n :])
-
-    @property
-    def mass_matrix(self) -> Any:
-        """sympy.Matrix (n, n), n the degrees of freedom."""
-        return self._raised[1]
-
-    @property
-    def force(self) -> Any:
-        """sympy.Matrix (n, 1): ``mass_matrix * v' = force``."""
-        return self._raised[2]
-
-    @property
-    def intermediates(self) -> list[tuple[Any, Any]]:
-        """Named subexpressions of a large mass matrix and force, in order: (symbol, expression); empty when small."""
-        return self._raised[0]
-
     # -- display
     def __str__(self) -> str:
         lines = [f"equations of {self.name}, method {self.method}, independent {', '.join(self.independent) or 'none'}"]
@@ -176,14 +103,14 @@ class Derivation:
         return f"<pre style='font-family:monospace'>{html_text(str(self))}</pre>"
 
     def _repr_latex_(self) -> str | None:
-        from .graph.sympy_raise import inlined_size
-
-        matrix, force = self._embedded
-        flat = [*(x for row in matrix for x in row), *force]
-        if inlined_size(flat) > READABLE:
+        if self.intermediates:
             return None
         import sympy
 
-        rates = [sympy.Symbol(name) for name in self.accelerations]
-        left = f"{sympy.latex(self.mass_matrix)} {sympy.latex(sympy.Matrix(rates))}"
-        return f"$\\displaystyle {left} = {sympy.latex(self.force)}$"
+        rates = [sympy.Symbol(name) for name in self.acceleration_names]
+        symbols = self.mass_matrix.free_symbols | self.force.free_symbols | {*rates}
+        names = self.notation.symbol_names(symbols)
+        left, vector, right = (
+            sympy.latex(part, symbol_names=names) for part in (self.mass_matrix, sympy.Matrix(rates), self.force)
+        )
+        return f"$\\displaystyle {left} {vector} = {right}$"

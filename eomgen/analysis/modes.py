@@ -18,6 +18,7 @@ from ..errors import EomgenError, UsageError
 from ..files.inline_pictures import image_html
 from ..limits.descriptions import SHOWN_COMPLEX
 from ..limits.statics import SYMMETRIC
+from ..notation.notation import Notation
 from ..numeric import algebra
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
 
+COLUMNS = 12  #: of mode shapes in the table of a notebook
 SHAPES = 3  #: modes that a notebook shows
 
 
@@ -102,10 +104,10 @@ class Modes:
     @property
     def facts(self) -> list[tuple[str, str]]:
         """Label and value of each line of the description."""
+        names = [name.removesuffix("_dot") for name in self.names]
         lines = []
         for k, square in enumerate(self.squares):
-            shape = ", ".join(f"{name.removesuffix('_dot')} {x:.4g}" for name, x in zip(self.names, self.shapes[:, k],
-                                                                                         strict=True))  # fmt: skip
+            shape = ", ".join(f"{name} {x:.4g}" for name, x in zip(names, self.shapes[:, k], strict=True))
             what = f"{self.frequencies[k]:.6g} rad/s, {self.hertz[k]:.6g} Hz"
             if self.frequencies[k] == 0.0:
                 what = "rigid body" if self._still[k] else f"diverges, {np.sqrt(-square):.6g} 1/s"
@@ -117,6 +119,23 @@ class Modes:
 
     def __repr__(self) -> str:
         return as_text(f"Modes of {self.name}", self.facts)
+
+    def _table(self) -> str:
+        """Frequencies and shapes, a row for each mode, and the eigenvalues with damping, for notebooks."""
+        printed = Notation.of(self._module.metadata).html
+        names = [name.removesuffix("_dot") for name in self.names[:COLUMNS]]
+        heads = ["mode", "rad/s", "Hz", *map(printed, names), *["..."] * (len(self.names) > COLUMNS)]
+        rows = []
+        for k, square in enumerate(self.squares):
+            found = [f"{self.frequencies[k]:.6g}", f"{self.hertz[k]:.6g}"]
+            if self.frequencies[k] == 0.0:
+                found = ["rigid body" if self._still[k] else f"diverges, {np.sqrt(-square):.6g} 1/s", ""]
+            rows.append([str(k + 1), *found, *(f"{x:.4g}" for x in self.shapes[: len(names), k])])
+        cells = "".join(f"<tr>{''.join(f'<td>{x}</td>' for x in row)}</tr>" for row in rows)
+        head = "".join(f"<th>{x}</th>" for x in heads)
+        damped = [fact for fact in self.facts if fact[0] == "with damping"]
+        title = f"<b>{html_text(f'Modes of {self.name}')}</b>"
+        return f"{title}<table><tr>{head}</tr>{cells}</table>{as_html('', damped) if damped else ''}"
 
     def animate(self, mode: int = 1, file: str | Path | None = None, **options: Any) -> Any:
         """Show a mode shape as it swings, enlarged until it is well seen; loops stay closed.
@@ -151,7 +170,7 @@ class Modes:
         return found, f"mode {k + 1}" + (f": {self.hertz[k]:.4g} Hz" if self.hertz[k] else "")
 
     def _repr_html_(self) -> str:
-        table = as_html(f"Modes of {self.name}", self.facts)
+        table = self._table()
         if self._module.metadata.get("picture") is None or not len(self.squares):
             return table
         swinging = [k for k in range(len(self.squares)) if self.hertz[k]] or list(range(len(self.squares)))

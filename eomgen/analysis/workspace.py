@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import UsageError
 from ..files.inline_pictures import picture_html
 from ..files.writing import whole_file
+from ..notation.notation import Notation
 from ..numeric import algebra
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
@@ -69,7 +70,7 @@ class Workspace:
 
     def __init__(self, module: BoundModel, grid: Grid, filled: Flood, known: Conditions) -> None:
         layout = module.layout
-        self.name, self.q_names = layout.name, layout.q
+        self.name, self.q_names, self.notation = layout.name, layout.q, Notation.of(layout.metadata)
         self.over: dict[str, Array] = dict(zip(grid.names, grid.axes, strict=True))
         self.of, self.shape = grid.of, grid.shape
         self.units = {name: layout.unit(name) for name in ("t", *layout.q, *layout.loops, *layout.y)}

@@ -7,6 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import UsageError
+from ..notation.labels import label
+from ..notation.notation import Notation
 from ..runtime.near_names import require
 
 MARKS = {"stop": ("x", "tab:red"), "change point": ("^", "tab:orange"), "outputs": (".", "black")}
@@ -20,6 +22,7 @@ class Coloured(Protocol):
     over: Any
     units: Any
     singularities: Any
+    notation: Notation
 
     @property
     def reached(self) -> Any: ...
@@ -44,9 +47,8 @@ def plot_workspace(ws: Coloured, by: str, ax: Any = None, figure: Any = None) ->
         shown = names[:3] if len(names) > 1 else (next(iter(ws.over)), names[0]) if k == 0 else (names[0], by)
         panel = ax or figure.add_subplot(1, 2, k + 1, projection="3d" if len(shown) == 3 else None)
         drawn = _draw(ws, panel, [ws[name] for name in shown], colour, cells=k == 1 and len(names) == 2)
-        for label, name in zip(("x", "y", "z"), shown, strict=False):
-            unit = ws.units.get(name, "")
-            getattr(panel, f"set_{label}label")(f"{name} ({unit})" if unit else name)
+        for axis, name in zip(("x", "y", "z"), shown, strict=False):
+            getattr(panel, f"set_{axis}label")(label(ws.notation.mathtext(name), ws.units.get(name, "")))
         if k == 1 and len(shown) <= 3 and by not in shown:
             _mark(ws, panel, shown)
         units = {ws.units.get(name, "") for name in shown}
@@ -57,7 +59,7 @@ def plot_workspace(ws: Coloured, by: str, ax: Any = None, figure: Any = None) ->
         return ax
     figure.suptitle(ws.name)
     if drawn is not None:
-        figure.colorbar(drawn, ax=panels, label=by)
+        figure.colorbar(drawn, ax=panels, label=ws.notation.mathtext(by))
     return np.array(panels)
 
 

@@ -30,6 +30,10 @@ class Equations(Derivation):
     mass_matrix, force : sympy.Matrix
         ``mass_matrix * v' = force``; for a mechanism with loops of the size of its degrees of freedom, v' then being
         the accelerations of ``independent``.  Large ones are written with ``intermediates``.
+    notation : Notation
+        How names are printed: LaTeX, text, HTML, labels of plots.
+    T, V, generalized_forces, constraints, velocity_transformation, poses, ...
+        Every quantity of the equations by name, as SymPy: the attributes of :class:`~eomgen.reading.Readable`.
     operations : dict of str to Operations
         Exact counts of mass matrix, bias, inverse dynamics and energies on the spanning tree, and of the entries of
         the linear system where the method solves one.

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import MissingDependencyError, UsageError
 from ..files.writing import save_figure
+from ..notation.notation import Notation
 from .shared_options import split_names
 
 if TYPE_CHECKING:
@@ -156,7 +157,8 @@ def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, f
     if paths:
         plane = figure.add_subplot(grid[1])
         _, columns = refined(trajectory, tuple(dict.fromkeys(name for pair in paths for name in pair)))
-        curves = [(f"({a}, {b})", columns[a], columns[b]) for a, b in paths]
+        printed = Notation.of(trajectory.metadata).mathtext
+        curves = [(f"({printed(a)}, {printed(b)})", columns[a], columns[b]) for a, b in paths]
         draw_panel(plane, Curves("", curves, equal=True), below=True)
         plane.set_title("paths (m)", fontsize="medium")
     figure.suptitle(title, parse_math=False)

@@ -98,7 +98,7 @@ def written(derived: Equations) -> dict[str, Any]:
         "intermediates": {str(symbol): str(expression) for symbol, expression in derived.intermediates},
         "mass_matrix": [[str(x) for x in row] for row in derived.mass_matrix.tolist()],
         "force": [str(x) for x in derived.force],
-        "accelerations": list(derived.accelerations),
+        "accelerations": list(derived.acceleration_names),
     }
 
 

@@ -17,6 +17,7 @@ from .description import Faults, items
 from .fields import EQUATIONS, MOTION
 from .mechanism import GivenEquations, Output
 from .names import fault_of_name, nearest
+from .printed_names import take_coordinates_latex
 from .scope import ENERGIES
 from .sympy_face import name_of
 from .values import Reader
@@ -55,6 +56,7 @@ def declare_equations(reader: Reader, given: Any, has_others: bool) -> dict[str,
             reader.names.declare("velocity", name, f"{PATH}.velocities[{k}]")
     for k, name in enumerate(values["multipliers"]):
         reader.names.declare("multiplier", name, f"{PATH}.multipliers[{k}]")
+    take_coordinates_latex(reader, f"{PATH}.latex", q, values.get("latex", ()))
     return values
 
 

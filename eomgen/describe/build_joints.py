@@ -20,6 +20,7 @@ from .joint_data import read_armature, read_dry_friction, read_limits
 from .mechanism import JointSpec
 from .names import nearest
 from .placement import TURNS, turn_matrix
+from .printed_names import take_coordinates_latex
 from .sympy_face import name_of
 from .values import Reader
 
@@ -78,6 +79,8 @@ def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[D
         for k, name in enumerate(names):
             parameter = k < count and joint.coordinates[k].kind == "parameter"
             reader.names.declare("parameter of rotation" if parameter else "coordinate", name, path)
+        if "latex" in entry.values and count and len(names) == count:
+            take_coordinates_latex(reader, f"{entry.path}.latex", names, entry.values["latex"])
         for velocity in joint.velocities:
             if velocity.of is None:
                 reader.names.declare("velocity", entry.name + velocity.suffix, entry.path)

@@ -14,6 +14,7 @@ from .description import items
 from .fields import LAGRANGIAN, MOTION
 from .mechanism import Lagrangian
 from .names import nearest
+from .printed_names import take_coordinates_latex
 from .sympy_face import in_order, name_of
 from .values import Reader
 
@@ -39,6 +40,7 @@ def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str
     values["coordinates"] = [name_of(q) for q in listed]
     for k, name in enumerate(values["coordinates"]):
         reader.names.declare("coordinate", name, f"lagrangian.coordinates[{k}]")
+    take_coordinates_latex(reader, "lagrangian.latex", values["coordinates"], values.get("latex", ()))
     return values
 
 

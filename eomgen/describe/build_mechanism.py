@@ -41,6 +41,7 @@ from .mass_properties import read_body
 from .mechanism import SUMS, Body, Input, Mechanism, Output, Parameter, Simulation
 from .names import fault_of_model_name, nearest
 from .physical import check_bodies
+from .printed_names import take_latex
 from .scope import Namespace
 from .sympy_face import in_order, name_of
 from .units import Unit, UnitError, read_unit
@@ -147,6 +148,8 @@ def build(description: Description) -> Mechanism:
         constraints=constraints,
         lines=dict(description.lines),
         doc=doc,
+        latex=dict(reader.latex),
+        instances=dict(description.instances),
         check_inertia=reader.check_word("check_inertia", values.get("check_inertia", True)),
         limits_told=_limits_told(reader, values.get("limits")),
         negative=negative,
@@ -169,6 +172,7 @@ def _described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[U
     """Unit and doc of an entry, its keys checked."""
     check_keys(entry.path, entry.values, fields, reader.faults)
     text, doc = (reader.text(f"{entry.path}.{key}", entry.values.get(key, "")) for key in ("unit", "doc"))
+    take_latex(reader, f"{entry.path}.latex", entry.name, entry.values.get("latex", ""))
     try:
         unit = read_unit(text)
     except UnitError as error:

@@ -69,12 +69,13 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         constraints: Sequence[Any] = (),
         parameters: Mapping[Any, Any] | None = None,
         inputs: Mapping[Any, Any] | None = None,
+        latex: Mapping[Any, str] | None = None,
     ) -> Self:
         """A model from a bare Lagrangian; see :func:`eomgen.describe.lagrangian.describe_lagrangian`."""
         from .lagrangian import describe_lagrangian
 
         return cls.from_description(
-            describe_lagrangian(name, L, coordinates, forces, dissipation, constraints, parameters, inputs)
+            describe_lagrangian(name, L, coordinates, forces, dissipation, constraints, parameters, inputs, latex)
         )
 
     @classmethod
@@ -88,7 +89,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         return cls.from_description(describe_equations(name, coordinates, mass_matrix, forcing, **further))
 
     # -- quantities -----------------------------------------------------------------------------------------------
-    def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "") -> Any:
+    def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "", latex: str = "") -> Any:
         """Declare a constant that can change between runs.
 
         Parameters
@@ -101,30 +102,41 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
             Unit of the value, such as ``"mm"`` or ``"N*m/rad"``; the value is converted to SI units.
         doc : str, optional
             For display.
+        latex : str, optional
+            How formulas and plots print it, such as ``"m_{c}"``; from its name unless given.
 
         Returns
         -------
         sympy.Symbol
         """
-        self._quantity("parameters", name, value, unit, doc)
+        self._quantity("parameters", name, value, unit, doc, latex)
         return symbol(name)
 
-    def input(self, name: str, value: Value = 0.0, unit: str = "", doc: str = "", signal: Value | None = None) -> Any:
+    def input(
+        self,
+        name: str,
+        value: Value = 0.0,
+        unit: str = "",
+        doc: str = "",
+        signal: Value | None = None,
+        latex: str = "",
+    ) -> Any:
         """Declare a quantity given from outside over time; ``value`` holds while none is given.
 
         ``signal``, an expression of t, coordinates, velocities and parameters, is what runs take that give none;
-        calls of the module's own functions still take ``value``.
+        calls of the module's own functions still take ``value``.  ``unit``, ``doc`` and ``latex`` are those
+        of :meth:`parameter`.
 
         Returns
         -------
         sympy.Symbol
         """
-        self._quantity("inputs", name, value, unit, doc)
+        self._quantity("inputs", name, value, unit, doc, latex)
         if signal is not None:
             self._description.sections["inputs"][-1].values["signal"] = signal
         return symbol(name)
 
-    def output(self, name: str, expression: Value, unit: str = "", doc: str = "") -> None:
+    def output(self, name: str, expression: Value, unit: str = "", doc: str = "", latex: str = "") -> None:
         """Declare a named result.
 
         Parameters
@@ -137,8 +149,10 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
             Unit in which the result is given; without one it is in SI units.
         doc : str, optional
             For display.
+        latex : str, optional
+            How formulas and plots print it, in LaTeX; from its name unless given.
         """
-        self._quantity("outputs", name, expression, unit, doc, key="expression")
+        self._quantity("outputs", name, expression, unit, doc, latex, key="expression")
 
     def event(
         self,
@@ -175,9 +189,11 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         defaults = {"terminal": False, "direction": 0, "doc": ""}
         self._description.add("events", name, without_defaults(given, defaults))
 
-    def _quantity(self, section: str, name: str, value: Value, unit: str, doc: str, key: str = "value") -> None:
-        given = {key: value, "unit": unit, "doc": doc}
-        self._description.add(section, name, without_defaults(given, {"unit": "", "doc": "", key: ""}))
+    def _quantity(
+        self, section: str, name: str, value: Value, unit: str, doc: str, latex: str, key: str = "value"
+    ) -> None:
+        given = {key: value, "unit": unit, "doc": doc, "latex": latex}
+        self._description.add(section, name, without_defaults(given, {"unit": "", "doc": "", "latex": "", key: ""}))
 
     def coordinate(self, name: str) -> Any:
         """The SymPy symbol of a coordinate, by name; it is looked up when the model is checked."""

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..errors import UsageError
 from ..joints import JOINTS
+from ..notation import with_instance
 from .build_cam_points import needs_point
 from .build_joints import coordinate_names, sketch
 from .description import GROUND_NAME, Description
@@ -115,6 +116,9 @@ class Renaming(Visitor):
     def coordinate(self, name: str) -> str:
         known = name in self.own.joints or self.own.has_symbol(name)
         return self.prefix + name if known or self.closed else name
+
+    def latex(self, text: Any) -> Any:
+        return with_instance(text, self.prefix.strip("_")) if isinstance(text, str) and text else text
 
     def body(self, name: str) -> str:
         if name in self.attached:

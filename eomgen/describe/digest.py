@@ -24,6 +24,8 @@ ASIDE = frozenset(
     {
         "doc",
         "docs",
+        "latex",
+        "instances",
         "lines",
         "notes",
         "place",

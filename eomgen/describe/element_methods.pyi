@@ -17,64 +17,78 @@ class ElementMethods(Described):
     def _method(self, name: str) -> Any: ...
     def revolute(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinate: Any = None, coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        dry_friction: float | None = None, armature: Value = None) -> JointHandle:
+        dry_friction: float | None = None, armature: Value = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type revolute: turns about the common z axis; the origins coincide."""
     def continuous(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinate: Any = None, coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        dry_friction: float | None = None, armature: Value = None) -> JointHandle:
+        dry_friction: float | None = None, armature: Value = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type continuous: a revolute joint without limits, as URDF calls it."""
     def prismatic(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinate: Any = None, coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        dry_friction: float | None = None, armature: Value = None) -> JointHandle:
+        dry_friction: float | None = None, armature: Value = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type prismatic: slides along the common z axis without turning."""
     def screw(self, name: str, predecessor: Any, successor: Any, pitch: Value,
         axis: str | Sequence[float] | None = None, coordinate: Any = None, coordinates: Sequence[Any] | None = None,
-        limits: Mapping[str, float] | None = None, dry_friction: float | None = None,
-        armature: Value = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None, dry_friction: float | None = None, armature: Value = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type screw: turns about the common z axis and slides along it by ``pitch`` (m) a turn."""
     def cylindrical(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
-        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
+        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type cylindrical: slides along and turns about the common z axis."""
     def universal(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         axes: Sequence[Any] | None = None, coordinates: Sequence[Any] | None = None,
-        limits: Mapping[str, float] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type universal: a cross that turns about x of P and y of S, which stay perpendicular."""
     def constant_velocity(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
-        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
+        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type constant_velocity: bends about any axis across the shaft and passes its turning on
         evenly."""
     def spherical(self, name: str, predecessor: Any, successor: Any, sequence: str | None = None,
         coordinates: Sequence[Any] | None = None, rotation: str | None = None,
-        limits: Mapping[str, float] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type spherical: turns about a point."""
     def planar(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
-        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
+        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type planar: moves in the x-y plane of P and turns about z."""
     def translational(self, name: str, predecessor: Any, successor: Any, coordinates: Sequence[Any] | None = None,
-        limits: Mapping[str, float] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type translational: slides along x, y and z of P without turning."""
     def curve_slider(self, name: str, predecessor: Any, successor: Any, curve: Sequence[Value], coordinate: Any = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        dry_friction: float | None = None, armature: Value = None) -> JointHandle:
+        dry_friction: float | None = None, armature: Value = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type curve_slider: the origin of S slides along a curve of P, without turning: a bead on a
         wire."""
     def surface_slider(self, name: str, predecessor: Any, successor: Any, surface: Sequence[Value],
-        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
+        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type surface_slider: the origin of S slides on a surface of P, without turning: a particle in
         a bowl."""
     def point_on_curve(self, name: str, predecessor: Any, successor: Any, curve: Sequence[Value],
         sequence: str | None = None, coordinates: Sequence[Any] | None = None,
-        limits: Mapping[str, float] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type point_on_curve: the origin of S slides along a curve of P; S turns freely, in Euler
         angles."""
     def point_on_surface(self, name: str, predecessor: Any, successor: Any, surface: Sequence[Value],
         sequence: str | None = None, coordinates: Sequence[Any] | None = None,
-        limits: Mapping[str, float] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type point_on_surface: the origin of S slides on a surface of P; S turns freely, in Euler
         angles."""
     def free(self, name: str, predecessor: Any, successor: Any, sequence: str | None = None,
         coordinates: Sequence[Any] | None = None, rotation: str | None = None,
-        limits: Mapping[str, float] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None,
+        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
         """Add a joint of type free: six degrees of freedom: position of S in P axes, then its rotation. Removes
         none."""
     def weld(self, name: str, predecessor: Any, successor: Any) -> JointHandle:

@@ -24,61 +24,8 @@ from ..forces import FORCES
 from ..joints import JOINTS
 from ..numeric.splines import KINDS as TABLES
 from ..solids import SOLIDS
+from .kinds import KINDS as KINDS
 from .mechanism import Simulation
-
-#: kind -> how a message describes it
-KINDS = {
-    "text": "a text",
-    "unit": "a unit, such as mm or N*m/rad",
-    "name": "a name",
-    "names": "a list of names",
-    "body": "the name of a body",
-    "number": "a number",
-    "positive": "a number greater than 0",
-    "expression": "a number or an expression",
-    "expressions": "a list of expressions",
-    "vector": "three numbers or expressions [x, y, z]",
-    "value": "a number or an expression for a joint, three of them [x, y, z] for a body",
-    "inertia": "[xx, yy, zz], a 3 x 3 tensor, or a mapping of xx yy zz xy xz yz",
-    "markers": "a mapping of marker names to [x, y, z] or {at, rpy}",
-    "marker": "a body, body.marker, ground or {body, at, rpy}",
-    "pair": "a list of two markers, each a body, body.marker, ground or {body, at, rpy}",
-    "joint": "the name of a joint, or of one coordinate of a joint",
-    "axis": "x, y, z, -x, -y, -z or three numbers",
-    "frame_axes": "a mapping of two of x, y, z to x, y, z, -x, -y, -z or three numbers",
-    "axes": "two directions at right angles, each x, y, z, -x, -y, -z or three numbers",
-    "choice": "one of the listed words",
-    "flag": "true or false",
-    "check": "true or false, error, note or off",
-    "joints": "a list of two joints, or coordinates of joints",
-    "two": "a list of two numbers or expressions",
-    "factors": "a mapping of coordinates to numbers or expressions",
-    "wheels": "a mapping of sun, planet, ring to numbers or expressions",
-    "limits": "a mapping of lower, upper, velocity and effort to numbers",
-    "display": "a list of shapes {shape, ...}",
-    "forces": "a mapping of coordinates to expressions, or a list of one expression for each coordinate",
-    "table": "a mapping",
-    "file": "the path of a file",
-    "about": "com, origin, a marker of the body or [x, y, z]",
-    "solids": "a list of solids {type, ...}",
-    "points": "a list of points {mass, at}",
-    "numbers": "a list of numbers",
-    "grid": "a list of lists of numbers, a row for each x",
-    "count": "a whole number greater than 0",
-    "functions": "a list of names of C functions, null for one that is not there",
-    "shape": "three expressions [x, y, z] of the joint's own first coordinates and of parameters",
-    "via": "a list of markers and cylinders {around, radius, sense}",
-    "matrix6": "six numbers or expressions for the diagonal, or 6 x 6 of them",
-    "radii": "two numbers or expressions",
-    "matrix": "a list of rows, each a list of numbers or expressions",
-    "rates": "a mapping of names to expressions",
-    "times": "true, false or a whole number greater than 0",
-    "sign": "1, -1 or 0",
-    "prefix": "the beginning of names",
-    "loops": "a mapping of variables to lists, counts or {from, to, step}",
-    "attached": "a marker, or a mapping of attachments to markers",
-    "values": "a mapping of names to numbers or expressions",
-}
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 AXES = ("x", "y", "z", "-x", "-y", "-z")
@@ -86,12 +33,17 @@ SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4")
 
 _UNIT = Field("unit", "unit of the value, such as mm or N*m/rad; converted to SI, and checked", default="")
 _DOC = Field("text", "one sentence, for display", default="")
+_LATEX = Field("latex", "how formulas and plots print it, in LaTeX (from its name unless given)", default="")
+_LATEXES = Field(
+    "latexes", "how formulas and plots print its coordinates, in LaTeX: a text, a list or a mapping", default=()
+)
 _NAME = Field("name", "name of the model and of the generated module", required=True)
 
 PARAMETER: Fields = {
     "value": Field("number", "value; may be left out until the model is compiled"),
     "unit": _UNIT,
     "doc": _DOC,
+    "latex": _LATEX,
 }
 INPUT: Fields = {
     "value": Field("number", "value while none is given", default=0.0),
@@ -100,6 +52,7 @@ INPUT: Fields = {
     ),
     "unit": _UNIT,
     "doc": _DOC,
+    "latex": _LATEX,
 }
 OUTPUT_FIELDS: Fields = {
     "expression": Field(
@@ -107,6 +60,7 @@ OUTPUT_FIELDS: Fields = {
     ),
     "unit": _UNIT,
     "doc": _DOC,
+    "latex": _LATEX,
 }
 EVENT: Fields = {
     "expression": Field(
@@ -249,6 +203,7 @@ LAGRANGIAN: Fields = {
     "constraints": Field(
         "expressions", "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=MOTION
     ),
+    "latex": _LATEXES,
 }
 EQUATIONS: Fields = {
     "coordinates": Field("names", "generalized coordinates q, in order", required=True),
@@ -263,6 +218,7 @@ EQUATIONS: Fields = {
     "multipliers": Field("names", "names of the multipliers l of the constraints, for outputs: M v' + C_q^T l = f"),
     "kinetic_energy": Field("expression", "kinetic energy (J)", default=0, level=MOTION, dimension=ENERGY),
     "potential_energy": Field("expression", "potential energy (J)", default=0, level=MOTION, dimension=ENERGY),
+    "latex": _LATEXES,
 }
 SIMULATION: Fields = {
     "end": Field("positive", "end time (s)", default=Simulation.end),
@@ -350,6 +306,8 @@ def joint_fields(type_name: str) -> Fields:
         fields["limits"] = JOINT_DATA["limits"]
     if len(joint.coordinates) == 1:
         fields |= JOINT_DATA
+    if joint.coordinates:
+        fields["latex"] = _LATEXES
     return fields
 
 
@@ -359,7 +317,9 @@ def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
     types: Any = {"joints": JOINTS, "forces": FORCES, "constraints": CONSTRAINTS}.get(section)
     if types is not None and isinstance(kind, str) and kind in types:
         return joint_fields(kind) if section == "joints" else types[kind].fields(section[:-1], types)
-    return {"bodies": BODY, "inputs": INPUT, "outputs": OUTPUT_FIELDS, "events": EVENT}.get(section, {})
+    return {"bodies": BODY, "parameters": PARAMETER, "inputs": INPUT, "outputs": OUTPUT_FIELDS, "events": EVENT}.get(
+        section, {}
+    )
 
 
 @cache

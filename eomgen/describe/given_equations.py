@@ -7,6 +7,7 @@ from typing import Any
 
 from .description import Description, items
 from .expressions import names_in
+from .printed_names import give_latex
 from .scope import RATES
 from .sympy_face import free_names, function_names, is_sympy, name_of
 
@@ -26,6 +27,7 @@ def describe_equations(
     potential_energy: Any = None,
     parameters: Mapping[Any, Any] | None = None,
     inputs: Mapping[Any, Any] | None = None,
+    latex: Mapping[Any, str] | None = None,
 ) -> Description:
     """Describe a system by its equations of motion M v' = f, as the section ``equations`` of a model file does.
 
@@ -57,6 +59,8 @@ def describe_equations(
         Values by symbol or name.  Every other free symbol becomes a parameter without a value.
     inputs : mapping, optional
         Quantities given over time, by symbol or name: the value that holds while none is given.
+    latex : mapping, optional
+        How formulas and plots print coordinates, parameters and inputs, by symbol or name: ``{q: r"\\varphi"}``.
 
     Returns
     -------
@@ -95,6 +99,7 @@ def describe_equations(
             description.add("parameters", parameter, {} if value is None else {"value": value})
     for source, value in driven.items():
         description.add("inputs", source, {} if value is None else {"value": value})
+    give_latex(description, "equations", latex)
     return description
 
 

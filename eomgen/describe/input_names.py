@@ -2,22 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 
-_RATE = re.compile(r"(.+)_(d+)ot\Z")
-
-
-def rate_of(name: str, times: int = 1) -> str:
-    """``u`` -> ``u_dot``, ``u_dot`` -> ``u_ddot``: what the rate of an input is called."""
-    stem, order = split_rate(name)
-    return f"{stem}_{'d' * (order + times)}ot"
-
-
-def split_rate(name: str) -> tuple[str, int]:
-    """``u_ddot`` -> (``u``, 2)."""
-    found = _RATE.match(name)
-    return (found[1], len(found[2])) if found else (name, 0)
+from ..notation.latex_of_names import rate_of as rate_of
+from ..notation.latex_of_names import split_rate as split_rate
 
 
 def chains(names: Iterable[str]) -> dict[str, list[str]]:

@@ -10,6 +10,7 @@ from ..graph.shown import shortened
 from .description import Description, items
 from .expressions import names_in
 from .input_names import split_rate
+from .printed_names import give_latex
 from .scope import RATES
 from .sympy_face import derivative_names, free_names, function_names, is_sympy, name_of, sympy_name
 
@@ -23,6 +24,7 @@ def describe_lagrangian(
     constraints: Sequence[Any] = (),
     parameters: Mapping[Any, Any] | None = None,
     inputs: Mapping[Any, Any] | None = None,
+    latex: Mapping[Any, str] | None = None,
 ) -> Description:
     """Describe a system by its Lagrangian.
 
@@ -45,6 +47,8 @@ def describe_lagrangian(
         Values by symbol or name.  Every other free symbol becomes a parameter without a value.
     inputs : mapping, optional
         Quantities given over time, by symbol or name: the value that holds while none is given.
+    latex : mapping, optional
+        How formulas and plots print coordinates, parameters and inputs, by symbol or name: ``{q: r"\\varphi"}``.
 
     Returns
     -------
@@ -90,6 +94,7 @@ def describe_lagrangian(
         description.add("inputs", source, {} if value is None else {"value": value})
     for rate in rates:
         description.add("inputs", rate, {})
+    give_latex(description, "lagrangian", latex)
     return description
 
 

@@ -234,6 +234,8 @@ class Mechanism:
     constraints: tuple[Constraint, ...] = ()
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
     doc: str = ""
+    latex: Mapping[str, str] = field(default_factory=dict)  #: how names are printed, where it is given
+    instances: Mapping[str, str] = field(default_factory=dict)  #: of components: name -> prefix, for display
     check_inertia: str = "error"  #: what becomes of motions without inertia: error, note or off
     limits_told: bool = True  #: whether runs that pass a limit of a joint say so
     negative: tuple[str, ...] = ()  #: bodies with a negative mass or moment, taken because it was asked for

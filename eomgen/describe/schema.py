@@ -102,6 +102,14 @@ _RANGE = {key: {"type": "number"} for key in ("from", "to", "step")}
 _KINDS: dict[str, Schema] = {
     "text": {"type": "string"},
     "unit": {"type": "string"},
+    "latex": {"type": "string"},
+    "latexes": {
+        "anyOf": [
+            {"type": "string"},
+            {"type": "array", "items": {"type": ["string", "null"]}},
+            {"type": "object", "propertyNames": _ref("name"), "additionalProperties": {"type": "string"}},
+        ]
+    },
     "name": _ref("name"),
     "body": _ref("reference"),
     "joint": _ref("reference"),

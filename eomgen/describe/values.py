@@ -66,6 +66,7 @@ class Reader:
         self.stand_in = graph.symbol("?")
         self.numbers: dict[str, float] = {}  # declared values of parameters
         self.units: dict[str, Unit] = {}  # by path of the parameter, input or output
+        self.latex: dict[str, str] = {}  # by name, where it is given
         self.expressions: list[tuple[str, Expr, Mapping[str, Expr]]] = []  # path, expression, names of its own
 
     def known(self, expression: Expr) -> float | None:

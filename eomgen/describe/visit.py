@@ -48,6 +48,10 @@ class Visitor:
         """The name of a joint or coordinate that is referred to."""
         return name
 
+    def latex(self, text: Any) -> Any:
+        """How a name is printed."""
+        return text
+
     def placement(self, body: str, placed: Mapping[str, Any], slot: Slot) -> dict[str, Any]:
         """``at`` and ``rpy`` in a body."""
         return {key: value if key == "axes" else self.vector(value, slot.named(key)) for key, value in placed.items()}
@@ -140,6 +144,10 @@ def _value(value: Any, kind: str, slot: Slot, visitor: Visitor) -> Any:
         return {name: visitor.scalar(part, slot.at(name)) for name, part in value.items()}
     if kind in ("inertia", "forces"):
         return visitor.vector(value, slot)
+    if kind in ("latex", "latexes"):
+        if isinstance(value, Mapping):
+            return {_named(name, visitor.coordinate): visitor.latex(part) for name, part in value.items()}
+        return [visitor.latex(part) for part in value] if listed else visitor.latex(value)
     if kind == "body":
         return _named(value, visitor.body)
     if kind == "via":

@@ -6,9 +6,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..notation.labels import TIME, label
+from ..notation.notation import Notation
 from ..numeric.counts import read_count
 from ..runtime.near_names import require
-from ..texts import visible
 
 
 class DrawnEnsemble(Protocol):
@@ -23,6 +24,9 @@ class DrawnEnsemble(Protocol):
 
     def unit(self, name: str) -> str: ...
 
+    @property
+    def notation(self) -> Notation: ...
+
 
 def draw(ensemble: DrawnEnsemble, name: str, ax: Any, limit: int) -> Any:
     """See :meth:`.ensemble.Ensemble.plot`; returns the axes."""
@@ -30,8 +34,7 @@ def draw(ensemble: DrawnEnsemble, name: str, ax: Any, limit: int) -> Any:
     if ax is None:
         plt: Any = require("matplotlib.pyplot", "matplotlib", "plot")
         ax = plt.subplots(figsize=(7, 4), layout="constrained")[1]
-    unit = visible(ensemble.unit(name), lines=False)
-    label = f"{name} ({unit})" if unit else name
+    printed = label(ensemble.notation.mathtext(name), ensemble.unit(name))
     if "mean" in ensemble.reduced:
         row = ensemble.names.index(name)
         spread = np.sqrt(ensemble.reduced["variance"][row])
@@ -45,9 +48,9 @@ def draw(ensemble: DrawnEnsemble, name: str, ax: Any, limit: int) -> Any:
         ax.plot(ensemble.t, values[:, chosen], color="C0", lw=0.8, alpha=max(0.08, min(1.0, 10 / len(chosen))))
     else:
         ax.hist(values[np.isfinite(values)], bins="auto")
-        ax.set_xlabel(f"{label} at t = {ensemble.t[0]:.6g} s", parse_math=False)
+        ax.set_xlabel(f"{printed} at $t$ = {ensemble.t[0]:.6g} s")
         ax.set_ylabel("runs")
         return ax
-    ax.set_xlabel("t (s)")
-    ax.set_ylabel(label, parse_math=False)
+    ax.set_xlabel(TIME)
+    ax.set_ylabel(printed)
     return ax

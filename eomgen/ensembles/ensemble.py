@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
+from ..notation.notation import Notation
 from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown
 from ..runtime.origin import origin, plain, spell_input
@@ -284,6 +285,11 @@ class Ensemble:
     def unit(self, name: str) -> str:
         """The unit of a column."""
         return self._module.layout.unit(name)
+
+    @property
+    def notation(self) -> Notation:
+        """How the columns are printed."""
+        return Notation.of(self._module.metadata)
 
     def __repr__(self) -> str:
         failed = int((~self.ok).sum())

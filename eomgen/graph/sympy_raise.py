@@ -48,7 +48,7 @@ def raise_inline(
     made: dict[int, Any] = {}
     for i in reachable(graph, roots):
         made[i] = _raised(graph, i, made, symbols)
-    return [_as_number(made[i]) for i in roots]
+    return [as_number(made[i]) for i in roots]
 
 
 def raise_named(
@@ -105,7 +105,7 @@ def raise_named(
             number += 1
             intermediates.append((name, made[i]))
             made[i], size[i] = name, 0
-    return intermediates, [_as_number(made[i]) for i in roots]
+    return intermediates, [as_number(made[i]) for i in roots]
 
 
 def inlined_size(exprs: Sequence[Expr]) -> int:
@@ -129,13 +129,17 @@ def _raised(graph: Graph, i: int, made: Mapping[int, Any], symbols: Callable[[st
         return _raised_number(args[0])
     if kind == "sym":
         return symbols(args[0])
+    return raise_operation(graph, kind, [made[k] for k in args])
+
+
+def raise_operation(graph: Graph, kind: str, operands: Sequence[Any]) -> Any:
+    """An operation, or a call of a function of the graph, on SymPy expressions."""
     if kind in graph.calls:
         function, orders = graph.calls[kind]
-        return _call(function.name, orders, [_as_number(made[k]) for k in args])
+        return _call(function.name, orders, [as_number(x) for x in operands])
     row = OPERATIONS[kind]
-    truths = len(args) if row.kind == CONDITION and not row.jumps else int(row.chooses)
-    operands = [_as_truth(made[k]) if n < truths else _as_number(made[k]) for n, k in enumerate(args)]
-    return row.raised(sympy, *operands)
+    truths = len(operands) if row.kind == CONDITION and not row.jumps else int(row.chooses)
+    return row.raised(sympy, *(_as_truth(x) if n < truths else as_number(x) for n, x in enumerate(operands)))
 
 
 def _call(name: str, orders: Sequence[int], operands: Sequence[Any]) -> Any:
@@ -159,7 +163,8 @@ def _is_truth(value: Any) -> bool:
     return isinstance(value, sympy.logic.boolalg.Boolean) and not isinstance(value, sympy.Symbol)
 
 
-def _as_number(value: Any) -> Any:
+def as_number(value: Any) -> Any:
+    """A SymPy expression; 1 or 0 of a condition."""
     return sympy.Piecewise((sympy.Integer(1), value), (sympy.Integer(0), True)) if _is_truth(value) else value
 
 

@@ -214,6 +214,8 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "u_values": [u.value for u in m.inputs],
         "units": units,
         "docs": docs,
+        **({"latex": dict(m.latex)} if m.latex else {}),
+        **({"instances": dict(m.instances)} if m.instances else {}),
         "independent": [kinematics.velocity_labels.index(n) for n in mobility.independent],
         "independent_rows": list(rows),
         "redundant_rows": [i for i in range(len(c.labels)) if i not in rows],

@@ -162,6 +162,7 @@ def _described(layout: Layout) -> dict[str, Any]:
         "u_names": list(layout.u),
         "model_method": layout.metadata.get("method"),
         "docs": layout.metadata.get("docs", {}),
+        **{key: layout.metadata[key] for key in ("latex", "instances") if key in layout.metadata},
     }
 
 

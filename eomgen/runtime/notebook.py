@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..files.inline_pictures import picture_html, side_by_side
 from ..kernel_table import KERNELS
+from ..notation.notation import Notation
 from ..texts import html_table, html_text
 from .near_names import require
 from .plotting import choose, height, stack
@@ -17,13 +18,14 @@ if TYPE_CHECKING:
     from .bound_model import BoundModel
 
 CURVES = 12  #: columns of the small plot of a run
+QUANTITIES = 100  #: names listed with their symbols
 LEFT = "style='text-align:left'"
 
 
 def module_html(module: BoundModel) -> str:
     """The mechanism, what the module is made of, and what can be called."""
     table = html_table(module.name, facts(module), module.doc)
-    return side_by_side(mechanism_html(module), table + _calls(module))
+    return side_by_side(mechanism_html(module), table + _quantities(module) + _calls(module))
 
 
 def mechanism_html(module: BoundModel) -> str:
@@ -31,6 +33,24 @@ def mechanism_html(module: BoundModel) -> str:
     if module.metadata.get("picture") is None:
         return ""
     return picture_html(lambda: load_show("draw", "a picture").small_figure(module))
+
+
+def _quantities(module: BoundModel) -> str:
+    """Coordinates, parameters, inputs and outputs: name, symbol, unit, value, doc; folded up."""
+    layout, docs = module.layout, module.metadata.get("docs", {})
+    printed = Notation.of(module.metadata).html
+    values = dict(zip(layout.p, (f"{value:.6g}" for value in module.kernels.context.p), strict=True))
+    kinds = {"coordinate": (*layout.q, *layout.loops), "parameter": layout.p, "input": layout.u, "output": layout.y}
+    rows = {name: kind for kind, names in kinds.items() for name in names}
+    cells = "".join(
+        f"<tr><td {LEFT}><code>{html_text(name)}</code></td><td>{printed(name)}</td><td {LEFT}>{kind}</td>"
+        f"<td>{values.get(name, '')}</td><td {LEFT}>{html_text(layout.unit(name))}</td>"
+        f"<td {LEFT}>{html_text(docs.get(name, ''))}</td></tr>"
+        for name, kind in list(rows.items())[:QUANTITIES]
+    )
+    more = f"<p {LEFT}>and {len(rows) - QUANTITIES} more</p>" if len(rows) > QUANTITIES else ""
+    heads = "".join(f"<th {LEFT}>{word}</th>" for word in ("name", "symbol", "kind", "value", "unit", "meaning"))
+    return f"<details><summary>names and symbols</summary><table><tr>{heads}</tr>{cells}</table>{more}</details>"
 
 
 def _calls(module: BoundModel) -> str:

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.pictures import FAINT
+from ..notation.labels import TIME, label
+from ..notation.notation import Notation
 from ..numeric.scales import Array
-from ..texts import visible
 from .near_names import plain_name, read_names, require, unknown
 from .refined import FINE, refined, refined_energy, states_at
 
@@ -33,7 +34,7 @@ class Curves(NamedTuple):
     label : str
         Of the vertical axis.
     curves : list of (str, x, y)
-        The name of each and its points.
+        The name of each, as Matplotlib prints it, and its points.
     points : list of (float, float)
         Places to be marked by a dot, such as where curves begin.
     """
@@ -102,8 +103,8 @@ def _show(panels: list[Curves], across: str, ax: Any) -> Any:
             ax.plot(x, y, label=name if len(names) > 1 else None, linewidth=1.2)
     labels = [panel.label for panel in panels if panel.label]
     units = list(dict.fromkeys(label for label in labels))
-    ax.set_ylabel(labels[0] if len(names) == 1 and labels else ", ".join(units), parse_math=False)
-    ax.set_xlabel(across, parse_math=False)
+    ax.set_ylabel(labels[0] if len(names) == 1 and labels else ", ".join(units))
+    ax.set_xlabel(across)
     if len(names) > 1:
         ax.legend(fontsize="small")
     return ax
@@ -140,7 +141,7 @@ def stack(figure: Any, grid: Any, panels: Sequence[Curves], across: str) -> list
         draw_panel(ax, panel)
         axes.append(ax)
         if panel.across or k + 1 == len(panels):
-            ax.set_xlabel(panel.across or across, parse_math=False)
+            ax.set_xlabel(panel.across or across)
         else:
             ax.tick_params(labelbottom=False)
     figure.align_ylabels(axes)
@@ -159,21 +160,13 @@ def draw_panel(ax: Any, panel: Curves, below: bool = False) -> None:
         ax.set_yscale("log")
     if panel.equal:
         ax.set_aspect("equal", adjustable="datalim")
-    ax.set_ylabel(panel.label, parse_math=False)
+    ax.set_ylabel(panel.label)
     ax.grid(alpha=0.3)
     if several:
         columns = min(3, len(panel.curves)) if below else -(-len(panel.curves) // IN_A_COLUMN)
         place = ("upper center", (0.5, -0.08)) if below else ("upper left", (1.005, 1.03))
-        look = {"fontsize": 7.5, "frameon": False, "labelspacing": 0.25, "handlelength": 1.8, "columnspacing": 1.0}
-        legend = ax.legend(ncols=columns, loc=place[0], bbox_to_anchor=place[1], **look)
-        for text in legend.get_texts():
-            text.set_parse_math(False)
-
-
-def label(name: str, unit: str) -> str:
-    """A name with its unit, or either alone."""
-    unit = visible(unit, lines=False)
-    return f"{name} ({unit})" if name and unit else name or unit
+        look = {"fontsize": 8.5, "frameon": False, "labelspacing": 0.25, "handlelength": 1.8, "columnspacing": 1.0}
+        ax.legend(ncols=columns, loc=place[0], bbox_to_anchor=place[1], **look)
 
 
 def by_unit(trajectory: TrajectoryLike, names: Sequence[str]) -> list[list[str]]:
@@ -185,10 +178,11 @@ def by_unit(trajectory: TrajectoryLike, names: Sequence[str]) -> list[list[str]]
 
 
 def _grouped(trajectory: TrajectoryLike, names: Sequence[str], x: Array, columns: dict[str, Array]) -> list[Curves]:
+    printed = Notation.of(trajectory.metadata).mathtext
     return [
         Curves(
-            label(group[0] if len(group) == 1 else "", trajectory.units.get(group[0], "")),
-            [(name, x, columns[name]) for name in group],
+            label(printed(group[0]) if len(group) == 1 else "", trajectory.units.get(group[0], "")),
+            [(printed(name), x, columns[name]) for name in group],
         )
         for group in by_unit(trajectory, names)
     ]
@@ -199,11 +193,13 @@ def over_time(trajectory: TrajectoryLike, names: tuple[str, ...], x: str | None 
     names = names or tuple(trajectory.metadata["q_names"])
     t, columns = refined(trajectory, (*names, *(() if x is None else (x,))))
     if x is None:
-        return _grouped(trajectory, names, t, columns), "t (s)"
+        return _grouped(trajectory, names, t, columns), TIME
     panels = _grouped(trajectory, names, columns[x], columns)
     unit = trajectory.units.get(x, "")
-    alike = [_one_scale(columns[x], unit, p, trajectory.units.get(p.curves[0][0], "")) for p in panels]
-    return [panel._replace(equal=same) for panel, same in zip(panels, alike, strict=True)], label(x, unit)
+    others = [trajectory.units.get(group[0], "") for group in by_unit(trajectory, names)]
+    alike = [_one_scale(columns[x], unit, panel, other) for panel, other in zip(panels, others, strict=True)]
+    across = label(Notation.of(trajectory.metadata).mathtext(x), unit)
+    return [panel._replace(equal=same) for panel, same in zip(panels, alike, strict=True)], across
 
 
 def _one_scale(x: Array, unit: str, panel: Curves, other: str) -> bool:
@@ -222,13 +218,13 @@ def _phases(trajectory: TrajectoryLike, names: tuple[str, ...], _: str | None) -
         if f"{name}_dot" not in trajectory.names:
             raise UsageError(f"{name!r} has no rate among the columns, so there is no phase portrait of it")
     columns = refined(trajectory, (*chosen, *(f"{name}_dot" for name in chosen)))[1]
-    panels = []
+    panels, printed = [], Notation.of(trajectory.metadata).mathtext
     for group in by_unit(trajectory, chosen):
         rates = [f"{name}_dot" for name in group]
-        curves = [(name, columns[name], columns[rate]) for name, rate in zip(group, rates, strict=True)]
+        curves = [(printed(name), columns[name], columns[rate]) for name, rate in zip(group, rates, strict=True)]
         starts = [(float(x[0]), float(y[0])) for _, x, y in curves]
-        rate = label(rates[0] if len(group) == 1 else "rate", trajectory.units.get(rates[0], ""))
-        across = label(group[0] if len(group) == 1 else "coordinate", trajectory.units.get(group[0], ""))
+        rate = label(printed(rates[0]) if len(group) == 1 else "rate", trajectory.units.get(rates[0], ""))
+        across = label(printed(group[0]) if len(group) == 1 else "coordinate", trajectory.units.get(group[0], ""))
         panels.append(Curves(rate, curves, starts, across=across))
     return panels, panels[0].across if panels else ""
 
@@ -237,7 +233,7 @@ def _energy(trajectory: TrajectoryLike, names: tuple[str, ...], x: str | None) -
     """Kinetic, potential and total energy, and the change of the total."""
     t, (T, V, E) = refined_energy(trajectory)
     parts = [("kinetic", t, T), ("potential", t, V), ("total", t, E)]
-    return [Curves("energy (J)", parts), Curves("change of total (J)", [("total", t, E - E[0])])], "t (s)"
+    return [Curves("energy (J)", parts), Curves("change of total (J)", [("total", t, E - E[0])])], TIME
 
 
 def _residuals(trajectory: Any, _: tuple[str, ...], __: str | None) -> tuple[list[Curves], str]:
@@ -261,7 +257,7 @@ def _residuals(trajectory: Any, _: tuple[str, ...], __: str | None) -> tuple[lis
         if raw > 0.0:
             curves.append(("raw, largest", t, np.full(len(t), raw)))
         panels.append(Curves(name, curves, logarithmic=True))
-    return panels, "t (s)"
+    return panels, TIME
 
 
 def _spectrum(trajectory: Any, names: tuple[str, ...], _: str | None) -> tuple[list[Curves], str]:

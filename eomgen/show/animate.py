@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
+from ..notation.labels import label
+from ..notation.notation import Notation
 from ..texts import shown
 from .film_frames import DPI, MOST_DOTS, Frames
 from .force_arrows import with_arrows
@@ -19,7 +21,7 @@ from .writers import FILMS, WRITERS, kind_of, require_target
 
 
 class ShownColumn(NamedTuple):
-    """A column of the run that is drawn along: its name and unit, and its values over what goes on."""
+    """A column of the run that is drawn along: its name as it is printed and unit, its values over what goes on."""
 
     label: str
     over: Any
@@ -62,8 +64,9 @@ def animate(
         scene = with_arrows(scene, module, motion, forces)
     still = motion.t[0] == motion.t[-1]
     times, values = columns(plot) if plot else (trajectory.t, {})
-    over, units = motion.over if still else times, trajectory.units
-    curves = [ShownColumn(f"{n} ({units[n]})" if units.get(n) else n, over, row) for n, row in values.items()]
+    over = motion.over if still else times
+    printed, units = Notation.of(trajectory.metadata).mathtext, trajectory.units
+    curves = [ShownColumn(label(printed(n), units.get(n, "")), over, row) for n, row in values.items()]
     return write(file, scene, motion, curves, dpi, format)
 
 

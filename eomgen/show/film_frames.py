@@ -104,11 +104,7 @@ def draw_curves(ax: Any, curves: Sequence[Any], motion: ShownMotion) -> None:
     for curve in curves:
         ax.plot(curve.over, curve.values, linewidth=1.1, label=curve.label)
     beside = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.05), "frameon": False}
-    for text in ax.legend(fontsize=7, **beside).get_texts():
-        text.set_parse_math(False)
-    name, _, value = motion.words[0].partition(" = ")
-    unit = value.partition(" ")[2]
-    led = f"{name} ({unit})" if unit else name
-    ax.set_xlabel("t (s)" if motion.over is motion.t else led, fontsize=8, parse_math=False)
+    ax.legend(fontsize=7, **beside)
+    ax.set_xlabel(motion.across, fontsize=8)
     ax.tick_params(labelsize=7)
     ax.grid(alpha=0.3)

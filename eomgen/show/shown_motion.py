@@ -9,6 +9,8 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.pictures import ROUNDED
+from ..notation.labels import TIME, label
+from ..notation.notation import Notation
 from .build_scene import build_scene
 from .data import Array
 from .scene import Scene
@@ -38,6 +40,8 @@ class ShownMotion(NamedTuple):
         What is written above each frame.
     over : (k,) array
         Time, or the coordinate that is led where time stands still.
+    across : str
+        How the latter is printed at an axis.
     """
 
     t: Array
@@ -47,6 +51,7 @@ class ShownMotion(NamedTuple):
     fps: float
     words: list[str]
     over: Array
+    across: str = TIME
 
     @property
     def clock(self) -> Array:
@@ -72,7 +77,8 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
         led = trajectory.metadata.get("led") or trajectory.x_names[:1]
         over, unit = trajectory[led[0]], trajectory.units.get(led[0], "")
         said = [f"{led[0]} = {value:.3f} {unit}" for value in over]
-        return ShownMotion(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST), said, over)
+        across = label(Notation.of(trajectory.metadata).mathtext(led[0]), unit)
+        return ShownMotion(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST), said, over, across)
     start, end = float(t[0]), float(t[-1])
     span = abs(end - start)
     if speed is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +19,7 @@ from eomgen.describe.yaml_file import describe_yaml
 from eomgen.describe.yaml_nodes import Document
 from eomgen.emit import emit_c, emit_numpy
 from eomgen.equations import METHODS
+from eomgen.errors import UnavailableError
 from eomgen.kinematics.report import MechanismReport
 from eomgen.program.fingerprint import fingerprint
 
@@ -50,9 +51,14 @@ def read_everything(model: eg.Model, equations: Equations, names: list[str]) -> 
     """Read every property, print, and compile, the last first."""
     model.check()
     for name in names:
-        value = getattr(equations, name)
-        if name.startswith("_repr"):
+        try:
+            value = getattr(equations, name)
+        except UnavailableError:  # of another method
+            continue
+        if name.startswith("_repr") or name in ("linearize", "with_dynamicsymbols"):
             value()
+        if isinstance(value, Mapping):
+            dict(value)
     for name in REPORTED:
         value = getattr(equations.report, name)
         if name.startswith("_repr"):

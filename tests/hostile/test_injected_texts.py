@@ -209,6 +209,7 @@ def test_a_model_file_that_is_written_reads_back_the_text(key: str) -> None:
 def test_pictures_are_whole_and_hold_no_element_of_a_text(tmp_path: Any) -> None:
     import xml.etree.ElementTree as ET
 
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     for key in (
@@ -229,7 +230,12 @@ def test_pictures_are_whole_and_hold_no_element_of_a_text(tmp_path: Any) -> None
         axes = Figure().add_subplot()
         run.plot("y", ax=axes)
         label = axes.get_ylabel()
-        assert label == f"y ({texts.visible(NASTY[key], lines=False)})"
+        unit = texts.visible(NASTY[key], lines=False)
+        assert label == f"$y$ ({unit.replace('$', chr(92) + '$')})"
+        with rc_context({"svg.fonttype": "none"}):
+            axes.figure.savefig(tmp_path / "shown.svg")
+        written = "".join(ET.parse(tmp_path / "shown.svg").getroot().itertext())
+        assert "".join(unit.split()) in "".join(written.split())  # as it is, no formula
         axes.figure.savefig(tmp_path / "y.svg")
         found = {part.tag.rpartition("}")[2] for part in ET.parse(tmp_path / "y.svg").iter()}
         assert not found & {"script", "img", "b", "foreignObject", "image"}

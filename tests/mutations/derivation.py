@@ -181,8 +181,8 @@ FAULTS = (
     ),
     Fault(
         "reduction-particular", "eomgen/equations/reduction.py",
-        "equations.bias[i] + _dot(mass[i], particular)",
-        "equations.bias[i]",
+        "-f + _dot(row, self.acceleration_offset)",
+        "-f",
         "the embedded force shown in SymPy lacks M a_p of loops that turn",
         ("tests/equations/test_reduction.py::test_one_equation_in_the_crank_angle[0.8-embedding]",),
     ),

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from mutations import c_drivers, c_steppers, derivation, elements, emitters, numerics, runtime, written
+from mutations import c_drivers, c_steppers, derivation, elements, emitters, numerics, reading, runtime, written
 
 FAULTS = (
     *derivation.FAULTS,
+    *reading.FAULTS,
     *elements.FAULTS,
     *numerics.FAULTS,
     *emitters.FAULTS,

@@ -44,15 +44,15 @@ def test_shape_against_shape_is_the_path_of_the_point(run: Any) -> None:
     assert line[:, 0] == pytest.approx(line[:, 1], abs=1e-9)
     assert ax.get_aspect() == 1.0
     assert len(line) > 500
-    assert run.plot("theta", x="s").get_xlabel() == "s (m)"
+    assert run.plot("theta", x="s").get_xlabel() == "$s$ (m)"
 
 
 def test_a_phase_portrait_of_a_small_swing_is_an_ellipse() -> None:
     ax = pendulum().plot("theta", kind="phase")
     x, y = ax.lines[0].get_xydata().T
     assert (x / 0.01) ** 2 + (y / (0.01 * np.sqrt(9.81))) ** 2 == pytest.approx(1.0, abs=1e-4)
-    assert ax.get_xlabel() == "theta (rad)"
-    assert ax.get_ylabel() == "theta_dot (rad/s)"
+    assert ax.get_xlabel() == r"$\theta$ (rad)"
+    assert ax.get_ylabel() == r"$\dot{\theta}$ (rad/s)"
 
 
 def test_a_spectrum_has_the_frequency_and_amplitude_of_the_swing() -> None:

@@ -117,10 +117,10 @@ def test_plots_carry_units(traj):
     import matplotlib.pyplot as plt
 
     ax = traj.plot("s")
-    assert ax.get_ylabel() == "s (m)"
-    assert ax.get_xlabel() == "t (s)"
+    assert ax.get_ylabel() == "$s$ (m)"
+    assert ax.get_xlabel() == "$t$ (s)"
     panels = traj.plot()
-    assert [panel.get_ylabel() for panel in panels] == ["rad", "s (m)"]
+    assert [panel.get_ylabel() for panel in panels] == ["rad", "$s$ (m)"]
     _, own = plt.subplots()
     assert traj.plot("theta", "beta", ax=own) is own
     assert own.get_ylabel() == "rad"

@@ -1,7 +1,7 @@
 """Stage verification, the plain form: Builder or Description -> numbers, texts and mappings only, defaults written out.
 
 A round trip through the text of a model file makes it plain, whether the model came from Python, YAML or a robot's
-file.  Data that enter no equation (shapes, limits) are left out.
+file.  Data that enter no equation (shapes, limits, LaTeX) are left out.
 """
 
 from __future__ import annotations
@@ -20,7 +20,11 @@ from ...forces.muscle import SHORTENING
 
 #: Type of constraint -> the key whose marker is ground unless given.
 _ON_GROUND = {"rolling": "plane", "knife_edge": "on", "driver": "on"}
-_DATA = {"joints": ("limits", "dry_friction"), "bodies": ("display",)}
+_DATA = {
+    "joints": ("limits", "dry_friction", "latex"),
+    "bodies": ("display",),
+    **dict.fromkeys(("parameters", "inputs", "outputs"), ("latex",)),
+}
 
 
 def plain(model: Builder | Description) -> Description:
@@ -37,6 +41,9 @@ def plain(model: Builder | Description) -> Description:
         for entry in result.sections[section]:
             for key in keys:
                 entry.values.pop(key, None)
+    for section in ("lagrangian", "equations"):
+        if result.values.get(section) is not None:
+            result.values[section].pop("latex", None)
     for section in ("parameters", "inputs"):
         for entry in result.sections[section]:
             _convert_to_si(entry)

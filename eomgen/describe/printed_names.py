@@ -1,0 +1,61 @@
+"""Stage describe, notation: LaTeX given for names -> checked, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..graph.shown import quoted, shown
+from ..notation import NotationError, read_latex
+from ..notation.latex_tree import spaced
+from .description import Description, items
+from .names import nearest
+from .sympy_face import name_of
+from .values import Reader
+
+
+def take_latex(reader: Reader, path: str, name: Any, given: Any) -> None:
+    """Take in the LaTeX of a name; what is no LaTeX of a symbol is a fault."""
+    text = reader.text(path, given)
+    if not text:
+        return
+    try:
+        read_latex(text)
+    except NotationError as error:
+        reader.faults.add(path, str(error), error.remedy)
+        return
+    text = spaced(text)
+    if reader.latex.setdefault(str(name), text) != text:  # an output that repeats a coordinate
+        reader.faults.add(path, f"{name!r} is printed as {quoted(reader.latex[name])} already", "leave one of them out")
+
+
+def take_coordinates_latex(reader: Reader, path: str, coordinates: Sequence[str], given: Any) -> None:
+    """Take in the LaTeX of coordinates: a text for one, a list in their order, or a mapping of their names."""
+    if isinstance(given, Mapping):
+        for key, text in given.items():
+            name = name_of(key)
+            if name in coordinates:
+                take_latex(reader, f"{path}.{name}", name, text)
+            else:
+                remedy = nearest(shown(name), coordinates, "coordinates")
+                reader.faults.add(f"{path}.{shown(name)}", f"no coordinate {quoted(name)}", remedy)
+        return
+    listed = [given] if isinstance(given, str) else items(given)
+    if listed is None:
+        reader.wrong(path, given, "latexes")
+    elif listed and len(listed) != len(coordinates):
+        message = f"{len(listed)} texts for {len(coordinates)} coordinates"
+        reader.faults.add(path, message, f"give one for each: {', '.join(coordinates) or 'none'}")
+    else:
+        for k, (name, text) in enumerate(zip(coordinates, listed, strict=False)):
+            if text is not None:
+                take_latex(reader, path if isinstance(given, str) else f"{path}[{k}]", name, text)
+
+
+def give_latex(description: Description, section: str, latex: Mapping[Any, str] | None) -> None:
+    """Put the LaTeX of names where each is described: parameters, inputs, else coordinates of the section."""
+    entries = {e.name: e for place in ("parameters", "inputs") for e in description.sections[place]}
+    for key, text in (latex or {}).items():
+        name = name_of(key)
+        home = entries[name].values if name in entries else description.values[section].setdefault("latex", {})
+        home["latex" if name in entries else name] = text

@@ -1,0 +1,186 @@
+"""Notation, the one place that decides: names of a model and the LaTeX given for some -> printed forms."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from typing import Any
+
+from .latex_of_names import latex_of, literal, split_rate
+from .latex_tree import Accent, Group, Node, NotationError, Scripts, head_of, read_latex, spaced
+from .printing import html_form, mathml_form, mathtext_form, text_form
+from .signs import DOTS
+
+_WORD = re.compile(r"\\mathrm\{([A-Za-z0-9.]{2,})\}\Z")
+_FORMS: dict[str, Callable[[Node], str]] = {
+    "text": text_form,
+    "html": html_form,
+    "mathml": mathml_form,
+    "mathtext": mathtext_form,
+}
+
+
+class Notation:
+    r"""The printed forms of the names of a model.
+
+    Parameters
+    ----------
+    names : iterable of str, optional
+        All names of the model.  Two that would be printed alike are kept apart: the first keeps its form, the others
+        are printed as they are, upright.
+    latex : mapping of str to str, optional
+        LaTeX that a model gives for some of them; rates follow, with a dot over the first letter.
+    instances : mapping of str to str, optional
+        Instances of components and the prefixes of their names, which become subscripts: ``leg1_theta`` is printed as
+        ``\theta_{\mathrm{leg1}}``.
+
+    Examples
+    --------
+    >>> notation = Notation(["theta1", "m_c", "q"], latex={"q": r"q_{\rm f}"})
+    >>> notation.latex("theta1_dot"), notation.latex("m_c"), notation.latex("q_ddot")
+    ('\\dot{\\theta}_1', 'm_c', '\\ddot{q}_{\\rm f}')
+    >>> notation.latex("theta1", of_time=True), notation.text("theta1"), notation.html("m_c")
+    ('\\theta_1(t)', 'θ₁', '<i>m</i><sub><i>c</i></sub>')
+    """
+
+    def __init__(
+        self,
+        names: Iterable[str] = (),
+        latex: Mapping[str, str] | None = None,
+        instances: Mapping[str, str] | None = None,
+    ) -> None:
+        self.given = {name: spaced(text) for name, text in (latex or {}).items()}
+        self.instances = instances or {}
+        self.names = tuple(dict.fromkeys(names))
+        self._sources: dict[str, str] = {}
+        self._texts: dict[str, str] = {}  #: of those whose text would be another's name
+        self._keep_apart()
+
+    @classmethod
+    def of(cls, metadata: Mapping[str, Any]) -> Notation:
+        """The notation of a module or a trajectory, from its metadata."""
+        keys = ("q_names", "v_names", "loop_names", "u_names", "p_names", "parameters", "y_names")
+        names = [name for key in keys for name in metadata.get(key, ())]
+        return cls(names, metadata.get("latex"), metadata.get("instances"))
+
+    def latex(self, name: str, of_time: bool = False) -> str:
+        r"""LaTeX, without dollars: ``\theta_1``; as a function of time ``\theta_1(t)``."""
+        return self._form("latex", name) + ("(t)" if of_time else "")
+
+    def text(self, name: str, of_time: bool = False) -> str:
+        """Unicode for terminals: ``θ₁``, ``θ₁'`` of its rate, ``m_c``."""
+        return self._form("text", name) + ("(t)" if of_time else "")
+
+    def html(self, name: str) -> str:
+        """Elements of HTML, escaped: ``<i>θ</i><sub>1</sub>``."""
+        return self._form("html", name)
+
+    def mathml(self, name: str) -> str:
+        """Elements of MathML, without ``<math>``: ``<msub><mi>θ</mi><mn>1</mn></msub>``."""
+        return self._form("mathml", name)
+
+    def mathtext(self, name: str) -> str:
+        r"""A label of Matplotlib, dollars included: ``$\theta_1$``; words without more are plain text."""
+        source = self._source(name)
+        return word[1] if (word := _WORD.match(source)) else f"${_printed('mathtext', source)}$"
+
+    def symbol_names(self, symbols: Iterable[Any]) -> dict[Any, str]:
+        """SymPy symbols -> LaTeX, for ``sympy.latex(expression, symbol_names=...)``."""
+        return {symbol: self.latex(str(symbol)) for symbol in symbols}
+
+    def _form(self, form: str, name: str) -> str:
+        if form == "text" and name in self._texts:
+            return self._texts[name]
+        return _printed(form, self._source(name))
+
+    def _source(self, name: str) -> str:
+        """The LaTeX that all forms of a name are made of."""
+        return self._sources.get(name) or self._wanted(name)
+
+    def _wanted(self, name: str) -> str:
+        """The LaTeX of a name by itself; of a rate, from what it is the rate of."""
+        if name in self.given:
+            return self.given[name]
+        stem, order = split_rate(name)
+        if not order:
+            return latex_of(self._with_dots(name))
+        return dotted(self._source(stem), order) if order < len(DOTS) else literal(name)
+
+    def _with_dots(self, name: str) -> str:
+        """The name of something in an instance with a dot after the instance: ``leg1.theta``."""
+        for instance, prefix in self.instances.items():
+            if prefix and name.startswith(prefix) and name != prefix:
+                return f"{instance}.{name.removeprefix(prefix)}"
+        return name
+
+    def _keep_apart(self) -> None:
+        """Find what every name is printed from, so that no two look alike: given LaTeX first, rates last."""
+        known = set(self.names)
+        used: set[tuple[str, str]] = set()
+        for name in sorted(self.names, key=self._rank):
+            wanted = self._wanted(name)
+            for source in (wanted, literal(name), literal(name, "mathtt")):
+                forms = {(form, _printed(form, source)) for form in ("latex", "text", "html")}
+                text = _printed("text", source)
+                if name in self.given and text != name and text in known:
+                    self._texts[name] = name
+                    forms.discard(("text", text))
+                if used.isdisjoint(forms):
+                    break
+            used |= forms
+            self._sources[name] = source
+
+    def _rank(self, name: str) -> int:
+        if name in self.given:
+            return 0
+        if split_rate(name)[1]:
+            return 3
+        return 1 if _printed("text", self._wanted(name)) == name else 2
+
+
+def dotted(latex: str, order: int) -> str:
+    r"""LaTeX with dots, for derivatives by the time, over its first letter or word.
+
+    Parameters
+    ----------
+    latex : str
+        Of one symbol, such as ``\theta_1``.
+    order : int
+        1, 2 or 3: ``\dot{\theta}_1``, ``\ddot{\theta}_1``, ``\dddot{\theta}_1``.
+    """
+    tree = read_latex(latex)
+    head = head_of(tree) or tree
+    body = head
+    if isinstance(head, Accent) and head.accent in DOTS and order + DOTS.index(head.accent) < len(DOTS):
+        body, order = head.body, order + DOTS.index(head.accent)
+    return f"{latex[: head.start]}\\{DOTS[order]}{{{latex[body.start : body.end]}}}{latex[head.end :]}"
+
+
+def with_instance(latex: str, instance: str) -> str:
+    r"""LaTeX with the name of an instance as a further subscript: ``m_{c}`` -> ``m_{c,\mathrm{leg1}}``.
+
+    What is not the LaTeX of a symbol stays as it is.
+    """
+    latex = spaced(latex)
+    try:
+        tree = read_latex(latex)
+    except NotationError:  # told when the model is checked
+        return latex
+    while isinstance(tree, Group) and len(tree.parts) > 1:
+        head = head_of(tree) or tree.parts[0]
+        tree = next(part for part in tree.parts if part.end >= head.end)
+    word = literal(instance)
+    if not isinstance(tree, Scripts):
+        return f"{latex[: tree.end]}_{{{word}}}{latex[tree.end :]}"
+    if tree.sub is None:
+        return f"{latex[: tree.base.end]}_{{{word}}}{latex[tree.base.end :]}"
+    start, end = tree.sub.start, tree.sub.end
+    sub = f"{latex[start:end]},{word}"
+    braced = latex[start - 1] == "{"
+    return f"{latex[:start]}{sub if braced else f'{{{sub}}}'}{latex[end:]}"
+
+
+@cache
+def _printed(form: str, latex: str) -> str:
+    return latex if form == "latex" else _FORMS[form](read_latex(latex))

@@ -1,0 +1,9 @@
+"""Stage reading: what was derived -> every quantity of the equations by name, as graph expressions and as SymPy.
+
+Reading happens in copies of the graph: nothing that is read changes what is compiled.
+"""
+
+from .quantities import Quantities
+from .readable import Readable
+
+__all__ = ["Quantities", "Readable"]

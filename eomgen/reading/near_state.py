@@ -1,0 +1,149 @@
+"""Stage reading, linearization: the embedded equations near a state -> x' = A x + B u as expressions.
+
+States are displacements of independent coordinates, then independent velocities; dependent ones follow the
+constraints, as in ``Module.linearize``.  With M v_i' = f: M dv_i' = df - dM v_i' along each direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..equations.reduction import eliminate
+from ..errors import UnavailableError
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.differentiate import jacobian, jvp
+from ..graph.evaluate import evaluate
+from ..graph.substitute import substitute, symbols_of
+from ..graph.symmetric import solve_symmetric
+from ..numeric.partitions import partition
+from .put_in import put_in
+from .quantities import Quantities, Row, Rows
+
+
+class StateEquations(NamedTuple):
+    """A (n, n), B (n, n_u), and the names of states and inputs."""
+
+    A: Rows
+    B: Rows
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+
+
+def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) -> StateEquations:
+    """A and B at a state; velocities that ``at`` does not name are 0.
+
+    ``equilibrium`` tells that the accelerations vanish there.
+
+    Raises
+    ------
+    UnavailableError
+        Rates of coordinates were given as functions of velocities, or constraints depend on inputs.
+    """
+    kinematics, graph = quantities.kinematics, quantities.graph
+    if kinematics.given_rates:
+        raise UnavailableError("rates of coordinates are given as functions of velocities; use linearize of the module")
+    inputs = kinematics.input_names
+    if not symbols_of([*kinematics.constraints.velocity, *kinematics.constraints.gamma]).isdisjoint(inputs):
+        raise UnavailableError("constraints depend on inputs; use linearize of the module")
+    at = {name: 0.0 for name in kinematics.velocity_names if name not in at} | dict(at)
+    free = [kinematics.velocity_labels.index(name) for name in quantities.mobility.independent]
+    positions, Z = _displacements(quantities)
+    moves = [_move(quantities, column) for column in zip(*Z, strict=True)]
+    moves += [_Move({}, column) for column in zip(*quantities.transformation.matrix, strict=True)]
+    a = [graph.symbol(f"a({k})") for k in range(len(free))]
+    residual = [f - _dot(row, a) for f, row in zip(quantities.force, quantities.mass_matrix, strict=True)]
+    changes = [jvp(residual, move.along(kinematics.v)) for move in moves]
+    slopes = jacobian(residual, [graph.symbol(name) for name in inputs])
+    changes += [[slopes.get((i, k), graph.zero) for i in range(len(free))] for k in range(len(inputs))]
+    flat = put_in([x for row in quantities.mass_matrix for x in row], at)
+    mass = [flat[k : k + len(free)] for k in range(0, len(flat), len(free))]
+    rates = [graph.zero] * len(free) if equilibrium else solve_symmetric(mass, put_in(quantities.force, at))
+    still = dict(zip(a, rates, strict=True))
+    columns = [solve_symmetric(mass, substitute(put_in(change, at), still)) for change in changes]
+    lower = list(zip(*columns, strict=True)) if columns else []
+    shifts = [_shift(quantities, move, column) for move, column in zip(moves, [*zip(*Z, strict=True)], strict=False)]
+    shifts += [move.velocities for move in moves[len(shifts) :]]
+    upper = [tuple(put_in([shift[k] for shift in shifts], at)) for k in positions]
+    n = len(moves)
+    return StateEquations(
+        (*upper, *(row[:n] for row in lower)),
+        (*((graph.zero,) * len(inputs) for _ in upper), *(row[n:] for row in lower)),
+        (*(_displacement_name(quantities, k) for k in positions), *(kinematics.velocity_names[k] for k in free)),
+        inputs,
+    )
+
+
+class _Move(NamedTuple):
+    """A direction on the constraints: changes of coordinates and of velocities (n_v)."""
+
+    coordinates: dict[Expr, Expr]
+    velocities: Row
+
+    def along(self, v: Sequence[Expr]) -> dict[Expr, Expr]:
+        """As the direction of a derivative."""
+        return self.coordinates | dict(zip(v, self.velocities, strict=True))
+
+
+def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
+    total = a[0].graph.zero
+    for x, y in zip(a, b, strict=True):
+        total = total + x * y
+    return total
+
+
+def _displacement_name(quantities: Quantities, k: int) -> str:
+    """The coordinate whose rate is velocity k, or ``ball_rx`` for the angular velocity ``ball_wx``."""
+    label = quantities.kinematics.velocity_labels[k]
+    return f"{label[:-2]}r{label[-1]}" if label == quantities.kinematics.velocity_names[k] else label
+
+
+def _displacements(quantities: Quantities) -> tuple[list[int], Rows]:
+    """Independent displacements and Z (n_v, n_z): all that the holonomic equations allow."""
+    kinematics, mobility, graph = quantities.kinematics, quantities.mobility, quantities.graph
+    n, c = len(kinematics.v), kinematics.constraints
+    free = [kinematics.velocity_labels.index(name) for name in mobility.independent]
+    if not c.nonholonomic:
+        return free, quantities.transformation.matrix
+    rows = [c.jacobian[i] for i in mobility.independent_rows if i < len(c.values)]
+    order = [*free, *(j for j in range(n) if j not in free)]
+    at = quantities.numbers | dict(zip(kinematics.names, mobility.q_reference, strict=True))
+    if rows:
+        J = np.array([[float(x) for x in evaluate(list(row), at)] for row in rows])
+        free = [int(k) for k in partition(J, len(rows), order).independent]
+    else:
+        free = order
+    bound = [j for j in range(n) if j not in free]
+    solved = eliminate(kinematics, mobility, rows, bound, quantities.numbers)
+    unit = {j: k for k, j in enumerate(free)}
+    return free, tuple(
+        tuple(-solved[j][i] for i in free)
+        if j in solved
+        else tuple(graph.one if unit[j] == k else graph.zero for k in range(len(free)))
+        for j in range(n)
+    )
+
+
+def _move(quantities: Quantities, column: Row) -> _Move:
+    """A displacement with the independent velocities as they are: the others follow from v = B v_i + b."""
+    kinematics, graph = quantities.kinematics, quantities.graph
+    still = substitute(list(kinematics.rates), dict.fromkeys(kinematics.v, graph.zero))
+    moved = substitute(list(kinematics.rates), dict(zip(kinematics.v, column, strict=True)))
+    dq = {q: x - rest for q, x, rest in zip(kinematics.q, moved, still, strict=True) if x != rest}
+    found = quantities.transformation
+    own = [kinematics.v[kinematics.velocity_labels.index(name)] for name in quantities.mobility.independent]
+    v = [_dot(row, own) + b if own else b for row, b in zip(found.matrix, found.offset, strict=True)]
+    return _Move(dq, tuple(jvp(v, dq)) if dq else (graph.zero,) * len(v))
+
+
+def _shift(quantities: Quantities, move: _Move, column: Row) -> Row:
+    """Rates of displacements for a displacement: dv, and r x w of small rotations r about turning axes."""
+    result = list(move.velocities)
+    for _, j in quantities.kinematics.quaternion_slots:
+        w, r = (vec.vector(quantities.graph, x[j : j + 3]) for x in (quantities.kinematics.v, column))
+        own = vec.vector(quantities.graph, result[j : j + 3])
+        result[j : j + 3] = vec.add(own, vec.cross(r, w))
+    return tuple(result)

@@ -1,0 +1,256 @@
+"""Stage reading: Kinematics, Mobility, TreeEquations -> each quantity of the equations as expressions of their graph.
+
+What is of the size of the degrees of freedom is embedded with B of v = B v_i + b (Shabana, Computational Dynamics,
+sec. 5.7): M = B^T M_t B, Q = B^T Q_t, Q_v = B^T (Q_v,t - M_t c), so that M v_i' = Q_v + Q.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+from ..equations import METHODS
+from ..equations.reduction import Names, VelocityTransformation, transform_velocities
+from ..equations.tree_equations import TreeEquations
+from ..errors import UnavailableError
+from ..frames import GROUND, Frame, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.count import count
+from ..graph.differentiate import gradient
+from ..graph.vectors import Vec3
+from ..kinematics import Kinematics
+from ..kinematics.mobility import Mobility
+from .applied_forces import forces_by_element, without_forces
+from .written import is_short
+
+Row = tuple[Expr, ...]
+Rows = tuple[Row, ...]
+
+
+class PointMotion(NamedTuple):
+    """Velocity or acceleration of a body or marker, ground axes: angular, of its origin, of the centre of mass."""
+
+    angular: Vec3
+    linear: Vec3
+    center_of_mass: Vec3
+
+
+class Quantities:
+    """Every quantity of one derivation, each formed when it is first asked for.
+
+    Parameters
+    ----------
+    kinematics, mobility, tree
+        What was derived, in a graph of their own (:meth:`~eomgen.derivation.Derivation.fresh`).
+    """
+
+    def __init__(self, kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> None:
+        self.kinematics, self.mobility, self.tree = kinematics, mobility, tree
+        self.graph = kinematics.graph
+
+    @cached_property
+    def numbers(self) -> dict[str, float]:
+        """Numbers of parameters, inputs and t by which pivots are judged; made up where a parameter has none."""
+        m = self.kinematics.mechanism
+        values = {p.name: 1.0 + 0.1 * k if p.value is None else p.value for k, p in enumerate(m.parameters)}
+        return values | {u.name: u.value for u in m.inputs} | {"t": 0.0}
+
+    # -- energies ---------------------------------------------------------------------------------------------------
+    def _require_energies(self, what: str) -> None:
+        given = self.kinematics.mechanism.given
+        if given is not None and given.kinetic_energy.is_zero:
+            raise UnavailableError(
+                f"{what} is not known: the equations are given without kinetic_energy; give equations.kinetic_energy"
+            )
+
+    @property
+    def kinetic_energy(self) -> Expr:
+        """T (J)."""
+        self._require_energies("T")
+        return self.tree.kinetic_energy
+
+    @property
+    def potential_energy(self) -> Expr:
+        """V of gravity and springs (J)."""
+        self._require_energies("V")
+        return self.tree.potential_energy
+
+    @property
+    def lagrangian(self) -> Expr:
+        """L = T - V; of a bare Lagrangian what was given."""
+        bare = self.kinematics.mechanism.lagrangian
+        return bare.expression if bare is not None else self.kinetic_energy - self.potential_energy
+
+    @cached_property
+    def momenta(self) -> Row:
+        """p = dT/dv (n_v,)."""
+        return tuple(gradient(self.kinetic_energy, list(self.kinematics.v)))
+
+    # -- equations of motion ------------------------------------------------------------------------------------------
+    @cached_property
+    def transformation(self) -> VelocityTransformation:
+        """v = B v_i + b, a = B a_i + c."""
+        return transform_velocities(self.kinematics, self.mobility, self.numbers)
+
+    @cached_property
+    def motion(self) -> tuple[list[Expr], list[tuple[str, Expr]]]:
+        """M row by row and M v_i', and names that stand in them for what loops give, with their values, where long."""
+        whole = [*(x for row in self.mass_matrix for x in row), *self.force]
+        if is_short(whole):
+            return whole, []
+        return [*(x for row in self.mass_matrix_by_names for x in row), *self.force_by_names], self._by_names[0].given
+
+    @cached_property
+    def _by_names(self) -> tuple[Names, VelocityTransformation]:
+        names = Names(self.kinematics, self.mobility.independent)
+        return names, transform_velocities(self.kinematics, self.mobility, self.numbers, names)
+
+    @cached_property
+    def mass_matrix_by_names(self) -> Rows:
+        """M (n_dof, n_dof) in the names of B's entries, as the book writes it: B^T M B."""
+        return self._by_names[1].mass_matrix(self.tree.mass_matrix) if self._embeds else self.tree.mass_matrix
+
+    @cached_property
+    def force_by_names(self) -> Row:
+        """M v_i' (n_dof,) in the names of the entries of B and c."""
+        right = tuple(-h for h in self.tree.bias)
+        return self._by_names[1].force(self.tree.mass_matrix, right) if self._embeds else right
+
+    @cached_property
+    def mass_matrix(self) -> Rows:
+        """M (n_dof, n_dof)."""
+        return self.transformation.mass_matrix(self.tree.mass_matrix) if self._embeds else self.tree.mass_matrix
+
+    @cached_property
+    def force(self) -> Row:
+        """M v_i' (n_dof,), quadratic velocity terms and generalized forces."""
+        return self.embedded_force([-h for h in self.tree.bias])
+
+    @property
+    def _embeds(self) -> bool:
+        return self.mobility.n_dof != len(self.kinematics.v)
+
+    def embedded_force(self, right: Sequence[Expr]) -> Row:
+        """B^T (Q - M c) of forces Q on the tree."""
+        return self.transformation.force(self.tree.mass_matrix, right) if self._embeds else tuple(right)
+
+    def along_independent(self, row: Sequence[Expr]) -> Row:
+        """B^T x: derivatives by the velocities of the tree -> by the independent ones."""
+        return self.transformation.project(row) if self._embeds else tuple(row)
+
+    def _require_separate(self, what: str) -> None:
+        if self.kinematics.mechanism.given is not None:
+            raise UnavailableError(f"{what} are not known apart: given equations tell their sum alone, which is force")
+
+    @cached_property
+    def tree_quadratic_velocity(self) -> Row:
+        """Q_v on the tree (n_v,): what is left of -h without gravity and force elements."""
+        self._require_separate("quadratic velocity terms")
+        method = self.tree.method if self.kinematics.mechanism.lagrangian is None else "lagrange"
+        if method == "augmented" or self.tree.system is not None:
+            method = "embedding"  # the same terms, without the system of equations around them
+        return tuple(-h for h in METHODS[method](without_forces(self.kinematics)).bias)
+
+    @cached_property
+    def quadratic_velocity(self) -> Row:
+        """Q_v (n_dof,): Coriolis, centrifugal and gyroscopic terms, and what prescribed motions ask for."""
+        return self.embedded_force(self.tree_quadratic_velocity)
+
+    @cached_property
+    def tree_forces(self) -> dict[str, Row]:
+        """Generalized forces on the tree (n_v,) by force element."""
+        self._require_separate("generalized forces")
+        return {name: tuple(force) for name, force in forces_by_element(self.kinematics).items()}
+
+    @cached_property
+    def forces(self) -> dict[str, Row]:
+        """Generalized forces (n_dof,) by force element."""
+        return {name: self.along_independent(force) for name, force in self.tree_forces.items()}
+
+    @cached_property
+    def total_force(self) -> Row:
+        """Generalized forces (n_dof,) of all elements."""
+        total = [self.graph.zero] * self.mobility.n_dof
+        for force in self.forces.values():
+            total = [a + b for a, b in zip(total, force, strict=True)]
+        return tuple(total)
+
+    # -- constraints --------------------------------------------------------------------------------------------------
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """The constraint equations that count; redundant ones are left out."""
+        return self.mobility.independent_rows
+
+    @property
+    def constraints(self) -> Row:
+        """C(q, t) of the holonomic equations (m)."""
+        c = self.kinematics.constraints
+        return tuple(c.values[i] for i in self.rows if i < len(c.values))
+
+    @property
+    def constraint_jacobian(self) -> Rows:
+        """C_q (n_c, n_v), nonholonomic equations last."""
+        return tuple(self.kinematics.constraints.jacobian[i] for i in self.rows)
+
+    @property
+    def velocity_constraints(self) -> Row:
+        """C' = C_q v + C_t (n_c,)."""
+        return tuple(self.kinematics.constraints.velocity[i] for i in self.rows)
+
+    @property
+    def gamma(self) -> Row:
+        """gamma of C'' = C_q v' + gamma (n_c,)."""
+        return tuple(self.kinematics.constraints.gamma[i] for i in self.rows)
+
+    # -- motion of bodies and markers ---------------------------------------------------------------------------------
+    @cached_property
+    def markers(self) -> dict[str, Marker]:
+        """Bodies by name, at their origins, and named markers as ``rod.tip``."""
+        mechanism = self.kinematics.mechanism
+        own = Frame(vec.identity(self.graph), vec.zero(self.graph))
+        bodies = {body.name: Marker(k, own, body.name) for k, body in enumerate(mechanism.bodies)}
+        return bodies | {marker.label: marker for marker in mechanism.named_markers}
+
+    def pose(self, name: str) -> Rows:
+        """Placement of a body or marker in ground axes (4, 4)."""
+        frame = self.kinematics.poses.marker(self.markers[name])
+        o, i = self.graph.zero, self.graph.one
+        rows = zip(frame.rotation, frame.position, strict=True)
+        return (*((*row, x) for row, x in rows), (o, o, o, i))
+
+    def velocity(self, name: str) -> PointMotion:
+        """Velocity of a body or marker, ground axes."""
+        marker = self.markers[name]
+        angular = self.kinematics.motion.angular_velocity(marker)
+        return PointMotion(angular, self._velocity(marker), self._velocity(self._centre(marker)))
+
+    def acceleration(self, name: str) -> PointMotion:
+        """Acceleration of a body or marker, ground axes."""
+        marker = self.markers[name]
+        turning = self.kinematics.motion.turning_of(marker, own_axes=False, rate=True)
+        linear, centre = (self._rate(self._velocity(m)) for m in (marker, self._centre(marker)))
+        return PointMotion(turning, linear, centre)
+
+    def _velocity(self, marker: Marker) -> Vec3:
+        """Velocity of a marker's origin: the rate of its position or, where that is longer, from the body's twist."""
+        motion = self.kinematics.motion
+        return min(self._rate(motion.position(marker)), motion.velocity(marker), key=lambda x: count(x).total)
+
+    def _rate(self, values: Vec3) -> Vec3:
+        x, y, z = self.kinematics.total_derivative(values)
+        return x, y, z
+
+    def _centre(self, marker: Marker) -> Marker:
+        """The centre of mass of the marker's body."""
+        if marker.body == GROUND:
+            return marker
+        body = self.kinematics.mechanism.bodies[marker.body]
+        return Marker(marker.body, Frame(vec.identity(self.graph), body.com), body.name)
+
+    @property
+    def loop_coordinates(self) -> dict[str, Expr]:
+        """Coordinates of cut joints as functions of the tree's."""
+        loop = self.kinematics.loop_coordinates
+        return dict(zip(loop.names, loop.values, strict=True))

@@ -1,0 +1,295 @@
+"""Stage reading: a derivation -> every quantity of its equations as SymPy, an attribute each.
+
+A class that inherits :class:`Readable` says what was derived (``fresh``), what SymPy object stands for a name, and what
+values are put in; :class:`ReadingView` is the same derivation with other answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+from ..graph.core import Expr
+from ..kinematics.state import acceleration_name
+from ..notation.notation import Notation
+from .put_in import read_values
+from .quantities import PointMotion, Quantities
+from .quantities_of_methods import QuantitiesOfMethods
+from .writes_quantities import Derived
+
+if TYPE_CHECKING:
+    from .named_parts import ByName, NamedSum, SpatialMotion
+
+
+class Readable(QuantitiesOfMethods):
+    """The quantities of derived equations as SymPy expressions and matrices, each made when it is first asked for.
+
+    Matrices of the size of the degrees of freedom belong to the velocities of ``independent``; those of the size of
+    the tree to all velocities ``v``.  In open chains both are the same.
+    """
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Names of the independent coordinates."""
+        return self.mobility.independent
+
+    @property
+    def acceleration_names(self) -> tuple[str, ...]:
+        """Names of the accelerations that ``mass_matrix`` and ``force`` are for."""
+        k = self.kinematics
+        return tuple(acceleration_name(k.velocity_names[k.velocity_labels.index(n)]) for n in self.independent)
+
+    @property
+    def constraint_names(self) -> tuple[str, ...]:
+        """Names of the rows of ``constraint_jacobian``, such as ``C.r_x`` of joint C; nonholonomic ones last."""
+        return tuple(self.kinematics.constraints.labels[i] for i in self.mobility.independent_rows)
+
+    @cached_property
+    def notation(self) -> Notation:
+        """How names are printed: ``.latex("theta1_dot")``, ``.text(name)``, ``.html(name)``, ``.mathtext(name)``."""
+        k = self.kinematics
+        outputs = [output.name for output in k.mechanism.outputs]
+        rates = [*k.velocity_names, *map(acceleration_name, k.velocity_names)]
+        names = [*k.names, *k.loop_coordinates.names, *k.parameter_names, *k.input_names, *outputs, *rates]
+        return Notation(names, k.mechanism.latex, k.mechanism.instances)
+
+    # -- symbols ------------------------------------------------------------------------------------------------------
+    @property
+    def q(self) -> tuple[Any, ...]:
+        """Coordinates of the spanning tree, SymPy symbols."""
+        return tuple(map(self._symbol, self.kinematics.names))
+
+    @property
+    def v(self) -> tuple[Any, ...]:
+        """Velocities of the spanning tree, SymPy symbols."""
+        return tuple(map(self._symbol, self.kinematics.velocity_names))
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        """Parameters, SymPy symbols."""
+        return tuple(map(self._symbol, self.kinematics.parameter_names))
+
+    # -- energies -----------------------------------------------------------------------------------------------------
+    @cached_property
+    def T(self) -> Any:
+        """Kinetic energy (J)."""
+        return self._write("T", lambda s: [s.kinetic_energy])[0]
+
+    @cached_property
+    def V(self) -> Any:
+        """Potential energy of gravity and springs (J); of a bare Lagrangian -L at rest."""
+        return self._write("V", lambda s: [s.potential_energy])[0]
+
+    @cached_property
+    def lagrangian(self) -> Any:
+        """T - V (J)."""
+        return self._write("lagrangian", lambda s: [s.lagrangian], "L_")[0]
+
+    @cached_property
+    def momenta(self) -> Any:
+        """p = dT/dv (n_v, 1), conjugate to the velocities ``v``."""
+        return self._column("momenta", lambda s: s.momenta)
+
+    # -- equations of motion ------------------------------------------------------------------------------------------
+    @cached_property
+    def _motion(self) -> tuple[list[tuple[Any, Any]], Any, Any]:
+        import sympy
+
+        n = self.mobility.n_dof
+        written = self._write("mass_matrix", lambda s: s.motion[0], "z", lambda s: s.motion[1])
+        named = self._named["force"] = self._named["mass_matrix"]
+        return named, sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, 1, written[n * n :])
+
+    @property
+    def mass_matrix(self) -> Any:
+        """sympy.Matrix (n, n), n the degrees of freedom."""
+        return self._motion[1]
+
+    @property
+    def force(self) -> Any:
+        """sympy.Matrix (n, 1): ``mass_matrix * v' = force``; it is ``quadratic_velocity + generalized_forces``."""
+        return self._motion[2]
+
+    @property
+    def intermediates(self) -> list[tuple[Any, Any]]:
+        """Named subexpressions of a large mass matrix and force, in order: (symbol, expression); empty when small."""
+        return self._motion[0]
+
+    @cached_property
+    def quadratic_velocity(self) -> Any:
+        """Q_v (n, 1): Coriolis, centrifugal and gyroscopic terms, and what prescribed motions ask for."""
+        return self._column("quadratic_velocity", lambda s: s.quadratic_velocity)
+
+    @cached_property
+    def generalized_forces(self) -> NamedSum:
+        """Q (n, 1) of gravity and all force elements; ``generalized_forces["motor"]`` is that of one alone.
+
+        ``.parts`` is a dict of all.  Gravity is ``"gravity"``; a bare Lagrangian has ``"potential"``, ``"forces"`` and
+        ``"dissipation"``.
+        """
+        import sympy
+
+        from .named_parts import NamedSum
+
+        n = self.mobility.n_dof
+        names: list[str] = []
+
+        def choose(s: Quantities) -> list[Expr]:
+            names.extend(s.forces)
+            return [*s.total_force, *(x for force in s.forces.values() for x in force)]
+
+        written = self._write("generalized_forces", choose, "Q_")
+        parts = {name: sympy.Matrix(n, 1, written[(k + 1) * n : (k + 2) * n]) for k, name in enumerate(names)}
+        return NamedSum.of(written[:n], parts)
+
+    # -- constraints --------------------------------------------------------------------------------------------------
+    @cached_property
+    def constraints(self) -> Any:
+        """C(q, t) (m, 1), which vanishes: the holonomic equations, without redundant ones."""
+        return self._column("constraints", lambda s: s.constraints)
+
+    @cached_property
+    def velocity_constraints(self) -> Any:
+        """C_q v + C_t (n_c, 1), which vanishes: rates of the holonomic equations, then the nonholonomic ones."""
+        return self._column("velocity_constraints", lambda s: s.velocity_constraints)
+
+    @cached_property
+    def constraint_jacobian(self) -> Any:
+        """C_q (n_c, n_v), nonholonomic rows last: the derivative of ``velocity_constraints`` by ``v``."""
+        return self._matrix("constraint_jacobian", lambda s: s.constraint_jacobian, len(self.kinematics.v))
+
+    @cached_property
+    def gamma(self) -> Any:
+        """gamma (n_c, 1) of C'' = C_q v' + gamma = 0."""
+        return self._column("gamma", lambda s: s.gamma)
+
+    @cached_property
+    def velocity_transformation(self) -> Any:
+        """B (n_v, n) of v = B v_i + b, v_i the velocities of ``independent``; b is ``velocity_offset``."""
+        return self._matrix("velocity_transformation", lambda s: s.transformation.matrix, self.mobility.n_dof)
+
+    @cached_property
+    def velocity_offset(self) -> Any:
+        """b (n_v, 1) of v = B v_i + b: what drivers and other motions over time add; 0 without them."""
+        return self._column("velocity_offset", lambda s: s.transformation.offset)
+
+    @cached_property
+    def acceleration_offset(self) -> Any:
+        """c (n_v, 1) of v' = B v_i' + c."""
+        return self._column("acceleration_offset", lambda s: s.transformation.acceleration_offset)
+
+    # -- motion of bodies and markers ---------------------------------------------------------------------------------
+    @cached_property
+    def _places(self) -> tuple[str, ...]:
+        mechanism = self.kinematics.mechanism
+        return (*(b.name for b in mechanism.bodies), *(marker.label for marker in mechanism.named_markers))
+
+    @cached_property
+    def poses(self) -> ByName[Any]:
+        """Pose (4, 4) of each body and named marker in ground axes: ``poses["rod"]``, ``poses["rod.tip"]``."""
+        from .named_parts import ByName
+
+        return ByName("body or marker", self._places, self._pose)
+
+    def _pose(self, name: str) -> Any:
+        return self._matrix(f"poses.{name}", lambda s: s.pose(name), 4)
+
+    @cached_property
+    def velocities(self) -> ByName[SpatialMotion]:
+        """Velocity of each body and named marker, ground axes: ``velocities["rod"].angular``, ``.linear`` ..."""
+        from .named_parts import ByName
+
+        return ByName("body or marker", self._places, partial(self._spatial, "velocities", Quantities.velocity))
+
+    @cached_property
+    def accelerations(self) -> ByName[SpatialMotion]:
+        """Acceleration of each body and named marker, ground axes: ``accelerations["rod"].angular``, ``.linear`` ..."""
+        from .named_parts import ByName
+
+        return ByName("body or marker", self._places, partial(self._spatial, "accelerations", Quantities.acceleration))
+
+    def _spatial(self, what: str, of: Callable[[Quantities, str], PointMotion], name: str) -> SpatialMotion:
+        import sympy
+
+        from .named_parts import SpatialMotion
+
+        written = self._write(f"{what}.{name}", lambda s: [x for part in of(s, name) for x in part])
+        return SpatialMotion(*(sympy.Matrix(3, 1, written[k : k + 3]) for k in (0, 3, 6)))
+
+    @cached_property
+    def loop_coordinates(self) -> ByName[Any]:
+        """Coordinates of the joints that close loops, as functions of ``q``: ``loop_coordinates["s"]``."""
+        from .named_parts import ByName
+
+        return ByName("coordinate of a cut joint", self.kinematics.loop_coordinates.names, self._loop_coordinate)
+
+    def _loop_coordinate(self, name: str) -> Any:
+        return self._write(f"loop_coordinates.{name}", lambda s: [s.loop_coordinates[name]])[0]
+
+    # -- the same with other symbols or values ------------------------------------------------------------------------
+    def with_dynamicsymbols(self) -> ReadingView:
+        """The same quantities in functions of time, as ``sympy.physics.mechanics.dynamicsymbols`` makes them.
+
+        ``theta`` becomes theta(t) and ``theta_dot`` its derivative; velocities that are no rates of coordinates, inputs
+        and multipliers are functions of time too; parameters stay symbols.
+
+        Returns
+        -------
+        ReadingView
+        """
+        from .functions_of_time import dynamic_symbols
+
+        return ReadingView(self, dynamic_symbols(self.kinematics), self._put_in)
+
+    def subs(self, values: Mapping[Any, Any]) -> ReadingView:
+        """The same quantities with values put in, all at once, after derivatives have been taken.
+
+        Parameters
+        ----------
+        values : mapping
+            Name, symbol or function of time of a coordinate, velocity, acceleration, parameter or input, or ``"t"`` ->
+            number, text or SymPy expression.
+
+        Returns
+        -------
+        ReadingView
+
+        Raises
+        ------
+        UsageError
+            An unknown name, or a value that is no expression.
+        """
+        return ReadingView(self, self._symbol, (*self._put_in, read_values(values, self._known, "symbol")))
+
+    def with_parameters(self, **values: Any) -> ReadingView:
+        """The same quantities with values of parameters put in: ``with_parameters(l=0.5)``; see :meth:`subs`."""
+        read = read_values(values, self.kinematics.parameter_names, "parameter")
+        return ReadingView(self, self._symbol, (*self._put_in, read))
+
+
+class ReadingView(Readable):
+    """Equations to read, with values put in or with functions of time; all quantities of :class:`Readable`.
+
+    Made by ``subs``, ``with_parameters`` and ``with_dynamicsymbols`` of equations and of other views.
+    """
+
+    def __init__(self, source: Readable, symbols: Callable[[str], Any], values: tuple[Mapping[str, Any], ...]) -> None:
+        self.source: Readable = source.source if isinstance(source, ReadingView) else source
+        self.kinematics, self.mobility = source.kinematics, source.mobility
+        self._symbols, self._values = symbols, values
+
+    def fresh(self) -> Derived:
+        return self.source.fresh()
+
+    @property
+    def _symbol(self) -> Callable[[str], Any]:
+        return self._symbols
+
+    @property
+    def _put_in(self) -> tuple[Mapping[str, Any], ...]:
+        return self._values
+
+    def __repr__(self) -> str:
+        put = ", ".join(f"{name} = {value}" for values in self._values for name, value in values.items())
+        return f"<equations of {self.kinematics.mechanism.name}{f' with {put}' if put else ''}>"

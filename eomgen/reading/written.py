@@ -1,0 +1,65 @@
+"""Stage reading, written: graph expressions -> SymPy expressions short to read, large ones with named parts.
+
+Everything that a user reads as SymPy comes through :func:`write`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, NamedTuple
+
+from ..graph.core import Expr
+from ..simplify import WHOLE, simplify
+
+READABLE = 400  #: operations an expression, on average, up to which expressions are written out
+LONGEST = 20_000  #: operations of all of them together
+
+
+class Written(NamedTuple):
+    """SymPy expressions, with the named parts that they use.
+
+    Attributes
+    ----------
+    intermediates : list of (sympy.Symbol, sympy.Expr)
+        In an order in which each uses only those before it; empty where everything is written out.
+    expressions : list of sympy.Expr
+    """
+
+    intermediates: list[tuple[Any, Any]]
+    expressions: list[Any]
+
+
+def is_short(expressions: Sequence[Expr]) -> bool:
+    """Whether expressions are written out whole."""
+    from ..graph.sympy_raise import inlined_size
+
+    return inlined_size(expressions) <= min(READABLE * len(expressions), LONGEST)
+
+
+def write(
+    expressions: Sequence[Expr],
+    symbols: Callable[[str], Any] | None = None,
+    prefix: str = "z",
+    given: Sequence[tuple[str, Expr]] = (),
+    rates: Collection[str] = (),
+) -> Written:
+    """Expressions of one graph in SymPy.
+
+    Parameters
+    ----------
+    expressions : sequence of Expr
+    symbols : callable, optional
+        Name -> the SymPy symbol, or function of time, that stands for it; plain symbols by default.
+    prefix : str, optional
+        Named parts are called ``z0``, ``z1``, ...
+    given : sequence of (str, Expr), optional
+        Names that stand in the expressions already, and what they stand for, in order.
+    rates : collection of str, optional
+        Names of velocities and accelerations.
+
+    Returns
+    -------
+    Written
+    """
+    form = simplify(expressions, given, rates, prefix, *([WHOLE] if not given and is_short(expressions) else []))
+    return Written([], []) if form is None else Written(*form.sympy(symbols))

@@ -1,0 +1,8 @@
+"""Stage simplify: expressions of a graph -> the forms in which a hand would write them, in SymPy.
+
+The forms are for reading; compiled code keeps its own.
+"""
+
+from .form import WHOLE, Form, simplify
+
+__all__ = ["WHOLE", "Form", "simplify"]

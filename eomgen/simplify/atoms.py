@@ -1,0 +1,198 @@
+"""Stage simplify: what polynomials are made of: symbols, sines, cosines, other calls, sums below or under roots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+Number = int | Fraction | float
+Monomial = tuple[tuple[int, Fraction | int], ...]  #: (atom, exponent) by rising atom; () is 1
+Poly = dict[Monomial, Number]  #: coefficient of each monomial, none of them zero
+Frozen = tuple[tuple[Monomial, Number], ...]  #: a Poly as a key, by rising monomial
+
+ONE: Monomial = ()
+TURNS = ("sin", "cos")
+SUMS = ("sum", "factor")  #: kinds of atoms that are one polynomial
+SMALL = 1000  #: denominators up to which a number is written as a fraction
+
+
+class Atom(NamedTuple):
+    """What cannot be split.
+
+    Attributes
+    ----------
+    kind : str
+        ``sym``, ``pi``, ``sin``, ``cos``, ``sum`` (a polynomial that stands in a denominator or under a root),
+        ``factor`` (a sum in a product), ``name`` (an intermediate), an operation of :mod:`eomgen.operations`, or a
+        declared function.
+    what : Any
+        The name of a symbol; the Frozen angle of a sine; the Frozen operands of another call.
+    """
+
+    kind: str
+    what: Any
+
+
+class Atoms:
+    """A table of interned atoms."""
+
+    def __init__(self) -> None:
+        self.table: list[Atom] = []
+        self._ids: dict[Atom, int] = {}
+        self._names: list[frozenset[int]] = []
+
+    def id(self, kind: str, what: Any) -> int:
+        """The number of an atom, the same for the same atom."""
+        atom = Atom(kind, what)
+        found = self._ids.get(atom)
+        if found is None:
+            found = self._ids[atom] = len(self.table)
+            self.table.append(atom)
+        return found
+
+    def inside(self, atom: int) -> set[int]:
+        """The atoms that an atom is made of, all of smaller numbers."""
+        kind, what = self.table[atom]
+        if kind in ("sym", "name", "pi"):
+            return set()
+        parts = [what] if kind in (*TURNS, *SUMS) else what
+        return {a for part in parts for monomial, _ in part for a, _ in monomial}
+
+    def names(self, poly: Poly) -> frozenset[int]:
+        """The atoms of names that stand in a polynomial, at any depth."""
+        while len(self._names) < len(self.table):  # what is inside an atom has smaller numbers
+            k = len(self._names)
+            own = frozenset({k} if self.table[k].kind == "name" else ())
+            self._names.append(own.union(*(self._names[part] for part in self.inside(k))))
+        return frozenset().union(*(self._names[a] for monomial in poly for a, _ in monomial))
+
+    def poly(self, kind: str, what: Any) -> Poly:
+        """The polynomial of one atom."""
+        return {((self.id(kind, what), 1),): 1}
+
+
+def number(value: float) -> tuple[Number, bool]:
+    """A double as it was probably meant, and whether it is that many times pi.
+
+    The fraction with a denominator up to 1000, or the multiple of pi, whose double this is; else the double itself.
+    """
+    near = Fraction(value).limit_denominator(SMALL)
+    if abs(near.numerator) < 10**15 and near.numerator / near.denominator == value:
+        return ratio(near, 1), False
+    turns = Fraction(value / math.pi).limit_denominator(360)
+    if 0 < abs(turns.numerator) <= SMALL and turns.numerator / turns.denominator * math.pi == value:
+        return ratio(turns, 1), True
+    return value, False
+
+
+def ratio(a: Number, b: Number) -> Number:
+    """a / b, whole where it is: whole numbers are quick."""
+    if isinstance(a, float) or isinstance(b, float):
+        return a / b
+    result = Fraction(a) / b
+    return result.numerator if result.denominator == 1 else result
+
+
+def freeze(poly: Poly) -> Frozen:
+    """A polynomial as a key."""
+    return tuple(sorted(poly.items()))
+
+
+def constant(value: Number) -> Poly:
+    """The polynomial of a number."""
+    return {ONE: value} if value else {}
+
+
+def add(a: Poly, b: Poly, factor: Number = 1) -> Poly:
+    """a + factor b"""
+    result = dict(a)
+    for monomial, x in b.items():
+        total = result.get(monomial, 0) + (x if factor == 1 else factor * x)
+        if total:
+            result[monomial] = total
+        else:
+            result.pop(monomial, None)
+    return result
+
+
+def scaled(a: Poly, factor: Number) -> Poly:
+    """factor a"""
+    return {m: x * factor for m, x in a.items()} if factor else {}
+
+
+def join(a: Monomial, b: Monomial) -> Monomial:
+    """a b"""
+    if not a:
+        return b
+    if not b:
+        return a
+    powers = dict(a)
+    for atom, n in b:
+        total = powers.get(atom, 0) + n
+        if total:
+            powers[atom] = total
+        else:
+            del powers[atom]
+    return tuple(sorted(powers.items()))
+
+
+def inverse(a: Monomial) -> Monomial:
+    """1 / a"""
+    return tuple((atom, -n) for atom, n in a)
+
+
+def common(a: Monomial, b: Monomial) -> Monomial:
+    """The largest monomial that divides both, of denominators the one that both have."""
+    others = dict(b)
+    shared = []
+    for atom, n in a:
+        m = others.get(atom)
+        if m is not None and (n > 0) == (m > 0):
+            shared.append((atom, min(n, m) if n > 0 else max(n, m)))
+    return tuple(shared)
+
+
+def multiply(a: Poly, b: Poly) -> Poly:
+    """a b, multiplied out."""
+    if len(a) > len(b):
+        a, b = b, a
+    result: Poly = {}
+    for m, x in a.items():
+        for n, y in b.items():
+            key = join(m, n)
+            total = result.get(key, 0) + x * y
+            if total:
+                result[key] = total
+            else:
+                result.pop(key, None)
+    return result
+
+
+class TooLongError(Exception):
+    """More terms were formed than may be: what is written out would be too long to read anyway."""
+
+
+class Work:
+    """Counts products of terms, so that effort is bounded alike on every machine."""
+
+    def __init__(self, allowed: float) -> None:
+        self.left = allowed
+        self._floor = 0.0
+
+    def spend(self, products: float) -> None:
+        """Raise TooLongError when there were too many."""
+        self.left -= products
+        if self.left < self._floor:
+            raise TooLongError
+
+    @contextmanager
+    def at_most(self, products: float) -> Iterator[None]:
+        """Allow only so many in this block."""
+        outer, self._floor = self._floor, max(self._floor, self.left - products)
+        try:
+            yield
+        finally:
+            self._floor = outer

@@ -1,0 +1,182 @@
+"""Stage simplify: a polynomial -> sums of products of sums, short to read.
+
+Common factors are taken out greedily, the one that shortens most first; what several products share is taken out once
+more.  This is algebraic factoring as of logic synthesis (R. K. Brayton and C. McMullen, The decomposition and
+factorization of Boolean expressions, ISCAS 1982), with a length for readers as the cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from functools import reduce
+
+from .atoms import (
+    Atoms,
+    Frozen,
+    Monomial,
+    Number,
+    Poly,
+    Work,
+    add,
+    common,
+    freeze,
+    inverse,
+    join,
+    multiply,
+    ratio,
+    scaled,
+)
+from .costs import SUM, Costs
+from .expansion import content
+
+PAIRS = 40  #: terms up to which all pairs are tried for their common factor
+TRIED = 3  #: factors that are tried to the end where there are few terms
+FEW = 8  #: terms
+
+
+class Factoring:
+    """Factors polynomials over a table of atoms.
+
+    A factored sum is a polynomial whose atoms may be factored sums, of kind ``factor``.
+    """
+
+    def __init__(self, atoms: Atoms, work: Work, rates: Collection[str] = ()) -> None:
+        self.atoms = atoms
+        self.work = work
+        self.costs = Costs(atoms, rates)
+        self._known: dict[Frozen, Poly] = {}
+
+    def factored(self, poly: Poly) -> Poly:
+        """The shortest form found: a product, or a sum of terms that share nothing worth while."""
+        if len(poly) < 2:
+            return poly
+        together = self._product(poly)
+        if not reduce(common, poly):
+            return together
+        apart = self._sum(poly)
+        return together if self.costs.of_terms(together) <= self.costs.of_terms(apart) else apart
+
+    def _product(self, poly: Poly) -> Poly:
+        """With all that is common taken out."""
+        amount, monomial = content(list(poly.values())), reduce(common, poly)
+        if all(x < 0 for x in poly.values()):
+            amount = -amount
+        found = self._sum(multiply(poly, {inverse(monomial): ratio(1, amount)}))
+        if len(found) == 1:
+            return multiply(found, {monomial: amount})
+        return self._wrapped(found, monomial, amount) if monomial else scaled(found, amount)
+
+    def _sum(self, poly: Poly) -> Poly:
+        """The shortest form found with what all terms share left in each of them."""
+        key = freeze(poly)
+        found = self._known.get(key)
+        if found is None:
+            found = self._known[key] = self._primitive(poly)
+        return found
+
+    def _wrapped(self, sum_: Poly, monomial: Monomial, amount: Number) -> Poly:
+        """amount monomial (sum), one term."""
+        atom = self.atoms.id("factor", freeze(sum_))
+        return {join(monomial, ((atom, 1),)): amount}
+
+    def _primitive(self, poly: Poly) -> Poly:
+        if len(poly) < 2:
+            return poly
+        square = self._square(poly)
+        if square is not None:
+            return square
+        candidates = self._divisors(poly)
+        best, cost = poly, self.costs.of_terms(poly)
+        whole = reduce(common, poly)
+        for divisor in [d for d in candidates if d != whole][: TRIED if len(poly) <= FEW else 1]:
+            tried = self._merged(self._taken_out(poly, divisor))
+            price = self.costs.of_terms(tried)
+            if price < cost:
+                best, cost = tried, price
+        return best
+
+    def _taken_out(self, poly: Poly, divisor: Monomial) -> Poly:
+        inside = {m: x for m, x in poly.items() if common(m, divisor) == divisor}
+        rest = {m: x for m, x in poly.items() if m not in inside}
+        taken = self.factored(inside)
+        return add(self.factored(rest), taken)
+
+    def _merged(self, poly: Poly) -> Poly:
+        """Terms that share a factored sum are taken together: a F + b F = (a + b) F."""
+        uses: dict[int, list[Monomial]] = {}
+        for monomial in poly:
+            for atom, _ in monomial:
+                if self.atoms.table[atom].kind == "factor":
+                    uses.setdefault(atom, []).append(monomial)
+        for monomials in uses.values():
+            if len(monomials) > 1:
+                inside = {m: poly[m] for m in monomials}
+                rest = {m: x for m, x in poly.items() if m not in inside}
+                return self._merged(add(rest, self._product(inside)))
+        return poly
+
+    def _divisors(self, poly: Poly) -> list[Monomial]:
+        """Common factors of two or more terms, the one that saves most first."""
+        terms = list(poly)
+        self.work.spend(len(terms) ** 2 // 2)
+        found: dict[Monomial, None] = {}
+        if len(terms) <= PAIRS:
+            for i, a in enumerate(terms):
+                for b in terms[i + 1 :]:
+                    both = common(a, b)
+                    if both:
+                        found[both] = None
+        for monomial in terms if len(terms) > PAIRS else ():
+            for atom, n in monomial:
+                found[((atom, 1 if n > 0 else -1 if n <= -1 else n),)] = None
+        scores = []
+        for divisor in found:
+            inside = [m for m in terms if common(m, divisor) == divisor]
+            if len(inside) > 1 and len(inside) <= len(terms):
+                saved = (len(inside) - 1) * (self.costs.of_monomial(divisor) + 5.0) - SUM
+                scores.append((-saved, divisor))
+        return [divisor for saved, divisor in sorted(scores) if saved < 0]
+
+    def _square(self, poly: Poly) -> Poly | None:
+        """The square of a sum of k terms, which has k (k + 1) / 2."""
+        k = int((2 * len(poly)) ** 0.5)
+        if k < 2 or k * (k + 1) // 2 != len(poly):
+            return None
+        roots = []
+        for monomial, x in poly.items():
+            if not isinstance(x, float) and x > 0 and all(n % 2 == 0 for _, n in monomial):
+                top, below = (_whole_root(y) for y in (x.numerator, x.denominator))
+                if top and below:
+                    roots.append((tuple((a, n // 2) for a, n in monomial), ratio(top, below)))
+        if len(roots) != k:
+            return None
+        head = roots[0]
+        base: Poly = {head[0]: head[1]}
+        for monomial, x in roots[1:]:
+            cross = poly.get(join(head[0], monomial))
+            if cross is None or abs(cross) != 2 * head[1] * x:
+                return None
+            base[monomial] = x if cross > 0 else -x
+        if multiply(base, base) != poly:
+            return None
+        return {((self.atoms.id("factor", freeze(self.factored(base))), 2),): 1}
+
+
+def _whole_root(n: int) -> int:
+    root = int(n**0.5 + 0.5)
+    return root if root * root == n else 0
+
+
+def sums_in(polys: Iterable[Poly], atoms: Atoms) -> dict[int, int]:
+    """How often each factored sum is used, its uses inside others included."""
+    count: dict[int, int] = {}
+    stack = list(polys)
+    while stack:
+        poly = stack.pop()
+        for monomial in poly:
+            for atom, _ in monomial:
+                if atoms.table[atom].kind == "factor":
+                    count[atom] = count.get(atom, 0) + 1
+                    if count[atom] == 1:
+                        stack.append(dict(atoms.table[atom].what))
+    return count

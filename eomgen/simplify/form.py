@@ -1,0 +1,180 @@
+"""Stage simplify: expressions -> the forms in which a hand would write them.
+
+Several ways to share what is used more than once are tried, from everything written out to a name for each shared part,
+and the shortest is taken.  Each part by itself is multiplied out, its sines and cosines are joined, and it is factored.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import field
+from typing import Any
+
+from ..graph.core import Expr, Graph
+from ..graph.traverse import LEAVES, common_graph, operands, reachable
+from ..operations import CONDITION, operations_with
+from ..records import dataclass
+from .atoms import Poly, TooLongError, Work
+from .expansion import Expansion
+from .factor import Factoring
+from .inline import EACH, NAME, Named, inlined
+from .literal import Literal
+
+WHOLE = (10**9,)
+SIZES = (1, 6, 16, 40, 120, *WHOLE)
+ALONE = 30  #: operations of what is used once beyond which it gets a name in the first attempt
+WRITTEN = 4_000  #: operations beyond which an attempt is not made
+WORK = 100_000  #: products of terms in all attempts together
+SHARED = 1.35  #: how much longer what needs no names may be
+
+
+@dataclass(frozen=True)
+class Form:
+    """Polynomials in atoms, in which names stand for others.
+
+    Attributes
+    ----------
+    named : list of (int, Poly)
+        The atom of each name and what it stands for, in an order in which each uses only those before it.
+    polys : list of Poly
+    """
+
+    graph: Graph
+    expansion: Expansion
+    factoring: Factoring
+    named: Named = field(repr=False)
+    polys: list[Poly] = field(repr=False)
+
+    @property
+    def cost(self) -> float:
+        """The length for a reader."""
+        costs = self.factoring.costs
+        return (
+            sum(costs.of_terms(p) for _, p in self.named)
+            + NAME * len(self.named)
+            + sum(map(costs.of_terms, self.polys))
+        )
+
+    def sympy(self, symbols: Callable[[str], Any] | None = None) -> tuple[list[tuple[Any, Any]], list[Any]]:
+        """Named intermediates, each a symbol and its expression, and expressions.
+
+        Parameters
+        ----------
+        symbols : callable, optional
+            Name -> the SymPy object that stands for it; plain symbols by default.
+        """
+        import sympy
+
+        from .to_sympy import Raising
+
+        raising = Raising(self.graph, self.expansion.atoms, self.factoring, symbols or sympy.Symbol)
+        named = []
+        for atom, poly in self.named:
+            name = self.expansion.atoms.table[atom].what
+            raising.names[name] = sympy.Symbol(name)
+            named.append((raising.names[name], raising.expression(poly)))
+        return named, [raising.expression(p) for p in self.polys]
+
+
+def simplify(
+    exprs: Sequence[Expr],
+    given: Sequence[tuple[str, Expr]] = (),
+    rates: Collection[str] = (),
+    prefix: str = "z",
+    sizes: Sequence[int] = SIZES,
+) -> Form | None:
+    """The shortest form found of expressions; None of no expressions.
+
+    Parameters
+    ----------
+    given : sequence of (str, Expr)
+        Names that stand in the expressions as symbols, and what they stand for, in order.
+    rates : collection of str, optional
+        Names of velocities and accelerations; sums of them are read more easily than sums of them and other quantities.
+    prefix : str, optional
+        Other names are ``z0``, ``z1``, ...
+    sizes : sequence of int, optional
+        Operations up to which what is shared is written out each time, one attempt each; ``WHOLE`` writes out all.
+    """
+    graph = common_graph([*exprs, *(x for _, x in given)])
+    if graph is None:
+        return None
+    roots = [*(x.id for _, x in given), *(x.id for x in exprs)]
+    best: Form | None = None
+    work = Work(WORK)
+    seen: set[tuple[int, ...]] = set()
+    for size in sizes:
+        cuts, total = _shared(graph, roots, size)
+        if cuts in seen:
+            continue
+        if best is not None and total > WRITTEN:
+            break
+        seen.add(cuts)
+        form = _Attempt(graph, work, rates).form(exprs, given, cuts, prefix)
+        if best is None or form.cost <= best.cost * (1.0 if form.named else SHARED):
+            best = form
+        if work.left <= 0:
+            break
+    work.left = math.inf  # what stands in sines and denominators is factored as it is written
+    return best
+
+
+def _shared(graph: Graph, roots: Sequence[int], largest: int) -> tuple[tuple[int, ...], int]:
+    """Nodes that are used more than once, of more operations than ``largest`` where those before have names.
+
+    Also the operations that are then written.
+    """
+    order = reachable(graph, roots)
+    uses = Counter(k for i in order for k in operands(graph.nodes[i])) + Counter(roots)
+    unnamed = operations_with(lambda row: row.kind == CONDITION) | {"neg"}  # read best where they stand
+    size: dict[int, int] = {}
+    cuts: list[int] = []
+    total = 0
+    for i in order:
+        node = graph.nodes[i]
+        size[i] = 0 if node[0] in LEAVES else 1 + sum(size[k] for k in operands(node))
+        limit = largest if uses[i] > 1 else max(largest, ALONE)
+        if size[i] > limit and node[0] not in unnamed and i not in roots:
+            cuts.append(i)
+            total += size[i]
+            size[i] = 0
+    return tuple(cuts), total + sum(size[i] for i in roots)
+
+
+class _Attempt:
+    """Makes the form in which certain nodes have names."""
+
+    def __init__(self, graph: Graph, work: Work, rates: Collection[str]) -> None:
+        self.graph, self.work = graph, work
+        self.expansion = Expansion(graph, work)
+        self.literal = Literal(self.expansion)
+        self.factoring = Factoring(self.expansion.atoms, work, rates)
+        self.named: Named = []
+
+    def form(self, exprs: Sequence[Expr], given: Sequence[tuple[str, Expr]], cuts: Sequence[int], prefix: str) -> Form:
+        known = {self.graph.symbol(name).id: (x.id, name) for name, x in given}
+        taken = {node[1] for node in self.graph.nodes if node[0] == "sym"}
+        free = (f"{prefix}{k}" for k in itertools.count() if f"{prefix}{k}" not in taken)
+        for i in sorted({*cuts, *known}):  # operands have smaller numbers, so do names that stand in them
+            of, name = known[i] if i in known else (i, next(free))
+            poly = self._shortest(of)
+            atom = self.expansion.name(i, name)
+            self.literal.name(i, {((atom, 1),): 1})
+            self.named.append((atom, poly))
+        polys = [self._shortest(x.id) for x in exprs]
+        named, polys = inlined(self.expansion, self.factoring, self.named, polys)
+        return Form(self.graph, self.expansion, self.factoring, named, polys)
+
+    def _shortest(self, i: int) -> Poly:
+        """A node multiplied out, simplified and factored, or as it stands where that is shorter."""
+        as_formed = self.literal.form(i)
+        cost = self.factoring.costs.of_terms(as_formed)
+        try:
+            with self.work.at_most(EACH * cost):
+                expanded = self.factoring.factored(self.expansion.angles.simplified(self.expansion.expand(i)))
+        except TooLongError:
+            return as_formed
+        return expanded if self.factoring.costs.of_terms(expanded) <= cost else as_formed

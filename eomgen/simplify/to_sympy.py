@@ -1,0 +1,77 @@
+"""Stage simplify: factored polynomials -> SymPy expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import sympy
+
+from ..graph.core import Graph
+from ..graph.sympy_raise import as_number, raise_operation
+from .atoms import SMALL, Atoms, Monomial, Number, Poly
+from .factor import Factoring
+
+
+class Raising:
+    """Makes SymPy expressions of polynomials over a table of atoms."""
+
+    def __init__(self, graph: Graph, atoms: Atoms, factoring: Factoring, symbols: Callable[[str], Any]) -> None:
+        self.graph = graph
+        self.atoms = atoms
+        self.factoring = factoring
+        self.symbols = symbols
+        self.names: dict[Any, Any] = {}  #: what stands for an intermediate
+        self._made: dict[int, Any] = {}
+
+    def expression(self, poly: Poly) -> Any:
+        """The SymPy expression of a polynomial as it stands."""
+        if len(poly) == 1:
+            ((monomial, x),) = poly.items()
+            if x == 1 and len(monomial) == 1 and monomial[0][1] == 1:
+                return self._atom(monomial[0][0])  # a condition stays one
+        return sympy.Add(*(self._term(m, x) for m, x in poly.items()))
+
+    def _term(self, monomial: Monomial, x: Number) -> Any:
+        factors = [sympy.Pow(as_number(self._atom(a)), _exponent(n)) for a, n in monomial]
+        return sympy.Mul(_number(x), *factors)
+
+    def _atom(self, atom: int) -> Any:
+        if atom not in self._made:
+            stack, needed = [atom], {atom}
+            while stack:  # from the inside out, as calls may be nested deep
+                new = self.atoms.inside(stack.pop()).difference(needed, self._made)
+                needed |= new
+                stack += new
+            for a in sorted(needed):
+                self._made[a] = self._raised(a)
+        return self._made[atom]
+
+    def _raised(self, atom: int) -> Any:
+        kind, what = self.atoms.table[atom]
+        if kind == "sym":
+            return self.symbols(what)
+        if kind == "name":
+            return self.names[what]
+        if kind == "pi":
+            return sympy.pi
+        if kind == "factor":
+            return self.expression(dict(what))
+        if kind == "sum":
+            return self.expression(self.factoring.factored(dict(what)))
+        if kind in ("sin", "cos"):
+            return getattr(sympy, kind)(self.expression(self.factoring.factored(dict(what))))
+        return raise_operation(self.graph, kind, [self.expression(self.factoring.factored(dict(p))) for p in what])
+
+
+def _exponent(n: Fraction | int) -> Any:
+    return sympy.Rational(n.numerator, n.denominator)
+
+
+def _number(x: Number) -> Any:
+    if isinstance(x, float):
+        return sympy.Float(x)
+    if x.denominator > SMALL:
+        return sympy.Float(float(x))
+    return sympy.Rational(x.numerator, x.denominator)
