@@ -19,7 +19,7 @@ from ..operations import CONDITION, operations_with
 from ..records import dataclass
 from .atoms import Poly, TooLongError, Work
 from .expansion import Expansion
-from .factor import Factoring
+from .factoring import Factoring
 from .inline import EACH, NAME, Named, inlined
 from .literal import Literal
 

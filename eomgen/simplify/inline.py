@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .atoms import Poly, TooLongError, add, join, multiply, ratio
 from .expansion import Expansion
-from .factor import Factoring
+from .factoring import Factoring
 
 NAME = 20.0  #: what a name costs a reader, beyond its definition
 ONCE = 60.0  #: length up to which a definition that is used once is put in its place

@@ -152,6 +152,6 @@ def test_cubics_take_the_later_state_after_a_reset() -> None:
 
 def test_names_may_be_given_as_a_list(run: Any) -> None:
     ax = run.plot(["theta", "B"])
-    assert [line.get_label() for line in ax.lines] == ["theta", "B"]
+    assert [line.get_label() for line in ax.lines] == [r"$\theta$", "$B$"]
     with pytest.raises(UsageError, match="a column must be a name or a list of names, not 3"):
         run.plot(3)

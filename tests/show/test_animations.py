@@ -321,7 +321,7 @@ def test_curves_over_a_range_name_its_unit(module: Any, monkeypatch: pytest.Monk
     motion = sample(turn, lambda t: (turn.x, None), 25, None)
     ax = Figure().add_subplot()
     draw_curves(ax, [ShownColumn("s (m)", motion.over, turn["s"])], motion)
-    assert ax.get_xlabel() == "theta (rad)"
+    assert ax.get_xlabel() == r"$\theta$ (rad)"
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium")
