@@ -191,8 +191,8 @@ def _check_inputs(
         size = np.abs(B).T @ (np.abs(S[:, :, k]) @ np.abs(forces[:, k]))
         if (np.abs(left) > REACHED * np.maximum(size, TINY)).any():
             raise UsageError(
-                f"forces are not linear in the inputs {', '.join(module.u_names[j] for _, j in inputs)} together (they "
-                "multiply each other); name one of them, or the coordinates that they drive"
+                f"the forces are not linear in the inputs {', '.join(module.u_names[j] for _, j in inputs)} together, "
+                "because these multiply each other; name one of them, or the coordinates that they drive"
             )
 
 
@@ -219,7 +219,7 @@ def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
             near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")
             raise UsageError(f"actuated: no coordinate or input {name!r}; {near}")
     if not names or len(set(names)) < len(names):
-        raise UsageError("actuated: at least one coordinate or input, each once")
+        raise UsageError("actuated must name at least one coordinate or input, and each only once")
     return names
 
 
@@ -268,8 +268,8 @@ def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: A
             part = B[chosen]
             if algebra.cond(part) > 1 / RANK:
                 raise UsageError(
-                    f"a: at t = {states.t[k]:g} the accelerations of {', '.join(rows)} do not tell the others (a dead "
-                    "centre): give a of all velocities"
+                    f"a: at t = {states.t[k]:g} the accelerations of {', '.join(rows)} do not determine the others (a "
+                    "dead centre); give the accelerations of all velocities as an array"
                 )
             result[:, k] += B @ algebra.solve(part, values[chosen, k] - free[chosen, k])
         return result
@@ -285,7 +285,7 @@ def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: A
         worst = np.unravel_index(int((np.abs(off) / (size + 1.0)).argmax()), off.shape)
         if np.abs(off[worst]) > REMAINDER * (size[worst] + 1.0):
             raise UsageError(
-                f"a breaks the constraint {layout.constraint_labels[int(worst[0])]} by {off[worst]:.3g} at "
+                f"a violates the constraint {layout.constraint_labels[int(worst[0])]} by {off[worst]:.3g} at "
                 f"t = {states.t[int(worst[1])]:g}; name the independent accelerations (a={{...}}) instead"
             )
     return result
@@ -321,7 +321,9 @@ def _input_effect(states: ProjectedStates, j: int) -> Array:
         h.append(np.asarray(module.bias(states.t, states.x, u=u)))
     slope, bend = 0.5 * (h[0] - h[2]), h[0] - 2.0 * h[1] + h[2]
     if np.abs(bend).max(initial=0.0) > AFFINE * max(*(np.abs(y).max(initial=0.0) for y in h), TINY):
-        raise UsageError(f"forces are not linear in the input {module.u_names[j]!r}; give the coordinate it drives")
+        raise UsageError(
+            f"the forces are not linear in the input {module.u_names[j]!r}; name the coordinate that it drives instead"
+        )
     return np.asarray(slope)
 
 

@@ -89,8 +89,8 @@ def equilibrium(
     rows = len(search.gradients(module, q))
     if unknowns and len(unknowns) < rows:
         raise UsageError(
-            f"{rows} held coordinates need as many unknowns to be in balance, given: {', '.join(unknowns)}; without "
-            "unknowns what is held is supported"
+            f"{rows} held coordinates need {rows} unknowns, and these are given: {', '.join(unknowns)}; give as many "
+            "unknowns as held coordinates, or none: supports then hold the coordinates"
         )
     point, steps = find_balance(search, q)
     return describe(search, point.module, point.q, point.unknowns, steps)
@@ -102,7 +102,7 @@ def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) 
     if guess is None or isinstance(guess, Mapping):
         values = {name: read_value(name, value) for name, value in (guess or {}).items()}
         if initial.sort(values).rates:
-            raise UsageError("a guess is a position: name coordinates, not rates")
+            raise UsageError("guess is a position: name coordinates in it, not rates")
         loose = {name: value for name, value in values.items() if name not in held}
         q = initial.from_guess(loose) if loose else initial.assembled({})
     else:

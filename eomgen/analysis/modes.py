@@ -203,8 +203,8 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
         values, complexes = algebra.eig(reduced)
         if np.abs(values.imag).max() > SYMMETRIC * max(1.0, np.abs(values).max()):
             raise UsageError(
-                "the undamped modes are not real, because the stiffness is not symmetric (forces that follow the "
-                "motion); see the eigenvalues of linearize"
+                "the undamped modes are not real, because the stiffness matrix is not symmetric (a force follows the "
+                "motion of a body); use the eigenvalues of linearize()"
             )
         order = np.argsort(values.real)
         squares, vectors = values.real[order], complexes.real[:, order]
@@ -264,7 +264,7 @@ def modes(
     if not linear.is_equilibrium:
         k = int(np.abs(linear.drift).argmax())
         raise UsageError(
-            f"modes are those about an equilibrium, and here {linear.states[k]} changes at a rate of "
-            f"{linear.drift[k]:.6g}; find one with equilibrium(), or take the eigenvalues of linearize()"
+            f"modes() needs an equilibrium, and at this state {linear.states[k]} changes at a rate of "
+            f"{linear.drift[k]:.6g}; find one with equilibrium(), or use the eigenvalues of linearize()"
         )
     return Modes(linear, module)

@@ -285,7 +285,8 @@ def joint_type(type_name: str) -> ElementType:
     """One joint type as the type of an element."""
     text = " ".join((inspect.getdoc(JOINTS[type_name]) or "").partition("\n\n")[0].split())
     keys = {key: field for key, field in joint_fields(type_name).items() if key != "type"}
-    doc = f"a joint of type {type_name}: {text[:1].lower()}{text[1:]}".replace(". Allows", ".  Allows")
+    doc = f"a joint of type {type_name}: {text}".replace(", removes", " of 6 degrees of freedom, removes")
+    doc = doc.replace(". Allows", ".  Allows")
     return ElementType(type_name, doc, keys, ends=("predecessor", "successor"))
 
 

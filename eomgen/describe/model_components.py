@@ -114,7 +114,7 @@ class ComponentMethods(Described):
         """
         part = _component(component)
         if prefix and fault_of_name(prefix):
-            raise UsageError(f"prefix={prefix!r} cannot begin a name; letters, digits and underscores")
+            raise UsageError(f"prefix={prefix!r} cannot begin a name; use letters, digits and underscores")
         values = {name: _plain(value) for name, value in parameters.items() if value is not None}
         description = self._description
         made = replace(description, lines=dict(description.lines), origins=dict(description.origins), problems=[])
@@ -159,7 +159,7 @@ def _component(given: Any) -> Component:
 
         description = plain_description(given.description)
     else:
-        raise UsageError(f"{given!r} is no component; give a Model, or the name of a model file")
+        raise UsageError(f"{given!r} is not a component; give a Model, or the name of a model file")
     name = str(description.values.get("name", "component"))
     part = component_of(description, name, f"components.{name}.", faults.add)
     for problem in (*description.problems, *faults.problems):

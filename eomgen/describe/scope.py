@@ -23,10 +23,10 @@ LEVELS |= {"event": OUTPUT + 1}
 LEVELS |= {"function": OUTPUT + 1}  # by itself; calls are not looked up here
 
 _LEVEL_REMEDY = {
-    NUMBER: "numbers and pi can",
-    CONSTANT: "numbers, parameters and pi can",
-    MOTION: "t, parameters, inputs, coordinates and their velocities can",
-    OUTPUT: "t, parameters, inputs, coordinates, their rates, motion of markers and energies can",
+    NUMBER: "allowed are numbers and pi",
+    CONSTANT: "allowed are numbers, parameters and pi",
+    MOTION: "allowed are t, parameters, inputs, coordinates and their velocities",
+    OUTPUT: "allowed are t, parameters, inputs, coordinates, their rates, motion of markers and energies",
 }
 _QUANTITY = re.compile(rf"({'|'.join(QUANTITIES)})\((.+)\)\Z", re.DOTALL)
 RATES = ("", "_dot", "_ddot")
@@ -179,4 +179,4 @@ class Scope:
 
     def _refuse(self, name: str, kind: str) -> None:
         remedy = f"only {_LEVEL_REMEDY[self.level]}"
-        self.names.faults.add(self.path, f"the {kind} {name!r} cannot stand here", remedy)
+        self.names.faults.add(self.path, f"the {kind} {name!r} cannot be used here", remedy)

@@ -223,7 +223,7 @@ def test_given_equations_are_checked() -> None:
     assert "equations.rates: 'b' has no rate" in faults(velocities=["u", "v"], rates={"a": "u"})
     assert "equations.constraints[0]: is not linear in the velocities" in faults(constraints=["a_dot*b_dot"])
     assert "equations.multipliers: 2 names for 1 constraints" in faults(constraints=["a - b"], multipliers=["l", "n"])
-    assert "cannot stand here" in faults(forcing=["a_ddot", 0])
+    assert "cannot be used here" in faults(forcing=["a_ddot", 0])
     assert "equations.masses: unknown key" in faults(masses=1)
     assert "equations: the model has bodies" in str_of_mixed()
 

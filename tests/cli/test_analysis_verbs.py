@@ -162,9 +162,9 @@ def test_impact(call: Call) -> None:
         (["--gap", "s"], "--gap s: write name=value, for example --gap s=0.5"),
         (["--gap", "s=abc"], "--gap s=abc: 'abc' is not a number"),
         (["--gap", "ss=0.5"], "--gap: no coordinate or output 'ss'"),
-        (["--gap", "s=2"], "--gap: the restitution of s is between 0 and 1"),
+        (["--gap", "s=2"], "--gap: the restitution of s must be between 0 and 1"),
         (["--stop", "q"], "--stop: no coordinate or output 'q'"),
-        (["--gap", "s=0.5"], "open; an impact needs 0"),
+        (["--gap", "s=0.5"], "(open); an impact needs a gap of 0"),
     ):
         result = call("impact", CRANK, "--target", "numpy", *option)
         assert result.code == 2

@@ -54,7 +54,7 @@ BROKEN = [
         "com: [theta, 0, 0]",
         13,
         "bodies.rod.com[0]",
-        "the coordinate 'theta' cannot stand",
+        "the coordinate 'theta' cannot be used",
         "parameters",
     ),
     (
@@ -62,7 +62,7 @@ BROKEN = [
         "stiffness: 1 + theta",
         22,
         "forces.k1.stiffness",
-        "the coordinate 'theta' cannot stand",
+        "the coordinate 'theta' cannot be used",
         "numbers",
     ),
     ("value: tau}", "value: x(rod)}", 21, "forces.motor.value", "x(...) of a marker cannot be used", "outputs only"),
@@ -135,13 +135,13 @@ BROKEN = [
     ("theta_dot: 10", "theta_dot: q", 25, "initial.theta_dot", "unknown name 'q'", ""),
     ("end: 5", "end: -5", 26, "simulation.end", "-5 is not a number greater than 0", ""),
     ("method: DOP853", "method: DOP85", 26, "simulation.method", "'DOP85' is not known", "did you mean 'DOP853'?"),
-    ("value: 0.1, unit", "value: m_c/2, unit", 4, "parameters.r.value", "'m_c' cannot stand here", "numbers and pi"),
+    ("value: 0.1, unit", "value: m_c/2, unit", 4, "parameters.r.value", "'m_c' cannot be used here", "numbers and pi"),
     ("unit: m, doc", "unit: 3, doc", 4, "parameters.r.unit", "3 is not a text", ""),
     ("name: slider_crank", "name: slider-crank", 1, "name", "not an identifier", "letters"),
     ("name: slider_crank", "doc: none", 1, "name", "is missing", "name"),
     ("independent: [theta]", "independant: [theta]", 24, "independant", "unknown key", "did you mean 'independent'?"),
     ("[0, -g, 0]", "[0, -g]", 2, "gravity", "is not three numbers", ""),
-    ("[0, -g, 0]", "[0, -g*t, 0]", 2, "gravity[1]", "the time 't' cannot stand here", "parameters"),
+    ("[0, -g, 0]", "[0, -g*t, 0]", 2, "gravity[1]", "the time 't' cannot be used here", "parameters"),
 ]
 
 

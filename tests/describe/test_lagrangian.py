@@ -94,7 +94,7 @@ def test_faults() -> None:
         bad.mechanism()
     told = {(p.path, p.message.split(" (")[0]) for p in caught.value.problems}
     assert ("lagrangian.expression", "unknown name 'z'") in told
-    assert ("lagrangian.expression", "the acceleration 'q_ddot' cannot stand here") in told
+    assert ("lagrangian.expression", "the acceleration 'q_ddot' cannot be used here") in told
     assert ("lagrangian.forces.z", "no coordinate 'z'") in told
     assert any(path == "lagrangian.constraints[0]" and "gamma" in message for path, message in told)
 

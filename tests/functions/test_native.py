@@ -166,8 +166,8 @@ def test_other_words_of_a_compiler_are_no_fault_of_a_source(sources: Path) -> No
         ("/* double swing(double) */\nstatic const double\nswing(double a,\n double b)\n{}", {},
          r"swing\.arguments: swing in laws\.c:3 takes 2 arguments, not the 1 declared; give arguments: 2"),
         ("double other(double q) { return swing(q); }\ndouble swing(void) { return 1; }", {}, "laws.c:2 takes 0 arg"),
-        ("int swing(int q) { return q; }", {}, "laws.c:1 has 'int', which is no double; write double swing.double."),
-        ("double swing(double *q) { return *q; }", {}, "has 'double .q', which is no double"),
+        ("int swing(int q) { return q; }", {}, "laws.c:1 has 'int', which is not double; write double swing.double."),
+        ("double swing(double *q) { return *q; }", {}, "has 'double .q', which is not double"),
     ],
 )  # fmt: skip
 def test_arguments_are_held_against_the_source(sources: Path, text: str, keys: dict[str, Any], message: str) -> None:
@@ -269,7 +269,7 @@ def test_twin_files_that_do_not_fit_are_told(sources: Path) -> None:
     for file, message in (("other.py", "other.py has no function swing"), ("broken.py", "ZeroDivisionError")):
         with pytest.raises(ModelError, match=message):
             pendulum("-swing(q)", full(sources, python=sources / file)).mechanism()
-    with pytest.raises(UsageError, match="python_derivatives go with a callable"):
+    with pytest.raises(UsageError, match="python_derivatives need a callable"):
         eg.Model("m").native("f", "f.c", python="f.py", python_derivatives=[math.cos])
     with pytest.raises(UsageError, match="native has no argument 'sorce'"):
         eg.Model("m").native("f", sorce="f.c")  # type: ignore[call-arg]
