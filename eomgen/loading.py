@@ -67,7 +67,7 @@ def load(
         example = f"; the example is load_example({path!r})" if find_example(path, example_files()) else ""
         raise UsageError(f"{path}: files ending in {suffix or 'nothing'} cannot be loaded; supported: {known}{example}")
     if robot:
-        raise UsageError(f"{path}: {', '.join(robot)}: options of robot files, not of model files")
+        raise UsageError(f"{path} is a model file, and {', '.join(robot)} are options of robot files only")
     model = Model.from_description(describe_yaml_file(path, allow_native=allow_native))
     if check_inertia is not None:
         word = word_of_check(check_inertia)

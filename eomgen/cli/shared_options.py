@@ -267,7 +267,7 @@ def _read_stdin(options: dict[str, Any]) -> Model:
 
 def _missing(path: Path) -> str:
     if what := kind_of(path):
-        return f"{path} is {what}, no plain file; " + (
+        return f"{path} is {what}, not a plain file; " + (
             "name a model file in it" if path.is_dir() else "copy what it gives into a file"
         )
     from ..shipped import example_files

@@ -89,7 +89,7 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
         if fault:
             faults.add(f"{PATH}.intermediates.{name}", *fault)
         elif name in reader.names.kinds:
-            message = f"the name is taken by the {reader.names.kinds[name]}"
+            message = f"the name is already used by the {reader.names.kinds[name]}"
             faults.add(f"{PATH}.intermediates.{name}", message, "rename one")
         local[name] = reader.expression(f"{PATH}.intermediates.{name}", part, MOTION, local)
     rates = _rates(reader, values.get("rates"), q, v, local)

@@ -123,7 +123,8 @@ class Ensemble:
             return np.asarray(self.reduced["mean"][row])
         if self.x is None:
             raise UsageError(
-                f"this ensemble kept only the results of its reduction ({', '.join(self.reduced)}), not {name!r}"
+                f"this ensemble kept only the results of its reduction ({', '.join(self.reduced)}), not {name!r}; "
+                "run it with reduce='states'"
             )
         states = self.x[:, None] if self.samples is None else self.samples
         if row < len(self.x):
@@ -155,7 +156,7 @@ class Ensemble:
         if self._statistics:
             rows = [self.reduced[key][:, -1] for key in ("mean", "variance", "least", "greatest")]
         elif self.x is None:
-            raise UsageError("this ensemble kept no states to summarise")
+            raise UsageError("this ensemble kept no states to summarise; run it with reduce='states' or 'statistics'")
         else:
             parts = summarise(self._outputs(self.x, self.t_end))
             spread = parts["squares"] / np.maximum(parts["count"] - 1.0, 1.0)

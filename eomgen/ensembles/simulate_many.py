@@ -173,7 +173,7 @@ def simulate_many(
     except (KeyError, ValueError, TypeError, IndexError) as error:
         if store_of is None:
             raise
-        raise UsageError(f"the blocks in store {store} do not fit each other: {error}; name another folder") from error
+        raise UsageError(f"the blocks in store {store} do not belong together: {error}; name another folder") from error
 
 
 def _run(

@@ -39,7 +39,7 @@ def read_arrays(path: Path, compressed: bool = True) -> dict[str, Any]:
     ------
     FileNotFoundError
     UsageError
-        It is no plain file.
+        It is not a plain file.
     ValueError and others of :data:`BROKEN`
         It is damaged, or holds what is no array of numbers or of text.
     """

@@ -113,7 +113,7 @@ class Assembled:
         """
         initial, given = self._given(guess, named, t, p, u)
         if given.rates:
-            raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; x0 takes rates too")
+            raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; use x0 for rates")
         return initial.from_guess(given.positions) if given.positions else initial.assembled({})
 
     @both_names
@@ -184,7 +184,7 @@ class Assembled:
             scalar = isinstance(given, (float, int, np.number)) or (isinstance(given, np.ndarray) and not given.ndim)
             if scalar and name in layout.q + layout.loops + layout.v:
                 kind = "velocity" if name in layout.v else "coordinate"
-                raise UsageError(f"{name}= gives the {what}; the {kind} {name!r} goes in a dict: {{{name!r}: ...}}")
+                raise UsageError(f"{name}= gives the {what}; give the {kind} {name!r} in a dict: {{{name!r}: ...}}")
         kernels = (self if p is None and u is None else self.bind(p, u)).kernels
         return initial_of(kernels, read_number("t", t), names)
 

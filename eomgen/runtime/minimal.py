@@ -208,7 +208,8 @@ class Minimal:
             if turned and np.abs(change).max() > SUDDEN * max(a, a_other) * gap:
                 self._memory.q = before
                 raise PartitionError(
-                    f"t = {t:.6g}: {', '.join(self.q_names)} passed a dead centre, where the branch is lost; "
+                    f"t = {t:.6g}: {', '.join(self.q_names)} passed a dead centre, so the branch is not known any "
+                    "more; "
                     "choose other independent coordinates, or integrate the full state",
                     t,
                     x,

@@ -108,7 +108,7 @@ def require_mapping(what: str, given: Any) -> None:
     UsageError
     """
     if not isinstance(given, Mapping):
-        raise UsageError(f"{what} must give values by name, as a mapping does, not {shown(given)}")
+        raise UsageError(f"{what} must be a mapping of names to values, not {shown(given)}")
 
 
 def require(module: str, extra: str, purpose: str) -> ModuleType:

@@ -26,7 +26,7 @@ from .room import as_real, read_vector
 Block: TypeAlias = Callable[[Any, Array, Array, Array], Array]
 
 #: For values by name where a call takes an array.
-BY_NAME = "{0} of a call is an array in the order of {0}_names; by name: bind({0}={{...}})"
+BY_NAME = "{0} of a call must be an array in the order of {0}_names; to give values by name use bind({0}={{...}})"
 CODES = {error: status for status, error in STATUS.items()}
 NON_FINITE = CODES[NonFiniteError]
 
@@ -95,7 +95,7 @@ class NumpyCore:
         except ArithmeticError:  # Python's own numbers raise where NumPy's become infinite: 1.0 / 0.0
             c = np.array(np.nan)
         if not np.isfinite(c).all() and np.isfinite(p).all():
-            raise error(f"the constants that follow from the parameters cannot be computed; p = {p}")
+            raise error(f"the constants cannot be computed from the parameters p = {p}")
         return c
 
     def timed(

@@ -177,7 +177,7 @@ class Trajectory:
             The run kept no dense output, or a time outside it.
         """
         if self._sample is None:
-            raise UsageError("no dense output was kept: simulate with dense_output=True")
+            raise UsageError("the run kept no dense output; simulate with dense_output=True")
         times = np.atleast_1d(read_numbers("t", t))
         low, high = sorted(self.metadata["span"])
         if times.ndim != 1 or not ((times >= low) & (times <= high)).all():
@@ -231,7 +231,7 @@ class Trajectory:
         """
         columns: Any = self._columns
         if not hasattr(type(columns), "change_points"):
-            raise UsageError("change points need the model: ask the trajectory that simulate gave, before it is saved")
+            raise UsageError("change points need the model: use the trajectory of simulate, not one read from a file")
         found: list[ChangePoint] = columns.change_points
         return found
 

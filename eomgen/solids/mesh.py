@@ -47,7 +47,7 @@ def measure_mesh(path: str) -> MeshProperties:
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror}") from None
     if not S_ISREG(stat.st_mode):
-        raise UsageError(f"{path} is no plain file")
+        raise UsageError(f"{path} is not a plain file")
     if not path.lower().endswith(".stl"):
         raise UsageError(f"{path}: only STL files (.stl) can be read")
     if stat.st_size > MESH:

@@ -142,7 +142,7 @@ def test_functions_of_time_may_be_specified() -> None:
     assert run["T"][-1] == pytest.approx(other["T"][-1], rel=1e-12)
     many = free.simulate_many(1.0, {"x": [0.1, 0.2]}, inputs=given)
     assert many["x"][0] == pytest.approx(run["x"][-1], abs=1e-8)
-    with pytest.raises(eg.UsageError, match="its rate lift_dot, which is not known of a function"):
+    with pytest.raises(eg.UsageError, match="its rate lift_dot, and the rate of a function is not known"):
         free.simulate(1.0, inputs={"lift": lambda t, x: 0.0})
     assert driven.rhs(0.7, [0.1, 0.0])[1] == pytest.approx(-15.0 * 0.1 + 0.9 * np.sin(2.1))
 
@@ -229,7 +229,7 @@ def test_given_equations_are_checked() -> None:
 
 
 def test_intermediates_are_checked() -> None:
-    assert "equations.intermediates.a: the name is taken by the coordinate" in faults(intermediates={"a": "2"})
+    assert "equations.intermediates.a: the name is already used by the coordinate" in faults(intermediates={"a": "2"})
     assert "unknown name 'z2'" in faults(intermediates={"z1": "z2 + 1", "z2": "a"})
     assert "equations.intermediates.2z" in faults(intermediates={"2z": 1})
 
@@ -245,6 +245,6 @@ def str_of_mixed() -> str:
 
 def test_a_method_that_needs_bodies_is_refused() -> None:
     model = eg.from_sympy(pulled_pendulum(), "pulled")
-    with pytest.raises(eg.UsageError, match="given equations are taken as they are: auto, given"):
+    with pytest.raises(eg.UsageError, match="for given equations there are: auto, given"):
         model.derive("embedding")
     assert model.derive("given").method == "given"

@@ -38,7 +38,7 @@ def test_what_does_not_fit_is_refused(call: Call) -> None:
     for words, fault in (
         (["--method", "kane"], "there are: auto, embedding"),
         (["--baumgarte", "3"], "not two numbers ALPHA,BETA"),
-        (["--baumgarte", "3,4"], "belongs to method 'augmented'"),
+        (["--baumgarte", "3,4"], "works with method 'augmented' only"),
     ):
         refused = call("derive", FILE, *words)
         assert refused.code == 2

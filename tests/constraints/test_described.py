@@ -193,7 +193,7 @@ BROKEN = [
     ("lift: k + r*cos(theta)", "lift: k + r*cos(alpha)", 25, "c7.lift", "the coordinate 'alpha' cannot", "parameters"),
     ("lift: k + r*cos(theta)", "lift: k + q*cos(theta)", 25, "c7.lift", "unknown name 'q'", "declare a parameter"),
     ("radius: r/9, coord", "coord", 26, "c8.radius", "is missing", "radius of the roller"),
-    (", coordinate: c}", ", coordinate: beta}", 13, "", "'beta' is taken", "rename"),
+    (", coordinate: c}", ", coordinate: beta}", 13, "", "'beta' is already used", "rename"),
     ("shape: roller", "shape: rollr", 26, "c8.shape", "'rollr' is not known", "roller"),
     ("shape: flat_face, supp", "shape: knife_edge, supp", 27, "c9.support", "only a flat face", "contour"),
     ("follower: bar, shape: flat", "follower: one, shape: flat", 27, "c9.follower", "on the same body", "another"),

@@ -215,5 +215,5 @@ def test_a_loop_that_cannot_close_is_not_blamed_on_the_driver() -> None:
 def test_initial_values_that_contradict_a_driver() -> None:
     m = slider_crank()
     m.initial(A=0.3)
-    with pytest.raises(eg.AssemblyError, match="A = 0.3 are inconsistent.*at t = 0 the drivers hold drive"):
+    with pytest.raises(eg.AssemblyError, match="A = 0.3 are inconsistent.*at t = 0 the drivers prescribe drive"):
         m.check()

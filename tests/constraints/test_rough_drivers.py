@@ -21,7 +21,7 @@ def driven(value: str) -> eg.Model:
 )
 def test_corners_are_noted(value: str, word: str) -> None:
     (note,) = driven(value).check().notes
-    assert f"motor: {word} in a driver's value may make a corner" in str(note)
+    assert f"motor: {word} in a driver's value can make a corner" in str(note)
 
 
 def test_smooth_motions_are_not_noted() -> None:

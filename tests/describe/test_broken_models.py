@@ -36,17 +36,38 @@ BROKEN = [
     ("pin_x: x(rod.tip)", "pin_x: x(rod.tap)", 23, "outputs.pin_x.expression", "no marker 'tap'", "'tip'"),
     ("pin_x: x(rod.tip)", "pin_x: x(road)", 23, "outputs.pin_x.expression", "no body 'road'", "'rod'"),
     ("  g: 9.81", "  g: 9.81\n  2r: 1", 10, "parameters.2r", "'2r' is not an identifier", "starts with a letter"),
-    ("  g: 9.81", "  g: 9.81\n  lambda: 1", 10, "parameters.lambda", "a word of Python", "lambda_"),
-    ("  g: 9.81", "  g: 9.81\n  double: 1", 10, "parameters.double", "a word of C", "double_"),
-    ("  g: 9.81", "  g: 9.81\n  t: 1", 10, "parameters.t", "'t' is the time", "another name"),
-    ("  g: 9.81", "  g: 9.81\n  sqrt: 1", 10, "parameters.sqrt", "'sqrt' is a function", "another name"),
-    ("  g: 9.81", "  g: 9.81\n  s: 1", 20, "joints.D.coordinate", "'s' is taken by the parameter", "one namespace"),
-    ("  g: 9.81", "  g: 9.81\n  theta_dot: 1", 17, "joints.A.coordinate", "'theta_dot' is taken", "rename one"),
-    ("inputs: {tau", "inputs: {g", 10, "inputs.g", "'g' is taken by the parameter at parameters.g", "rename one"),
-    ("speed: vx", "tau: vx", 23, "outputs.tau", "'tau' is taken by the input", "rename one"),
+    ("  g: 9.81", "  g: 9.81\n  lambda: 1", 10, "parameters.lambda", "a reserved word of Python", "lambda_"),
+    ("  g: 9.81", "  g: 9.81\n  double: 1", 10, "parameters.double", "a reserved word of C", "double_"),
+    ("  g: 9.81", "  g: 9.81\n  t: 1", 10, "parameters.t", "'t' is reserved for the time", "another name"),
+    ("  g: 9.81", "  g: 9.81\n  sqrt: 1", 10, "parameters.sqrt", "'sqrt' is a built-in function", "another name"),
+    (
+        "  g: 9.81",
+        "  g: 9.81\n  s: 1",
+        20,
+        "joints.D.coordinate",
+        "'s' is already used by the parameter",
+        "one namespace",
+    ),
+    ("  g: 9.81", "  g: 9.81\n  theta_dot: 1", 17, "joints.A.coordinate", "'theta_dot' is already used", "rename one"),
+    (
+        "inputs: {tau",
+        "inputs: {g",
+        10,
+        "inputs.g",
+        "'g' is already used by the parameter at parameters.g",
+        "rename one",
+    ),
+    ("speed: vx", "tau: vx", 23, "outputs.tau", "'tau' is already used by the input", "rename one"),
     ("speed: vx", "theta: vx", 23, "outputs.theta", "'theta' is a coordinate", "must be theta itself"),
     ("  D: {type", "  C: {type", 19, "joints.C", "given twice, first in line 18", "rename one"),
-    ("coordinate: s}", "coordinate: theta}", 19, "joints.D.coordinate", "'theta' is taken by the coordinate", "rename"),
+    (
+        "coordinate: s}",
+        "coordinate: theta}",
+        19,
+        "joints.D.coordinate",
+        "'theta' is already used by the coordinate",
+        "rename",
+    ),
     ("value: tau}", "value: tua}", 21, "forces.motor.value", "unknown name 'tua'", "did you mean 'tau'?"),
     ("com: [l/2, 0, 0]", "com: [ell/2, 0, 0]", 13, "bodies.rod.com[0]", "unknown name 'ell'", "declare a parameter"),
     (
@@ -257,4 +278,4 @@ def test_empty_and_double_models() -> None:
     both = Model.from_lagrangian("both", "q_dot**2/2", ["q"])
     both.body("b", mass=1)
     assert "lagrangian" in python_problems(both)
-    assert python_problems(Model("double"))["name"].startswith("'double' is a word of C")
+    assert python_problems(Model("double"))["name"].startswith("'double' is a reserved word of C")

@@ -102,7 +102,7 @@ def test_faults() -> None:
 def test_a_clash_of_names() -> None:
     v = sympy.Symbol("q_dot")
     clash = Model.from_lagrangian("p", v**2, ["q"], inputs={"q_dot": 1})
-    with pytest.raises(ModelError, match="'q_dot' is taken"):
+    with pytest.raises(ModelError, match="'q_dot' is already used"):
         clash.mechanism()
     with pytest.raises(ModelError, match="there are no coordinates; name at least one"):
         Model.from_lagrangian("p", v**2, []).mechanism()

@@ -48,7 +48,7 @@ def test_a_store_of_another_ensemble_is_refused(pendulum: Any, tmp_path: Path) -
         with pytest.raises(eg.UsageError, match="belongs to another ensemble: .* differ"):
             pendulum.simulate_many(**{"span": 1, "initial": angles(4), **changed}, store=tmp_path / "runs")
     (tmp_path / "mine.txt").write_text("precious")
-    with pytest.raises(eg.UsageError, match="not empty and holds no ensemble"):
+    with pytest.raises(eg.UsageError, match="not empty and does not contain an ensemble"):
         pendulum.simulate_many(1, angles(4), store=tmp_path)
     block = next((tmp_path / "runs").glob("block_*"))
     block.write_bytes(block.read_bytes()[:700])

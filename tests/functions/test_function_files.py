@@ -184,7 +184,7 @@ def test_permission_runs_it(sources: Path, monkeypatch: pytest.MonkeyPatch) -> N
         ("{type: native, source: none.c}", "none.c cannot be read (No such file or directory); paths are relative"),
         ("{type: native, source: laws.c, derivatives: swing}", "functions.swing.derivatives: 'swing' is not a list"),
         ("{type: native, source: laws.c, function: [a]}", "functions.swing.function: ['a'] is not a name"),
-        ("{type: native, source: ., function: a}", "is no plain file but a folder"),
+        ("{type: native, source: ., function: a}", "is not a plain file but a folder"),
         ("{type: native, source: laws.c, python: [a]}", "functions.swing.python: ['a'] is not the path of a file"),
     ],
 )

@@ -215,7 +215,7 @@ def test_packages_carry_the_function(sources: Path, tmp_path: Path) -> None:
 
 def test_a_package_cannot_carry_a_callable(sources: Path, tmp_path: Path) -> None:
     m = pendulum("-swing(q)", full(sources, python=math.sin))
-    with pytest.raises(UsageError, match="needs its Python twin as a file"):
+    with pytest.raises(UsageError, match="needs this function in Python too, in a file"):
         generate(m, tmp_path / "numpy", target="numpy")
     with pytest.raises(UsageError, match="cannot be written to a model file"):
         m.to_yaml()

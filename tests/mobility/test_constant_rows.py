@@ -107,5 +107,5 @@ def test_rows_of_time_or_inputs_alone_are_refused(row: sp.Expr, what: str) -> No
     m = eg.Model.from_lagrangian(
         "of_time", x_dot**2 / 2, [x], constraints=[row], parameters={"d": 1.0} if row.has(d) else {}, inputs={"u": 1.0}
     )
-    with pytest.raises(ModelError, match=f"{what} and on no coordinate, so nothing can hold it"):
+    with pytest.raises(ModelError, match=f"{what} but on no coordinate, so no motion can satisfy it"):
         m.check()

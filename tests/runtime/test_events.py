@@ -269,7 +269,7 @@ def test_faults_are_told_with_their_lines(tmp_path: Path) -> None:
         eg.load(file).compile()
     text = str(told.value)
     for words in (
-        "events.h: the name 'h' is taken",
+        "events.h: the name 'h' is already used",
         "the acceleration 'h_ddot' cannot be used in an event",
         "events.far.expression: is missing",
         "events.far.direction: 2 is not 1, -1 or 0",

@@ -179,7 +179,7 @@ def test_models_without_series_say_so() -> None:
     body = m.body("mass", mass=1.0)
     m.prismatic("J", m.ground, body, axis="x", coordinate="s")
     m.torque("push", "J", "-max(s, 0)")
-    for target, why in (("cython", "max of what moves has corners"), ("numpy", "its module has none compiled")):
+    for target, why in (("cython", "max of a moving quantity has corners"), ("numpy", "its module has none compiled")):
         with pytest.raises(eg.UsageError, match=f"no Taylor series: {why}"):
             m.compile(target=target).simulate(1, method="Taylor")
 
