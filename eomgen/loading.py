@@ -65,7 +65,8 @@ def load(
     if suffix not in SUFFIXES:
         known = ", ".join(f"{s} {what}" for s, what in {**SUFFIXES, **ROBOTS}.items())
         example = f"; the example is load_example({path!r})" if find_example(path, example_files()) else ""
-        raise UsageError(f"{path}: files ending in {suffix or 'nothing'} cannot be loaded; supported: {known}{example}")
+        ending = suffix or "(none)"
+        raise UsageError(f"{path}: files with the ending {ending} cannot be loaded; supported are {known}{example}")
     if robot:
         raise UsageError(f"{path} is a model file, and {', '.join(robot)} are options of robot files only")
     model = Model.from_description(describe_yaml_file(path, allow_native=allow_native))

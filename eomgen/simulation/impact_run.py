@@ -75,7 +75,7 @@ def simulate_impacts(
     for key in ("events", "t_eval", "dense_output"):
         if key in options:
             raise UsageError(
-                f"simulate_impacts has no {key}=; the run it returns has t_events, and at(t) for any times"
+                f"simulate_impacts has no {key}=; use t_events of the run that it returns, and at(t) for any times"
             )
     most = read_count("most, the number of impacts,", most, 1)
     found, _ = check_gaps(module.layout, gaps)
@@ -100,8 +100,8 @@ def _ending(module: BoundModel) -> list[str]:
     for event in declared:
         if int(event.get("terminal") or 0) > 1:
             raise UsageError(
-                f"event {event['name']} ends a run when it has happened {event['terminal']} times, which "
-                "simulate_impacts does not count; give the gaps as events with restitution, and simulate"
+                f"event {event['name']} ends a run after {event['terminal']} times, and simulate_impacts cannot "
+                "count them; give the gaps as events with restitution, and use simulate"
             )
     return [str(event["name"]) for event in declared if event.get("terminal")]
 
@@ -136,7 +136,7 @@ class _ImpactRun:
         values = self.gaps.values(t, x)
         low = values < -np.maximum(self.limits, allowance(self.module.layout, self.gaps.names, BEYOND))
         for i in np.flatnonzero(low):
-            raise UsageError(f"gaps: {self.gaps.names[i]} is {values[i]:.3g} at the start; a gap is 0 or positive")
+            raise UsageError(f"gaps: {self.gaps.names[i]} is {values[i]:.3g} at the start; a gap must be 0 or positive")
         fired, idle = np.zeros(len(values), dtype=bool), 0
         while True:
             closed = fired | (self.gaps.values(t, x) <= self.limits)
@@ -270,5 +270,5 @@ class _ImpactRun:
             i = int(np.flatnonzero(beyond[:, k])[0])
             raise SimulationError(
                 f"the gap {self.gaps.names[i]} is {values[i, k]:.6g} at t = {t[k]:.6g} s without an impact before: "
-                "it jumps there, or closes and opens within less than a step; give max_step"
+                "it jumps there, or it closes and opens within one step; give max_step"
             )

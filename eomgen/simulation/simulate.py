@@ -134,7 +134,7 @@ def simulate(
 
         kept = Checkpoint(checkpoint, checkpoint_every, resume)
     elif resume is not None:
-        raise UsageError("resume needs checkpoint=, the file to go on from")
+        raise UsageError("resume needs checkpoint=, the file to continue from")
     if (isinstance(method, str) and method == "kinematic") or (method is None and not module.n_dof):
         from .driven import follow_drivers
 
@@ -150,7 +150,7 @@ def simulate(
     forcing = Forcing(module.layout, inputs)
     compiled = can_run(module, method, forcing) and options.keys().isdisjoint(IMPLICIT)
     if method == "RK4" and not compiled:
-        raise UsageError("method RK4 runs in compiled code only: target='cython', and no input that is a function")
+        raise UsageError("method RK4 needs compiled code: use target='cython', and no input that is a function")
     if compiled:
         solver, title = None, str(method)
         check_names("option of simulate", options, (), OPTIONS)

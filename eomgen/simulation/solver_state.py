@@ -49,8 +49,8 @@ class Pause:
         name = solver.__name__
         if name not in STATE or not solver.__module__.startswith("scipy."):
             raise UsageError(
-                f"no checkpoint can be kept with method {name}: its state cannot be read; "
-                f"take one of {', '.join(STATE)}"
+                f"a run with method {name} cannot keep a checkpoint, because its state cannot be read; "
+                f"use one of {', '.join(STATE)}"
             )
         if dense:
             raise UsageError(

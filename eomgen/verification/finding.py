@@ -92,7 +92,7 @@ class Verification(NamedTuple):
         left_out = len(self.findings) - len(checked)
         ending = f"{len(checked)} checks, {len(self.breaches)} breaches"
         ending += f", {left_out} left out" if left_out else ""
-        ending += f", {self.not_reached} of them not reached: give more seconds" if self.not_reached else ""
+        ending += f", {self.not_reached} of them for lack of time: give more seconds" if self.not_reached else ""
         return f"verification of {self.name}\n\n{self.table}\n\n{'ok' if self.ok else 'BREACH'}: {ending}"
 
     def __repr__(self) -> str:

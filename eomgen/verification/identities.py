@@ -38,7 +38,7 @@ def identities(module: BoundModel, cases: Sequence[Case]) -> list[Finding]:
     found = []
     for name, check in CHECKS.items():
         if module.metadata.get("no_inertia") and check not in KINEMATIC:
-            found.append(Finding.skipped(name, "the model is there for kinematics only"))
+            found.append(Finding.skipped(name, "the model is for kinematics only"))
             continue
         try:
             found.append(check(module, cases))
@@ -61,7 +61,7 @@ def _definite(module: BoundModel, cases: Sequence[Case]) -> Finding:
     if not module.n_dof or module.layout.given_rates:
         return Finding.skipped(check, "there is no degree of freedom" if not module.n_dof else "equations are given")
     if module.metadata.get("indefinite"):
-        return Finding.skipped(check, "the model allows masses and inertias that no body has")
+        return Finding.skipped(check, "the model accepts masses and inertias that no body can have")
     found = Comparison(check, "asymmetry; or the smallest eigenvalue at unit diagonal, sign reversed")
     for c in cases:
         M = module.embedded_mass_matrix(c.q, p=c.p, u=c.u, t=c.t)

@@ -164,11 +164,11 @@ def test_what_is_refused(compiled: Callable[..., Any]) -> None:
     with pytest.raises(eg.UsageError, match=r"gap z is -0\.1 m \(closed too far\)"):
         ball().impact(0.0, [-0.1, -1.0], {"z": 0.5})
     for words, message in (
-        ({"initial": {"z": 0.0}}, "gap is -0.1 at the start; a gap is 0 or positive"),
+        ({"initial": {"z": 0.0}}, "gap is -0.1 at the start; a gap must be 0 or positive"),
         ({"span": -1.0}, "forward in time"),
         ({"gaps": {}}, "needs gaps"),
         ({"most": 0}, "most, the number of impacts, must be a whole number of at least 1, not 0"),
-        ({"t_eval": [0.0]}, r"no t_eval=; the run it returns has t_events, and at\(t\)"),
+        ({"t_eval": [0.0]}, r"no t_eval=; use t_events of the run that it returns, and at\(t\)"),
     ):
         with pytest.raises(eg.UsageError, match=message):
             ball().simulate_impacts(**{"span": 1.0, "gaps": {"gap": 0.5}, "initial": {"z": 1.0}, **words})

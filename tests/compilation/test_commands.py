@@ -78,7 +78,7 @@ def test_what_a_command_leaves_running_is_not_waited_for(shell: Callable[[str], 
 
 def test_output_has_a_bound(shell: Callable[[str], str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(commands_module, "OUTPUT", 100_000)
-    with pytest.raises(ToolchainError, match="ended after 0.1 MB of output") as raised:
+    with pytest.raises(ToolchainError, match="stopped after 0.1 MB of output") as raised:
         run([shell("exec yes")], seconds=60)
     assert len(raised.value.output) <= 2000
 
@@ -118,12 +118,12 @@ def test_work_that_is_given_up_ends_its_own_commands_only(shell: Callable[[str],
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("gcc 'x", "is no command: No closing quotation: gcc 'x"),
+        ("gcc 'x", "is not a command: No closing quotation: gcc 'x"),
         ("/nowhere/cc", "not found"),
         ("{folder}", "a directory"),
         ("{folder}/plain", "not executable"),
         ("{folder}/elf", "cannot be started"),
-        ("/bin/sh -c :", "says nothing when asked for its --version"),
+        ("/bin/sh -c :", "prints nothing for --version"),
         ("/bin/sh -c 'exit 7'", "exit status 7"),
         ("''", "not found"),
     ],
@@ -198,6 +198,6 @@ def test_a_library_that_cannot_be_loaded_is_not_kept(sources: dict[str, str]) ->
     text = sources["pendulum.c"].replace("#include <math.h>", "#include <math.h>\ndouble missing(double);", 1)
     broken = {**sources, "pendulum.c": text.replace("-c[4] * cos(x[0])", "missing(x[0])")}
     artifact = compile_sources(broken, "pendulum")
-    with pytest.raises(ToolchainError, match="missing.*no longer in the cache; compile the model again"):
+    with pytest.raises(ToolchainError, match="missing.*removed from the cache; compile the model again"):
         load_core(artifact)
     assert cache.find(artifact.key) is None

@@ -337,7 +337,7 @@ def test_an_event_that_is_not_watched_ends_no_run(method: str) -> None:
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_a_single_step_passes_over_no_reset(target: str) -> None:
     mod = ball().compile(target=target)
-    with pytest.raises(eg.UsageError, match="events of ball reset its state, and a single step watches none"):
+    with pytest.raises(eg.UsageError, match="events of ball reset its state, and a single step finds no events"):
         mod.step(0.0, mod.x0(), 0.5)
 
 

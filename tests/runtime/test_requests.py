@@ -35,7 +35,7 @@ def ending(times: Any) -> Any:
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        ({"events": ending(-1)}, "event height: terminal must be true, false, or at which time .* not -1"),
+        ({"events": ending(-1)}, "event height: terminal must be true, false, or the number of events .* not -1"),
         ({"events": ending(1.5)}, "not 1.5"),
         ({"events": {"low": {"expression": "theta", "terminal": -2}}}, "event low: terminal .* not -2"),
         ({"events": {"low": {"expression": "theta", "terminal": "once"}}}, "event low: terminal .* not 'once'"),
