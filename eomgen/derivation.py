@@ -92,7 +92,7 @@ class Derivation(Readable):
             lines.append(f"  {name:<22}{operations.total:>7} operations")
         if self.system_size is not None:
             unknowns, entries = self.system_size
-            lines.append(f"  linear system of {unknowns} unknowns, {entries} entries that do not vanish")
+            lines.append(f"  linear system of {unknowns} unknowns, {entries} nonzero entries")
         if self.choice is not None:
             lines.append(f"  {self.choice}")
         return "\n".join(lines)

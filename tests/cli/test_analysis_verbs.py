@@ -104,7 +104,7 @@ def test_consistent(call: Call) -> None:
     light, heavy = (abs(call(*words, *rough, "--weight", f"s={w}").json["change"]["s"]) for w in ("1e-4", "1e4"))
     assert heavy < 0.1 * light
     assert call("consistent", CRANK, "--weight", "s", "--target", "numpy").code == 2
-    assert "a rough state has" in call("consistent", CRANK, "--set", "C=1", "--target", "numpy").err
+    assert "the names of a rough state are" in call("consistent", CRANK, "--set", "C=1", "--target", "numpy").err
 
 
 def test_sensitivity(call: Call, tmp_path) -> None:
