@@ -81,7 +81,7 @@ class Derivation(Readable):
 
     @property
     def system_size(self) -> tuple[int, int] | None:
-        """Unknowns and entries of the linear system of a method that keeps reactions as unknowns; else None."""
+        """Unknowns and nonzero entries of the linear system, of a method with unknown reactions; else None."""
         system = self.tree.system
         return None if system is None else (len(system.unknowns), len(system.places))
 

@@ -23,7 +23,7 @@ ROBOTS = {".urdf": "a robot (URDF)", ".xml": "a robot (MJCF or URDF)"}
 def load(
     path: str | os.PathLike[str], *, allow_native: bool = False, check_inertia: bool | str | None = None, **robot: Any
 ) -> Model:
-    """A model from a file, by its suffix.
+    """Load a model from a file; the ending of its name says what it is.
 
     Parameters
     ----------
@@ -33,8 +33,9 @@ def load(
         Whether native functions of the file are compiled and run; else each is a fault of the model, and the files it
         names are not read.
     check_inertia : {'error', 'note', 'off'} or bool, optional
-        What becomes of masses and inertias that no body can have, and of motions without inertia: refused (the default,
-        True), taken and told in ``Model.notes``, or taken in silence (False).  The file's own word unless given.
+        What happens to masses and inertias that no body can have, and to motions without inertia: they are refused
+        ('error', True), noted in ``Model.notes`` ('note'), or accepted silently ('off', False).  By default
+        as the file says; if it says nothing, they are refused.
     **robot
         For robots: ``mimic`` ('coupling', the default, or 'independent'), ``limits`` ('note', the default, 'stop' or
         'off'), ``floating``, ``lock`` and the other fields of

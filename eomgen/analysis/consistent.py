@@ -48,7 +48,7 @@ def consistent(
     p: Any = None,
     u: Any = None,
 ) -> Array:
-    """The state on the constraints that differs least from a given one, positions first, then velocities.
+    """Find the state on the constraints that is nearest to a given one: first its position, then its velocities.
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ def consistent(
         Any state.
     t : float
     weights : mapping of str to float, or 'mass', optional
-        What a change costs: weight times the square of the change, in radians or lengths of the model; 1 where
-        nothing is said.  The weight of a coordinate is that of its rate too, unless the rate is named.  ``'mass'``
+        Weights of the squared changes, in radians or lengths of the model; 1 for names not
+        given.  The weight of a coordinate is also that of its rate, unless the rate is named.  ``'mass'``
         takes the mass matrix of the tree as the metric.
     hold : sequence of str
         Coordinates and rates that keep their values exactly.
@@ -71,9 +71,9 @@ def consistent(
     Raises
     ------
     ProjectionError
-        The constraints cannot be met near the state, or not with these values held.
+        No state near the given one satisfies the constraints, or none with these values held.
     UsageError
-        An unknown name, or a weight that is not positive.
+        A name is unknown, or a weight is not positive.
 
     Notes
     -----

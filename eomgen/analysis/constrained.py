@@ -136,7 +136,7 @@ def solve_multipliers(C_q: Array, force: Array, scales: Scales) -> Array:
 def multipliers(
     module: BoundModel, /, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
 ) -> Array:
-    """Lagrange multipliers l of all constraint rows, in ``M v' + h + C_q^T l = 0``.
+    """Compute the Lagrange multipliers l of all constraint rows, in ``M v' + h + C_q^T l = 0``.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ActuatorForces:
-    """What drives exert so that the model moves as it should.
+    """Forces of drives that produce a given motion.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ def actuator_forces(
     p: Any = None,
     u: Any = None,
 ) -> ActuatorForces:
-    """Constrained inverse dynamics: the forces of chosen drives that make a motion, loops closed.
+    """Find the forces of chosen drives that make a motion (inverse dynamics of a constrained mechanism).
 
     Parameters
     ----------
@@ -95,11 +95,11 @@ def actuator_forces(
     x : (n_x,) or (n_x, k) array
         States; projected onto the constraints first.
     a : mapping of str to float or (k,) array, or (n_v,) or (n_v, k) array, optional
-        Accelerations: those of the independent coordinates by name (others 0), from which the rest follows, or all
+        Accelerations: those of the independent coordinates by name (0 for others), which determine the rest, or all
         of them, which must obey the constraints.  By default the independent accelerations are 0.
     actuated : sequence of str, optional
-        What is driven: coordinates of the tree or of cut joints, whose forces come on top of the model's own, or
-        inputs in which forces are linear, whose whole values are found.  By default the independent coordinates.
+        The drives: coordinates of the tree or of cut joints, whose forces are added to the model's own, or inputs in
+        which forces are linear, whose whole values are found.  By default the independent coordinates.
     p, u : optional
         As for ``bind``.
 
@@ -107,12 +107,12 @@ def actuator_forces(
     -------
     ActuatorForces
         ``forces["theta"]``, ``forces.forces`` (n,) or (n, k), ``multipliers``, ``reactions``.  With more drives
-        than freedoms the smallest sum of squares (torques, and forces times the model's length).
+        than degrees of freedom: the smallest sum of squares (torques, and forces times the model's length).
 
     Raises
     ------
     UsageError
-        An unknown name; accelerations that break the constraints; drives that cannot make the motion.
+        A name is unknown, the accelerations violate the constraints, or the drives cannot make the motion.
     """
     module = module if p is None and u is None else module.bind(p, u)
     layout = module.layout

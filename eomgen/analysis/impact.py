@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Impact:
-    """What an impact does.
+    """The result of an impact: states before and after it, impulses and the energy lost.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ def impact(
     p: Any = None,
     u: Any = None,
 ) -> Impact:
-    """The state after an impact without friction, or after coordinates are locked at once.
+    """Compute the state after an impact without friction, or after coordinates are locked suddenly.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ def impact(
     x : (n_x,) array
         The state right before; projected onto the constraints first.
     gaps : mapping of str to float
-        Coordinates or outputs (functions of positions) that must not become negative and are 0 now -> coefficient
-        of restitution, 0 to 1.  Gaps that open are left alone.
+        Gaps and their coefficients of restitution, 0 to 1.  A gap is a coordinate or an output (a function of
+        positions) that is 0 now and must not become negative.  Gaps that open have no impact.
     lock : sequence of str
         Coordinates that stop (plastic, whatever the sign of the impulse).
     closed : bool
-        Take the gaps as closed whatever their values, as at a stop that is put where a coordinate is now.
+        Treat the gaps as closed at any value, as for a stop that is placed where a coordinate is now.
     p, u : optional
         As for ``bind``.
 
@@ -116,8 +116,8 @@ def impact(
     Raises
     ------
     UsageError
-        An unknown name; a gap that is not 0 (within 1e-6 lengths of the model, or rad); impulses that cannot do
-        it; a gap that drivers close.
+        A name is unknown; a gap is not 0 (within 1e-6 lengths of the model, or rad); no impulses satisfy the laws; or
+        drivers close a gap.
 
     Notes
     -----

@@ -106,10 +106,10 @@ def kinematic_analysis(
     partial: bool = False,
     **led: ArrayLike,
 ) -> KinematicAnalysis:
-    """Positions, velocities and accelerations over a range of time or of coordinates, without forces.
+    """Compute positions, velocities and accelerations over a range of time or of coordinates, without forces.
 
-    The range is followed from the initial position in small steps, so the mechanism stays on its branch, also through
-    change points, where others meet it.
+    The range is followed from the initial position in small steps, so the mechanism stays on its branch, even through
+    change points, where branches meet.
 
     Parameters
     ----------
@@ -124,8 +124,8 @@ def kinematic_analysis(
     partial : bool
         Return the part of the range that can be reached instead of raising an error.
     **led : (n,) arrays or floats
-        Values of coordinates, of the tree or of cut joints, at most as many as degrees of freedom; those left
-        over stand still.  ``theta_dot=`` and ``theta_ddot=`` give their rates over time (0 by default).
+        Values of the prescribed coordinates, of the tree or of cut joints, at most as many as degrees of freedom;
+        the others stand still.  ``theta_dot=`` and ``theta_ddot=`` give their rates over time (0 by default).
 
     Returns
     -------

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Linearization:
-    """The motion near a state: ``s' = drift + A s + B du``, ``dy = C s + D du``.
+    """Linear equations of the motion near a state: ``s' = drift + A s + B du``, ``dy = C s + D du``.
 
     In the minimal form s holds the n_z independent displacements, then the n_dof independent velocities; in the full
     form it is the change of x.  At a steady motion the matrices are those of the motion with respect to it.
@@ -101,7 +101,7 @@ class Linearization:
 
     @property
     def is_equilibrium(self) -> bool:
-        """Whether nothing moves, up to 1e-7 in units of the length scale, radians and seconds.
+        """Whether the state is an equilibrium, up to 1e-7 in units of the length scale, radians and seconds.
 
         Where the model's own forces are weaker than that, accelerations are compared with those that they would make.
         """
@@ -110,7 +110,7 @@ class Linearization:
 
     @property
     def is_steady(self) -> bool:
-        """Whether no velocity changes, up to 1e-7.
+        """Whether the state belongs to a steady motion: no velocity changes, up to 1e-7.
 
         Where forces are stiff, up to what a relative rounding of the state (100 eps) makes of them.
         """

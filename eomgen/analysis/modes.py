@@ -50,7 +50,7 @@ class Damped(NamedTuple):
 
 
 class Modes:
-    """Small motions about an equilibrium.
+    """Natural frequencies, mode shapes and damping of small motions about an equilibrium.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class Modes:
         return f"{title}<table><tr>{head}</tr>{cells}</table>{as_html('', damped) if damped else ''}"
 
     def animate(self, mode: int = 1, file: str | Path | None = None, **options: Any) -> Any:
-        """Show a mode shape as it swings, enlarged until it is well seen; loops stay closed.
+        """Show an animation of a mode shape, enlarged so that it is visible; loops stay closed.
 
         Parameters
         ----------

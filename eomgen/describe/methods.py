@@ -76,7 +76,7 @@ def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[
     doc = f"{field.doc[:1].upper()}{field.doc[1:]}."
     default: Any = field.default if type(field.default) in (int, float) else None
     if isinstance(field.default, (str, bool)):  # which is no default of the method: given, it may contradict the rest
-        doc = f"{doc.removesuffix('.')}; {str(field.default).lower()} unless given."
+        doc = f"{doc} Default: {str(field.default).lower()}."
     anywhere = {"joint", "between"} <= {*found.one_of}
     if field.required and (anywhere or not later):  # what follows *between is given by its keyword
         default = Parameter.empty

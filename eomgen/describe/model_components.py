@@ -67,7 +67,7 @@ class ComponentMethods(Described):
     """The part of Model that takes other models in."""
 
     def attachment(self, name: str) -> MarkerHandle:
-        """Declare a name that stands for a marker of the model that takes this one in; see :meth:`add`.
+        """Declare a name for a marker of the model to which this one is added as a component; see :meth:`add`.
 
         Parameters
         ----------
@@ -83,10 +83,10 @@ class ComponentMethods(Described):
         return MarkerHandle(self, name)
 
     def add(self, component: Any, /, prefix: str = "", at: Any = None, **parameters: Any) -> InstanceHandle:
-        """Add the bodies, joints, forces and all else of another model, under names of their own.
+        """Add all parts of another model (bodies, joints, forces, ...) with a prefix before their names.
 
-        The component stays as it is, and what is done to it later changes nothing here.  Its gravity, independent
-        coordinates and settings of simulations do not count.
+        The component is copied: later changes of it do not change this model.  Its gravity, independent
+        coordinates and settings of simulations are not used.
 
         Parameters
         ----------

@@ -45,7 +45,7 @@ class MechanismReport:
         Coordinates that can be independent at the reference configuration, the best first, and their conditioning: 1 is
         perfect, 0 not at all.
     notes : list of str
-        What deserves attention, each with a remedy.
+        Facts that deserve attention, each with a remedy.
     """
 
     name: str

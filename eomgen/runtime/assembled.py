@@ -45,7 +45,7 @@ class Assembled:
         u: Any = None,
         **named: float | str,
     ) -> Array:
-        """An assembled state.
+        """Find an initial state: loops closed and velocities consistent.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class Assembled:
         u: Any = None,
         **named: float | str,
     ) -> Array:
-        """Close the loops from a guess.
+        """Find a position with closed loops near a guess.
 
         Parameters
         ----------
@@ -128,7 +128,7 @@ class Assembled:
         u: Any = None,
         **named: float | str,
     ) -> list[Array]:
-        """All positions (n_q,) found that hold the given values, that of :meth:`x0` first.
+        """Find all positions (n_q,) with the given values; the first is that of :meth:`x0`.
 
         Without any, the declared initial values are held.  Where the held values leave freedom, the independent
         coordinates keep the values of the first position.  The search is bounded and repeats exactly; it may miss a
@@ -141,7 +141,7 @@ class Assembled:
     @both_names
     @np.errstate(all="ignore")
     def branch(self, x: ArrayLike, t: float = 0.0) -> int:
-        """Which side of the dead centres a state or position lies on.
+        """Tell on which side of the dead centres a state or position lies.
 
         Parameters
         ----------

@@ -28,7 +28,7 @@ def load_trajectory(path: str | Path) -> Trajectory:
     Raises
     ------
     UsageError
-        The file holds something else.
+        The file is not a trajectory saved by eomgen.
     FileNotFoundError
     """
     source = as_path("path", path)

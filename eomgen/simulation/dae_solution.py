@@ -38,7 +38,7 @@ OWN = ("eventsfn", "num_events", "jacfn", "userdata", "algebraic_idx")  #: optio
 
 
 class Dae(DaeForm):
-    """The differential-algebraic form of a model, with a solver."""
+    """The differential-algebraic form F(t, y, y') = 0 of a model, with a solver."""
 
     def solve(
         self,
@@ -80,7 +80,7 @@ class Dae(DaeForm):
         MissingDependencyError
             scikit-sundae is not installed.
         SimulationError
-            IDA gave up.
+            IDA could not reach the end.
         ZenoError
             Events that reset the state follow each other ever faster.
         """

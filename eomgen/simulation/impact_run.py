@@ -43,7 +43,7 @@ def simulate_impacts(
     most: int = 1000,
     **options: Any,
 ) -> ImpactRun:
-    """Integrate, with an impact whenever a gap closes.
+    """Integrate the equations of motion, with an impact whenever a gap closes.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def simulate_impacts(
     initial, parameters, inputs : optional
         As for ``simulate``.
     most : int
-        Impacts after which the run is given up: they accumulate as a body comes to rest.
+        Number of impacts after which the run ends: impacts accumulate as a body comes to rest.
     **options
         method, rtol, atol, max_step, first_step, as for ``simulate``.
 
@@ -68,7 +68,7 @@ def simulate_impacts(
     Raises
     ------
     UsageError
-        A gap is negative at the start, an unknown name, or a mechanism without freedom.
+        A gap is negative at the start, a name is unknown, or the mechanism has no degree of freedom.
     SimulationError, AssemblyError, MissingDependencyError
         As for ``simulate``; also where a gap is found negative without an impact before.
     """

@@ -32,7 +32,7 @@ OPTIONS = ("method", "rtol", "atol", "max_step", "first_step", "step")
 
 
 class Integrator:
-    """Integrates from one state to another, again and again, with all that stays the same checked beforehand.
+    """Integrates from one state to another many times; everything that stays the same is checked only once.
 
     A call costs a microsecond or two besides the steps themselves, and no call depends on those before it.
 
@@ -202,7 +202,7 @@ class Integrator:
 def integrator(
     module: BoundModel, /, parameters: Any = None, inputs: Any = None, *, method: str | None = None, **options: Any
 ) -> Integrator:
-    """An integrator held ready, for many short integrations: control, shooting, filters, learning.
+    """Make an integrator for many short integrations, as in control, shooting methods, filters and learning.
 
     Parameters
     ----------

@@ -71,10 +71,10 @@ def simulate(
         Those not named keep their bound values.
     inputs : mapping of str to number, (times, values), Signal, expression or callable f(t, x), optional
         Tables are linear in between (a :class:`~..runtime.signals.Signal` may hold the last value, or be a cubic
-        spline) and constant outside; their corners are stepped on exactly.  An expression is a text as in model
+        spline) and constant outside; steps end exactly at their corners.  An expression is a text as in model
         files, of t, coordinates, velocities and parameters.
-        Rates of an input that the equations need (``u_dot``, ``u_ddot`` among ``u_names``) follow from it; a function
-        of which none is known is refused unless they are given beside it.
+        Rates of an input that the equations need (``u_dot``, ``u_ddot`` among ``u_names``) are derived from it; for a
+        function without a method ``derivative`` they must be given too.
     method : str or OdeSolver subclass, optional
         A method of SciPy: RK23, RK45, DOP853 (default), Radau (stiff), BDF, LSODA.  The first four run in compiled code
         with SciPy's steps unless there are inputs that are functions; in large mechanisms with loops (more than 8

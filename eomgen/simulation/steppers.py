@@ -139,7 +139,7 @@ def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:
 def step(
     module: BoundModel, /, t: float, x: ArrayLike, h: float, u: ArrayLike | None = None, out: Array | None = None
 ) -> Array:
-    """One Runge-Kutta step (order 4) of size h, for real time: every step costs the same.
+    """Take one Runge-Kutta step (order 4) of size h, for real time: every step takes the same work.
 
     Parameters
     ----------

@@ -47,8 +47,8 @@ def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, second
     seed : int
         Of the states.
     seconds : float
-        Time for all of it.  Variants of the model, the same mechanism described differently, have what is left, and
-        at least 2 s; those that are not reached are left out and counted.
+        Time for all checks.  Variants of the model (the same mechanism described differently) get the time that is
+        left, and at least 2 s; variants for which no time is left are counted.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, second
     MissingDependencyError
         mpmath or SciPy is not installed.
     UsageError
-        ``states``, ``seed`` or ``seconds`` is none.
+        ``states``, ``seed`` or ``seconds`` is not a valid number.
 
     Notes
     -----
