@@ -117,7 +117,7 @@ def _of_fixed_bodies(module: BoundModel) -> list[Finding]:
     worst = float(np.abs(R @ np.moveaxis(R, 1, 2) - np.eye(3)).max(initial=0.0))
     why = "the model has no coordinate: its bodies are fixed to ground"
     return [
-        Finding("poses: rotations are rotations", worst, 16.0 * EPS, cases=1),
+        Finding("poses: rotation matrices are orthonormal", worst, 16.0 * EPS, cases=1),
         Finding.skipped("all that moves", why),
     ]
 
