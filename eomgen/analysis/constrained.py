@@ -93,7 +93,7 @@ def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: An
             f"x must have shape ({layout.n_x},) or ({layout.n_x}, k) [{', '.join(layout.x)}], not {state.shape}"
         )
     if not state.size and layout.n_x:
-        raise UsageError(f"x of shape {state.shape} holds no state")
+        raise UsageError(f"x of shape {state.shape} contains no state")
     single = state.ndim == 1
     columns = state[:, None] if single else state
     time = as_real(t)

@@ -252,7 +252,7 @@ def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: A
         for name in given:
             if name not in keys:
                 raise UsageError(
-                    f"a: {name!r} is no independent coordinate or its acceleration; there are {', '.join(keys)}"
+                    f"a: {name!r} is not an independent coordinate or its acceleration; there are {', '.join(keys)}"
                 )
         values = np.zeros((layout.n_v, count))
         for name, value in given.items():

@@ -110,7 +110,9 @@ class KinematicAnalysis(Trajectory):
         if name + "_dot" not in self.names:
             raise UsageError(f"{name!r} has no rate among the columns")
         if len(self.t) < 2 or not np.diff(self.t).any():
-            raise UsageError("the time is constant in this range, so there are no rates; give t beside the values")
+            raise UsageError(
+                "the time is constant in this range, so there are no rates; give t together with the values"
+            )
         y, rate = self[name], self[name + "_dot"]
         found = []
         for k in np.flatnonzero((rate[:-1] * rate[1:] < 0.0) | (rate[:-1] == 0.0)):

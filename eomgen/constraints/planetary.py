@@ -117,7 +117,7 @@ def _fit(e: Entry, key: str, sizes: Mapping[str, Expr]) -> None:
     numbers = {wheel: size.value for wheel, size in sizes.items() if size.value is not None}
     if {"sun", "ring"} <= numbers.keys() and numbers["ring"] <= numbers["sun"]:
         message = f"ring {numbers['ring']:g} is not larger than sun {numbers['sun']:g}"
-        e.fault(key, message, "the sun stands inside the ring")
+        e.fault(key, message, "the sun must be smaller than the ring")
     elif len(numbers) == 3 and abs(numbers["ring"] - numbers["sun"] - 2 * numbers["planet"]) > TENSOR * numbers["ring"]:
         message = f"ring {numbers['ring']:g} is not sun {numbers['sun']:g} + 2 planet {numbers['planet']:g}"
         e.fault(key, message, "the sizes must fit (ring = sun + 2 planet); leave one of them out")

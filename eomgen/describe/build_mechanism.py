@@ -361,6 +361,6 @@ def _simulation(reader: Reader, given: Any) -> Simulation:
         else:
             settings[key] = reader.number(path, given[key], positive=True)
     if (settings.get("method") == "RK4") != ("step" in settings):
-        remedy = "give step, in s" if "step" not in settings else "take it away, or set method to RK4"
+        remedy = "give step, in s" if "step" not in settings else "remove it, or set method to RK4"
         reader.faults.add("simulation.step", "only method RK4 takes steps of one size, and it needs their size", remedy)
     return Simulation(**settings)

@@ -59,7 +59,7 @@ _HEADERS = frozenset(("python", "pythread", "structmember", "frameobject"))
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z", re.ASCII)
 LONGEST = 64  #: characters of a name
 
-IDENTIFIER_RULE = "a name starts with a letter and goes on with letters a to z, digits and underscores"
+IDENTIFIER_RULE = "a name must start with a letter and contain only letters a to z, digits and underscores"
 
 
 def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:

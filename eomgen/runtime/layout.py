@@ -151,7 +151,7 @@ class Layout:
         if self.given_rates:
             reason = "the rates of its coordinates are given as functions of velocities"
         elif self.n_h < self.n_c:
-            reason = "nonholonomic constraints restrict velocities and not positions"
+            reason = "nonholonomic constraints restrict velocities but not positions"
         elif turning:
             reason = f"the independent {', '.join(turning)} are not rates of coordinates (rotation: euler_parameters)"
         else:

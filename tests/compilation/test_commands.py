@@ -171,9 +171,9 @@ def test_products_are_looked_at(sources: dict[str, str], fresh_cache: Cache, tmp
     assert sorted(path.name for path in artifact.directory.iterdir()) == ["libpendulum.so", "manifest.json", "sources"]
     for data, words in (
         (b"", "was not made"),
-        (b"garbage", "no library for this machine"),
-        (good[:18] + b"\xff\xff" + good[20:], "no library for this machine"),
-        (good[:16] + b"\x02\x00" + good[18:], "no library for this machine"),
+        (b"garbage", "not a library for this machine"),
+        (good[:18] + b"\xff\xff" + good[20:], "not a library for this machine"),
+        (good[:16] + b"\x02\x00" + good[18:], "not a library for this machine"),
         (good.replace(mark, b"?" * len(mark)), "lacks the mark"),
     ):
         (tmp_path / "made").write_bytes(data)

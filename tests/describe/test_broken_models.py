@@ -35,7 +35,7 @@ BROKEN = [
     ),
     ("pin_x: x(rod.tip)", "pin_x: x(rod.tap)", 23, "outputs.pin_x.expression", "no marker 'tap'", "'tip'"),
     ("pin_x: x(rod.tip)", "pin_x: x(road)", 23, "outputs.pin_x.expression", "no body 'road'", "'rod'"),
-    ("  g: 9.81", "  g: 9.81\n  2r: 1", 10, "parameters.2r", "'2r' is not an identifier", "starts with a letter"),
+    ("  g: 9.81", "  g: 9.81\n  2r: 1", 10, "parameters.2r", "'2r' is not an identifier", "start with a letter"),
     ("  g: 9.81", "  g: 9.81\n  lambda: 1", 10, "parameters.lambda", "a reserved word of Python", "lambda_"),
     ("  g: 9.81", "  g: 9.81\n  double: 1", 10, "parameters.double", "a reserved word of C", "double_"),
     ("  g: 9.81", "  g: 9.81\n  t: 1", 10, "parameters.t", "'t' is reserved for the time", "another name"),

@@ -265,4 +265,6 @@ def test_one_thread_at_a_time(compiled: Any) -> None:
                     go(0.0, compiled.x0(), 1e9)
     finally:
         signal.signal(signal.SIGINT, before)
-    assert refused == ["integrator of spring: it is already working in another thread; make one integrator for each thread"]
+    assert refused == [
+        "integrator of spring: it is already working in another thread; make one integrator for each thread"
+    ]

@@ -163,7 +163,7 @@ def test_holonomic_and_nonholonomic_rows_together_and_driven() -> None:
         np.testing.assert_allclose(J, np.array(slopes).T, atol=1e-6 * np.abs(J).max())
     states = modules[0].project(np.random.default_rng(2).uniform(0.3, 0.9, (6, 4)), t=0.3)
     np.testing.assert_allclose(modules[0].rhs(0.3, states), modules[1].rhs(0.3, states), rtol=1e-10)
-    with pytest.raises(eg.UsageError, match="nonholonomic constraints restrict velocities and not positions"):
+    with pytest.raises(eg.UsageError, match="nonholonomic constraints restrict velocities but not positions"):
         _ = modules[0].minimal
 
 
