@@ -33,7 +33,7 @@ MEANING = {
     STOPPED: "not run: the ensemble was interrupted",
     TOO_SMALL_STEP: TOO_SMALL,
     TOO_MANY_STEPS: "more than max_steps steps",
-    BAD_PARAMETERS: "the constants cannot be computed from the parameters",
+    BAD_PARAMETERS: "the constants that follow from the parameters cannot be computed",
     UNASSEMBLED: "the initial values cannot be assembled",
     FAILED: "the integration failed",
     ZENO: "events that reset the state follow each other faster and faster (Zeno), or a reset repeats without an end",

@@ -95,7 +95,7 @@ class NumpyCore:
         except ArithmeticError:  # Python's own numbers raise where NumPy's become infinite: 1.0 / 0.0
             c = np.array(np.nan)
         if not np.isfinite(c).all() and np.isfinite(p).all():
-            raise error(f"the constants cannot be computed from the parameters p = {p}")
+            raise error(f"the constants that follow from the parameters cannot be computed; p = {p}")
         return c
 
     def timed(

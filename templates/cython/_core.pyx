@@ -117,7 +117,7 @@ cdef cnp.ndarray compute_constants(cnp.ndarray p, object error):
     cdef cnp.ndarray constants = cnp.PyArray_ZEROS(1, &n, cnp.NPY_DOUBLE, 0)
     cdef int status = MODEL.precompute(<double *>cnp.PyArray_DATA(p), <double *>cnp.PyArray_DATA(constants))
     if status != 0:
-        raise error(f"the constants cannot be computed (status {status}) from the parameters p = {p}")
+        raise error(f"the constants that follow from the parameters cannot be computed (status {status}); p = {p}")
     return constants
 
 

@@ -61,7 +61,9 @@ def test_with_its_energy_it_is_kept(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["kinetic_energy", "potential_energy", "total_energy"])
 def test_an_output_of_it_is_refused(name: str, tmp_path: Path) -> None:
-    with pytest.raises(eg.ModelError, match=rf"yaml:9: outputs.pull: {name} is not known: .*equations.kinetic_energy"):
+    with pytest.raises(
+        eg.ModelError, match=rf"yaml:9: outputs.pull: {name} is not known, because .*equations.kinetic_energy"
+    ):
         eg.load(write(tmp_path, out=name)).check()
 
 

@@ -83,7 +83,7 @@ def test_constraints_with_given_rates(target: str) -> None:
         tied().derive(independent=["a", "v"])
     with pytest.raises(eg.UsageError, match="'a_dot' follows from the velocities; give one of r, v, s, z instead"):
         module.x0(a_dot=1.0)
-    with pytest.raises(eg.UsageError, match="p= gives the parameters; the velocity 'p'"):
+    with pytest.raises(eg.UsageError, match="p= gives the parameters; give the velocity 'p'"):
         given("named", coordinates=["a"], velocities=["p"], mass_matrix=[[1]], forcing=[0]).compile(target="numpy").x0(
             p=1.0
         )

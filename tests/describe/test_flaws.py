@@ -85,7 +85,7 @@ def test_calls_with_the_wrong_shape_of_values_are_told() -> None:
     length = m.parameter("l", 1.0)
     m.revolute("q", m.ground, m.body("a", mass=1, com=(0, -1, 0)))
     m.torque("law", "q", 1 / length)
-    with pytest.raises(UsageError, match="by name"):
+    with pytest.raises(UsageError, match="mapping of names"):
         m.initial(5)
     module = m.compile(target="numpy")
     with pytest.raises(UsageError, match=r"must be a mapping of names to values"):
@@ -100,7 +100,9 @@ def test_a_mapping_of_parameters_in_a_call_is_told_of_bind(target: str) -> None:
     m.parameter("l", 1.0)
     m.revolute("q", m.ground, m.body("a", mass=1, com=(0, "-l", 0)))
     module = m.compile(target=target)
-    with pytest.raises(UsageError, match=r"array in the order of p_names; by name: bind\(p=\{\.\.\.\}\)"):
+    with pytest.raises(
+        UsageError, match=r"array in the order of p_names; to give values by name use bind\(p=\{\.\.\.\}\)"
+    ):
         module.rhs(0, [0.0, 0.0], p={"l": 1})
 
 
@@ -135,5 +137,5 @@ def test_a_singular_position_without_freedom_names_no_independent_coordinates() 
     m.revolute("B", a.at(0.2, 0, 0), b)
     m.revolute("C", b.at(0.2, 0, 0), m.ground.at(0.4, 0, 0))
     module = m.compile(target="numpy")
-    with pytest.raises(EvaluationError, match="no freedom; start a little away"):
+    with pytest.raises(EvaluationError, match="no degree of freedom; start a little away"):
         module.rhs(0.0, [0.0] * module.n_x)

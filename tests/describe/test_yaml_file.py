@@ -79,7 +79,7 @@ def test_load_goes_by_the_suffix(tmp_path: Path, slider_crank_text: str) -> None
     with pytest.raises(FileNotFoundError):
         load(tmp_path / "absent.yaml")
     for name in ("panda.sdf", "model"):
-        with pytest.raises(UsageError, match=r"supported: \.yaml"):
+        with pytest.raises(UsageError, match=r"supported are \.yaml"):
             load(tmp_path / name)
 
 

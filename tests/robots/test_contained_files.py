@@ -348,7 +348,7 @@ def test_limits_of_joints_may_be_as_large_as_others_write_them(tmp_path: Path) -
         ({"lock": [None]}, "names of joints"),
         ({"actuate": 5}, "actuate must be names of joints, or True, not 5"),
         ({"actuate": {"j": 1}}, "names of joints"),
-        ({"snap": "x"}, "snap must be an angle (rad), 0 or positive, not 'x'"),
+        ({"snap": "x"}, "0 or positive, not 'x'"),
         ({"snap": -1.0}, "an angle"),
         ({"assets": 5}, "assets must be the name of a file or folder, as text or Path, not 5"),
         ({"floating": "yes"}, "floating must be True or False, not 'yes'"),

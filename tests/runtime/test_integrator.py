@@ -168,7 +168,7 @@ def test_loops_stay_closed(four_bar: Any) -> None:
         (((0.0, [1.0, 2.0], 1.0), {"out": np.zeros(2, dtype=np.float32)}), "float64"),
         (((0.0, [1.0, 2.0], 1.0), {"p": {"k": 1.0}}), "integrator of spring"),
         ((("0", [1.0, 2.0], 1.0), {}), "integrator of spring"),
-        (((1e16, [1.0, 2.0], 1.0), {}), "lost in rounding"),
+        (((1e16, [1.0, 2.0], 1.0), {}), "too small at t"),
         (((1e308, [1.0, 2.0], 1e308), {}), "finite"),
     ],
 )

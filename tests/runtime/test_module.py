@@ -200,7 +200,7 @@ def test_kinematics_is_pure(crank):
 
 def test_kinematics_says_when_the_way_is_blocked(crank):
     m = crank(independent=[2], q_reference=[0.7, -0.32768, 0.40673])
-    with pytest.raises((ProjectionError, PartitionError), match=r"way to s = 0\.6 is blocked"):
+    with pytest.raises((ProjectionError, PartitionError), match=r"path to s = 0\.6 is blocked"):
         m.kinematics([0.6])
 
 

@@ -129,7 +129,7 @@ def test_wishes_that_do_not_go_together_are_refused(run: Any) -> None:
     for call, words in (
         ({"y": "s"}, "needs x="),
         ({"x": "s"}, "no column to draw against it"),
-        ({"x": "s", "y": "theta", "kind": "phase"}, "do not go together"),
+        ({"x": "s", "y": "theta", "kind": "phase"}, "cannot be used together"),
         ({"kind": "phases"}, "did you mean phase"),
         ({"x": "thet", "y": "s"}, "did you mean theta"),
     ):

@@ -68,7 +68,7 @@ def test_times_of_events(swing: Any, times: Any, count: int) -> None:
 @pytest.mark.parametrize("method", ["DOP853", "BDF"])
 def test_an_event_without_a_value_is_told_of(swing: Any, method: str) -> None:
     unknown = {"gap": "log(-1 - theta**2)", "low": "theta"}
-    with pytest.warns(UserWarning, match="event gap: no number") as told:
+    with pytest.warns(UserWarning, match="event gap: the value was not a number") as told:
         run = swing.simulate((0, 1.5), events=unknown, method=method)
     assert told[0].filename == __file__
     assert len(run.t_events["gap"]) == 0

@@ -171,7 +171,7 @@ def test_held_inputs_are_steps_and_others_refused() -> None:
 
 def test_models_without_series_say_so() -> None:
     loops = eg.load(Path("examples/four_bar.yaml")).compile()
-    with pytest.raises(eg.UsageError, match="four_bar has no Taylor series: closed loops are solved"):
+    with pytest.raises(eg.UsageError, match="four_bar has no Taylor series: its closed loops are solved"):
         loops.simulate(1, method="Taylor")
     with pytest.raises(eg.UsageError, match="no Taylor series"):
         loops.Taylor  # noqa: B018

@@ -58,7 +58,7 @@ def test_what_cannot_be_held_is_refused(crank: Any) -> None:
         crank.x0({"x(rod.tp)": 0.4})
     with pytest.raises(UsageError, match="did you mean pin_x"):
         crank.x0(pinx=0.4)
-    with pytest.raises(UsageError, match="held, not pin_x; give the coordinates"):
+    with pytest.raises(UsageError, match="held coordinates and rates, not pin_x; give the coordinates"):
         crank.sensitivities(["l"], (0, 0.01), initial={"pin_x": 0.42})
 
 
