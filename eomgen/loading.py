@@ -69,12 +69,12 @@ def load(
         ending = suffix or "(none)"
         raise UsageError(f"{path}: files with the ending {ending} cannot be loaded; supported are {known}{example}")
     if robot:
-        raise UsageError(f"{path} is a model file, and {', '.join(robot)} are options of robot files only")
+        raise UsageError(f"{path} is a model file; only robot files take the options {', '.join(robot)}")
     model = Model.from_description(describe_yaml_file(path, allow_native=allow_native))
     if check_inertia is not None:
         word = word_of_check(check_inertia)
         if word is None:
-            raise UsageError(f"check_inertia={check_inertia!r}: allowed: {', '.join(CHECKS)}, True, False")
+            raise UsageError(f"check_inertia must be one of {', '.join(CHECKS)}, True, False, not {check_inertia!r}")
         model.check_inertia = word
     return _with_notes(model)
 

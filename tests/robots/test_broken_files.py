@@ -210,7 +210,7 @@ def test_mujoco_reads_nothing_outside(line: str, tmp_path: Path, monkeypatch: py
     path = tmp_path / "model" / "model.xml"
     path.write_text(f"<mujoco>\n{line.format(secret=tmp_path / 'secret')}\n</mujoco>")
     with pytest.raises(
-        eg.ModelError, match=r"model.xml:2: .*is outside the folder .*; so it is not read; .*assets="
+        eg.ModelError, match=r"model.xml:2: .*is outside the folder .*, so it is not read; .*assets="
     ) as caught:
         eg.load(path)
     assert "hidden" not in str(caught.value)
@@ -312,5 +312,5 @@ def test_options_are_checked(arm: Any, tmp_path: Path) -> None:
         eg.load(arm(), lock=["shulder"])
     model = tmp_path / "model.yaml"
     eg.load(arm()).save(model)
-    with pytest.raises(eg.UsageError, match="floating: options of robot files"):
+    with pytest.raises(eg.UsageError, match="only robot files take the options floating"):
         eg.load(model, floating=True)

@@ -243,10 +243,10 @@ def test_options_are_checked(tmp_path: Path) -> None:
     path = write(tmp_path, {})
     with pytest.raises(eg.UsageError, match="check_inertia must be one of error, note, off"):
         eg.load(path, check_inertia="maybe")
-    with pytest.raises(eg.UsageError, match="limits='hard': allowed: note, stop, off"):
+    with pytest.raises(eg.UsageError, match="limits must be one of note, stop, off, not 'hard'"):
         eg.load(path, limits="hard")
     eg.load(path).save(tmp_path / "arm.yaml")
-    with pytest.raises(eg.UsageError, match="check_inertia='maybe': allowed"):
+    with pytest.raises(eg.UsageError, match="check_inertia must be one of error"):
         eg.load(tmp_path / "arm.yaml", check_inertia="maybe")
     (tmp_path / "bad.yaml").write_text("check_inertia: maybe\n" + (tmp_path / "arm.yaml").read_text())
     with pytest.raises(eg.ModelError, match=r"bad.yaml:1: check_inertia: 'maybe' is not true or false, error, note"):
