@@ -124,7 +124,7 @@ def test_a_workspace(call: Call, model_file: Callable[[str], Path], tmp_path: Pa
         (("--over", "q1=0:1", "--of", "x"), "write NAME=LOW:HIGH:COUNT"),
         (("--over", "q1=0:1:x", "--of", "x"), "--over q1=0:1:x: "),
         (("--over", "q1=0:1:3", "--over", "q1=0:1:3", "--of", "x"), "each name once"),
-        (("--over", "q1=0:1:3", "--of", "x", "--range", "q1=0:1"), "do not go together"),
+        (("--over", "q1=0:1:3", "--of", "x", "--range", "q1=0:1"), "cannot be used together"),
         (("--over", "q1=0:1:3", "--of", "z"), "no output or coordinate 'z'"),
     ],
 )
