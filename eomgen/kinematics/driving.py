@@ -146,7 +146,7 @@ def _explain(
     text = str(error).partition("; check")[0]
     words = (
         f"the loops cannot reach the position that the drivers prescribe at t = 0: {text}; at the position nearest to "
-        f"the guess where the loops close, the drivers are off by {', '.join(gaps)}; give the drivers values within "
+        f"the guess where the loops close, the drivers are off ({', '.join(gaps)}); give the drivers values within "
         "reach, or a guess nearer to them"
     )
     return AssemblyError(words, [*rows, *error.rows])

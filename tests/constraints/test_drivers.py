@@ -202,7 +202,7 @@ def test_drivers_that_agree_may_stay() -> None:
 
 def test_a_driver_out_of_reach_is_told() -> None:
     with pytest.raises(
-        eg.AssemblyError, match=r"constraints.drive: .*C.r_y 0.09.*miss drive by .* rad; give the drivers"
+        eg.AssemblyError, match=r"constraints.drive: .*C.r_y 0.09.*off \(drive by .* rad\); give the drivers"
     ):
         slider_crank("1.5 + t", l=0.2, r=0.3).check()
 

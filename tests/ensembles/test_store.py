@@ -83,7 +83,7 @@ def test_hostile_stores_are_refused(pendulum: Any, tmp_path: Path) -> None:
     with np.load(block) as data:
         arrays = {name: data[name] for name in data.files}
     for change, words in (
-        ({"runs_t": arrays["runs_t"][:3]}, "another count of runs"), ({"x": arrays["x"][:1]}, "do not fit each other"),
+        ({"runs_t": arrays["runs_t"][:3]}, "another count of runs"), ({"x": arrays["x"][:1]}, "do not belong together"),
         ({"words": np.array("[1, 2]")}, "cannot be read"), ({"words": np.array("[" * 99999)}, "cannot be read"),
     ):  # fmt: skip
         np.savez(block, **(arrays | change))

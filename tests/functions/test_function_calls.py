@@ -202,7 +202,7 @@ def test_names_of_functions_belong_to_the_one_namespace() -> None:
         m.mechanism()
     text = str(caught.value)
     assert "functions.f: the name 'f' is already used by the parameter at parameters.f" in text
-    assert "functions.sin: 'sin' is a function" in text
+    assert "functions.sin: 'sin' is a built-in function" in text
     assert "functions.vx: 'vx' is a built-in name for the motion of a marker" in text
     assert "joints.s: the name 's' is already used by the function at functions.s" in text
     assert len(caught.value.problems) == 4

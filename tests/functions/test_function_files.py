@@ -110,8 +110,8 @@ BROKEN: list[tuple[str, str, str]] = [
     ),
     ("  law: {type: table, x: [0, 1e-9], y: [0, 1], z: [[9e299, -9e299], [0, 0]]}", "functions.law", "is too steep"),
     ("  2law: {type: table, x: [0, 1], y: [0, 1]}", "functions.2law", "is not an identifier"),
-    ("  cos: {type: table, x: [0, 1], y: [0, 1]}", "functions.cos", "'cos' is a function"),
-    ("  t: {type: table, x: [0, 1], y: [0, 1]}", "functions.t", "'t' is the time"),
+    ("  cos: {type: table, x: [0, 1], y: [0, 1]}", "functions.cos", "'cos' is a built-in function"),
+    ("  t: {type: table, x: [0, 1], y: [0, 1]}", "functions.t", "'t' is reserved for the time"),
 ]
 
 
@@ -220,7 +220,7 @@ def test_the_command_line_asks_for_permission(sources: Path, capfd: pytest.Captu
     assert "swing(s)" in capfd.readouterr().out
     bare = written(sources, "  swing: {type: native, source: laws.c}", "-swing(s)", "s")
     assert command("run", bare, "--allow-native", "--target", "numpy", "--end", "0.1") == 1
-    assert f"{bare}:3: functions.swing: is C code without a Python twin" in capfd.readouterr().err
+    assert f"{bare}:3: functions.swing: is a C function without a Python version" in capfd.readouterr().err
 
 
 def test_the_schema_knows_functions() -> None:

@@ -89,10 +89,10 @@ def test_without_a_twin_only_compiled_code_runs(sources: Path) -> None:
     assert m.derive().force[0].has(sympy_call("swing", m.coordinate("q"), 0).func)
     x = np.array([0.4, 0.0])
     assert m.compile().rhs(0, x)[1] == pytest.approx(-9.81 * math.sin(0.4), rel=1e-15)
-    with pytest.raises(ModelError, match=r"functions\.swing: is C code without a Python twin"):
+    with pytest.raises(ModelError, match=r"functions\.swing: is a C function without a Python version"):
         m.compile(target="numpy")
     m.body("heavy", mass="2 + swing(0)")
-    with pytest.raises(ModelError, match=r"functions\.swing: is C code without a Python twin"):
+    with pytest.raises(ModelError, match=r"functions\.swing: is a C function without a Python version"):
         m.mechanism()
 
 
@@ -127,7 +127,7 @@ def test_a_native_function_in_a_constraint_needs_its_twin(sources: Path) -> None
         m.native("swing", sources / "laws.c", derivatives=["swing_slope"], python=twin)
         m.initial(x=0.7)
         if twin is None:
-            with pytest.raises(ModelError, match="without a Python twin"):
+            with pytest.raises(ModelError, match="without a Python version"):
                 m.compile()
             continue
         run = m.compile().simulate((0, 2), rtol=1e-9, atol=1e-11)
@@ -248,7 +248,7 @@ WRONG = [
     ({"arguments": 0}, "functions.swing.arguments: 0 arguments; allowed: 1 to 16"),
     ({"arguments": 99}, "allowed: 1 to 16"),
     ({"function": "a;b"}, "functions.swing.function: 'a;b' is not an identifier"),
-    ({"function": "sin"}, "'sin' is a function"),
+    ({"function": "sin"}, "'sin' is a built-in function"),
     ({"derivatives": ["swing"]}, "functions.swing: names one C function twice"),
     ({"python": "no.py"}, "functions.swing.python: no.py cannot be read (No such file or directory)"),
     ({"python": 3}, "functions.swing.python: is not a function"),

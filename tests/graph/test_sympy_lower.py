@@ -172,7 +172,7 @@ def test_all_unknown_symbols_are_named_at_once():
     with pytest.raises(LoweringError) as caught:
         lower(g, x * z + sympy.sin(y) + f(z), resolver(g, "x"), allowed=["x", "mass"])
     assert set(caught.value.unresolved) == {y, z, f(z)}
-    assert "no meaning for f(z), y, z; known are mass, x" in caught.value.reason
+    assert "unknown names f(z), y, z; known are mass, x" in caught.value.reason
     assert isinstance(caught.value, EomgenError)
 
 
