@@ -171,7 +171,7 @@ def test_a_number_in_an_inertia_may_be_the_mass_of_the_body(mass: object, inerti
         about = m.compile(target="numpy").mass_matrix([0.0])[0, 0]
         assert about == pytest.approx(size * 0.36 + float(str(mass)) * 0.09, rel=1e-14)
     else:
-        with pytest.raises(eg.ModelError, match="a moment of inertia .* belongs here"):
+        with pytest.raises(eg.ModelError, match="a moment of inertia .* is needed here"):
             m.compile(target="numpy")
 
 
