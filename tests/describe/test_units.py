@@ -402,9 +402,9 @@ def test_an_output_has_the_unit_that_is_certain(expression: str, unit: str) -> N
 @pytest.mark.parametrize(
     ("expression", "unit", "told"),
     [
-        ("th", "mm", "th is a number or an angle, and a length (m) belongs here"),
-        ("x(rod.tip) - s", "deg", "is a length (m), and a number or an angle belongs here"),
-        ("th_dot", "m/s", "th_dot is a rate (1/s), and a speed (m/s) belongs here"),
+        ("th", "mm", "th is a number or an angle, and a length (m) is needed here"),
+        ("x(rod.tip) - s", "deg", "is a length (m), and a number or an angle is needed here"),
+        ("th_dot", "m/s", "th_dot is a rate (1/s), and a speed (m/s) is needed here"),
     ],
 )
 def test_an_output_of_another_dimension_is_told(expression: str, unit: str, told: str) -> None:
