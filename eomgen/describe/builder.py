@@ -90,7 +90,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
 
     # -- quantities -----------------------------------------------------------------------------------------------
     def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "", latex: str = "") -> Any:
-        """Declare a constant that can change between runs.
+        """Declare a parameter: a constant that can change between runs.
 
         Parameters
         ----------
@@ -121,7 +121,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         signal: Value | None = None,
         latex: str = "",
     ) -> Any:
-        """Declare a quantity given from outside over time; ``value`` holds while none is given.
+        """Declare an input, a quantity that is given over time; ``value`` is used as long as a call gives none.
 
         ``signal``, an expression of t, coordinates, velocities and parameters, is what runs take that give none;
         calls of the module's own functions still take ``value``.  ``unit``, ``doc`` and ``latex`` are those
@@ -137,7 +137,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         return symbol(name)
 
     def output(self, name: str, expression: Value, unit: str = "", doc: str = "", latex: str = "") -> None:
-        """Declare a named result.
+        """Declare an output: a named result of the model.
 
         Parameters
         ----------
