@@ -23,7 +23,7 @@ ROBOTS = {".urdf": "a robot (URDF)", ".xml": "a robot (MJCF or URDF)"}
 def load(
     path: str | os.PathLike[str], *, allow_native: bool = False, check_inertia: bool | str | None = None, **robot: Any
 ) -> Model:
-    """A model from a file, by its suffix.
+    """Load a model from a file; the ending of its name says what it is.
 
     Parameters
     ----------
@@ -33,8 +33,9 @@ def load(
         Whether native functions of the file are compiled and run; else each is a fault of the model, and the files it
         names are not read.
     check_inertia : {'error', 'note', 'off'} or bool, optional
-        What becomes of masses and inertias that no body can have, and of motions without inertia: refused (the default,
-        True), taken and told in ``Model.notes``, or taken in silence (False).  The file's own word unless given.
+        What happens to masses and inertias that no body can have, and to motions without inertia: they are refused
+        ('error', True), noted in ``Model.notes`` ('note'), or accepted silently ('off', False).  By default
+        as the file says; if it says nothing, they are refused.
     **robot
         For robots: ``mimic`` ('coupling', the default, or 'independent'), ``limits`` ('note', the default, 'stop' or
         'off'), ``floating``, ``lock`` and the other fields of
@@ -65,14 +66,15 @@ def load(
     if suffix not in SUFFIXES:
         known = ", ".join(f"{s} {what}" for s, what in {**SUFFIXES, **ROBOTS}.items())
         example = f"; the example is load_example({path!r})" if find_example(path, example_files()) else ""
-        raise UsageError(f"{path}: files ending in {suffix or 'nothing'} cannot be loaded; supported: {known}{example}")
+        ending = suffix or "(none)"
+        raise UsageError(f"{path}: files with the ending {ending} cannot be loaded; supported are {known}{example}")
     if robot:
-        raise UsageError(f"{path}: {', '.join(robot)}: options of robot files, not of model files")
+        raise UsageError(f"{path} is a model file; only robot files take the options {', '.join(robot)}")
     model = Model.from_description(describe_yaml_file(path, allow_native=allow_native))
     if check_inertia is not None:
         word = word_of_check(check_inertia)
         if word is None:
-            raise UsageError(f"check_inertia={check_inertia!r}: allowed: {', '.join(CHECKS)}, True, False")
+            raise UsageError(f"check_inertia must be one of {', '.join(CHECKS)}, True, False, not {check_inertia!r}")
         model.check_inertia = word
     return _with_notes(model)
 

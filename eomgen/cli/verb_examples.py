@@ -40,7 +40,7 @@ def describe_example(file: Path) -> str:
 @verb_command()
 @click.argument("name", required=False)
 @click.option("--force", is_flag=True, help="Overwrite a file of that name.")
-@click.option("--all", "every", is_flag=True, help="Run every example for a tenth of its time; scripts as they are.")
+@click.option("--all", "every", is_flag=True, help="Run every example for a tenth of its time, scripts in full.")
 @target_option("numpy", "cython", default="numpy")
 @json_option
 @reports_failures
@@ -52,7 +52,7 @@ def examples(name: str | None, force: bool, every: bool, target: str, as_json: b
     found = example_files()
     if every:
         if name is not None:
-            raise UsageError(f"--all runs every example; leave {name} out, or --all")
+            raise UsageError(f"--all runs every example; leave out {name} or --all")
         _run_all(found, target, as_json)
         return
     if name is None:

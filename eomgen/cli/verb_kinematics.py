@@ -49,18 +49,18 @@ SHOWN = 9  #: of them on the screen
     "ranges",
     multiple=True,
     metavar="NAME=START:END[:COUNT]",
-    help="Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges have one count.",
+    help="Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges must have the same count.",
 )
-@click.option("--limits", multiple=True, metavar="NAME", help="Find how far a coordinate can go from the start.")
+@click.option("--limits", multiple=True, metavar="NAME", help="Find how far a coordinate can move from the start.")
 @click.option(
     "--over",
     multiple=True,
     metavar="NAME=LOW:HIGH:COUNT",
-    help="Find the workspace of --of over a grid of coordinates, one --over for each (up to three); t for drivers.",
+    help="Find the workspace of --of over a grid of up to three coordinates, one --over for each; t for drivers.",
 )
 @click.option("--of", multiple=True, metavar="NAME", help="Outputs or coordinates of the workspace.")
-@click.option("--within-limits", is_flag=True, help="Keep the workspace within the limits of the joints.")
-@click.option("--partial", is_flag=True, help="Give the part of the range that can be reached.")
+@click.option("--within-limits", is_flag=True, help="Restrict the workspace to the limits of the joints.")
+@click.option("--partial", is_flag=True, help="If the range cannot be reached completely, give the part that can.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, or start position.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write all columns to FILE.npz or .csv.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw them, e.g. to FILE.png.")
@@ -184,10 +184,10 @@ def range_values(module: Module, asked: list[tuple[str, float, float, int | None
         asked = [("t", 0.0, float(module.metadata.get("simulation", {}).get("end") or 10.0), None)]
     names = [name for name, *_ in asked]
     if len(set(names)) < len(names):
-        raise UsageError(f"--range: {', '.join(names)}: each name once")
+        raise UsageError(f"--range: {', '.join(names)}: give each name once")
     counts = {count for *_, count in asked if count is not None} or {COUNT}
     if len(counts) > 1:
-        raise UsageError(f"--range: the counts {', '.join(map(str, sorted(counts)))} are not one")
+        raise UsageError(f"--range: the counts {', '.join(map(str, sorted(counts)))} must be equal")
     (count,) = counts
     values: dict[str, Any] = {name: np.linspace(start, end, count) for name, start, end, _ in asked}
     if "t" in values and len(asked) > 1 and count > 1:  # coordinates that are led over time have their rates

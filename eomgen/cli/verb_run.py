@@ -66,24 +66,27 @@ POINTS = 5  #: change points listed
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write the run to FILE.npz or FILE.csv.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the run, e.g. to FILE.png.")
 @click.option(
-    "--animate", type=click.Path(path_type=Path), metavar="FILE", help="Show it move: FILE.gif, FILE.mp4 or FILE.html."
+    "--animate",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write an animation: FILE.gif, FILE.mp4 or FILE.html.",
 )
 @click.option(
     "--checkpoint",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Keep the run in FILE while it goes on; the same command again goes on from there, to the last bit.",
+    help="Save the run in FILE while it goes on; the same command continues it later, with exactly the same result.",
 )
 @click.option(
     "--checkpoint-every",
     type=NumberRange(min=0),
     metavar="SECONDS",
-    help="Write that file so often; 60 s by default.",
+    help="Time between two writes of that file; 60 s by default.",
 )
 @click.option(
     "--resume/--no-resume",
     default=None,
-    help="The checkpoint must be there / begin anew; by default go on if it is there.",
+    help="Require a checkpoint / ignore it; by default the run continues if there is one.",
 )
 @picture_options
 @json_option
@@ -129,7 +132,7 @@ def run(
     kept: dict[str, Any] = {"checkpoint": checkpoint, "checkpoint_every": checkpoint_every, "resume": resume}
     kept = {key: value for key, value in kept.items() if value is not None}
     if kept and checkpoint is None:
-        raise UsageError("--checkpoint-every and --resume belong to --checkpoint FILE")
+        raise UsageError("--checkpoint-every and --resume need --checkpoint FILE; give it too")
 
     with blaming_option(independent), stage("derive") as parts:
         described = load_model(model, allow_native, robot)
@@ -260,7 +263,7 @@ def _energy_rows(energy: EnergyBalance | None, uncounted: Sequence[str]) -> list
     rows = [("energy", f"{change}{kept}")]
     if uncounted:
         names = ", ".join(uncounted)
-        rows.append(("power balance", f"not formed: {names} is C code without a Python twin (key python)"))
+        rows.append(("power balance", f"not computed: {names} is C code without a Python version (key python)"))
     return rows
 
 

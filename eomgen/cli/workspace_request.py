@@ -25,12 +25,12 @@ def read_grid(over: tuple[str, ...], of: tuple[str, ...], within: bool, ranges: 
     """
     if not over:
         if of or within:
-            raise UsageError("--of and --within-limits belong to --over NAME=LOW:HIGH:COUNT")
+            raise UsageError("--of and --within-limits need --over NAME=LOW:HIGH:COUNT; give it too")
         return {}
     if not of:
         raise UsageError("--over needs --of NAME: the outputs or coordinates whose workspace it is")
     if ranges:
-        raise UsageError("--over and --range do not go together: one is a grid, the other a path")
+        raise UsageError("--over and --range cannot be used together: one is a grid, the other a path")
     return read_axes("--over", over)
 
 
@@ -53,7 +53,7 @@ def read_axes(option: str, over: tuple[str, ...]) -> dict[str, Any]:
         except ValueError as error:  # a UsageError too
             raise UsageError(f"{option} {words}: {error}") from None
         if name.strip() in grid:
-            raise UsageError(f"{option} {words}: each name once")
+            raise UsageError(f"{option} {words}: give each name once")
         grid[name.strip()] = (low, high, count)
     return grid
 

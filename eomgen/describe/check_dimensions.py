@@ -219,7 +219,7 @@ class _Check:
             return
         if not result.dimension.alike(wanted):
             message = (
-                f"{written(self.graph, expression.id)} is {named(result.dimension)}, and {named(wanted)} belongs here"
+                f"{written(self.graph, expression.id)} is {named(result.dimension)}, and {named(wanted)} is needed here"
             )
             yield message, self._remedy(nodes, f"give {named(wanted)}")
 
@@ -254,7 +254,7 @@ class _Check:
             f"{name} in {si_text(own.dimension)}" for name, own in known if own.dimension not in (None, NONE)
         )
         constant = any(self.graph.nodes[i][0] == "const" for i in nodes)
-        advice = "; a number with a unit is given as a parameter" if constant else ""
+        advice = "; give a number that has a unit as a parameter" if constant else ""
         return f"{first}; here {listed} in SI units{advice}" if listed else first
 
     def _node(self, i: int) -> Known:
@@ -278,7 +278,7 @@ class _Check:
         for other, k in some[1:]:
             if not other.alike(some[0][0]):
                 a, b = written(self.graph, some[0][1]), written(self.graph, k)
-                message = f"{written(self.graph, i)} puts together {named(some[0][0])}, {a}, and {named(other)}, {b}"
+                message = f"{written(self.graph, i)} combines {named(some[0][0])}, {a}, with {named(other)}, {b}"
                 nodes = reachable(self.graph, operands)
                 self.wrong[i] = (
                     message,
@@ -301,7 +301,7 @@ class _Check:
         for own, k in zip(parts, operands, strict=True):
             if own.declared and own.dimension is not None and not own.dimension.alike(NONE):
                 message = f"{written(self.graph, i)} is taken of {named(own.dimension)}"
-                remedy = "take it of an angle (rad) or a number without unit, such as a ratio of two alike"
+                remedy = "its argument must be an angle (rad) or a number without unit, such as a ratio of two lengths"
                 self.wrong[i] = message, self._remedy(reachable(self.graph, [k]), remedy)
         return NONE
 

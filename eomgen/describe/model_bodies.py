@@ -31,7 +31,7 @@ class BodyMethods(Described):
     ) -> BodyHandle:
         """Add a rigid body.
 
-        Values are numbers, texts or SymPy expressions of parameters; parameters stay symbols in all that follows.
+        Values are numbers, texts or SymPy expressions of parameters; parameters stay symbols in the equations.
 
         Parameters
         ----------
@@ -91,7 +91,7 @@ class BodyMethods(Described):
 
     @property
     def check_inertia(self) -> bool | str:
-        """What becomes of a mass and inertia that no rigid body can have: error (True), note or off (False)."""
+        """What happens to a mass and inertia that no rigid body can have: error (True), note or off (False)."""
         given: bool | str = self._description.values.get("check_inertia", True)
         return given
 

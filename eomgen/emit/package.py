@@ -68,7 +68,9 @@ def emit_package(program: Program, target: str, slim: bool = False) -> SourceSet
     """
     row = find_target(target)
     if slim and not row.module:
-        raise UsageError(f"target {target} holds no Python that could be left out; slim is for target cython or numpy")
+        raise UsageError(
+            f"slim is for target cython or numpy; packages of target {target} contain no Python to leave out"
+        )
     program = replace(program, metadata={**program.metadata, "target": target})
     return SourceSet({"model.json": metadata_json(program), **row.files(program, _context(program, slim))})
 

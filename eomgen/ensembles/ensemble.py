@@ -37,7 +37,7 @@ class Failure(NamedTuple):
 
 
 class Ensemble:
-    """The result of :meth:`~..api.module.Module.simulate_many`.
+    """The results of many runs, from :meth:`~..api.module.Module.simulate_many`.
 
     ``ens["theta"]`` is the column (k,) at the end of the runs, or (m, k) at the times ``t_eval``: coordinates,
     velocities and outputs.  Runs that failed hold NaN; ``reached`` has the states they came to.
@@ -123,7 +123,8 @@ class Ensemble:
             return np.asarray(self.reduced["mean"][row])
         if self.x is None:
             raise UsageError(
-                f"this ensemble kept only the results of its reduction ({', '.join(self.reduced)}), not {name!r}"
+                f"this ensemble kept only the results of its reduction ({', '.join(self.reduced)}), not {name!r}; "
+                "run it with reduce='states'"
             )
         states = self.x[:, None] if self.samples is None else self.samples
         if row < len(self.x):
@@ -155,7 +156,7 @@ class Ensemble:
         if self._statistics:
             rows = [self.reduced[key][:, -1] for key in ("mean", "variance", "least", "greatest")]
         elif self.x is None:
-            raise UsageError("this ensemble kept no states to summarise")
+            raise UsageError("this ensemble kept no states to summarise; run it with reduce='states' or 'statistics'")
         else:
             parts = summarise(self._outputs(self.x, self.t_end))
             spread = parts["squares"] / np.maximum(parts["count"] - 1.0, 1.0)
@@ -183,7 +184,7 @@ class Ensemble:
         return {"initial": initial, "parameters": column["p"], "inputs": inputs, **watched}
 
     def trajectory(self, k: int, **options: Any) -> Trajectory:
-        """Run k again, with all its steps; options as for ``Module.simulate``."""
+        """Run case k again and keep all its steps; options as for ``Module.simulate``."""
         plan = self._plan
         settings = {"method": plan.method, **plan.options, **options}
         return simulate(self._module, plan.span, **self.case(k), **settings)
@@ -234,7 +235,7 @@ class Ensemble:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """What the runs have in common, as a trajectory's ``metadata`` has it; ``values`` is a digest of the others."""
+        """Metadata of all runs, as in a trajectory's ``metadata``; ``values`` is a digest of what differs."""
         plan, cases = self._plan, self._cases
         shared = zip(self._module.p_names, np.reshape(cases.p, (self._module.n_p, -1)), strict=True)
         return {
@@ -276,7 +277,7 @@ class Ensemble:
         name : str
         ax : matplotlib Axes, optional
         limit : int
-            Draw so many runs at most, evenly chosen.
+            Draw at most this number of runs, evenly chosen.
         """
         from .column_picture import draw
 

@@ -120,8 +120,8 @@ class Columns:
         t, x, u = (self.t, self.x, self.u) if self._steps is None else self._steps()
         if self._steps is not None and not len(t):
             raise UsageError(
-                "the run took too many steps for all to be kept besides t_eval: run it without t_eval, "
-                "or in parts, for its change points"
+                "the run took too many steps to keep all of them besides t_eval; for its change points run it without "
+                "t_eval, or in parts"
             )
         return find_change_points(self.module, t, x, u)
 

@@ -33,8 +33,8 @@ def draw(
     Parameters
     ----------
     x : array (n_x,) or (n_q,), or mapping of str to float, optional
-        A state, a position, or values of coordinates that are assembled as by ``x0``; by default the declared initial
-        position.  An array is drawn as it is: a loop that it leaves open is seen to be open.
+        A state, a position, or values of coordinates, which are assembled as by ``x0``; by default the declared initial
+        position.  An array is drawn as given: loops that it leaves open are drawn open.
     ax : matplotlib Axes, optional
         Where to draw; a new figure by default.
     t : float
@@ -63,7 +63,7 @@ def draw(
 def explore(model: BoundModel, /, x: Any = None) -> Any:
     """Show the mechanism in a notebook with sliders for its independent coordinates and its lengths.
 
-    The loops are closed anew at each position, near the one before; where that cannot be done, a line says so.
+    At each position the loops are closed near the previous one; a line of text says where that is not possible.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def draw_branches(
     names: bool | None = None,
     **named: float | str,
 ) -> Any:
-    """Draw every way in which the loops close with the given values, side by side in one scale.
+    """Draw all positions in which the loops close with the given values, side by side at the same scale.
 
     Parameters
     ----------

@@ -70,8 +70,8 @@ class Initial:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")
             if name in layout.parameter_rates:
                 wanted = ", ".join(n for n in layout.v if not n.endswith("_dot"))
-                what = "angular velocity; give that" if layout.quaternion_slots else "velocities; give those"
-                raise UnknownNameError(f"{name!r} follows from the {what} instead, of {wanted}")
+                what = "angular velocity" if layout.quaternion_slots else "velocities"
+                raise UnknownNameError(f"{name!r} follows from the {what}; give one of {wanted} instead")
             if name not in self.coordinates and name not in rates:
                 raise unknown("coordinate or rate", name, self.coordinates + rates + layout.y)
         positions = {n: x for n, x in values.items() if n in self.coordinates}
@@ -90,7 +90,7 @@ class Initial:
         """From a closed position steadily to held values; raises AssemblyError when blocked."""
         q = follow(self.system, start, held)
         if not self.system.aligned(q):
-            raise AssemblyError("a joint's axes flipped on the way")
+            raise AssemblyError("the axes of a joint flipped on the path there")
         return q
 
     def reference(self) -> Array:
@@ -117,8 +117,8 @@ class Initial:
     def _tell_branch(self, what: str, error: AssemblyError | None) -> None:
         """Warn that a position was found by closing the loops anew."""
         warnings.warn(
-            f"{what} is not reached from the reference position without leaving its branch: {error}.  The loops are "
-            "closed from the nearest guess; branches() gives all positions found, assemble() the one near a guess",
+            f"{what} cannot be reached from the reference position on the same branch: {error}.  The loops are closed "
+            "from the nearest guess instead; branches() gives all positions found, assemble() the one near a guess",
             stacklevel=2,
         )
 
@@ -245,10 +245,10 @@ class Initial:
                 ordered = dict.fromkeys([*layout.independent, *np.argsort(-moves, kind="stable")])
                 others = [layout.v[i] for i in ordered if moves[i] > 0.1]
                 instead = " or ".join(others[:2])
-                remedy = f"give {instead} instead, or another position" if others else "nothing can move"
+                remedy = f"give {instead} instead, or another position" if others else "no velocity is possible here"
                 raise AssemblyError(
-                    f"{name} = {value:.6g} cannot be reached: the constraints hold that coordinate still here, as at "
-                    f"a dead centre or across a blade{place(layout.q, q)}; {remedy}"
+                    f"{name} = {value:.6g} cannot be reached: the constraints allow no such velocity here, as "
+                    f"at a dead centre or across a blade{place(layout.q, q)}; {remedy}"
                 )
 
     def _solve_rates(self, q: Array, held: Mapping[str, float]) -> Rates:

@@ -37,7 +37,7 @@ def module_of(trajectory: Any, model: BoundModel | None, purpose: str) -> BoundM
         return model.bind(p=trajectory.metadata.get("parameters"))
     found: BoundModel | None = getattr(trajectory.columns, "module", None)
     if found is None:
-        raise UsageError(f"{purpose} needs the model, which a saved trajectory does not hold: give model=module")
+        raise UsageError(f"{purpose} needs the model, which a saved trajectory does not contain; give model=module")
     return found
 
 

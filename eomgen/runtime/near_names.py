@@ -108,7 +108,7 @@ def require_mapping(what: str, given: Any) -> None:
     UsageError
     """
     if not isinstance(given, Mapping):
-        raise UsageError(f"{what} must give values by name, as a mapping does, not {shown(given)}")
+        raise UsageError(f"{what} must be a mapping of names to values, not {shown(given)}")
 
 
 def require(module: str, extra: str, purpose: str) -> ModuleType:
@@ -137,4 +137,4 @@ def require_time_and_state(label: str, function: Callable[..., Any]) -> None:
     except TypeError:
         given = f"{getattr(function, '__name__', type(function).__name__)}{taken}"
         remedy = "write it with both, as lambda t, x: ..." if len(taken.parameters) < 2 else "bind its other arguments"
-        raise UsageError(f"{label} is called as f(t, x), which {given} does not take; {remedy}") from None
+        raise UsageError(f"{label} must be callable as f(t, x), and {given} is not; {remedy}") from None

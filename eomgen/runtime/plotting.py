@@ -79,11 +79,11 @@ def choose(
     if kind not in KINDS:
         raise unknown("kind of plot", kind, KINDS)
     if y is not None and x is None:
-        raise UsageError("y= goes with x=, for example plot(x='x', y='y'); columns over time are given as they are")
+        raise UsageError("y= needs x=, for example plot(x='x', y='y'); for columns over time give their names alone")
     if x is not None and kind != "time":
-        raise UsageError(f"x= and kind={kind!r} do not go together; leave one out")
+        raise UsageError(f"x= and kind={kind!r} cannot be used together; leave out one of them")
     if x is not None and not names:
-        raise UsageError(f"plot(x={x!r}) has nothing to draw over it; give y= or names of columns")
+        raise UsageError(f"plot(x={x!r}) names no column to draw against it; give y= or names of columns")
     panels, across = KINDS[kind](trajectory, tuple(dict.fromkeys(names)), x)
     if not panels:
         raise UsageError(f"there is nothing to plot of kind {kind!r}: the run has no coordinates")
@@ -240,7 +240,9 @@ def _residuals(trajectory: Any, _: tuple[str, ...], __: str | None) -> tuple[lis
     """Largest violation of the constraints over time, of the stored states, and the raw one's largest."""
     module = getattr(trajectory.columns, "module", None)
     if module is None:
-        raise UsageError("residuals over time need the model: plot the trajectory that simulate gave, unsaved")
+        raise UsageError(
+            "residuals over time need the model: plot the trajectory of simulate itself, not one read from a file"
+        )
     if not module.n_rows:
         raise UsageError(f"model {module.name!r} has no constraints, so there are no residuals")
     t, x = trajectory.t, trajectory.x

@@ -57,7 +57,9 @@ def build_scene(
     tracked = [_tracked(data, name) for name in trace]  # unknown names fail before anything is evaluated
     poses = module.poses(q, t=t, u=u)
     if not np.isfinite(poses).all():
-        raise UsageError("the poses of the bodies are not finite at this position; give coordinates that are")
+        raise UsageError(
+            "the poses of the bodies are not finite at this position; give finite coordinates within the model's reach"
+        )
     frames = _with_ground(poses)
     start = np.array(q[:, 0])
     quaternions = [i for i, _ in layout.quaternion_slots]

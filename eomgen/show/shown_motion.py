@@ -72,7 +72,9 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
             raise UsageError(f"{name} must be a number greater than 0, not {value!r}")
     t = trajectory.t
     if len(t) < 2:
-        raise UsageError("the run has one point only; draw its state with module.draw(x)")
+        raise UsageError(
+            "the run has only one point, so there is no motion to show; draw its state with module.draw(x)"
+        )
     if t[0] == t[-1]:  # a range of coordinates at one time
         led = trajectory.metadata.get("led") or trajectory.x_names[:1]
         over, unit = trajectory[led[0]], trajectory.units.get(led[0], "")
@@ -86,8 +88,8 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
     count = int(np.ceil(span / speed * fps)) + 1
     if count > FRAMES:
         raise UsageError(
-            f"{count} frames, of which an animation has at most {FRAMES}: give a speed of {span * fps / FRAMES:.3g} or "
-            "more, a lower fps, or a shorter run"
+            f"the animation would have {count} frames, and {FRAMES} is the most; give a speed of "
+            f"{span * fps / FRAMES:.3g} or more, a lower fps, or a shorter run"
         )
     times = np.linspace(start, end, max(count, 2))
     slow = "" if abs(speed - 1.0) < ROUNDED else f"  x{speed:.2g}"

@@ -60,13 +60,15 @@ def require_kind(path: Path) -> None:
         )
     if kind not in (*WRITERS, ".html"):
         raise UsageError(
-            f"{path}: the ending of the name selects the kind of animation: .gif, .mp4, .html, "
-            "and a name without an ending is a folder for PNG frames"
+            f"{path}: the name of an animation must end in .gif, .mp4 or .html, or have no ending (a folder for PNG "
+            "frames)"
         )
     if kind == FOLDER:
         refuse_link(path)
         if path.exists() and (not path.is_dir() or any(path.iterdir())):
-            raise UsageError(f"{path}: frames go into a new or an empty folder; name another, or empty it")
+            raise UsageError(
+                f"{path}: the folder for frames must be new or empty; name another folder, or empty this one"
+            )
     _require_libraries(kind)
 
 
@@ -92,8 +94,8 @@ def _find_ffmpeg() -> str:
         return str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
     except (ImportError, RuntimeError):
         raise MissingDependencyError(
-            "an animation as .mp4 needs ffmpeg: pip install imageio-ffmpeg, or that of the system "
-            "(Debian: apt install ffmpeg); .gif and .html need neither"
+            "an animation as .mp4 needs ffmpeg: pip install imageio-ffmpeg, or install it on the system "
+            "(Debian: apt install ffmpeg); .gif and .html do not need it"
         ) from None
 
 

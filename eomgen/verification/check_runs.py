@@ -57,10 +57,10 @@ def check(bench: Bench) -> list[Finding]:
     references = [(case, cache(_reference(bench, case))) for case in _held(bench)[:TRIED]]
     found = [_order(bench, method, references) for method in ORDERS if method in _methods(bench)]
     if not found:
-        found = [Finding.skipped("steppers: order of one step", "the module has no steppers of its own: target numpy")]
+        found = [Finding.skipped("steppers: order of one step", "a module of target numpy has no steppers of its own")]
     end = _far(bench, *references[0])
     found += [_agreement(bench, *end), _energy(bench, end[0])]
-    why = "its forces have kinks or tables, at which no method keeps its order"
+    why = "its forces have corners or tables, and no method keeps its order there"
     return [
         f if f.ok or not kinked or f.check.startswith("runs: energy") else Finding.skipped(f.check, why) for f in found
     ]
@@ -68,9 +68,9 @@ def check(bench: Bench) -> list[Finding]:
 
 def _inapplicable(bench: Bench) -> str:
     if not bench.module.n_dof:
-        return "drivers move all of it, and nothing is integrated"
+        return "drivers move the whole mechanism, so nothing is integrated"
     if Events(bench.layout, None).resets:
-        return "events reset its state, and an integrator watches none"
+        return "events reset its state, and an integrator finds no events"
     if not bench.layout.projects:
         return "derived with baumgarte="
     return ""
@@ -194,7 +194,7 @@ def _order(bench: Bench, method: str, references: Sequence[tuple[Case, Reference
                 missing = 0.0
             observed.append((missing, case.number))
     if not observed:
-        return Finding.skipped(check, "one step is exact to rounding, or no two steps' errors can be told from it")
+        return Finding.skipped(check, "the errors of one step are so small that rounding hides them")
     best, number = min(observed)
     found.add(number, [best], SHORT)
     return found.finding()

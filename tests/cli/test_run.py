@@ -122,7 +122,7 @@ def test_a_run_with_c_code_that_has_no_python_twin_tells_that_its_power_balance_
     words = ["run", model, "--allow-native", "--end", "1", "--set", "q_dot=1"]
     result = call(*words, "--out", "run.csv")
     assert result.code == 0, result.err
-    assert "not formed: drag is C code without a Python twin" in result.out
+    assert "not computed: drag is C code without a Python version" in result.out
     assert (tmp_path / "run.csv").is_file()
     run = call(*words, "--json").json
     assert run["energy"]["power_balance"] is None

@@ -60,9 +60,9 @@ def test_frames_go_into_a_new_folder(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--range", "theta=0:1", "--end", "2"], "--end and options of the integrator are for runs"),
+        (["--range", "theta=0:1", "--end", "2"], "leave out --end and options of the integrator"),
         (["--range", "theta"], "write NAME=START:END"),
-        (["--out", "x.avi"], "selects the kind of animation: .gif, .mp4, .html"),
+        (["--out", "x.avi"], "must end in .gif, .mp4 or .html"),
         (["--range", "thet=0:1:3", "--out", "x.gif"], "did you mean theta"),
         (["--trace", "coupler.Q", "--out", "x.gif", "--end", "0.1"], "no marker or body 'coupler.Q'"),
     ],

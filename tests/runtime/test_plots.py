@@ -127,9 +127,9 @@ def test_sixty_columns_leave_the_axes_their_room() -> None:
 
 def test_wishes_that_do_not_go_together_are_refused(run: Any) -> None:
     for call, words in (
-        ({"y": "s"}, "goes with x="),
-        ({"x": "s"}, "nothing to draw over it"),
-        ({"x": "s", "y": "theta", "kind": "phase"}, "do not go together"),
+        ({"y": "s"}, "needs x="),
+        ({"x": "s"}, "no column to draw against it"),
+        ({"x": "s", "y": "theta", "kind": "phase"}, "cannot be used together"),
         ({"kind": "phases"}, "did you mean phase"),
         ({"x": "thet", "y": "s"}, "did you mean theta"),
     ):

@@ -81,7 +81,7 @@ def test_a_term_dropped_in_gamma(row: int) -> None:
     gamma = tuple(g * 0.999 if k == row else g for k, g in enumerate(c.gamma))
     broken = dataclasses.replace(kinematics, constraints=dataclasses.replace(c, gamma=gamma))
     breaches = verified(dataclasses.replace(equations, kinematics=broken))
-    assert {"gamma: second differences of C along the motion", "rhs: constraints go on holding"} <= breaches
+    assert {"gamma: second differences of C along the motion", "rhs: constraints stay satisfied"} <= breaches
     assert "accelerations: free bodies" in breaches
 
 
@@ -100,7 +100,7 @@ def test_a_loop_closed_in_the_wrong_place() -> None:
     kinematics, c = equations.kinematics, equations.kinematics.constraints
     values = (c.values[0] + 0.001, *c.values[1:])
     broken = dataclasses.replace(kinematics, constraints=dataclasses.replace(c, values=values))
-    assert verified(dataclasses.replace(equations, kinematics=broken)) >= {"joints: ends where their coordinates say"}
+    assert verified(dataclasses.replace(equations, kinematics=broken)) >= {"joints: poses match their coordinates"}
 
 
 def test_a_wrong_index_in_a_pose(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,7 +113,7 @@ def test_a_wrong_index_in_a_pose(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(collect, "_poses", swapped)
     breaches = verified(derived())
-    assert {"joints: ends where their coordinates say", "joints: relative velocities"} <= breaches
+    assert {"joints: poses match their coordinates", "joints: relative velocities"} <= breaches
 
 
 def test_a_potential_of_the_wrong_sign() -> None:
@@ -232,7 +232,7 @@ def test_a_projection_that_stops_early(module: Module, monkeypatch: pytest.Monke
         return 0.999 * right(x, **options) + 0.001 * np.asarray(x)
 
     monkeypatch.setattr(module, "project", lambda x, **options: wrong(np.asarray(x) + 1e-5, **options))
-    assert "project: idempotent, loops closed, as x0 leaves them" in found_by(module.verify(states=3))
+    assert "project: idempotent, closes loops, keeps x0" in found_by(module.verify(states=3))
 
 
 def test_a_step_of_lower_order(monkeypatch: pytest.MonkeyPatch) -> None:
