@@ -161,8 +161,7 @@ def _described(layout: Layout) -> dict[str, Any]:
         "y_names": list(layout.y),
         "u_names": list(layout.u),
         "model_method": layout.metadata.get("method"),
-        "docs": layout.metadata.get("docs", {}),
-        **{key: layout.metadata[key] for key in ("latex", "instances") if key in layout.metadata},
+        **{key: layout.metadata.get(key, {}) for key in ("docs", "latex", "instances")},
     }
 
 

@@ -12,13 +12,17 @@ from sympy.abc import a, b, c, d, k, l, m, x, y
 
 from eomgen.graph.core import Graph
 from eomgen.graph.evaluate import evaluate
-from eomgen.graph.sympy_lower import lower
+from eomgen.graph.sympy_lower import lower as lower_by
 from eomgen.simplify import WHOLE, simplify
 from eomgen.simplify.atoms import Work
 from eomgen.simplify.form import WORK
 
 A, B, C = sympy.symbols("A B C")
 sin, cos, sqrt = sympy.sin, sympy.cos, sympy.sqrt
+
+
+def lower(graph: Graph, expression: Any) -> Any:
+    return lower_by(graph, expression, lambda x: graph.symbol(x.name) if x.is_Symbol else None)
 
 
 def short(expression: Any, **more: Any) -> Any:
@@ -164,16 +168,17 @@ def test_effort_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_deep_nesting_needs_no_recursion() -> None:
-    expression = x
-    for i in range(1, 400):
-        expression = sympy.Symbol(f"p{i}") * sympy.exp(expression)
+    """Of calls in calls, as of a table with many intervals."""
     graph = Graph()
-    lowered = graph.symbol("x")
-    for i in range(1, 400):
-        lowered = graph.symbol(f"p{i}") * graph.apply("exp", lowered)
-    form = simplify([lowered], sizes=WHOLE)
+    found = graph.symbol("x")
+    for i in range(150):
+        found = graph.apply("select", graph.apply("lt", graph.symbol("x"), float(i)), graph.symbol(f"p{i}"), found)
+    form = simplify([found], sizes=WHOLE)
     assert form is not None
-    assert form.sympy()[1] == [expression]
+    (expression,) = form.sympy()[1]
+    for i in reversed(range(150)):
+        (value, condition), (expression, _) = expression.args
+        assert (value, condition) == (sympy.Symbol(f"p{i}"), x < i)
 
 
 def test_nothing_of_nothing() -> None:
