@@ -30,6 +30,7 @@ ALONE = 30  #: operations of what is used once beyond which it gets a name in th
 WRITTEN = 4_000  #: operations beyond which an attempt is not made
 WORK = 100_000  #: products of terms in all attempts together
 LATER = 10_000  #: products of terms that are left in any case for names that are put in
+WORSE = 1.15  #: how much longer an attempt is after which none with fewer names is made
 SHARED = 1.35  #: how much longer what needs no names may be
 
 
@@ -138,7 +139,7 @@ def simplify(
         form = _Attempt(graph, work, rates).form(exprs, given, cuts, prefix)
         if best is None or form.cost <= best.cost * (1.0 if form.named else SHARED):
             best = form
-        if work.left <= LATER:
+        if work.left <= LATER or form.cost > WORSE * best.cost:
             break
     work.left = math.inf  # what stands in sines and denominators is factored as it is written
     return best
