@@ -6,6 +6,7 @@ from mutations.fault import Fault
 
 SHOWN = "tests/reading/test_shown_is_compiled.py::test_of_every_example[slider_crank]"
 VIEWS = "tests/reading/test_methods_and_views.py"
+FORMS = "tests/simplify/test_simplify.py"
 
 FAULTS = (
     Fault(
@@ -63,5 +64,33 @@ FAULTS = (
         "(0.0, -1.0, 0.0, 1.0)[k]",
         "the sine of a quarter turn that is put in has the wrong sign",
         (f"{VIEWS}::test_values_put_in_one_after_the_other",),
+    ),
+    Fault(
+        "form-angle-sum", "eomgen/simplify/joined_angles.py",
+        'angle = less if (made == "cos") == alike else both',
+        'angle = both if (made == "cos") == alike else less',
+        "cos a cos b - sin a sin b is joined to cos(a - b)",
+        (f"{FORMS}::test_as_by_hand",),
+    ),
+    Fault(
+        "form-half-turn", "eomgen/simplify/joined_angles.py",
+        'sign = {("sin", 2): -1, ("sin", 3): -1, ("cos", 1): -1, ("cos", 2): -1}.get((kind, quarters), 1)',
+        'sign = {("sin", 2): -1, ("sin", 3): -1, ("cos", 2): -1}.get((kind, quarters), 1)',
+        "cos(a + pi/2) becomes sin a",
+        (f"{FORMS}::test_quarter_turns",),
+    ),
+    Fault(
+        "form-signed-root", "eomgen/simplify/expansion.py",
+        'return self.atoms.poly("abs", (freeze({base: 1}),))',
+        "return {base: 1}",
+        "the root of a square has the sign of what is squared",
+        (f"{FORMS}::test_roots_of_squares_have_no_sign",),
+    ),
+    Fault(
+        "form-inverse-power", "eomgen/simplify/inline.py",
+        "x**n if n >= 0 else ratio(1, x**-n)",
+        "x ** abs(n)",
+        "a number that is put in below a fraction is multiplied",
+        (f"{FORMS}::test_given_names_stay_or_are_put_in",),
     ),
 )  # fmt: skip
