@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
 from .equations import TreeEquations
+from .files.terminal import fold
 from .graph.core import Expr
 from .graph.count import Operations, count
 from .kinematics import Kinematics

@@ -4,7 +4,21 @@ from __future__ import annotations
 
 from ..notation.latex_of_names import literal
 from ..notation.notation import Notation
-from .tree import Call, Cases, Formula, Name, Number, Power, Product, Quotient, Relation, Sum, Words, is_group, is_simple
+from .tree import (
+    Call,
+    Cases,
+    Formula,
+    Name,
+    Number,
+    Power,
+    Product,
+    Quotient,
+    Relation,
+    Sum,
+    Words,
+    is_group,
+    is_simple,
+)
 
 _FUNCTIONS = {
     "sin": r"\sin", "cos": r"\cos", "tan": r"\tan", "asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan",
@@ -61,7 +75,8 @@ class _Latex:
                     else rf"{self.line(value)} & \text{{if }} {self.line(when)}"
                     for value, when in formula.branches
                 ]  # fmt: skip
-                return rf"\begin{{cases}}{r' \\ '.join(rows)}\end{{cases}}"
+                body = r" \\ ".join(rows)
+                return rf"\begin{{cases}}{body}\end{{cases}}"
 
     def _sum(self, formula: Sum) -> str:
         found = ""

@@ -4,10 +4,24 @@ from __future__ import annotations
 
 from ..notation.notation import Notation
 from ..texts import html_text
-from .tree import Call, Cases, Formula, Name, Number, Power, Product, Quotient, Relation, Sum, Words, is_group, is_simple
+from .tree import (
+    Call,
+    Cases,
+    Formula,
+    Name,
+    Number,
+    Power,
+    Product,
+    Quotient,
+    Relation,
+    Sum,
+    Words,
+    is_group,
+    is_simple,
+)
 
 _FUNCTIONS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan"}
-_RELATIONS = {"<=": "≤", ">=": "≥", "and": "∧", "or": "∨"}
+_RELATIONS = {"<=": "≤", ">=": "≥", "and": "\u2227", "or": "\u2228"}
 MINUS = "<mo>\u2212</mo>"
 _THIN = "<mspace width='0.17em'></mspace>"
 

@@ -18,7 +18,9 @@ from .readable import Readable
 FOLDED = 12  #: formulas more than which are folded up
 MOST = 1_000  #: intermediates that are shown
 LEFT = "style='text-align:left'"
-_STYLE = "margin:0.7em 0;overflow-x:auto;font-size:1.15em"
+_STYLE = "margin:0.5em 0;padding:0.2em 0;overflow-x:auto;overflow-y:hidden;font-size:1.15em"
+#: Fonts with brackets that grow, of the usual systems.
+_FONT = "font-family:Latin Modern Math,STIX Two Math,Cambria Math,TeX Gyre Termes Math,DejaVu Math TeX Gyre,math"
 
 
 def equations_html(equations: Readable) -> str:
@@ -56,11 +58,11 @@ def _coordinates(printed: PrintedEquations) -> str:
 
 
 def _math(inside: str) -> str:
-    return f"<math>{inside}</math>"
+    return f"<math style='{_FONT}'>{inside}</math>"
 
 
 def _block(inside: str) -> str:
-    return f"<div style='{_STYLE}'><math displaystyle='true'>{inside}</math></div>"
+    return f"<div style='{_STYLE}'><math displaystyle='true' style='{_FONT}'>{inside}</math></div>"
 
 
 def _bracketed(rows: list[list[str]]) -> str:
@@ -137,5 +139,3 @@ def _intermediates(printed: PrintedEquations) -> Iterator[str]:
         yield f"<p {LEFT}>where</p>{lines}"
     else:
         yield f"<details><summary>where: {len(named)} named intermediates</summary>{lines}{more}</details>"
-
-

@@ -45,15 +45,15 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
         factor = rf"\left({shown(M)}\right)" if is_group(M) else shown(M)
         yield f"{'' if shown(M) == '1' else factor + ' '}{rates[0]} = {shown(f)}"
         return
-    M = _matrix([[shown(x) for x in row] for row in printed.mass_matrix])
-    f, v = _matrix([[shown(x)] for x in printed.force]), _matrix([[x] for x in rates])
+    left = _matrix([[shown(x) for x in row] for row in printed.mass_matrix])
+    right, v = _matrix([[shown(x)] for x in printed.force]), _matrix([[x] for x in rates])
     if len(rates) > 1 and of_mass + of_force <= WIDE:
-        yield f"{M} {v} = {f}"
+        yield f"{left} {v} = {right}"
         return
     yield rf"M\, {v} = f" if len(rates) > 1 else rf"M\, {rates[0]} = f"
     whole = len(rates) > 1 and of_mass <= WIDE
     if whole:
-        yield f"M = {M}"
+        yield f"M = {left}"
     for entry in printed.entries():
         if not (whole and entry.letter == "M"):
             comma = "," if len(rates) > 9 else ""

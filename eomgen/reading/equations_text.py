@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from ..files.terminal import fold
 from ..printing.text import TIGHT
 from ..printing.tree import Formula, is_group
 from ..texts import visible
@@ -40,7 +41,7 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
         if len(shown) > lines:
             rest = f"... and {len(shown) - lines} lines more: eqs.mass_matrix, eqs.force, eqs.intermediates"
             found += [rest, "or in a shell: eomgen derive MODEL --format text"]
-    found += ["", *_fold("read next: " + ", ".join(f"eqs.{name}" for name in printed.attributes), columns, "  ")]
+    found += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
     return "\n".join(found)
 
 
@@ -74,7 +75,8 @@ def _equations(printed: PrintedEquations, columns: int) -> Iterator[str]:
         yield from map(plain, whole_rows)
         yield from _where(printed, columns)
         return
-    yield f"M v' = f with v' = ({', '.join(rates)})" if len(", ".join(rates)) < columns - 24 else "M v' = f"
+    listed = f"M v' = f with v' = ({', '.join(rates)})"
+    yield f"M {rates[0]} = f" if len(rates) == 1 else listed if len(listed) <= columns else "M v' = f"
     yield ""
     rows = [*_matrix(M, "M = ")]
     small = len(rates) > 1 and max(map(len, rows)) <= columns
@@ -132,43 +134,36 @@ def _matrix_equation(M: list[list[str]], rates: list[str], f: list[str]) -> Iter
 
 
 def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
-    """A formula broken between terms, and between factors where a term is too long."""
+    """A formula broken between terms, inside of a term where it is too long, and between factors at last."""
     margin = " " * min(len(label) + 2, 12)
     line = f"  {label}"
-    for word in _words(shown, columns - len(margin)):
-        if len(line) + len(word) + 1 > columns and line.strip():
-            yield plain(line.rstrip())
-            line = margin
-        line += word + " "
+    for term in _pieces(shown, outside=True):
+        whole = len(margin) + len(term) <= columns
+        for word in [term] if whole else _pieces(term):
+            for part in [word] if len(margin) + len(word) <= columns else _cut(word, columns - len(margin)):
+                if len(line) + len(part) > columns and line.strip():
+                    yield plain(line.rstrip())
+                    line = margin
+                line += part + " "
     yield plain(line.rstrip())
 
 
-def _words(shown: str, room: int) -> Iterator[str]:
-    """Pieces between which a line may end; a sign stays with what comes after it."""
-    sign = ""
+def _pieces(shown: str, outside: bool = False) -> Iterator[str]:
+    """Parts between which a line may end, a sign with what comes after it; outside of parentheses alone if asked."""
+    piece, depth = "", 0
     for word in shown.split(" "):
-        if word in ("+", "-", "if", "otherwise"):
-            sign = f"{sign}{word}{TIGHT}"
-            continue
-        piece, sign = sign + word, ""
-        if len(piece) <= room:
-            yield piece
-            continue
-        for part in piece.split(TIGHT):
-            for k in range(0, len(part), room):
-                yield part[k : k + room]
-    if sign:
-        yield sign
-
-
-def _fold(words: str, columns: int, margin: str) -> Iterator[str]:
-    line = ""
-    for word in words.split(" "):
-        if len(line) + len(word) + 1 > columns:
-            yield line
-            line = margin + word
+        piece += word
+        depth += sum(map(word.count, "({")) - sum(map(word.count, ")}"))
+        if word in ("+", "-", "if", "otherwise") or (outside and depth):
+            piece += TIGHT if word in ("+", "-", "if") else " "
         else:
-            line = f"{line} {word}" if line else word
-    yield line
+            yield piece
+            piece = ""
+    if piece:
+        yield piece
 
 
+def _cut(word: str, room: int) -> Iterator[str]:
+    """A long part between factors; a longer factor anywhere."""
+    for part in word.split(TIGHT):
+        yield from (part[k : k + room] for k in range(0, len(part), room))

@@ -1,12 +1,13 @@
-"""Stage reading, printed: equations of motion M(q) v' = f -> the formulas that a display shows, whatever it is made of."""
+"""Stage reading, printed: equations of motion M(q) v' = f -> the formulas that a display shows."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..graph.core import Expr
+from ..graph.substitute import symbols_of
 from ..notation.notation import Notation
 from ..printing import Formulas, Order, text
 from ..printing.order import COORDINATE, GRAVITY, INERTIA, INPUT, MASS, PARAMETER, RATE
@@ -64,12 +65,11 @@ def order_of(equations: Readable) -> Order:
 
 def _alone(x: Expr) -> tuple[str, ...]:
     """The name that an expression is, if it is one."""
-    return (str(x.name),) if x.op == "sym" else ()
+    names = _names(x)
+    return tuple(names) if len(names) == 1 and x.graph.symbol(*names).id == x.id else ()
 
 
 def _names(x: Expr) -> set[str]:
-    from ..graph.substitute import symbols_of
-
     return set(symbols_of([x]))
 
 
