@@ -103,6 +103,8 @@ class _Latex:
         if isinstance(base, Call) and base.function in _FUNCTIONS:
             return self._call(base, f"^{{{exponent}}}" if len(exponent) > 1 else f"^{exponent}")
         shown = self.line(base)
+        if isinstance(base, Call) and base.function == "abs":
+            return f"{shown}^{{{exponent}}}" if len(exponent) > 1 else f"{shown}^{exponent}"
         if not is_simple(base) or "^" in shown or "'" in shown:
             shown = fenced(shown)
         return f"{shown}^{{{exponent}}}" if len(exponent) > 1 else f"{shown}^{exponent}"

@@ -76,7 +76,7 @@ class Order:
         return (family, heavy, function, degree, _flat(keys))
 
     def _is_rate(self, symbol: Any) -> bool:
-        return self.of_name(str(symbol))[0] == RATE
+        return bool(self.of_name(str(symbol))[0] == RATE)
 
     def factors(self, factors: Iterable[Any]) -> list[Any]:
         """Factors in order."""

@@ -34,7 +34,7 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
     name = visible(equations.kinematics.mechanism.name, lines=False)
     found = [f"equations of motion of {name}", f"  {printed.title}", *_coordinates(printed, columns)]
     if equations.mobility.n_dof == 0:
-        found.append("  nothing is free to move: the position follows from the constraints and the time")
+        found.append("  nothing is free to move: the position follows from constraints and time")
     else:
         shown = [*_equations(printed, columns)]
         found += ["", *shown[:lines]]
