@@ -20,7 +20,7 @@ DRAWN = 30  #: bodies of a mechanism that is drawn whenever a notebook shows its
 
 
 class Equations(Derivation):
-    """The derived equations of motion of a model.
+    """The derived equations of motion of a model: to read, to count and to compile.
 
     Attributes
     ----------

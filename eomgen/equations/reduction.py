@@ -63,7 +63,7 @@ class VelocityTransformation(NamedTuple):
 
 
 def transform_velocities(
-    kinematics: Kinematics, mobility: Mobility, values: Mapping[str, float], names: Names | None = None
+    kinematics: Kinematics, mobility: Mobility, values: Mapping[str, float], names: LoopNames | None = None
 ) -> VelocityTransformation:
     """B, b and c of the independent velocities of the mobility, with pivots judged by numbers as above.
 
@@ -93,13 +93,13 @@ def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
     return total
 
 
-class Names:
-    """Names for what is formed on the way to the dependent velocities.
+class LoopNames:
+    """LoopNames for what is formed on the way to the dependent velocities.
 
     Attributes
     ----------
     given : list of (str, Expr)
-        Names, which stand as symbols in what follows, and their values, in order.
+        LoopNames, which stand as symbols in what follows, and their values, in order.
     """
 
     def __init__(self, kinematics: Kinematics, independent: Sequence[str]) -> None:
@@ -138,7 +138,7 @@ def eliminate(
     given: Sequence[Sequence[Expr]],
     bound: Sequence[int],
     values: Mapping[str, float],
-    names: Names | None = None,
+    names: LoopNames | None = None,
 ) -> dict[int, list[Expr]]:
     """Solve rows, as many as there are columns ``bound``, for these columns: column -> its solved row.
 
@@ -164,7 +164,7 @@ def eliminate(
             row = dict(zip(others, values_of_row, strict=True))
             if names is not None:
                 row = {k: names.entry(j, k, x) for k, x in row.items()}
-            solved[j] = [row[k] if k in row else one if k == j else zero for k in range(len(given[0]))]
+            solved[j] = [row.get(k, one if k == j else zero) for k in range(len(given[0]))]
     return solved
 
 
@@ -178,21 +178,18 @@ def _blocks(given: Sequence[Sequence[Expr]], bound: Sequence[int]) -> list[tuple
     needs = [[filled[row_of[a]][b] for b in range(len(bound))] for a in range(len(bound))]
     _, labels = connected_components(csr_array(needs), directed=True, connection="strong")
     waiting = [[k for k, label in enumerate(labels) if label == one] for one in sorted(set(labels.tolist()))]
-    done: set[int] = set()
+    left = set(range(len(bound)))
     blocks = []
     while waiting:
-        known = [[b for b in range(len(bound)) if b not in done and b not in group] for group in waiting]
-        ready = next(
-            g for g, later in zip(waiting, known, strict=True) if not any(needs[a][b] for a in g for b in later)
-        )
+        ready = next(group for group in waiting if not any(needs[a][b] for a in group for b in left - {*group}))
         waiting.remove(ready)
-        done.update(ready)
+        left -= {*ready}
         blocks.append(([row_of[k] for k in ready], [bound[k] for k in ready]))
     return blocks
 
 
 def _solve(
-    left: list[list[Expr]], right: list[list[Expr]], at: Mapping[str, float], names: Names | None
+    left: list[list[Expr]], right: list[list[Expr]], at: Mapping[str, float], names: LoopNames | None
 ) -> list[list[Expr]]:
     """left^-1 right; parts get names where there are names."""
     if len(left) == 1:
@@ -230,5 +227,5 @@ def _solve(
     return [rows[pivots[j]][n:] for j in range(n)]
 
 
-def _named(names: Names | None, value: Expr) -> Expr:
+def _named(names: LoopNames | None, value: Expr) -> Expr:
     return value if names is None else names.part("w", value)

@@ -17,7 +17,7 @@ from .rotation_coordinates import about, unit
 
 @dataclass(frozen=True)
 class Cylindrical(Joint):
-    """Slides along and turns about the common z axis.  Allows 2, removes 4."""
+    """S slides along the common z axis and turns about it.  Allows 2, removes 4."""
 
     type_name: ClassVar[str] = "cylindrical"
     look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (1.0, 3.2)),), slides=True)
@@ -41,7 +41,7 @@ class Cylindrical(Joint):
 
 @dataclass(frozen=True)
 class Planar(Joint):
-    """Moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
+    """S moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
 
     type_name: ClassVar[str] = "planar"
     look: ClassVar[JointLook] = JointLook((SymbolPart("box", (3.0, 3.0, 0.8)),))
@@ -71,7 +71,7 @@ class Planar(Joint):
 
 @dataclass(frozen=True)
 class Translational(Joint):
-    """Slides along x, y and z of P without turning.  Allows 3, removes 3."""
+    """S slides along x, y and z of P without turning.  Allows 3, removes 3."""
 
     type_name: ClassVar[str] = "translational"
     look: ClassVar[JointLook] = JointLook((SymbolPart("box", (1.6, 1.6, 1.6)),))
@@ -96,7 +96,7 @@ class Translational(Joint):
 
 @dataclass(frozen=True)
 class Weld(Joint):
-    """No motion.  Allows 0, removes 6."""
+    """S is fixed to P.  Allows 0, removes 6."""
 
     type_name: ClassVar[str] = "weld"
     look: ClassVar[JointLook] = JointLook((SymbolPart("box", (0.9, 0.9, 0.9)),))

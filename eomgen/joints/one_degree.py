@@ -20,10 +20,10 @@ from .rotation_coordinates import about, unit
 
 @dataclass(frozen=True)
 class Revolute(Joint):
-    """Turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
+    """S turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
 
     type_name: ClassVar[str] = "revolute"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (0.75, 2.2)),))
+    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (0.75, 2.5)),))
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
@@ -51,7 +51,7 @@ class Continuous(Revolute):
 
 @dataclass(frozen=True)
 class Prismatic(Joint):
-    """Slides along the common z axis without turning.  Allows 1, removes 5."""
+    """S slides along the common z axis without turning.  Allows 1, removes 5."""
 
     type_name: ClassVar[str] = "prismatic"
     look: ClassVar[JointLook] = JointLook((SymbolPart("box", (2.2, 2.2, 4.0)),), slides=True)
@@ -75,7 +75,7 @@ class Prismatic(Joint):
 
 @dataclass(frozen=True)
 class Screw(Joint):
-    """Turns about the common z axis and slides along it by ``pitch`` (m) a turn.  Allows 1, removes 5.
+    """S turns about the common z axis and slides along it by ``pitch`` (m) per turn.  Allows 1, removes 5.
 
     The coordinate is the angle; a positive pitch is a right-handed thread (Shabana, sec. 7.7, screw joint).
     """
@@ -87,9 +87,9 @@ class Screw(Joint):
     options: ClassVar[Fields] = {
         "pitch": Field(
             "expression",
-            "advance in one turn (m), negative for a left-handed thread",
+            "advance of S per turn (m), negative for a left-handed thread",
             required=True,
-            not_zero="a screw without advance is a revolute joint",
+            not_zero="give a pitch other than 0; a screw without advance is a revolute joint",
             dimension=LENGTH,
         )
     }

@@ -46,7 +46,7 @@ def apart(length: Expr, position: Vec3) -> Closure:
 
 @dataclass(frozen=True)
 class Distance(RodJoint):
-    """A massless rod with a ball at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
+    """A massless rod with a ball joint at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "distance"
     look: ClassVar[JointLook] = JointLook(
@@ -63,7 +63,7 @@ class Distance(RodJoint):
 
 @dataclass(frozen=True)
 class RevoluteSpherical(RodJoint):
-    """A massless rod that turns about z of P, with a ball at S: across z, ``length`` long.  Allows 4, removes 2."""
+    """A massless rod of ``length`` turns about z of P, across it, with a ball joint at S.  Allows 4, removes 2."""
 
     type_name: ClassVar[str] = "revolute_spherical"
     look: ClassVar[JointLook] = JointLook(
@@ -128,7 +128,7 @@ class Perpendicular(RodJoint):
 
 @dataclass(frozen=True)
 class Orientation(RodJoint):
-    """All axes stay parallel, the origins are free: S does not turn against P.  Allows 3, removes 3."""
+    """S does not turn against P: all axes stay parallel, and the origins move freely.  Allows 3, removes 3."""
 
     type_name: ClassVar[str] = "orientation"
     has_axis: ClassVar[bool] = False

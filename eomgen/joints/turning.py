@@ -71,7 +71,7 @@ class RotatingJoint(Joint):
 
 @dataclass(frozen=True)
 class Spherical(RotatingJoint):
-    """Turns about a point.  Allows 3, removes 3."""
+    """S turns freely about the common origin.  Allows 3, removes 3."""
 
     type_name: ClassVar[str] = "spherical"
     look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)),))
@@ -92,7 +92,7 @@ class Spherical(RotatingJoint):
 
 @dataclass(frozen=True)
 class Free(RotatingJoint):
-    """Six degrees of freedom: position of S in P axes, then its rotation.  Removes none."""
+    """S moves freely: three coordinates of its position in P axes, then its rotation.  Allows 6, removes 0."""
 
     type_name: ClassVar[str] = "free"
     place: ClassVar[tuple[Coordinate, ...]] = PLACE

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..printing import mathml
-from ..printing.mathml import fenced, row, table
-from ..printing.tree import Formula, Name, Sum, is_group
+from ..printing.formula_mathml import fenced, row, table
+from ..printing.formula_tree import Formula, Name, SumOf, is_group
 from ..texts import html_text
 from .equations_latex import LONGEST_LINE, WIDE, sums_in_lines
-from .printed_equations import Entry, PrintedEquations
+from .printed_equations import PrintedEntry, PrintedEquations
 from .readable import Readable
 
 FOLDED = 12  #: formulas more than which are folded up
@@ -104,7 +104,7 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
         yield f"<details><summary>the {len(entries)} entries of M and f</summary>{''.join(entries)}</details>"
 
 
-def _label(entry: Entry, n: int) -> str:
+def _label(entry: PrintedEntry, n: int) -> str:
     if n == 1:
         return f"<mi>{entry.letter}</mi>"
     comma = "," if n > 9 else ""
@@ -116,7 +116,7 @@ def _line(printed: PrintedEquations, label: str, formula: Formula) -> str:
     lines = []
     for k, part in enumerate(sums_in_lines(printed, formula, LONGEST_LINE)):
         sign = ""
-        if k and isinstance(part, Sum) and not part.terms[0][0]:
+        if k and isinstance(part, SumOf) and not part.terms[0][0]:
             sign = "<mo form='infix'>+</mo>"
         lines.append(sign + mathml(part, printed.names))
     if len(lines) == 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..printing import latex
-from ..printing.tree import Formula, is_group
+from ..printing.formula_tree import Formula, is_group
 from .printed_equations import PrintedEquations
 from .readable import Readable
 
@@ -79,9 +79,9 @@ def _broken(printed: PrintedEquations, label: str, formula: Formula) -> str:
 
 def sums_in_lines(printed: PrintedEquations, formula: Formula, room: int) -> list[Formula]:
     """A sum as sums that are at most about ``room`` characters long; anything else alone."""
-    from ..printing.tree import Sum
+    from ..printing.formula_tree import SumOf
 
-    if not isinstance(formula, Sum):
+    if not isinstance(formula, SumOf):
         return [formula]
     lines: list[list[tuple[bool, Formula]]] = [[]]
     used = 0
@@ -92,4 +92,4 @@ def sums_in_lines(printed: PrintedEquations, formula: Formula, room: int) -> lis
             used = 0
         lines[-1].append((subtracted, term))
         used += size
-    return [Sum(tuple(line)) for line in lines]
+    return [SumOf(tuple(line)) for line in lines]

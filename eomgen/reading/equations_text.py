@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ..files.terminal import fold
-from ..printing.text import TIGHT
-from ..printing.tree import Formula, is_group
+from ..printing.formula_text import TIGHT
+from ..printing.formula_tree import Formula, is_group
 from ..texts import visible
-from .printed_equations import Entry, PrintedEquations, plain
+from .printed_equations import PrintedEntry, PrintedEquations, plain
 from .readable import Readable
 
 COLUMNS = 80
@@ -95,7 +95,7 @@ def _as_factor(shown: str, formula: Formula) -> str:
     return "" if shown == "1" else f"({shown}){TIGHT}" if is_group(formula) else f"{shown}{TIGHT}"
 
 
-def _label(entry: Entry, n: int) -> str:
+def _label(entry: PrintedEntry, n: int) -> str:
     if n == 1:
         return entry.letter
     comma = "," if n > 9 else ""

@@ -10,9 +10,9 @@ from ..graph.core import Expr
 from ..graph.substitute import symbols_of
 from ..notation.notation import Notation
 from ..printing import Formulas, Order, text
-from ..printing.order import COORDINATE, GRAVITY, INERTIA, INPUT, MASS, PARAMETER, RATE
-from ..printing.text import TIGHT
-from ..printing.tree import Formula, Number
+from ..printing.factor_order import COORDINATE, GRAVITY, INERTIA, INPUT, MASS, PARAMETER, RATE
+from ..printing.formula_text import TIGHT
+from ..printing.formula_tree import Formula, NumberPart
 from .readable import Readable
 
 UNITS = {"angle": "rad", "turn": "rad", "length": "m", "parameter": ""}
@@ -24,7 +24,7 @@ ATTRIBUTES = (
 OF_LOOPS = ("constraints", "constraint_jacobian", "gamma", "velocity_transformation")
 
 
-class Coordinate(NamedTuple):
+class PrintedCoordinate(NamedTuple):
     """A row of the table of coordinates."""
 
     name: str
@@ -33,7 +33,7 @@ class Coordinate(NamedTuple):
     role: str
 
 
-class Entry(NamedTuple):
+class PrintedEntry(NamedTuple):
     """An entry of M or f: ``M_12`` with its formula; places count from 1."""
 
     letter: str
@@ -101,19 +101,19 @@ class PrintedEquations:
         """Names that stand in M and f, with what they stand for."""
         return [(str(name), self.formula(x)) for name, x in self.equations.intermediates]
 
-    def entries(self) -> Iterator[Entry]:
+    def entries(self) -> Iterator[PrintedEntry]:
         """Entries of M on and below its diagonal that do not vanish, then those of f."""
         for i, row in enumerate(self.mass_matrix):
             for j, x in enumerate(row[: i + 1]):
-                if x != Number("0"):
-                    yield Entry("M", (j + 1, i + 1), x)
+                if x != NumberPart("0"):
+                    yield PrintedEntry("M", (j + 1, i + 1), x)
         for i, x in enumerate(self.force):
-            yield Entry("f", (i + 1,), x)
+            yield PrintedEntry("f", (i + 1,), x)
 
     @property
     def vanishing(self) -> bool:
         """Whether entries of M vanish."""
-        return any(x == Number("0") for row in self.mass_matrix for x in row)
+        return any(x == NumberPart("0") for row in self.mass_matrix for x in row)
 
     def text(self, formula: Formula) -> str:
         """A formula in text."""
@@ -129,14 +129,16 @@ class PrintedEquations:
         return self.width([list(c) for c in zip(*self.mass_matrix, strict=True)]), self.width([self.force])
 
     @property
-    def coordinates(self) -> list[Coordinate]:
+    def coordinates(self) -> list[PrintedCoordinate]:
         """Coordinates of the spanning tree."""
         k = self.equations.kinematics
         joints = {name: joint.name for joint in k.mechanism.joints for name in joint.coordinates}
         units = {} if k.mechanism.bare else dict(zip(k.names, (UNITS[kind] for kind in k.kinds), strict=True))
         independent = {*self.equations.independent}
         return [
-            Coordinate(name, joints.get(name, ""), units.get(name, ""), "" if name in independent else "dependent")
+            PrintedCoordinate(
+                name, joints.get(name, ""), units.get(name, ""), "" if name in independent else "dependent"
+            )
             for name in k.names
         ]
 

@@ -1,4 +1,4 @@
-"""Stage simplify: what polynomials are made of: symbols, sines and cosines, other calls, sums in denominators and roots."""
+"""Stage simplify: what polynomials are made of: symbols, sines, cosines, other calls, sums below or under roots."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ class Atom(NamedTuple):
     Attributes
     ----------
     kind : str
-        ``sym``, ``pi``, ``sin``, ``cos``, ``sum`` (a polynomial that stands in a denominator or under a root), ``factor``
-        (a sum in a product), ``name`` (an intermediate), or an operation of :mod:`eomgen.operations` or a declared function.
+        ``sym``, ``pi``, ``sin``, ``cos``, ``sum`` (a polynomial that stands in a denominator or under a root),
+        ``factor`` (a sum in a product), ``name`` (an intermediate), an operation of :mod:`eomgen.operations`, or a
+        declared function.
     what : Any
         The name of a symbol; the Frozen angle of a sine; the Frozen operands of another call.
     """
@@ -41,6 +42,7 @@ class Atoms:
     def __init__(self) -> None:
         self.table: list[Atom] = []
         self._ids: dict[Atom, int] = {}
+        self._names: list[frozenset[int]] = []
 
     def id(self, kind: str, what: Any) -> int:
         """The number of an atom, the same for the same atom."""
@@ -59,6 +61,14 @@ class Atoms:
         parts = [what] if kind in (*TURNS, *SUMS) else what
         return {a for part in parts for monomial, _ in part for a, _ in monomial}
 
+    def names(self, poly: Poly) -> frozenset[int]:
+        """The atoms of names that stand in a polynomial, at any depth."""
+        while len(self._names) < len(self.table):  # what is inside an atom has smaller numbers
+            k = len(self._names)
+            own = frozenset({k} if self.table[k].kind == "name" else ())
+            self._names.append(own.union(*(self._names[part] for part in self.inside(k))))
+        return frozenset().union(*(self._names[a] for monomial in poly for a, _ in monomial))
+
     def poly(self, kind: str, what: Any) -> Poly:
         """The polynomial of one atom."""
         return {((self.id(kind, what), 1),): 1}
@@ -67,8 +77,7 @@ class Atoms:
 def number(value: float) -> tuple[Number, bool]:
     """A double as it was probably meant, and whether it is that many times pi.
 
-    The fraction with a denominator up to 1000, or the multiple of pi, whose double this is; a decimal of few digits; else
-    the double itself.
+    The fraction with a denominator up to 1000, or the multiple of pi, whose double this is; else the double itself.
     """
     near = Fraction(value).limit_denominator(SMALL)
     if abs(near.numerator) < 10**15 and near.numerator / near.denominator == value:

@@ -67,17 +67,10 @@ class Costs:
 
     def of_number(self, value: Number) -> float:
         """A coefficient without its sign, and the sign that joins it; nothing for 1."""
-        size = abs(value)
-        if size == 1:
-            return 0.0
+        size: Number = value if value > 0 else -value
         if isinstance(size, float):
             return len(repr(size)) + OPERATION + 1.0
-        cost = 0.0
-        if size.numerator != 1:
-            cost += len(str(size.numerator)) + OPERATION + 1.0
-        if size.denominator != 1:
-            cost += len(str(size.denominator)) + OPERATION + 1.0
-        return cost
+        return sum((len(str(n)) + OPERATION + 1.0 for n in (size.numerator, size.denominator) if n != 1), 0.0)
 
     def of_monomial(self, monomial: Monomial) -> float:
         """A product."""

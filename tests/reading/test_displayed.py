@@ -14,7 +14,7 @@ import eomgen as eg
 from eomgen.api.equations import Equations
 from eomgen.notation import Notation
 from eomgen.printing import Formulas, Order, latex, mathml, text
-from eomgen.printing.order import COORDINATE, GRAVITY, INPUT, MASS, PARAMETER, RATE
+from eomgen.printing.factor_order import COORDINATE, GRAVITY, INPUT, MASS, PARAMETER, RATE
 from eomgen.reading.equations_html import equations_html, facts_html
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from ..notation.notation import Notation
 from ..texts import html_text
-from .tree import (
-    Call,
-    Cases,
+from .formula_tree import (
+    CallOf,
+    CasesOf,
     Formula,
     Name,
-    Number,
+    NumberPart,
     Power,
     Product,
     Quotient,
     Relation,
-    Sum,
+    SumOf,
     Words,
     is_group,
     is_simple,
@@ -60,7 +60,7 @@ class _MathML:
 
     def element(self, formula: Formula) -> str:
         match formula:
-            case Number():
+            case NumberPart():
                 if formula.power:
                     ten = f"<msup><mn>10</mn><mn>{formula.power}</mn></msup>"
                     return row(f"<mn>{formula.digits}</mn><mo>·</mo>", ten)
@@ -69,7 +69,7 @@ class _MathML:
                 return self.names.mathml(formula.name)
             case Words():
                 return f"<mtext>{html_text(formula.text)}</mtext>"
-            case Sum():
+            case SumOf():
                 return self._sum(formula)
             case Product():
                 return row(_THIN.join(map(self._factor, formula.factors)))
@@ -77,12 +77,12 @@ class _MathML:
                 return f"<mfrac>{row(self.element(formula.above))}{row(self.element(formula.below))}</mfrac>"
             case Power():
                 return self._power(formula)
-            case Call():
+            case CallOf():
                 return self._call(formula, "")
             case Relation():
                 sign = html_text(_RELATIONS.get(formula.sign, formula.sign))
                 return row(f"<mo>{sign}</mo>".join(map(self.element, formula.sides)))
-            case Cases():
+            case CasesOf():
                 rows = [
                     [self.element(value), "<mtext>otherwise</mtext>" if when is None
                      else row("<mtext>if </mtext>", self.element(when))]
@@ -90,7 +90,7 @@ class _MathML:
                 ]  # fmt: skip
                 return row("<mo>{</mo>", table(rows, "text-align:left"))
 
-    def _sum(self, formula: Sum) -> str:
+    def _sum(self, formula: SumOf) -> str:
         parts = []
         for k, (subtracted, term) in enumerate(formula.terms):
             sign = MINUS if subtracted else "<mo>+</mo>"
@@ -103,7 +103,7 @@ class _MathML:
 
     def _power(self, formula: Power) -> str:
         exponent, base = self.element(formula.exponent), formula.base
-        if isinstance(base, Call) and base.function not in ("sqrt", "abs"):
+        if isinstance(base, CallOf) and base.function not in ("sqrt", "abs"):
             return self._call(base, exponent)
         shown = self.element(base)
         if not is_simple(base):
@@ -114,7 +114,7 @@ class _MathML:
             shown = fenced(shown)
         return f"<msup>{shown}{exponent}</msup>"
 
-    def _call(self, formula: Call, power: str) -> str:
+    def _call(self, formula: CallOf, power: str) -> str:
         arguments = "<mo>,</mo>".join(map(self.element, formula.arguments))
         if formula.function == "sqrt":
             return f"<msqrt>{arguments}</msqrt>"

@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from ..notation.notation import Notation
 from ..notation.signs import SUPERSCRIPTS
-from .tree import Call, Cases, Formula, Name, Number, Power, Product, Quotient, Relation, Sum, Words, is_group
+from .formula_tree import (
+    CallOf,
+    CasesOf,
+    Formula,
+    Name,
+    NumberPart,
+    Power,
+    Product,
+    Quotient,
+    Relation,
+    SumOf,
+    Words,
+    is_group,
+)
 
 #: Between factors: lines are broken between terms before they are broken between factors.
 TIGHT = "\u00a0"
@@ -20,22 +33,22 @@ def text(formula: Formula, names: Notation) -> str:
     formula : Formula
     names : Notation
     """
-    return _Text(names).line(formula)
+    return _TextOf(names).line(formula)
 
 
-class _Text:
+class _TextOf:
     def __init__(self, names: Notation) -> None:
         self.names = names
 
     def line(self, formula: Formula) -> str:
         match formula:
-            case Number():
+            case NumberPart():
                 return f"{formula.digits}e{formula.power}" if formula.power else formula.digits
             case Name():
                 return self.names.text(formula.name)
             case Words():
                 return formula.text
-            case Sum():
+            case SumOf():
                 return self._sum(formula)
             case Product():
                 return self._product(formula.factors)
@@ -43,12 +56,12 @@ class _Text:
                 return f"{self._part(formula.above, products=True)}/{self._part(formula.below)}"
             case Power():
                 return self._power(formula)
-            case Call():
+            case CallOf():
                 return self._call(formula.function, formula.arguments)
             case Relation():
                 sign = _RELATIONS.get(formula.sign, formula.sign)
                 return f" {sign} ".join(map(self.line, formula.sides))
-            case Cases():
+            case CasesOf():
                 parts = [
                     f"{self.line(value)} otherwise" if when is None else f"{self.line(value)} if {self.line(when)}"
                     for value, when in formula.branches
@@ -61,7 +74,7 @@ class _Text:
             return f"|{inside}|"
         return f"√{inside}" if function == "sqrt" and isinstance(arguments[0], Name) else f"{function}({inside})"
 
-    def _sum(self, formula: Sum) -> str:
+    def _sum(self, formula: SumOf) -> str:
         found = ""
         for k, (subtracted, term) in enumerate(formula.terms):
             sign = (MINUS if subtracted else "") if k == 0 else f" {MINUS if subtracted else '+'} "
@@ -71,7 +84,7 @@ class _Text:
     def _product(self, factors: tuple[Formula, ...]) -> str:
         """A fraction of numbers stands at the end: ``m l²/3``."""
         first, others = factors[0], factors[1:]
-        if isinstance(first, Quotient) and isinstance(first.below, Number) and isinstance(first.above, Number):
+        if isinstance(first, Quotient) and isinstance(first.below, NumberPart) and isinstance(first.above, NumberPart):
             above = others if first.above.digits == "1" else (first.above, *others)
             return f"{self._product(above)}/{first.below.digits}"
         return TIGHT.join(map(self._part, factors))
@@ -80,10 +93,10 @@ class _Text:
         exponent = self.line(formula.exponent)
         high = exponent.translate(SUPERSCRIPTS) if exponent.isdecimal() else ""
         base = formula.base
-        if high and isinstance(base, Call) and base.function not in ("abs", "sqrt"):
+        if high and isinstance(base, CallOf) and base.function not in ("abs", "sqrt"):
             return f"{base.function}{high}({', '.join(map(self.line, base.arguments))})"
         shown = self.line(base)
-        plain = isinstance(base, Name | Words) or (isinstance(base, Call) and shown.startswith("|"))
+        plain = isinstance(base, Name | Words) or (isinstance(base, CallOf) and shown.startswith("|"))
         shown = shown if plain and not any(c in shown for c in "^*") else f"({shown})"
         if high:
             return shown + high

@@ -1,12 +1,13 @@
 """Stage simplify: sums of products of sines and cosines -> few terms, as a hand would join them.
 
-The terms of a polynomial are taken together by what stands beside their sines and cosines; of each such group, by itself
+The terms of a polynomial are taken together by what stands beside their sines and cosines.  Of each such group,
 a polynomial in sines and cosines with numbers, several forms are made and the shortest is kept.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from typing import Any
 
 from .atoms import (
@@ -28,10 +29,11 @@ from .atoms import (
 )
 from .costs import Costs
 
+MULTIPLE = 4  #: of an angle, up to which its sine is written in those of the angle
 GROUP = 48  #: terms of a group beyond which only its own terms are joined
 
 
-class Angles:
+class JoinedAngles:
     """Simplifies sines and cosines in polynomials over a table of atoms."""
 
     def __init__(self, atoms: Atoms, work: Work) -> None:
@@ -132,22 +134,20 @@ class Angles:
 
     def _reduced(self, group: Poly, full: str) -> Poly:
         """With the squares of the other function replaced by 1 - full^2: a normal form of what has single angles."""
-        result = dict(group)
-        while True:
-            for monomial, x in result.items():
-                square = next(
-                    (f for f in monomial if f[1] >= 2 and self.atoms.table[f[0]].kind not in (full, "sum")), None
-                )
-                if square is not None and self._turns(square[0]):
-                    break
-            else:
-                return result
+        other = "cos" if full == "sin" else "sin"
+        result: Poly = {}
+        waiting = dict(group)
+        while waiting:
+            monomial, x = waiting.popitem()
+            square = next((a for a, n in monomial if n >= 2 and self.atoms.table[a].kind == other), None)
+            if square is None:
+                result = add(result, {monomial: x})
+                continue
             self.work.spend(2)
-            twin = self.atoms.id(full, self.atoms.table[square[0]].what)
-            rest = join(monomial, ((square[0], -2),))
-            result = add(result, {monomial: -x})
-            result = add(result, {rest: x})
-            result = add(result, {join(rest, ((twin, 2),)): -x})
+            twin = self.atoms.id(full, self.atoms.table[square].what)
+            rest = join(monomial, ((square, -2),))
+            waiting = add(waiting, {rest: x, join(rest, ((twin, 2),)): -x})
+        return result
 
     def _split(self, group: Poly) -> Poly:
         """With the sines and cosines of sums written in those of their parts."""
@@ -166,16 +166,17 @@ class Angles:
 
     def _parts(self, kind: str, angle: Frozen) -> Poly:
         terms = dict(angle)
-        sizes = [abs(x) for x in terms.values()]
-        if len(terms) == 1 and not (sizes[0].denominator == 1 and 1 < sizes[0] <= 4):  # type: ignore[union-attr]
-            return self.atoms.poly(kind, angle)
-        if any(isinstance(x, float) for x in sizes):
+        if any(isinstance(x, float) for x in terms.values()):
             return self.atoms.poly(kind, angle)
         first = min(terms)
-        step = (1 if terms[first] > 0 else -1) if terms[first].denominator == 1 else terms[first]  # type: ignore[union-attr]
-        one, rest = {first: step}, add(terms, {first: -step})
-        turn = {(k, p): self.of_angle(k, dict(p)) for k in TURNS for p in (freeze(one),)}
-        s, c = turn["sin", freeze(one)], turn["cos", freeze(one)]
+        size = Fraction(terms[first])
+        whole = size.denominator == 1 and abs(size) <= MULTIPLE
+        if len(terms) == 1 and not (whole and abs(size) > 1):
+            return self.atoms.poly(kind, angle)
+        step = (1 if size > 0 else -1) if whole else terms[first]
+        one: Poly = {first: step}
+        rest = add(terms, {first: -step})
+        s, c = (self.of_angle(k, one) for k in TURNS)
         other_s, other_c = (self._parts_of(k, rest) for k in TURNS)
         if kind == "sin":
             return add(multiply(s, other_c), multiply(c, other_s))

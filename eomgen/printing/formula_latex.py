@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from ..notation.latex_of_names import literal
 from ..notation.notation import Notation
-from .tree import (
-    Call,
-    Cases,
+from .formula_tree import (
+    CallOf,
+    CasesOf,
     Formula,
     Name,
-    Number,
+    NumberPart,
     Power,
     Product,
     Quotient,
     Relation,
-    Sum,
+    SumOf,
     Words,
     is_group,
     is_simple,
@@ -50,13 +50,13 @@ class _Latex:
 
     def line(self, formula: Formula) -> str:
         match formula:
-            case Number():
+            case NumberPart():
                 return rf"{formula.digits} \cdot 10^{{{formula.power}}}" if formula.power else formula.digits
             case Name():
                 return self.names.latex(formula.name)
             case Words():
                 return formula.latex
-            case Sum():
+            case SumOf():
                 return self._sum(formula)
             case Product():
                 return self._product(formula)
@@ -64,12 +64,12 @@ class _Latex:
                 return rf"\frac{{{self.line(formula.above)}}}{{{self.line(formula.below)}}}"
             case Power():
                 return self._power(formula)
-            case Call():
+            case CallOf():
                 return self._call(formula, "")
             case Relation():
                 sign = _RELATIONS.get(formula.sign, formula.sign)
                 return f" {sign} ".join(map(self.line, formula.sides))
-            case Cases():
+            case CasesOf():
                 rows = [
                     rf"{self.line(value)} & \text{{otherwise}}" if when is None
                     else rf"{self.line(value)} & \text{{if }} {self.line(when)}"
@@ -78,7 +78,7 @@ class _Latex:
                 body = r" \\ ".join(rows)
                 return rf"\begin{{cases}}{body}\end{{cases}}"
 
-    def _sum(self, formula: Sum) -> str:
+    def _sum(self, formula: SumOf) -> str:
         found = ""
         for k, (subtracted, term) in enumerate(formula.terms):
             sign = ("-" if subtracted else "") if k == 0 else (" - " if subtracted else " + ")
@@ -89,7 +89,7 @@ class _Latex:
         found = ""
         for factor in formula.factors:
             shown = self._factor(factor)
-            ends_in_number = isinstance(factor, Number) and found
+            ends_in_number = isinstance(factor, NumberPart) and found
             found += (r" \cdot " if ends_in_number else " " if found else "") + shown
         return found
 
@@ -100,16 +100,16 @@ class _Latex:
     def _power(self, formula: Power) -> str:
         exponent = self.line(formula.exponent)
         base = formula.base
-        if isinstance(base, Call) and base.function in _FUNCTIONS:
+        if isinstance(base, CallOf) and base.function in _FUNCTIONS:
             return self._call(base, f"^{{{exponent}}}" if len(exponent) > 1 else f"^{exponent}")
         shown = self.line(base)
-        if isinstance(base, Call) and base.function == "abs":
+        if isinstance(base, CallOf) and base.function == "abs":
             return f"{shown}^{{{exponent}}}" if len(exponent) > 1 else f"{shown}^{exponent}"
         if not is_simple(base) or "^" in shown or "'" in shown:
             shown = fenced(shown)
         return f"{shown}^{{{exponent}}}" if len(exponent) > 1 else f"{shown}^{exponent}"
 
-    def _call(self, formula: Call, power: str) -> str:
+    def _call(self, formula: CallOf, power: str) -> str:
         inside = ", ".join(map(self.line, formula.arguments))
         if formula.function == "sqrt":
             return rf"\sqrt{{{inside}}}"

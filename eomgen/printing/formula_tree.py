@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
-class Number(NamedTuple):
+class NumberPart(NamedTuple):
     """A number without a sign, as it is printed; ``power`` is the power of ten after it."""
 
     digits: str
@@ -18,7 +18,7 @@ class Name(NamedTuple):
     name: str
 
 
-class Sum(NamedTuple):
+class SumOf(NamedTuple):
     """Terms, each with whether it is subtracted."""
 
     terms: tuple[tuple[bool, Formula], ...]
@@ -44,7 +44,7 @@ class Power(NamedTuple):
     exponent: Formula
 
 
-class Call(NamedTuple):
+class CallOf(NamedTuple):
     """A function of arguments: ``sin``, ``sqrt``, ``abs``, ``min``, ..."""
 
     function: str
@@ -58,7 +58,7 @@ class Relation(NamedTuple):
     sides: tuple[Formula, ...]
 
 
-class Cases(NamedTuple):
+class CasesOf(NamedTuple):
     """Values and the conditions under which they hold; the last may hold otherwise."""
 
     branches: tuple[tuple[Formula, Formula | None], ...]
@@ -71,14 +71,14 @@ class Words(NamedTuple):
     latex: str
 
 
-Formula = Number | Name | Sum | Product | Quotient | Power | Call | Relation | Cases | Words
+Formula = NumberPart | Name | SumOf | Product | Quotient | Power | CallOf | Relation | CasesOf | Words
 
 
 def is_group(formula: Formula) -> bool:
     """Whether a formula needs parentheses to be one factor."""
-    return isinstance(formula, Sum | Relation)
+    return isinstance(formula, SumOf | Relation)
 
 
 def is_simple(formula: Formula) -> bool:
     """Whether a formula is one symbol."""
-    return isinstance(formula, Name) or (isinstance(formula, Number) and not formula.power)
+    return isinstance(formula, Name) or (isinstance(formula, NumberPart) and not formula.power)

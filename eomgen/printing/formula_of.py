@@ -7,8 +7,8 @@ from typing import Any
 import sympy
 from sympy.core.function import AppliedUndef
 
-from .order import Order, is_subtracted
-from .tree import Call, Cases, Formula, Name, Number, Power, Product, Quotient, Relation, Sum, Words
+from .factor_order import Order, is_subtracted
+from .formula_tree import CallOf, CasesOf, Formula, Name, NumberPart, Power, Product, Quotient, Relation, SumOf, Words
 
 _SIGNS = {"StrictLessThan": "<", "StrictGreaterThan": ">", "LessThan": "<=", "GreaterThan": ">=", "Equality": "="}
 _LOGIC = {"And": "and", "Or": "or"}
@@ -31,17 +31,17 @@ class Formulas:
         """The tree of an expression."""
         found = self._made.get(expression)
         if found is None:
-            found = self._made[expression] = self._formula(sympy.sympify(expression))
+            found = self._made[expression] = self._formula(expression)
         return found
 
     def _formula(self, x: Any) -> Formula:
         if x.is_Symbol:
             return Name(x.name)
         if x.is_Add:
-            return Sum(tuple(self._signed(term) for term in self.order.terms(x.args)))
+            return SumOf(tuple(self._signed(term) for term in self.order.terms(x.args)))
         if x.is_Mul or x.is_Number:
             subtracted, term = self._signed(x)
-            return Sum(((True, term),)) if subtracted else term
+            return SumOf(((True, term),)) if subtracted else term
         if x.is_Pow:
             return self._power(x.base, x.exp)
         if isinstance(x, AppliedUndef) and x.args == (sympy.Symbol("t"),):
@@ -50,12 +50,12 @@ class Formulas:
             return Name(f"{x.expr.func.__name__}_{'d' * int(x.variable_count[0][1])}ot")
         if isinstance(x, sympy.Piecewise):
             branches = ((self(value), None if when == sympy.true else self(when)) for value, when in x.args)
-            return Cases(tuple(branches))
+            return CasesOf(tuple(branches))
         kind = type(x).__name__
         if kind in _SIGNS or kind in _LOGIC:
             return Relation(_SIGNS.get(kind) or _LOGIC[kind], tuple(map(self, x.args)))
         if isinstance(x, sympy.Function | sympy.Max | sympy.Min) and x.args:
-            return Call(_NAMES.get(kind, kind), tuple(map(self, x.args)))
+            return CallOf(_NAMES.get(kind, kind), tuple(map(self, x.args)))
         if x == sympy.pi:
             return Name("pi")
         return Words(str(x), sympy.latex(x))
@@ -75,12 +75,12 @@ class Formulas:
         if not number.is_Rational:
             upper = (_decimal(number), *upper)
         elif number.q == 1:
-            upper = (Number(str(number)), *upper) if number != 1 or not upper else upper
+            upper = (NumberPart(str(number)), *upper) if number != 1 or not upper else upper
         elif lower:
-            upper = (Number(str(number.p)), *upper) if number.p != 1 or not upper else upper
-            lower = (Number(str(number.q)), *lower)
+            upper = (NumberPart(str(number.p)), *upper) if number.p != 1 or not upper else upper
+            lower = (NumberPart(str(number.q)), *lower)
         else:
-            upper = (Quotient(Number(str(number.p)), Number(str(number.q))), *upper)
+            upper = (Quotient(NumberPart(str(number.p)), NumberPart(str(number.q))), *upper)
         return subtracted, Quotient(_product(upper), _product(lower)) if lower else _product(upper)
 
     def _factors(self, factors: list[Any]) -> tuple[Formula, ...]:
@@ -88,9 +88,9 @@ class Formulas:
 
     def _power(self, base: Any, exponent: Any) -> Formula:
         if exponent == sympy.Rational(1, 2):
-            return Call("sqrt", (self(base),))
+            return CallOf("sqrt", (self(base),))
         if exponent.is_Number and exponent.is_negative:
-            return Quotient(Number("1"), self._power(base, -exponent))
+            return Quotient(NumberPart("1"), self._power(base, -exponent))
         if exponent == 1:
             return self(base)
         return Power(self(base), self(exponent))
@@ -98,7 +98,7 @@ class Formulas:
 
 def _product(factors: tuple[Formula, ...]) -> Formula:
     if not factors:
-        return Number("1")
+        return NumberPart("1")
     return factors[0] if len(factors) == 1 else Product(factors)
 
 
@@ -106,4 +106,4 @@ def _decimal(x: Any) -> Formula:
     if not x.is_Float or not x.is_finite:
         return Words(str(x), sympy.latex(x))
     digits, _, power = repr(float(x)).partition("e")
-    return Number(digits.removesuffix(".0"), str(int(power)) if power else "")
+    return NumberPart(digits.removesuffix(".0"), str(int(power)) if power else "")

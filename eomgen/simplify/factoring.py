@@ -108,7 +108,7 @@ class Factoring:
             for atom, _ in monomial:
                 if self.atoms.table[atom].kind == "factor":
                     uses.setdefault(atom, []).append(monomial)
-        for atom, monomials in uses.items():
+        for monomials in uses.values():
             if len(monomials) > 1:
                 inside = {m: poly[m] for m in monomials}
                 rest = {m: x for m, x in poly.items() if m not in inside}
