@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
 from .equations import TreeEquations
+from .files.terminal import fold
 from .graph.core import Expr
 from .graph.count import Operations, count
 from .kinematics import Kinematics
@@ -16,7 +17,6 @@ from .kinematics.mobility import Mobility
 from .kinematics.report import MechanismReport, report
 from .reading import Readable
 from .records import dataclass
-from .texts import html_text
 
 if TYPE_CHECKING:
     from .program.choice import Choice
@@ -87,30 +87,44 @@ class Derivation(Readable):
 
     # -- display
     def __str__(self) -> str:
-        lines = [f"equations of {self.name}, method {self.method}, independent {', '.join(self.independent) or 'none'}"]
-        for name, operations in self.operations.items():
-            lines.append(f"  {name:<22}{operations.total:>7} operations")
+        return self._shown_text
+
+    __repr__ = __str__
+
+    @cached_property
+    def _shown_text(self) -> str:
+        from .reading.equations_text import equations_text
+
+        lines = [equations_text(self), ""]
+        counts = (f"{name} {operations.total}" for name, operations in self.operations.items())
+        lines += fold(", ".join(counts), 80, "operations: ", "  ")
         if self.system_size is not None:
             unknowns, entries = self.system_size
             lines.append(f"  linear system of {unknowns} unknowns, {entries} nonzero entries")
         if self.choice is not None:
-            lines.append(f"  {self.choice}")
+            lines += fold(str(self.choice), 80, "", "  ")
         return "\n".join(lines)
 
-    __repr__ = __str__
-
     def _repr_html_(self) -> str:
-        return f"<pre style='font-family:monospace'>{html_text(str(self))}</pre>"
+        return f"{self._picture_and_facts(self._facts_html)}{self._equations_html}"
 
-    def _repr_latex_(self) -> str | None:
-        if self.intermediates:
-            return None
-        import sympy
+    def _picture_and_facts(self, facts: str) -> str:
+        """What stands above the formulas; equations that can be compiled add a picture."""
+        return facts
 
-        rates = [sympy.Symbol(name) for name in self.acceleration_names]
-        symbols = self.mass_matrix.free_symbols | self.force.free_symbols | {*rates}
-        names = self.notation.symbol_names(symbols)
-        left, vector, right = (
-            sympy.latex(part, symbol_names=names) for part in (self.mass_matrix, sympy.Matrix(rates), self.force)
-        )
-        return f"$\\displaystyle {left} {vector} = {right}$"
+    @cached_property
+    def _facts_html(self) -> str:
+        from .reading.equations_html import facts_html
+
+        return facts_html(self)
+
+    @cached_property
+    def _equations_html(self) -> str:
+        from .reading.equations_html import equations_html
+
+        return equations_html(self)
+
+    def _repr_latex_(self) -> str:
+        from .reading.equations_latex import equations_latex
+
+        return equations_latex(self)

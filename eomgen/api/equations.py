@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from .. import pipeline
 from ..derivation import Derivation
+from ..files.inline_pictures import picture_html, side_by_side
 from ..runtime.near_names import find_lacking
 from .module import Module
 
 if TYPE_CHECKING:
     from ..describe.builder import Builder
+
+
+DRAWN = 30  #: bodies of a mechanism that is drawn whenever a notebook shows its equations
 
 
 class Equations(Derivation):
@@ -72,6 +77,20 @@ class Equations(Derivation):
         module = Module(pipeline.compile_core(self, target, kernels, **options))
         module.equations = self
         return module
+
+    def _picture_and_facts(self, facts: str) -> str:
+        return side_by_side(self._picture, facts)
+
+    @cached_property
+    def _picture(self) -> str:
+        """The mechanism at its declared initial position; none of one without bodies, or where nothing can draw it."""
+        bodies = len(self.kinematics.mechanism.bodies)
+        if not 0 < bodies <= DRAWN:
+            return ""
+        from ..show.draw import small_figure
+
+        found = picture_html(lambda: small_figure(self.compile("numpy")))
+        return found if found.startswith("<img") else ""
 
 
 def derive(

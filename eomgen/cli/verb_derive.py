@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from ..api.equations import Equations
 
 
+#: Of :mod:`eomgen.reading.formats`, which loads SymPy.
+FORMATS = ("latex", "text", "sympy", "matlab", "octave", "julia", "mathematica", "c")
+
+
 @verb_command()
 @model_argument
 @native_option
@@ -33,6 +37,13 @@ if TYPE_CHECKING:
 @baumgarte_option
 @independent_option
 @click.option("--equations", is_flag=True, help="Also write out mass matrix and force (this loads SymPy).")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(FORMATS),
+    help="Write named intermediates, M and f of M v' = f for reading or for another program.",
+)
+@click.option("--out", metavar="FILE", type=click.Path(path_type=Path), help="File to write the format into.")
 @json_option
 @robot_options
 @reports_failures
@@ -42,6 +53,8 @@ def derive(
     method: str,
     independent: tuple[str, ...],
     equations: bool,
+    form: str | None,
+    out: Path | None,
     as_json: bool,
     baumgarte: tuple[float, float] | None,
     robot: dict[str, Any],
@@ -51,9 +64,16 @@ def derive(
     Prints the mechanism and the operations of each part of the equations.
     """
 
+    if out is not None and form is None:
+        raise click.UsageError("--out needs --format")
+    if form is not None and as_json:
+        raise click.UsageError("--json and --format exclude each other")
     with blaming_option(independent), stage("derive") as parts:
         derived = load_model(model, allow_native, robot).derive(method, independent or None, baumgarte)
         parts |= derived.seconds
+    if form is not None:
+        write_or_print(derived, form, out)
+        return
     if as_json:
         print_json(summary(derived) | (written(derived) if equations else {}))
         return
@@ -61,6 +81,18 @@ def derive(
     print_operations(derived)
     if equations:
         print_equations(written(derived))
+
+
+def write_or_print(derived: Equations, form: str, out: Path | None) -> None:
+    """Equations in a format, into a file or on the standard output."""
+    from ..reading.formats import write_format
+
+    text = write_format(derived, form)
+    if out is None:
+        say(text.rstrip("\n"))
+    else:
+        out.write_text(text, encoding="utf-8")
+        say(str(out))
 
 
 def summary(derived: Equations) -> dict[str, Any]:

@@ -1,0 +1,7 @@
+"""Printing: SymPy expressions -> formulas in the order in which textbooks print them: LaTeX, text, MathML."""
+
+from .factor_order import Order as Order
+from .formula_latex import latex as latex
+from .formula_mathml import mathml as mathml
+from .formula_of import Formulas as Formulas
+from .formula_text import text as text

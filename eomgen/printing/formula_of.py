@@ -1,0 +1,109 @@
+"""Printing, formulas: a SymPy expression -> the tree that is printed, factors and terms in a textbook's order."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy
+from sympy.core.function import AppliedUndef
+
+from .factor_order import Order, is_subtracted
+from .formula_tree import CallOf, CasesOf, Formula, Name, NumberPart, Power, Product, Quotient, Relation, SumOf, Words
+
+_SIGNS = {"StrictLessThan": "<", "StrictGreaterThan": ">", "LessThan": "<=", "GreaterThan": ">=", "Equality": "="}
+_LOGIC = {"And": "and", "Or": "or"}
+_NAMES = {"Abs": "abs", "Max": "max", "Min": "min", "log": "ln", "ceiling": "ceil"}
+
+
+class Formulas:
+    """Makes trees of expressions; parts that appear again are made once.
+
+    Parameters
+    ----------
+    order : Order
+    """
+
+    def __init__(self, order: Order) -> None:
+        self.order = order
+        self._made: dict[Any, Formula] = {}
+
+    def __call__(self, expression: Any) -> Formula:
+        """The tree of an expression."""
+        found = self._made.get(expression)
+        if found is None:
+            found = self._made[expression] = self._formula(expression)
+        return found
+
+    def _formula(self, x: Any) -> Formula:
+        if x.is_Symbol:
+            return Name(x.name)
+        if x.is_Add:
+            return SumOf(tuple(self._signed(term) for term in self.order.terms(x.args)))
+        if x.is_Mul or x.is_Number:
+            subtracted, term = self._signed(x)
+            return SumOf(((True, term),)) if subtracted else term
+        if x.is_Pow:
+            return self._power(x.base, x.exp)
+        if isinstance(x, AppliedUndef) and x.args == (sympy.Symbol("t"),):
+            return Name(x.func.__name__)
+        if isinstance(x, sympy.Derivative) and isinstance(x.expr, AppliedUndef) and len(x.variable_count) == 1:
+            return Name(f"{x.expr.func.__name__}_{'d' * int(x.variable_count[0][1])}ot")
+        if isinstance(x, sympy.Piecewise):
+            branches = ((self(value), None if when == sympy.true else self(when)) for value, when in x.args)
+            return CasesOf(tuple(branches))
+        kind = type(x).__name__
+        if kind in _SIGNS or kind in _LOGIC:
+            return Relation(_SIGNS.get(kind) or _LOGIC[kind], tuple(map(self, x.args)))
+        if isinstance(x, sympy.Function | sympy.Max | sympy.Min) and x.args:
+            return CallOf(_NAMES.get(kind, kind), tuple(map(self, x.args)))
+        if x == sympy.pi:
+            return Name("pi")
+        return Words(str(x), sympy.latex(x))
+
+    def _signed(self, x: Any) -> tuple[bool, Formula]:
+        """Whether a term is subtracted, and the term without its sign."""
+        number, rest = x.as_coeff_Mul()
+        above, below = [], []
+        for factor in sympy.Mul.make_args(rest):
+            if factor.is_Pow and factor.exp.is_Number and factor.exp.is_negative:
+                below.append(sympy.Pow(factor.base, -factor.exp, evaluate=False))
+            elif factor != 1:
+                above.append(factor)
+        subtracted = is_subtracted(x)
+        number = -number if subtracted else number
+        upper, lower = self._factors(above), self._factors(below)
+        if not number.is_Rational:
+            upper = (_decimal(number), *upper)
+        elif number.q == 1:
+            upper = (NumberPart(str(number)), *upper) if number != 1 or not upper else upper
+        elif lower:
+            upper = (NumberPart(str(number.p)), *upper) if number.p != 1 or not upper else upper
+            lower = (NumberPart(str(number.q)), *lower)
+        else:
+            upper = (Quotient(NumberPart(str(number.p)), NumberPart(str(number.q))), *upper)
+        return subtracted, Quotient(_product(upper), _product(lower)) if lower else _product(upper)
+
+    def _factors(self, factors: list[Any]) -> tuple[Formula, ...]:
+        return tuple(self(factor) for factor in self.order.factors(factors))
+
+    def _power(self, base: Any, exponent: Any) -> Formula:
+        if exponent == sympy.Rational(1, 2):
+            return CallOf("sqrt", (self(base),))
+        if exponent.is_Number and exponent.is_negative:
+            return Quotient(NumberPart("1"), self._power(base, -exponent))
+        if exponent == 1:
+            return self(base)
+        return Power(self(base), self(exponent))
+
+
+def _product(factors: tuple[Formula, ...]) -> Formula:
+    if not factors:
+        return NumberPart("1")
+    return factors[0] if len(factors) == 1 else Product(factors)
+
+
+def _decimal(x: Any) -> Formula:
+    if not x.is_Float or not x.is_finite:
+        return Words(str(x), sympy.latex(x))
+    digits, _, power = repr(float(x)).partition("e")
+    return NumberPart(digits.removesuffix(".0"), str(int(power)) if power else "")

@@ -1,0 +1,84 @@
+"""Printing, tree: what a printed formula is made of, whatever it is printed in."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class NumberPart(NamedTuple):
+    """A number without a sign, as it is printed; ``power`` is the power of ten after it."""
+
+    digits: str
+    power: str = ""
+
+
+class Name(NamedTuple):
+    """A name of the model or of an intermediate."""
+
+    name: str
+
+
+class SumOf(NamedTuple):
+    """Terms, each with whether it is subtracted."""
+
+    terms: tuple[tuple[bool, Formula], ...]
+
+
+class Product(NamedTuple):
+    """Factors side by side."""
+
+    factors: tuple[Formula, ...]
+
+
+class Quotient(NamedTuple):
+    """One over the other."""
+
+    above: Formula
+    below: Formula
+
+
+class Power(NamedTuple):
+    """A base and its exponent."""
+
+    base: Formula
+    exponent: Formula
+
+
+class CallOf(NamedTuple):
+    """A function of arguments: ``sin``, ``sqrt``, ``abs``, ``min``, ..."""
+
+    function: str
+    arguments: tuple[Formula, ...]
+
+
+class Relation(NamedTuple):
+    """Formulas with signs between them: < > <= >= = and or."""
+
+    sign: str
+    sides: tuple[Formula, ...]
+
+
+class CasesOf(NamedTuple):
+    """Values and the conditions under which they hold; the last may hold otherwise."""
+
+    branches: tuple[tuple[Formula, Formula | None], ...]
+
+
+class Words(NamedTuple):
+    """What no other part is for, as SymPy writes it: in text and in LaTeX."""
+
+    text: str
+    latex: str
+
+
+Formula = NumberPart | Name | SumOf | Product | Quotient | Power | CallOf | Relation | CasesOf | Words
+
+
+def is_group(formula: Formula) -> bool:
+    """Whether a formula needs parentheses to be one factor."""
+    return isinstance(formula, SumOf | Relation)
+
+
+def is_simple(formula: Formula) -> bool:
+    """Whether a formula is one symbol."""
+    return isinstance(formula, Name) or (isinstance(formula, NumberPart) and not formula.power)

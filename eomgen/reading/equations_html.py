@@ -1,0 +1,141 @@
+"""Stage reading, HTML: equations of motion -> a page's part with coordinates and formulas in MathML.
+
+MathML needs neither a script nor a network: a saved notebook shows the formulas too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..printing import mathml
+from ..printing.formula_mathml import fenced, row, table
+from ..printing.formula_tree import Formula, Name, SumOf, is_group
+from ..texts import html_text
+from .equations_latex import LONGEST_LINE, WIDE, sums_in_lines
+from .printed_equations import PrintedEntry, PrintedEquations
+from .readable import Readable
+
+FOLDED = 12  #: formulas more than which are folded up
+MOST = 1_000  #: intermediates that are shown
+LEFT = "style='text-align:left'"
+_STYLE = "margin:0.5em 0;padding:0.2em 0;overflow-x:auto;overflow-y:hidden;font-size:1.15em"
+#: Fonts with brackets that grow, of the usual systems.
+_FONT = "font-family:Latin Modern Math,STIX Two Math,Cambria Math,TeX Gyre Termes Math,DejaVu Math TeX Gyre,math"
+
+
+def equations_html(equations: Readable) -> str:
+    """Formulas of the equations of motion."""
+    printed = PrintedEquations(equations)
+    if equations.mobility.n_dof == 0:
+        return "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
+    return "".join([*_motion(printed), *_intermediates(printed)])
+
+
+def facts_html(equations: Readable) -> str:
+    """What the equations are, their coordinates and the attributes to read next."""
+    printed = PrintedEquations(equations)
+    name = html_text(equations.kinematics.mechanism.name)
+    head = f"<p style='margin:0 0 0.6em 0'><b>{name}</b>: equations of motion, {html_text(printed.title)}</p>"
+    attributes = ", ".join(f"<code>eqs.{name}</code>" for name in printed.attributes)
+    return f"{head}{_coordinates(printed)}<details><summary>read next</summary><p {LEFT}>{attributes}</p></details>"
+
+
+def _coordinates(printed: PrintedEquations) -> str:
+    shown = printed.coordinates
+    if not shown:
+        return ""
+    dependent = any(c.role for c in shown)
+    heads = ["coordinate", "name", "joint", "unit", *([""] if dependent else [])]
+    rows = "".join(
+        f"<tr><td {LEFT}>{_math(printed.names.mathml(c.name))}</td><td {LEFT}><code>{html_text(c.name)}</code></td>"
+        f"<td {LEFT}>{html_text(c.joint)}</td><td {LEFT}>{html_text(c.unit)}</td>"
+        + (f"<td {LEFT}>{c.role}</td>" if dependent else "")
+        + "</tr>"
+        for c in shown
+    )
+    whole = f"<table><tr>{''.join(f'<th {LEFT}>{head}</th>' for head in heads)}</tr>{rows}</table>"
+    return whole if len(shown) <= FOLDED else f"<details><summary>{len(shown)} coordinates</summary>{whole}</details>"
+
+
+def _math(inside: str) -> str:
+    return f"<math style='{_FONT}'>{inside}</math>"
+
+
+def _block(inside: str) -> str:
+    return f"<div style='{_STYLE}'><math displaystyle='true' style='{_FONT}'>{inside}</math></div>"
+
+
+def _bracketed(rows: list[list[str]]) -> str:
+    return fenced(table(rows), "[", "]")
+
+
+def _motion(printed: PrintedEquations) -> Iterator[str]:
+    def shown(formula: Formula) -> str:
+        return mathml(formula, printed.names)
+
+    rates = [printed.names.mathml(name) for name in printed.equations.acceleration_names]
+    of_mass, of_force = printed.size
+    M, f = printed.mass_matrix, printed.force
+    equals = "<mo>=</mo>"
+    if len(rates) == 1 and of_mass + of_force <= WIDE:
+        factor = "" if printed.text(M[0][0]) == "1" else fenced(shown(M[0][0])) if is_group(M[0][0]) else shown(M[0][0])
+        yield _block(row(factor, "<mspace width='0.17em'></mspace>", rates[0], equals, shown(f[0])))
+        return
+    v, right = _bracketed([[x] for x in rates]), _bracketed([[shown(x)] for x in f])
+    left = _bracketed([[shown(x) for x in one] for one in M])
+    if len(rates) > 1 and of_mass + of_force <= WIDE:
+        yield _block(row(left, v, equals, right))
+        return
+    yield _block(row("<mi>M</mi>", v if len(rates) > 1 else rates[0], equals, "<mi>f</mi>"))
+    whole = len(rates) > 1 and of_mass <= WIDE
+    if whole:
+        yield _block(row("<mi>M</mi>", equals, left))
+    elif len(rates) > 1:
+        zeros = "; entries that are not shown are 0" if printed.vanishing else ""
+        yield f"<p {LEFT}>The mass matrix is symmetric{zeros}.</p>"
+    entries = [
+        _line(printed, _label(entry, len(rates)), entry.formula)
+        for entry in printed.entries()
+        if not (whole and entry.letter == "M")
+    ]
+    if len(entries) <= FOLDED:
+        yield from entries
+    else:
+        yield f"<details><summary>the {len(entries)} entries of M and f</summary>{''.join(entries)}</details>"
+
+
+def _label(entry: PrintedEntry, n: int) -> str:
+    if n == 1:
+        return f"<mi>{entry.letter}</mi>"
+    comma = "," if n > 9 else ""
+    return f"<msub><mi>{entry.letter}</mi><mn>{comma.join(map(str, entry.place))}</mn></msub>"
+
+
+def _line(printed: PrintedEquations, label: str, formula: Formula) -> str:
+    """A formula; a long sum in lines of its terms, below each other."""
+    lines = []
+    for k, part in enumerate(sums_in_lines(printed, formula, LONGEST_LINE)):
+        sign = ""
+        if k and isinstance(part, SumOf) and not part.terms[0][0]:
+            sign = "<mo form='infix'>+</mo>"
+        lines.append(sign + mathml(part, printed.names))
+    if len(lines) == 1:
+        return _block(row(label, "<mo>=</mo>", lines[0]))
+    cells = [
+        f"<mtr><mtd style='text-align:right;padding:0.2em 0'>{row(label, '<mo>=</mo>') if k == 0 else ''}</mtd>"
+        f"<mtd style='text-align:left;padding:0.2em 0 0.2em {0 if k == 0 else 1.5}em'>{row(line)}</mtd></mtr>"
+        for k, line in enumerate(lines)
+    ]
+    return _block(f"<mtable displaystyle='true'>{''.join(cells)}</mtable>")
+
+
+def _intermediates(printed: PrintedEquations) -> Iterator[str]:
+    named = printed.intermediates
+    if not named:
+        return
+    lines = "".join(_line(printed, mathml(Name(name), printed.names), x) for name, x in named[:MOST])
+    more = f"<p {LEFT}>and {len(named) - MOST} more: <code>eqs.intermediates</code></p>" if len(named) > MOST else ""
+    if len(named) <= FOLDED:
+        yield f"<p {LEFT}>where</p>{lines}"
+    else:
+        yield f"<details><summary>where: {len(named)} named intermediates</summary>{lines}{more}</details>"

@@ -1,0 +1,95 @@
+"""Stage reading, LaTeX: equations of motion -> formulas in LaTeX, for slides and printed notebooks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..printing import latex
+from ..printing.formula_tree import Formula, is_group
+from .printed_equations import PrintedEquations
+from .readable import Readable
+
+WIDE = 150  #: characters of text up to which a matrix equation stands in one line
+LONGEST_LINE = 90  #: characters of text after which a sum goes on in the next line
+
+
+def latex_lines(equations: Readable) -> list[str]:
+    """Each formula of the equations of motion, without dollars: M v' = f first, then what their names stand for."""
+    printed = PrintedEquations(equations)
+    return [*_motion(printed), *(_broken(printed, _name(printed, n), x) for n, x in printed.intermediates)]
+
+
+def equations_latex(equations: Readable) -> str:
+    """The same as Jupyter prints it, each formula in a line of its own."""
+    lines = latex_lines(equations)
+    if len(lines) == 1:
+        return f"$\\displaystyle {lines[0]}$"
+    return "\n\n".join(f"$$\n{line}\n$$" for line in lines)
+
+
+def _name(printed: PrintedEquations, name: str) -> str:
+    return printed.names.latex(name)
+
+
+def _motion(printed: PrintedEquations) -> Iterator[str]:
+    def shown(formula: Formula) -> str:
+        return latex(formula, printed.names)
+
+    rates = [printed.names.latex(name) for name in printed.equations.acceleration_names]
+    if not rates:
+        yield r"n = 0"
+        return
+    of_mass, of_force = printed.size
+    if len(rates) == 1 and of_mass + of_force <= WIDE:
+        M, f = printed.mass_matrix[0][0], printed.force[0]
+        factor = rf"\left({shown(M)}\right)" if is_group(M) else shown(M)
+        yield f"{'' if shown(M) == '1' else factor + ' '}{rates[0]} = {shown(f)}"
+        return
+    left = _matrix([[shown(x) for x in row] for row in printed.mass_matrix])
+    right, v = _matrix([[shown(x)] for x in printed.force]), _matrix([[x] for x in rates])
+    if len(rates) > 1 and of_mass + of_force <= WIDE:
+        yield f"{left} {v} = {right}"
+        return
+    yield rf"M\, {v} = f" if len(rates) > 1 else rf"M\, {rates[0]} = f"
+    whole = len(rates) > 1 and of_mass <= WIDE
+    if whole:
+        yield f"M = {left}"
+    for entry in printed.entries():
+        if not (whole and entry.letter == "M"):
+            comma = "," if len(rates) > 9 else ""
+            label = f"{entry.letter}_{{{comma.join(map(str, entry.place))}}}" if len(rates) > 1 else entry.letter
+            yield _broken(printed, label, entry.formula)
+
+
+def _matrix(rows: list[list[str]]) -> str:
+    body = r" \\ ".join(" & ".join(row) for row in rows)
+    return rf"\begin{{bmatrix}}{body}\end{{bmatrix}}"
+
+
+def _broken(printed: PrintedEquations, label: str, formula: Formula) -> str:
+    """A formula; a long sum in lines of its terms."""
+    lines = sums_in_lines(printed, formula, LONGEST_LINE)
+    shown = [latex(line, printed.names) for line in lines]
+    if len(shown) == 1:
+        return f"{label} = {shown[0]}"
+    others = (line if line.startswith("-") else f"+ {line}" for line in shown[1:])
+    body = r" \\ & \quad ".join([shown[0], *others])
+    return rf"\begin{{aligned}}{label} & = {body}\end{{aligned}}"
+
+
+def sums_in_lines(printed: PrintedEquations, formula: Formula, room: int) -> list[Formula]:
+    """A sum as sums that are at most about ``room`` characters long; anything else alone."""
+    from ..printing.formula_tree import SumOf
+
+    if not isinstance(formula, SumOf):
+        return [formula]
+    lines: list[list[tuple[bool, Formula]]] = [[]]
+    used = 0
+    for subtracted, term in formula.terms:
+        size = len(printed.text(term)) + 3
+        if used and used + size > room:
+            lines.append([])
+            used = 0
+        lines[-1].append((subtracted, term))
+        used += size
+    return [SumOf(tuple(line)) for line in lines]

@@ -1,0 +1,169 @@
+"""Stage reading, text: equations of motion -> text of 80 columns, as ``print(eqs)`` shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from ..files.terminal import fold
+from ..printing.formula_text import TIGHT
+from ..printing.formula_tree import Formula, is_group
+from ..texts import visible
+from .printed_equations import PrintedEntry, PrintedEquations, plain
+from .readable import Readable
+
+COLUMNS = 80
+LINES = 60  #: of formulas; how to get the others is said
+
+
+def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LINES) -> str:
+    """Coordinates and equations, in matrix form where it fits, else entry by entry.
+
+    Parameters
+    ----------
+    equations : Readable
+    columns : int
+        Longest line.
+    lines : int
+        Of formulas; what is beyond is left out, and how to get it is said.
+
+    Returns
+    -------
+    str
+    """
+    printed = PrintedEquations(equations)
+    name = visible(equations.kinematics.mechanism.name, lines=False)
+    found = [f"equations of motion of {name}", f"  {printed.title}", *_coordinates(printed, columns)]
+    if equations.mobility.n_dof == 0:
+        found.append("  nothing is free to move: the position follows from constraints and time")
+    else:
+        shown = [*_equations(printed, columns)]
+        found += ["", *shown[:lines]]
+        if len(shown) > lines:
+            rest = f"... and {len(shown) - lines} lines more: eqs.mass_matrix, eqs.force, eqs.intermediates"
+            found += [rest, "or in a shell: eomgen derive MODEL --format text"]
+    found += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
+    return "\n".join(found)
+
+
+def _coordinates(printed: PrintedEquations, columns: int) -> Iterator[str]:
+    rows = [(printed.names.text(c.name), c.name, c.joint, c.unit, c.role) for c in printed.coordinates]
+    if not rows:
+        return
+    sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    yield "coordinates"
+    for symbol, name, joint, unit, role in rows[:20]:
+        of = f"of joint {joint:<{sizes[2]}}" if joint else ""
+        same = "" if symbol == name and all(row[0] == row[1] for row in rows) else f"{name:<{sizes[1]}}  "
+        yield f"  {symbol:<{sizes[0]}}  {same}{of}  {unit:<{sizes[3]}}  {role}".rstrip()[:columns]
+    if len(rows) > 20:
+        yield f"  and {len(rows) - 20} more: eqs.q"
+
+
+def _equations(printed: PrintedEquations, columns: int) -> Iterator[str]:
+    rates = [printed.names.text(name) for name in printed.equations.acceleration_names]
+    M = [[printed.text(x) for x in row] for row in printed.mass_matrix]
+    f = [printed.text(x) for x in printed.force]
+    if len(rates) == 1:
+        left = f"{_as_factor(M[0][0], printed.mass_matrix[0][0])}{rates[0]}"
+        whole = f"  {left} = {f[0]}"
+        if len(whole) <= columns:
+            yield plain(whole)
+            yield from _where(printed, columns)
+            return
+    whole_rows = [*_matrix_equation(M, rates, f)]
+    if len(rates) > 1 and max(map(len, whole_rows)) <= columns:
+        yield from map(plain, whole_rows)
+        yield from _where(printed, columns)
+        return
+    listed = f"M v' = f with v' = ({', '.join(rates)})"
+    yield f"M {rates[0]} = f" if len(rates) == 1 else listed if len(listed) <= columns else "M v' = f"
+    yield ""
+    rows = [*_matrix(M, "M = ")]
+    small = len(rates) > 1 and max(map(len, rows)) <= columns
+    if small:
+        yield from map(plain, rows)
+        yield ""
+    for entry in printed.entries():
+        if not (small and entry.letter == "M"):
+            yield from _wrapped(f"{_label(entry, len(rates))} = ", printed.text(entry.formula), columns)
+    if not small and len(rates) > 1:
+        yield f"M is symmetric{'; its other entries are 0' if printed.vanishing else ''}"
+    yield from _where(printed, columns)
+
+
+def _as_factor(shown: str, formula: Formula) -> str:
+    return "" if shown == "1" else f"({shown}){TIGHT}" if is_group(formula) else f"{shown}{TIGHT}"
+
+
+def _label(entry: PrintedEntry, n: int) -> str:
+    if n == 1:
+        return entry.letter
+    comma = "," if n > 9 else ""
+    return f"{entry.letter}_{comma.join(map(str, entry.place))}"
+
+
+def _where(printed: PrintedEquations, columns: int) -> Iterator[str]:
+    if printed.intermediates:
+        yield "where"
+        for name, formula in printed.intermediates:
+            yield from _wrapped(f"{printed.names.text(name)} = ", printed.text(formula), columns)
+
+
+def _matrix(rows: Sequence[Sequence[str]], before: str = "") -> list[str]:
+    sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    middle = (len(rows) - 1) // 2
+    found = []
+    for k, row in enumerate(rows):
+        left, right = _brackets(k, len(rows))
+        cells = "  ".join(cell.center(size) for cell, size in zip(row, sizes, strict=True))
+        found.append(f"{before if k == middle else ' ' * len(before)}{left}{cells}{right}")
+    return found
+
+
+def _brackets(k: int, n: int) -> tuple[str, str]:
+    if n == 1:
+        return "[", "]"
+    return ("⎡", "⎤") if k == 0 else ("⎣", "⎦") if k == n - 1 else ("⎢", "⎥")
+
+
+def _matrix_equation(M: list[list[str]], rates: list[str], f: list[str]) -> Iterator[str]:
+    parts = (_matrix(M), _matrix([[x] for x in rates]), _matrix([[x] for x in f]))
+    middle = (len(f) - 1) // 2
+    for k, (a, b, c) in enumerate(zip(*parts, strict=True)):
+        yield f"  {a} {b} {'=' if k == middle else ' '} {c}"
+
+
+def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
+    """A formula broken between terms, inside of a term where it is too long, and between factors at last."""
+    margin = " " * min(len(label) + 2, 12)
+    line = f"  {label}"
+    for term in _pieces(shown, outside=True):
+        whole = len(margin) + len(term) <= columns
+        for word in [term] if whole else _pieces(term):
+            for part in [word] if len(margin) + len(word) <= columns else _cut(word, columns - len(margin)):
+                if len(line) + len(part) > columns and line.strip():
+                    yield plain(line.rstrip())
+                    line = margin
+                line += part + " "
+    yield plain(line.rstrip())
+
+
+def _pieces(shown: str, outside: bool = False) -> Iterator[str]:
+    """Parts between which a line may end, a sign with what comes after it; outside of parentheses alone if asked."""
+    piece, depth = "", 0
+    for word in shown.split(" "):
+        piece += word
+        depth += sum(map(word.count, "({")) - sum(map(word.count, ")}"))
+        if word in ("+", "-", "if", "otherwise") or (outside and depth):
+            piece += TIGHT if word in ("+", "-", "if") else " "
+        else:
+            yield piece
+            piece = ""
+    if piece:
+        yield piece
+
+
+def _cut(word: str, room: int) -> Iterator[str]:
+    """A long part between factors; a longer factor anywhere."""
+    for part in word.split(TIGHT):
+        yield from (part[k : k + room] for k in range(0, len(part), room))

@@ -1,0 +1,179 @@
+"""Stage reading, formats: equations of motion -> files for other programs, written by SymPy's printers.
+
+Each file holds the named intermediates, M and f of M(q) v' = f, in the symbols of the model.
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import sympy
+from sympy.printing.c import reserved_words as c_words
+
+from .equations_latex import latex_lines
+from .equations_text import COLUMNS, equations_text
+from .readable import Readable
+
+_MATLAB_WORDS = "break case catch classdef continue else elseif end for function global if otherwise parfor persistent "
+_MATLAB_WORDS += "return spmd switch try while pi i j Inf NaN eps ans M f sin cos tan exp log sqrt abs sign min max"
+_JULIA_WORDS = (
+    "baremodule begin break catch const continue do else elseif end export false finally for function global "
+)
+_JULIA_WORDS += (
+    "if import let local macro module quote return struct true try using while pi im M f sin cos tan exp log"
+)
+
+
+class Language(NamedTuple):
+    """How a language is written: its printer, its comment, and names that a quantity may not have."""
+
+    print: Callable[[Any], str]
+    comment: str
+    reserved: frozenset[str]
+
+
+LANGUAGES = {
+    "sympy": Language(sympy.sstr, "#", frozenset([*keyword.kwlist, *dir(sympy), "sympy", "M", "f"])),
+    "matlab": Language(sympy.octave_code, "%", frozenset(_MATLAB_WORDS.split())),
+    "octave": Language(sympy.octave_code, "%", frozenset([*_MATLAB_WORDS.split(), "endfunction", "endif", "do"])),
+    "julia": Language(sympy.julia_code, "#", frozenset(_JULIA_WORDS.split())),
+    "mathematica": Language(
+        sympy.mathematica_code, "", frozenset(["C", "D", "E", "I", "K", "N", "O", "Pi", "Sin", "Cos", "M", "f"])
+    ),
+    "c": Language(sympy.ccode, "//", frozenset([*c_words, "M", "f", "double", "restrict", "inline", "y0", "y1", "jn"])),
+}
+FORMATS = ("latex", "text", *LANGUAGES)
+
+
+def write_format(equations: Readable, form: str) -> str:
+    """The equations of motion as the text of a file.
+
+    Parameters
+    ----------
+    equations : Readable
+    form : str
+        One of ``FORMATS``.  ``matlab``, ``octave``, ``julia`` and ``c`` give a function of the symbols, in
+        alphabetical order, for M and f; ``sympy`` and ``mathematica`` give statements that define M and f.
+
+    Returns
+    -------
+    str
+    """
+    if form == "latex":
+        return "\n".join(f"\\[\n{line}\n\\]" for line in latex_lines(equations)) + "\n"
+    if form == "text":
+        return equations_text(equations, COLUMNS, 1_000_000) + "\n"
+    return _Code(equations, LANGUAGES[form], form).file()
+
+
+class _Code:
+    """Equations with names that a language takes."""
+
+    def __init__(self, equations: Readable, language: Language, form: str) -> None:
+        self.language, self.form, self.model = language, form, equations.kinematics.mechanism.name
+        named = equations.intermediates
+        whole = [*(x for _, x in named), *equations.mass_matrix, *equations.force]
+        symbols = set().union(*(x.free_symbols for x in whole), {symbol for symbol, _ in named})
+        self.renamed = _renamed((str(s) for s in symbols), language.reserved, form)
+        put = {s: sympy.Symbol(self.renamed[str(s)]) for s in symbols}
+        self.named = [(put[symbol], x.xreplace(put)) for symbol, x in named]
+        self.mass, self.force = equations.mass_matrix.xreplace(put), equations.force.xreplace(put)
+        inner = {symbol for symbol, _ in self.named}
+        self.arguments = sorted(str(symbol) for symbol in put.values() if symbol not in inner)
+        self.rates = equations.acceleration_names
+        self.function = re.sub(r"\W", "_", f"{self.model}_equations")
+
+    def file(self) -> str:
+        notes = [f"M * [{', '.join(self.rates)}] = f of {self.model}"]
+        notes += [f"{new} is {old} of the model" for old, new in sorted(self.renamed.items()) if old != new]
+        if self.form == "mathematica":
+            return "\n".join([*(f"(* {note} *)" for note in notes), *self._mathematica(), ""])
+        body = {"sympy": self._sympy, "julia": self._julia, "c": self._c}.get(self.form, self._matlab)
+        return "\n".join([*(f"{self.language.comment} {note}" for note in notes), *body(), ""])
+
+    def _lines(self, one: Callable[[str, str], str]) -> list[str]:
+        return [one(str(symbol), self.language.print(x)) for symbol, x in self.named]
+
+    def _cells(self, start: int) -> Iterable[tuple[int, int, str]]:
+        for i in range(self.mass.rows):
+            for j in range(self.mass.cols):
+                yield i + start, j + start, self.language.print(self.mass[i, j])
+
+    def _sympy(self) -> list[str]:
+        """Statements that define the symbols, M and f."""
+        names = ", ".join(self.arguments)
+        return [
+            "import sympy",
+            "from sympy import *",
+            *([f"{names}, = symbols({' '.join(self.arguments)!r}, seq=True)"] if names else []),
+            *self._lines(lambda name, x: f"{name} = {x}"),
+            f"M = sympy.Matrix({[[*row] for row in self.mass.tolist()]})",
+            f"f = sympy.Matrix({list(self.force)})",
+        ]
+
+    def _matlab(self) -> list[str]:
+        n = self.mass.rows
+        return [
+            f"function [M, f] = {self.function}({', '.join(self.arguments)})",
+            *self._lines(lambda name, x: f"  {name} = {x};"),
+            f"  M = zeros({n}, {n});",
+            *(f"  M({i}, {j}) = {x};" for i, j, x in self._cells(1)),
+            f"  f = zeros({n}, 1);",
+            *(f"  f({i}) = {self.language.print(x)};" for i, x in enumerate(self.force, 1)),
+            "end",
+        ]
+
+    def _julia(self) -> list[str]:
+        n = self.mass.rows
+        return [
+            f"function {self.function}({', '.join(self.arguments)})",
+            *self._lines(lambda name, x: f"    {name} = {x}"),
+            f"    M = zeros({n}, {n})",
+            *(f"    M[{i}, {j}] = {x}" for i, j, x in self._cells(1)),
+            f"    f = zeros({n})",
+            *(f"    f[{i}] = {self.language.print(x)}" for i, x in enumerate(self.force, 1)),
+            "    return M, f",
+            "end",
+        ]
+
+    def _c(self) -> list[str]:
+        n = self.mass.rows
+        given = "".join(f"double {name}, " for name in self.arguments)
+        return [
+            "#include <math.h>",
+            f"void {self.function}({given}double M[{n}][{n}], double f[{n}])",
+            "{",
+            *self._lines(lambda name, x: f"  const double {name} = {x};"),
+            *(f"  M[{i}][{j}] = {x};" for i, j, x in self._cells(0)),
+            *(f"  f[{i}] = {self.language.print(x)};" for i, x in enumerate(self.force)),
+            "}",
+        ]
+
+    def _mathematica(self) -> list[str]:
+        rows = (", ".join(self.language.print(x) for x in row) for row in self.mass.tolist())
+        return [
+            *self._lines(lambda name, x: f"{name} = {x};"),
+            f"M = {{{', '.join(f'{{{row}}}' for row in rows)}}};",
+            f"f = {{{', '.join(map(self.language.print, self.force))}}};",
+        ]
+
+
+def _renamed(names: Iterable[str], reserved: frozenset[str], form: str) -> dict[str, str]:
+    """Names -> names that the language takes and no two of which are the same."""
+    found: dict[str, str] = {}
+    listed = sorted(names)
+    used = set(listed) - reserved
+    for name in listed:
+        new = re.sub(r"\W", "_", name)
+        if form == "mathematica":  # no underscores there
+            first, *others = new.split("_")
+            new = first + "".join(part[:1].upper() + part[1:] for part in others)
+        if new != name or new in reserved:
+            while new in used or new in reserved:
+                new += "X" if form == "mathematica" else "_"
+            used.add(new)
+        found[name] = new
+    return found

@@ -1,0 +1,161 @@
+"""Stage reading, printed: equations of motion M(q) v' = f -> the formulas that a display shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from typing import NamedTuple
+
+from ..graph.core import Expr
+from ..graph.substitute import symbols_of
+from ..notation.notation import Notation
+from ..printing import Formulas, Order, text
+from ..printing.factor_order import COORDINATE, GRAVITY, INERTIA, INPUT, MASS, PARAMETER, RATE
+from ..printing.formula_text import TIGHT
+from ..printing.formula_tree import Formula, NumberPart
+from .readable import Readable
+
+UNITS = {"angle": "rad", "turn": "rad", "length": "m", "parameter": ""}
+#: What a reader may want next: attributes of the equations, in the order of a derivation.
+ATTRIBUTES = (
+    "q", "v", "parameters", "T", "V", "lagrangian", "mass_matrix", "force", "quadratic_velocity", "generalized_forces",
+    "poses", "velocities", "accelerations", "momenta", "linearize", "operations", "report",
+)  # fmt: skip
+OF_LOOPS = ("constraints", "constraint_jacobian", "gamma", "velocity_transformation")
+
+
+class PrintedCoordinate(NamedTuple):
+    """A row of the table of coordinates."""
+
+    name: str
+    joint: str
+    unit: str
+    role: str
+
+
+class PrintedEntry(NamedTuple):
+    """An entry of M or f: ``M_12`` with its formula; places count from 1."""
+
+    letter: str
+    place: tuple[int, ...]
+    formula: Formula
+
+
+def order_of(equations: Readable) -> Order:
+    """In what order the names of a model stand in formulas."""
+    k, m = equations.kinematics, equations.kinematics.mechanism
+    masses = {name for body in m.bodies for name in _alone(body.mass)}
+    inertias = {name for body in m.bodies for row in body.inertia for x in row for name in _alone(x)}
+    inertias |= {name for body in m.bodies if body.inertia_origin for row in body.inertia_origin for x in row
+                 for name in _alone(x)}  # fmt: skip
+    gravity = {name for x in m.gravity for name in _names(x)}
+    kinds: dict[str, int] = {}
+    for p in m.parameters:
+        unit = p.unit.replace(" ", "").replace("·", "*").replace("**", "^")
+        if unit == "kg" or p.name in masses:
+            kinds[p.name] = MASS
+        elif unit in ("kg*m^2", "kgm^2", "kg*m2") or p.name in inertias:
+            kinds[p.name] = INERTIA
+        else:
+            kinds[p.name] = GRAVITY if p.name in gravity else PARAMETER
+    kinds |= dict.fromkeys(equations.kinematics.input_names, INPUT)
+    kinds |= dict.fromkeys([*k.names, *k.loop_coordinates.names, "t"], COORDINATE)
+    return Order(kinds | dict.fromkeys([*k.velocity_names, *equations.acceleration_names], RATE))
+
+
+def _alone(x: Expr) -> tuple[str, ...]:
+    """The name that an expression is, if it is one."""
+    names = _names(x)
+    return tuple(names) if len(names) == 1 and x.graph.symbol(*names).id == x.id else ()
+
+
+def _names(x: Expr) -> set[str]:
+    return set(symbols_of([x]))
+
+
+class PrintedEquations:
+    """Formulas of M(q) v' = f and what else a display says.
+
+    Parameters
+    ----------
+    equations : Readable
+    """
+
+    def __init__(self, equations: Readable) -> None:
+        self.equations = equations
+        self.names: Notation = equations.notation
+        self.formula = Formulas(order_of(equations))
+
+    @cached_property
+    def mass_matrix(self) -> list[list[Formula]]:
+        """M by rows."""
+        return [[self.formula(x) for x in row] for row in self.equations.mass_matrix.tolist()]
+
+    @cached_property
+    def force(self) -> list[Formula]:
+        """f."""
+        return [self.formula(x) for x in self.equations.force]
+
+    @cached_property
+    def intermediates(self) -> list[tuple[str, Formula]]:
+        """Names that stand in M and f, with what they stand for."""
+        return [(str(name), self.formula(x)) for name, x in self.equations.intermediates]
+
+    def entries(self) -> Iterator[PrintedEntry]:
+        """Entries of M on and below its diagonal that do not vanish, then those of f."""
+        for i, row in enumerate(self.mass_matrix):
+            for j, x in enumerate(row[: i + 1]):
+                if x != NumberPart("0"):
+                    yield PrintedEntry("M", (j + 1, i + 1), x)
+        for i, x in enumerate(self.force):
+            yield PrintedEntry("f", (i + 1,), x)
+
+    @property
+    def vanishing(self) -> bool:
+        """Whether entries of M vanish."""
+        return any(x == NumberPart("0") for row in self.mass_matrix for x in row)
+
+    def text(self, formula: Formula) -> str:
+        """A formula in text."""
+        return text(formula, self.names)
+
+    def width(self, columns: list[list[Formula]]) -> int:
+        """Characters of a matrix given by its columns."""
+        return sum(max(len(self.text(x)) for x in column) + 2 for column in columns)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Characters of M and of f side by side, in text."""
+        return self.width([list(c) for c in zip(*self.mass_matrix, strict=True)]), self.width([self.force])
+
+    @property
+    def coordinates(self) -> list[PrintedCoordinate]:
+        """Coordinates of the spanning tree."""
+        k = self.equations.kinematics
+        joints = {name: joint.name for joint in k.mechanism.joints for name in joint.coordinates}
+        units = {} if k.mechanism.bare else dict(zip(k.names, (UNITS[kind] for kind in k.kinds), strict=True))
+        independent = {*self.equations.independent}
+        return [
+            PrintedCoordinate(
+                name, joints.get(name, ""), units.get(name, ""), "" if name in independent else "dependent"
+            )
+            for name in k.names
+        ]
+
+    @property
+    def title(self) -> str:
+        """What these equations are, in one line."""
+        n = self.equations.mobility.n_dof
+        method = getattr(self.equations, "method", "").replace("_", "-")
+        return f"method {method}, {n} degree{'s' * (n != 1)} of freedom"
+
+    @property
+    def attributes(self) -> tuple[str, ...]:
+        """Attributes to read next."""
+        loops = OF_LOOPS if self.equations.constraint_names else ()
+        return (*ATTRIBUTES, *loops)
+
+
+def plain(line: str) -> str:
+    """Text with ordinary spaces."""
+    return line.replace(TIGHT, " ")

@@ -1,0 +1,94 @@
+"""Equations written for other programs give the numbers of the compiled module."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy
+
+import eomgen as eg
+from eomgen.reading.formats import FORMATS, write_format
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+Numbers = dict[str, float]
+
+
+@pytest.fixture(scope="module")
+def pendulum() -> tuple[Any, Numbers, np.ndarray, np.ndarray]:
+    """Equations, numbers of all names, and M and f of the compiled module there."""
+    equations = eg.load(EXAMPLES / "double_pendulum.yaml").derive()
+    module = equations.compile("numpy")
+    x = np.array([0.3, -0.7, 1.1, 0.4])
+    numbers = dict(zip((*module.x_names, *module.p_names), (*x, *module.p), strict=True))
+    return equations, numbers, module.mass_matrix(x[:2]), -module.bias(0.0, x)
+
+
+def evaluated(assignments: dict[str, str], numbers: Numbers) -> dict[str, float]:
+    """Right sides in the syntax that SymPy reads, one after the other."""
+    known: dict[str, Any] = dict(numbers)
+    for name, right in assignments.items():
+        known[name] = float(sympy.parse_expr(right, local_dict=known))
+    return known
+
+
+def test_sympy_text_is_the_compiled_equations(pendulum: Any) -> None:
+    equations, numbers, M, f = pendulum
+    space: dict[str, Any] = {}
+    exec(write_format(equations, "sympy"), space)  # noqa: S102 - what a user does with the file
+    assert np.array(space["M"].subs(numbers), dtype=float) == pytest.approx(M, rel=1e-12)
+    assert np.array(space["f"].subs(numbers), dtype=float)[:, 0] == pytest.approx(f, rel=1e-12)
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc compiles the text")
+def test_c_text_is_the_compiled_equations(pendulum: Any, tmp_path: Path) -> None:
+    equations, numbers, M, f = pendulum
+    text = write_format(equations, "c")
+    (tmp_path / "e.c").write_text(text)
+    subprocess.run(
+        ["gcc", "-Wall", "-Werror", "-shared", "-fPIC", "-o", "e.so", "e.c", "-lm"], cwd=tmp_path, check=True
+    )
+    arguments = re.findall(r"double (\w+),", text)
+    call = ctypes.CDLL(str(tmp_path / "e.so")).double_pendulum_equations
+    found, right = (ctypes.c_double * 4)(), (ctypes.c_double * 2)()
+    call(*(ctypes.c_double(numbers[name]) for name in arguments), found, right)
+    assert list(found) == pytest.approx(M.ravel(), rel=1e-12)
+    assert list(right) == pytest.approx(f, rel=1e-12)
+
+
+@pytest.mark.parametrize("form", ["matlab", "octave", "julia"])
+def test_array_languages_give_the_compiled_equations(form: str, pendulum: Any) -> None:
+    """Their arithmetic is read here: no such program need be installed."""
+    equations, numbers, M, f = pendulum
+    text = write_format(equations, form)
+    assert text.count("function") == 1
+    assert text.rstrip().endswith("end")
+    rows = re.findall(r"^ +([Mf])[\[(]([\d, ]+)[\])] = (.*?);?$", text, re.M)
+    right = {f"{a}_{place.replace(', ', '_')}": x.replace(".*", "*").replace(".^", "**") for a, place, x in rows}
+    right = {name: x.replace("./", "/").replace("^", "**").replace("//", "/") for name, x in right.items()}
+    known = evaluated(right, numbers)
+    assert [known[f"M_{i}_{j}"] for i in (1, 2) for j in (1, 2)] == pytest.approx(M.ravel(), rel=1e-12)
+    assert [known["f_1"], known["f_2"]] == pytest.approx(f, rel=1e-12)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_large_equations_are_written_whole(form: str) -> None:
+    text = write_format(eg.load(EXAMPLES / "four_bar.yaml").derive(), form)
+    assert "bend" in text
+    assert len(text) > 500
+
+
+def test_words_of_a_language_are_changed_with_a_note() -> None:
+    m = eg.Model("wheel")
+    end, M = m.parameter("end"), m.parameter("M")
+    m.revolute("A", m.ground, m.body("rim", mass=1, inertia={"zz": end * M}), coordinate="theta")
+    equations = m.derive()
+    assert "% end_ is end of the model" in write_format(equations, "matlab")
+    assert "// M_ is M of the model" in write_format(equations, "c")
+    assert "end_" not in write_format(equations, "c")
