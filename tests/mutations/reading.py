@@ -86,11 +86,4 @@ FAULTS = (
         "the root of a square has the sign of what is squared",
         (f"{FORMS}::test_roots_of_squares_have_no_sign",),
     ),
-    Fault(
-        "form-inverse-power", "eomgen/simplify/inline.py",
-        "x**n if n >= 0 else ratio(1, x**-n)",
-        "x ** abs(n)",
-        "a number that is put in below a fraction is multiplied",
-        (f"{FORMS}::test_given_names_stay_or_are_put_in",),
-    ),
 )  # fmt: skip
