@@ -25,8 +25,8 @@ _WORDS = ("ab", "ad", "am", "an", "as", "at", "be", "by", "do", "ex", "go", "he"
           "me", "my", "no", "of", "oh", "ok", "on", "or", "so", "to", "up", "us", "we")  # fmt: skip
 _MOTIONS = {"v": "v", "a": "a", "w": r"\omega"}
 _DOTTED = {"dot": 1, "ddot": 2}
-#: Other spellings, as Python keeps ``lambda`` for itself.
-_SPELLED = {"lamda": "lambda"}
+#: Other spellings: Python keeps ``lambda`` for itself, and ``th`` is written for an angle where names are short.
+_SPELLED = {"lamda": "lambda", "th": "theta"}
 
 
 def rate_of(name: str, times: int = 1) -> str:

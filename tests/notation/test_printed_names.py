@@ -27,6 +27,9 @@ NAMES = {
     # Greek letters
     "theta": (r"\theta", "θ"),
     "theta1": (r"\theta_1", "θ₁"),
+    "th": (r"\theta", "θ"),
+    "th1": (r"\theta_1", "θ₁"),
+    "th_dot": (r"\dot{\theta}", "θ'"),
     "theta_2": (r"\theta_2", "θ₂"),
     "thetaA": (r"\theta_A", "θ_A"),
     "Omega": (r"\Omega", "Ω"),
