@@ -58,7 +58,7 @@ class Equations(Derivation):
         Returns
         -------
         Explanation
-            ``.html``, ``.markdown``, ``.latex``, ``.save("solution.html")``, and ``.difference``, the largest difference
+            ``.html``, ``.markdown``, ``.latex``, ``.save("solution.html")``, and ``.difference``, the largest one
             between the shown formulas and the compiled module.
 
         Raises

@@ -22,6 +22,7 @@ VERBS = {
     "kinematics": "Analyse the motion over a range of time or coordinates, without forces.",
     "check": "Report a model's topology, mobility and faults.",
     "derive": "Derive the equations of motion and count their operations.",
+    "explain": "Write the worked solution: every step to the equations, then numbers.",
     "linearize": "Linearize a model: A, B, C, D, eigenvalues.",
     "modes": "Natural frequencies, mode shapes and damping ratios about an equilibrium.",
     "equilibrium": "Find a static equilibrium, with parameters that make it one.",

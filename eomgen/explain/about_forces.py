@@ -29,7 +29,8 @@ def forces(author: Author) -> list[Section]:
         text = "There are no degrees of freedom for forces to act on." if parts else "No forces act."
         return [Section("Forces", (Sentence(text),))]
     text = (
-        "The virtual work of an element is $\\delta W = \\mathbf{Q}^T \\delta \\mathbf{q}_i$; the factors of the variations of "
+        "The virtual work of an element is $\\delta W = \\mathbf{Q}^T \\delta \\mathbf{q}_i$; the factors of "
+        "the variations of "
         "the independent coordinates are its generalized forces."
     )
     found = [Section("Forces and their virtual work", (Sentence(text),))]
@@ -48,7 +49,9 @@ def forces(author: Author) -> list[Section]:
 def _work(author: Author, column: Any) -> Any:
     """Q^T delta q_i as a sum."""
     total = zip(column, author.equations.independent, strict=True)
-    return sympy.Add(*(sympy.Mul(x, author.variation(name), evaluate=False) for x, name in total if x != 0), evaluate=False)
+    return sympy.Add(
+        *(sympy.Mul(x, author.variation(name), evaluate=False) for x, name in total if x != 0), evaluate=False
+    )
 
 
 def _weight(author: Author, name: str) -> list[Piece]:
@@ -58,7 +61,8 @@ def _weight(author: Author, name: str) -> list[Piece]:
     gravity = write(list(author.mechanism.gravity)).expressions
     return [
         Sentence(
-            "The weight of each body acts at its centre of mass, $\\delta W = m \\mathbf{g}^T \\delta \\mathbf{r}_c$, with "
+            "The weight of each body acts at its centre of mass, $\\delta W = m \\mathbf{g}^T \\delta "
+            "\\mathbf{r}_c$, with "
             "the field of gravity in ground axes"
         ),
         Formula((r"\mathbf{g}", sympy.Matrix(3, 1, gravity))),

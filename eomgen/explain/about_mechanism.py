@@ -30,11 +30,12 @@ def mechanism(author: Author, module: Any | None) -> Section:
         return Section("Mechanism", tuple(pieces))
     pieces.append(_picture(module))
     report = eqs.report
-    loops = f"{len(report.loop_joints)} of them close loops: {_names(report.loop_joints)}" if report.loop_joints else ""
+    cut = report.loop_joints
+    loops = f"; joint{'s' * (len(cut) > 1)} {_names(cut)} close{'s a loop' if len(cut) == 1 else ' loops'}"
     pieces.append(
         Sentence(
             f"The mechanism has {_count(len(m.bodies), 'body', 'bodies')} beside ground ({_names(report.bodies)}) and "
-            f"{_count(len(m.joints), 'joint')}{'; ' + loops if loops else ', which form an open tree'}."
+            f"{_count(len(m.joints), 'joint')}{loops if cut else ', which form an open tree'}."
         )
     )
     rows = tuple(
@@ -112,7 +113,9 @@ def coordinates(author: Author) -> Section:
             start, end = (_place(m, marker) for marker in (spec.predecessor, spec.successor))
             kind = {"angle": "angle (rad)", "length": "length (m)", "parameter": "Euler parameter"}[coordinate.kind]
             role = "independent" if name in free else "dependent" if name in tree else "at a joint that closes a loop"
-            rows.append((f"${author.symbol(name)}$", f"`{name}`", role, f"{kind} of {end} against {start}, joint `{spec.name}`"))
+            rows.append(
+                (f"${author.symbol(name)}$", f"`{name}`", role, f"{kind} of {end} against {start}, joint `{spec.name}`")
+            )
     known = {row[1] for row in rows}
     for name in (*eqs.kinematics.names, *(n for n in eqs.independent if n not in tree)):
         if f"`{name}`" not in known:
@@ -121,7 +124,7 @@ def coordinates(author: Author) -> Section:
     pieces: list[Piece] = [
         Sentence(
             f"The tree has {_count(len(tree), 'coordinate')}"
-            + (f"; {_count(len(loop), 'further one')} belong to joints that close loops" if loop else "")
+            + (f"; {_count(len(loop), 'further one')} at joints that close loops" if loop else "")
             + f". The equations of motion are for {_count(len(free), 'independent one')}"
             + (f": {', '.join(f'${author.symbol(n)}$' for n in eqs.independent)}." if free else ".")
         ),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import sympy
@@ -10,8 +11,9 @@ import sympy
 from ..errors import UnavailableError
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
+from ..notation import dotted
 from ..reading import Quantities
-from .author import Author
+from .author import Author, needed
 from .document import Formula, Piece, Section, Sentence
 
 
@@ -42,7 +44,8 @@ def _embedding(author: Author) -> list[Piece]:
     return [
         Sentence(
             "The velocities of all bodies, of each $\\mathbf{v}$ of the centre of mass in ground axes and "
-            "$\\mathbf{\\omega}$ in its own axes, are $\\mathbf{v}_b = \\mathbf{B}_b \\dot{\\mathbf{q}}_i + \\mathbf{b}_b$ with "
+            "$\\mathbf{\\omega}$ in its own axes, are $\\mathbf{v}_b = \\mathbf{B}_b \\dot{\\mathbf{q}}_i + "
+            "\\mathbf{b}_b$ with "
             "the velocity transformation"
         ),
         *author.quantity(r"\mathbf{B}_b", "body_velocity_transformation"),
@@ -51,7 +54,8 @@ def _embedding(author: Author) -> list[Piece]:
         Sentence("and the mass matrix of the independent accelerations is"),
         Formula((r"\mathbf{M}", r"\mathbf{B}_b^T \mathbf{M}_b \mathbf{B}_b")),
         Sentence(
-            "What the accelerations hold beside $\\mathbf{B}_b \\ddot{\\mathbf{q}}_i$ gives the quadratic velocity terms "
+            "What the accelerations hold beside $\\mathbf{B}_b \\ddot{\\mathbf{q}}_i$ gives the quadratic "
+            "velocity terms "
             "$\\mathbf{Q}_v$; the generalized forces of all elements together are $\\mathbf{Q}$:"
         ),
         *_right_side(author),
@@ -71,7 +75,8 @@ def _lagrange(author: Author) -> list[Piece]:
     pieces: list[Piece] = [
         Sentence(
             "Lagrange's equations, one for each coordinate $q$ of the tree: $\\frac{d}{d\\,t} "
-            "\\frac{\\partial T}{\\partial\\dot{q}} - \\frac{\\partial T}{\\partial q} + \\frac{\\partial V}{\\partial q} = "
+            "\\frac{\\partial T}{\\partial\\dot{q}} - \\frac{\\partial T}{\\partial q} + \\frac{\\partial "
+            "V}{\\partial q} = "
             "Q_q$, where $Q_q$ holds the forces without a potential"
             + (" and those of the constraints." if author.equations.constraint_names else ".")
         )
@@ -84,7 +89,7 @@ def _lagrange(author: Author) -> list[Piece]:
             break
         q = author.symbol(name)
         for left, choose in _derivatives(q, j):
-            named, (value,) = author.form(lambda s, f=choose: [f(s)], "d_")
+            named, (value,) = author.form(choose, "d_")
             pieces += author.formulas(left, value, named)
     if k.velocity_names and author.equations.constraint_names:
         pieces.append(Sentence("Multiplied by $\\mathbf{B}^T$, these equations lose the forces of the constraints:"))
@@ -92,37 +97,36 @@ def _lagrange(author: Author) -> list[Piece]:
     return pieces
 
 
-def _derivatives(q: str, j: int) -> list[tuple[str, Callable[[Quantities], Expr]]]:
+def _derivatives(q: str, j: int) -> list[tuple[str, Callable[[Quantities], Sequence[Expr]]]]:
     """Left sides and values of the derivatives of the energies by coordinate j."""
-    partial_rate = rf"\frac{{\partial T}}{{\partial{_dot(q)}}}"
+    partial_rate = rf"\frac{{\partial T}}{{\partial{dotted(q, 1)}}}"
     return [
-        (partial_rate, lambda s: s.momenta[j]),
-        (rf"\frac{{d}}{{d\,t}} {partial_rate}", lambda s: s.kinematics.total_derivative([s.momenta[j]])[0]),
-        (rf"\frac{{\partial T}}{{\partial {q}}}", lambda s: gradient(s.kinetic_energy, [s.kinematics.q[j]])[0]),
-        (rf"\frac{{\partial V}}{{\partial {q}}}", lambda s: gradient(s.potential_energy, [s.kinematics.q[j]])[0]),
+        (partial_rate, lambda s: [s.momenta[j]]),
+        (rf"\frac{{d}}{{d\,t}} {partial_rate}", lambda s: s.kinematics.total_derivative([s.momenta[j]])),
+        (rf"\frac{{\partial T}}{{\partial {q}}}", lambda s: gradient(s.kinetic_energy, [s.kinematics.q[j]])),
+        (rf"\frac{{\partial V}}{{\partial {q}}}", lambda s: gradient(s.potential_energy, [s.kinematics.q[j]])),
     ]
-
-
-def _dot(q: str) -> str:
-    from ..notation import dotted
-
-    return dotted(q, 1)
 
 
 def _newton_euler(author: Author) -> list[Piece]:
     eqs = author.equations
     pieces: list[Piece] = [
         Sentence(
-            "Each body is set free. In ground axes, its mass times the acceleration of its centre of mass is the sum of "
-            "all forces on it, and the rate of its angular momentum is the sum of their moments about the centre of mass. "
-            "$F$ and $M$ with the name of a joint are the force and the moment of this joint on the body that it carries."
+            "Each body is set free. In ground axes, its mass times the acceleration of its centre of mass is "
+            "the sum of "
+            "all forces on it, and the rate of its angular momentum is the sum of their moments about the "
+            "centre of mass. "
+            "$F$ and $M$ with the name of a joint are the force and the moment of this joint on the body that "
+            "it carries."
         )
     ]
     for name in eqs.free_bodies:
         named, body = eqs.written("free_bodies", name)
         pieces.append(Sentence(f"`{name}`:"))
         pieces += _equations(author, [*body.force, *body.moment], named)
-    pieces.append(Sentence("Along the directions in which a joint is free, its reaction is what drives and forces give:"))
+    pieces.append(
+        Sentence("Along the directions in which a joint is free, its reaction is what drives and forces give:")
+    )
     for name in eqs.joint_forces:
         named, pairs = eqs.written("joint_forces", name)
         pieces += _equations(author, pairs, named)
@@ -142,7 +146,10 @@ def _block(author: Author) -> list[Piece]:
     named, system = author.equations.written("block_system")
     unknowns = ", ".join(f"${author.symbol(str(x))}$" for x in system.unknowns)
     return [
-        Sentence(f"Together they are one linear system $\\mathbf{{K}} \\mathbf{{x}} = \\mathbf{{k}}$ for the {len(system.unknowns)} unknowns {unknowns}:"),
+        Sentence(
+            f"Together they are one linear system $\\mathbf{{K}} \\mathbf{{x}} = \\mathbf{{k}}$ for the "
+            f"{len(system.unknowns)} unknowns {unknowns}:"
+        ),
         *author.formulas(r"\mathbf{K}", system.matrix, named, ("block_system", "matrix")),
         *author.formulas(r"\mathbf{k}", system.right, named, ("block_system", "right")),
     ]
@@ -151,8 +158,10 @@ def _block(author: Author) -> list[Piece]:
 def _augmented(author: Author) -> list[Piece]:
     return [
         Sentence(
-            "The accelerations of the tree and the multipliers $\\mathbf{\\lambda}$ of the constraints are the unknowns: "
-            "$\\mathbf{M}_t \\ddot{\\mathbf{q}} + \\mathbf{C}_q^T \\mathbf{\\lambda} = \\mathbf{Q} + \\mathbf{Q}_v$ and "
+            "The accelerations of the tree and the multipliers $\\mathbf{\\lambda}$ of the constraints are the "
+            "unknowns: "
+            "$\\mathbf{M}_t \\ddot{\\mathbf{q}} + \\mathbf{C}_q^T \\mathbf{\\lambda} = \\mathbf{Q} + "
+            "\\mathbf{Q}_v$ and "
             "$\\mathbf{C}_q \\ddot{\\mathbf{q}} = -\\mathbf{\\gamma}$."
         ),
         *_block(author),
@@ -166,7 +175,10 @@ def _gibbs_appell(author: Author) -> list[Piece]:
             "free of accelerations is left out, because only derivatives by accelerations are needed:"
         ),
         *author.quantity("S", "gibbs_function"),
-        Sentence("Its derivatives by the accelerations are the generalized forces: $\\frac{\\partial S}{\\partial\\ddot{q}} = Q_q$."),
+        Sentence(
+            "Its derivatives by the accelerations are the generalized forces: $\\frac{\\partial "
+            "S}{\\partial\\ddot{q}} = Q_q$."
+        ),
         *_right_side(author),
     ]
 
@@ -179,7 +191,9 @@ def _hamilton(author: Author) -> list[Piece]:
         *author.quantity(r"\mathbf{p}", "momenta"),
         Sentence("The Hamiltonian is $H = \\mathbf{p}^T \\dot{\\mathbf{q}} - L$, in coordinates and momenta:"),
         *author.quantity("H", "hamiltonian"),
-        Sentence("The rates of the momenta are $\\dot{p} = -\\frac{\\partial H}{\\partial q} + Q_q$; written in velocities:"),
+        Sentence(
+            "The rates of the momenta are $\\dot{p} = -\\frac{\\partial H}{\\partial q} + Q_q$; written in velocities:"
+        ),
         *author.quantity(r"\dot{\mathbf{p}}", "momentum_rates"),
     ]
 
@@ -188,9 +202,12 @@ def _recursive(author: Author) -> list[Piece]:
     k = author.equations.kinematics
     pieces: list[Piece] = [
         Sentence(
-            "From ground outwards, the velocity of each link is that of the link that carries it plus that of its joint, "
-            "$\\mathbf{v}_j = \\mathbf{X}_j \\mathbf{v}_p + \\mathbf{S}_j \\dot{q}_j$, each in the axes of the link; its wrench is "
-            "$\\mathbf{f}_j = \\mathbf{I}_j \\mathbf{a}_j + \\mathbf{v}_j^{\\ast} \\mathbf{I}_j \\mathbf{v}_j$. From the last link "
+            "From ground outwards, the velocity of each link is that of the link that carries it plus that of "
+            "its joint, "
+            "$\\mathbf{v}_j = \\mathbf{X}_j \\mathbf{v}_p + \\mathbf{S}_j \\dot{q}_j$, each in the axes of the "
+            "link; its wrench is "
+            "$\\mathbf{f}_j = \\mathbf{I}_j \\mathbf{a}_j + \\mathbf{v}_j^{\\ast} \\mathbf{I}_j \\mathbf{v}_j$. "
+            "From the last link "
             "inwards, wrenches and inertias of the links that a link carries are added to its own."
         )
     ]
@@ -198,12 +215,17 @@ def _recursive(author: Author) -> list[Piece]:
         body, joint = k.mechanism.bodies[branch.body].name, k.mechanism.joints[branch.joint]
         below = "ground" if branch.parent < 0 else f"`{k.mechanism.bodies[branch.parent].name}`"
         pieces.append(Sentence(f"Link {place + 1} is `{body}`, carried by {below} through joint `{joint.name}`:"))
-        named, flat = author.form(lambda s, i=place: [*s.kinematics.twists[i].angular, *s.kinematics.twists[i].linear], "w_")
+        named, flat = author.form(partial(_twist, place), "w_")
         pieces += author.formulas(author.of(r"\mathbf{v}", body), sympy.Matrix(6, 1, flat), named)
     if author.equations.constraint_names:
         pieces.append(Sentence("The equations of the tree are then multiplied by $\\mathbf{B}^T$ of the constraints:"))
         pieces += author.quantity(r"\mathbf{B}", "velocity_transformation")
     return [*pieces, *_right_side(author)]
+
+
+def _twist(place: int, quantities: Quantities) -> list[Expr]:
+    """Angular velocity and velocity of the origin of a link, in its axes."""
+    return [x for part in quantities.kinematics.twists[place] for x in part]
 
 
 #: Method -> title of its section, and what tells it.
@@ -236,14 +258,8 @@ def final(author: Author) -> Section:
     if len(mass) == 1:
         pieces = [Sentence(f"$M {author.symbol(eqs.acceleration_names[0])} = f$ with")]
     one = len(mass) == 1
-    pieces += author.formulas("M" if one else r"\mathbf{M}", mass[0] if one else mass, named, ("mass_matrix", None), True)
-    known = set() if not named else {s for s, _ in _used(named, mass)}
-    later = [(s, x) for s, x in named if s not in known]
-    pieces += author.formulas("f" if one else r"\mathbf{f}", force[0] if one else force, later, ("force", None))
+    left, right = ("M", "f") if one else (r"\mathbf{M}", r"\mathbf{f}")
+    pieces += author.formulas(left, mass[0] if one else mass, named, ("mass_matrix", None), True)
+    known = {symbol for symbol, _ in needed(named, mass)}
+    pieces += author.formulas(right, force[0] if one else force, named, ("force", None), told=known)
     return Section("Equations of motion", tuple(pieces))
-
-
-def _used(named: Any, value: Any) -> Any:
-    from .author import needed
-
-    return needed(named, value)

@@ -18,7 +18,8 @@ def motion(author: Author) -> list[Section]:
         return []
     position: list[Piece] = [
         Sentence(
-            "Of each body: $\\mathbf{r}$ is the place of its origin in ground axes, and the columns of $\\mathbf{R}$ are "
+            "Of each body: $\\mathbf{r}$ is the place of its origin in ground axes, and the columns of "
+            "$\\mathbf{R}$ are "
             "its axes. A point at $\\mathbf{u}$ of the body is at $\\mathbf{r} + \\mathbf{R} \\mathbf{u}$."
         )
     ]
@@ -40,7 +41,9 @@ def motion(author: Author) -> list[Section]:
         velocity += author.quantity(author.of(r"\mathbf{\omega}", name), "velocities", name, lambda v: v.angular)
         velocity += author.quantity(author.of(r"\mathbf{v}", name), "velocities", name, lambda v: v.center_of_mass)
         acceleration += author.quantity(author.of(r"\mathbf{\alpha}", name), "accelerations", name, lambda a: a.angular)
-        acceleration += author.quantity(author.of(r"\mathbf{a}", name), "accelerations", name, lambda a: a.center_of_mass)
+        acceleration += author.quantity(
+            author.of(r"\mathbf{a}", name), "accelerations", name, lambda a: a.center_of_mass
+        )
     return [
         Section("Position of each body", tuple(position)),
         Section("Velocity of each body", tuple(velocity)),
@@ -62,6 +65,8 @@ def constraints(author: Author) -> Section:
             f"{n} - {len(rows)} = {_freedoms(free)} remain. The equations are {', '.join(f'`{row}`' for row in rows)}."
         )
     ]
+    for element in author.mechanism.constraints:
+        pieces.append(Sentence(f"`{element.name}`: {element.sentence} ${element.formula}$"))
     if eqs.mobility.redundant:
         pieces.append(Sentence(f"{len(eqs.mobility.redundant)} further equations follow from these and are left out."))
     if len(eqs.constraints):
@@ -72,11 +77,18 @@ def constraints(author: Author) -> Section:
     pieces += author.quantity(r"\dot{\mathbf{C}}", "velocity_constraints")
     pieces.append(Sentence("The Jacobian $\\mathbf{C}_q$ is the derivative of $\\dot{\\mathbf{C}}$ by the velocities:"))
     pieces += author.quantity(r"\mathbf{C}_q", "constraint_jacobian")
-    pieces.append(Sentence("$\\ddot{\\mathbf{C}} = \\mathbf{C}_q \\ddot{\\mathbf{q}} + \\mathbf{\\gamma} = \\mathbf{0}$ with"))
+    pieces.append(
+        Sentence("$\\ddot{\\mathbf{C}} = \\mathbf{C}_q \\ddot{\\mathbf{q}} + \\mathbf{\\gamma} = \\mathbf{0}$ with")
+    )
     pieces += author.quantity(r"\mathbf{\gamma}", "gamma")
     pieces += _dead_centres(author)
     if free:
-        pieces.append(Sentence("All velocities follow from the independent ones: $\\dot{\\mathbf{q}} = \\mathbf{B} \\dot{\\mathbf{q}}_i + \\mathbf{b}$ with"))
+        pieces.append(
+            Sentence(
+                "All velocities follow from the independent ones: $\\dot{\\mathbf{q}} = \\mathbf{B} "
+                "\\dot{\\mathbf{q}}_i + \\mathbf{b}$ with"
+            )
+        )
         pieces += author.quantity(r"\mathbf{B}", "velocity_transformation")
         if any(x != 0 for x in eqs.velocity_offset):
             pieces += author.quantity(r"\mathbf{b}", "velocity_offset")
@@ -96,7 +108,8 @@ def _dead_centres(author: Author) -> list[Piece]:
     if len(dependent) != len(eqs.constraint_names):
         return []
     told = Sentence(
-        f"The columns of the dependent velocities ({names}) form the square block $\\mathbf{{C}}_d$. Where its determinant "
+        f"The columns of the dependent velocities ({names}) form the square block $\\mathbf{{C}}_d$. Where its "
+        f"determinant "
         "vanishes, the mechanism is at a dead centre: the independent velocities do not tell the others, and other "
         "coordinates must be chosen as independent."
     )
@@ -108,7 +121,7 @@ def _dead_centres(author: Author) -> list[Piece]:
         return [_determinant(block)]
 
     named, (value,) = author.form(choose, "d_")
-    return [told, *author.formulas(r"\det \mathbf{C}_d", value, named)]
+    return [told, *author.formulas(r"\mathrm{det} \mathbf{C}_d", value, named)]
 
 
 def _determinant(rows: list[list[Expr]]) -> Expr:

@@ -1,4 +1,4 @@
-"""Stage explain, sections: the shown formulas line by line at one state, the difference from what is compiled, counts."""
+"""Stage explain, sections: the shown formulas line by line at one state, the comparison with the module, counts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def calculation(author: Author, state: Mapping[str, float], reason: str) -> Sect
     numbers = dict(state)
     pieces: list[Piece] = [
         Sentence(
-            "The declared initial state, with closed loops and consistent velocities, and the declared parameters. Each "
+            "The declared initial state, with closed loops and consistent velocities, and the declared "
+            "parameters. Each "
             "line repeats the left side of a formula, then the formula with its numbers, then its value."
         ),
         Table(("symbol", "value"), rows),
@@ -99,7 +100,8 @@ def difference(found: Difference | None, reason: str) -> Section:
         return Section(title, (Sentence(f"Not compared: {reason}"),))
     rows = tuple((f"`{name}`", f"{value:.1e}") for name, value in found.each.items())
     text = (
-        f"Each of these formulas was evaluated through SymPy at {found.states} random consistent states and compared with the "
+        f"Each of these formulas was evaluated through SymPy at {found.states} random consistent states and "
+        f"compared with the "
         f"module that is generated from the same equations. The largest difference, as a share of the largest entry or "
         f"term, is {found.largest:.1e}."
     )

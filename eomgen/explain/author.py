@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import sympy
@@ -61,7 +61,7 @@ class Author:
 
     def variation(self, name: str) -> Any:
         """The SymPy symbol of the variation of a coordinate, printed with a delta."""
-        return self.printer.sign(f"delta {name}", rf"\delta {self.symbol(name)}")
+        return self.printer.sign(f"~delta {name}", rf"\delta {self.symbol(name)}")
 
     # -- quantities ---------------------------------------------------------------------------------------------------
     def quantity(
@@ -98,8 +98,12 @@ class Author:
         named: Sequence[tuple[Any, Any]] = (),
         key: tuple[str, str | None] = ("", None),
         symmetric: bool = False,
+        told: Collection[Any] = (),
     ) -> list[Piece]:
-        """Named parts and the formula of an expression or matrix, folded or left out where they are large."""
+        """Named parts, save those in ``told``, and the formula of an expression or matrix.
+
+        Large ones are folded or left out.
+        """
         named = needed(named, value)
         size = sum(map(nodes, (x for _, x in named))) + nodes(value)
         if size > MOST:
@@ -107,7 +111,7 @@ class Author:
             return [Sentence(f"${left}$ is left out: it has {size} terms and factors; {where} gives it as SymPy.")]
         entries = list(self._entries(left, value, symmetric))
         self.shown.append(Shown(*key, named, entries))
-        found: list[Piece] = [Formula((self.printer.latex(s), x)) for s, x in named]
+        found: list[Piece] = [Formula((self.printer.latex(s), x)) for s, x in named if s not in told]
         if not isinstance(value, sympy.MatrixBase) or (
             size <= WHOLE and value.cols <= COLUMNS and value.rows <= 2 * COLUMNS
         ):
@@ -143,7 +147,8 @@ class Author:
             for j in range(i + 1 if symmetric else value.cols):
                 if value[i, j] != 0:
                     place = str(i + 1) if column else f"{i + 1},{j + 1}"
-                    yield rf"{{{left}}}_{{{place}}}" if value.rows * value.cols > 1 else left, value[i, j]
+                    whole = rf"({left})" if "_" in left else left
+                    yield rf"{whole}_{{{place}}}" if value.rows * value.cols > 1 else left, value[i, j]
 
 
 def nodes(value: Any) -> int:
@@ -168,4 +173,3 @@ def in_numbers(left: str, expression: Any, numbers: dict[str, float], value: flo
     if not expression.free_symbols or not expression.args:
         return Formula((left, value))
     return Formula((left, PutIn(expression, numbers), value))
-

@@ -1,4 +1,4 @@
-"""Stage explain, comparison: shown formulas, evaluated through SymPy at random consistent states, against the module."""
+"""Stage explain, comparison: shown formulas through SymPy at random consistent states, against the module."""
 
 from __future__ import annotations
 

@@ -103,7 +103,8 @@ class Explanation:
         program = shutil.which("pdflatex")
         if program is None:
             raise MissingDependencyError(
-                "a .pdf needs pdflatex: install TeX Live (Debian: apt install texlive-latex-extra), or save .html and print it"
+                "a .pdf needs pdflatex: install TeX Live (Debian: apt install texlive-latex-extra), or save "
+                ".html and print it"
             )
         with tempfile.TemporaryDirectory() as folder:
             self._save_tex(Path(folder) / "document.tex")
@@ -175,5 +176,3 @@ def _module(equations: Any) -> tuple[Any, str]:
     except EomgenError as error:
         return None, str(error)
     return module, ""
-
-

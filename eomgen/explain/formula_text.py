@@ -15,7 +15,7 @@ from ..texts import html_text
 @cache
 def text_to_mathml(latex: str) -> str:
     """The elements of a formula, without ``<math>``."""
-    return "".join(map(_piece, _pieces(latex)))
+    return "".join(map(_piece, _pieces(latex))).replace("<mo>-</mo>", "<mo>\N{MINUS SIGN}</mo>")
 
 
 def _pieces(latex: str) -> list[str]:
@@ -45,10 +45,10 @@ def number_latex(value: float, digits: int = 6) -> str:
 def number_mathml(value: float, digits: int = 6) -> str:
     """A number as elements of MathML."""
     mantissa, _, exponent = f"{value + 0.0:.{digits}g}".partition("e")
-    sign = "<mo>-</mo>" if mantissa.startswith("-") else ""
+    sign = "<mo>\N{MINUS SIGN}</mo>" if mantissa.startswith("-") else ""
     found = f"{sign}<mn>{mantissa.lstrip('-')}</mn>"
     if not exponent:
         return found
     power = int(exponent)
-    raised = f"<mrow><mo>-</mo><mn>{-power}</mn></mrow>" if power < 0 else f"<mn>{power}</mn>"
+    raised = f"<mrow><mo>\N{MINUS SIGN}</mo><mn>{-power}</mn></mrow>" if power < 0 else f"<mn>{power}</mn>"
     return f"{found}<mo>·</mo><msup><mn>10</mn>{raised}</msup>"

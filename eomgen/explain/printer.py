@@ -14,7 +14,14 @@ from .document import PutIn
 from .formula_text import number_latex, number_mathml, text_to_mathml
 
 WIDE = 110  #: characters of LaTeX, without commands, after which a sum goes on in the next line
-_TERMS = 1  #: fewest terms of a line
+#: What SymPy writes -> what browsers draw well; it does not escape signs of comparison.
+_BETTER = (
+    ("<mo>&InvisibleTimes;</mo>", "<mspace width='0.17em'/>"),
+    ("<mo>-</mo>", "<mo>\N{MINUS SIGN}</mo>"),
+    ("<mn>-", "<mo>\N{MINUS SIGN}</mo><mn>"),
+    ("<mo><</mo>", "<mo>&lt;</mo>"),
+    ("<mo>></mo>", "<mo>&gt;</mo>"),
+)
 
 
 class _Latex(LatexPrinter):  # type: ignore[misc]  # SymPy has no types
@@ -32,8 +39,7 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
         self.printed = printed
 
     def _elements(self, text: str) -> Any:
-        document = parseString(f"<mrow>{text}</mrow>".encode())
-        row = document.documentElement
+        row: Any = parseString(f"<mrow>{text}</mrow>".encode()).documentElement
         return row.firstChild if len(row.childNodes) == 1 else row
 
     def _print_Symbol(self, sym: Any, style: str = "plain") -> Any:
@@ -44,12 +50,33 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
         return self._elements(number_mathml(float(expr), 12))
 
     def _print_Piecewise(self, expr: Any) -> Any:
-        rows = []
+        table = self.dom.createElement("mtable")
         for value, condition in expr.args:
-            when = "<mtext>otherwise</mtext>" if condition is sympy.true else self._print(condition).toxml()
-            cells = (self._print(value).toxml(), "<mtext>&#160; if &#160;</mtext>" if condition != True else "", when)  # noqa: E712
-            rows.append("<mtr>" + "".join(f"<mtd>{cell}</mtd>" for cell in cells) + "</mtr>")
-        return self._elements(f"<mo>{{</mo><mtable>{''.join(rows)}</mtable>")
+            row = self.dom.createElement("mtr")
+            when = self._elements("<mtext>else</mtext>") if condition is sympy.true else self._print(condition)
+            for part in (self._print(value), when):
+                cell = self.dom.createElement("mtd")
+                cell.appendChild(part)
+                row.appendChild(cell)
+            table.appendChild(row)
+        found = self.dom.createElement("mrow")
+        found.appendChild(self._elements("<mo>{</mo>"))
+        found.appendChild(table)
+        found.appendChild(self._elements("<mo>}</mo>"))
+        return found
+
+    def _print_MatrixBase(self, m: Any) -> Any:
+        table = self.dom.createElement("mtable")
+        table.setAttribute("class", "matrix")
+        table.setAttribute("displaystyle", "true")
+        for i in range(m.rows):
+            row = self.dom.createElement("mtr")
+            for j in range(m.cols):
+                cell = self.dom.createElement("mtd")
+                cell.appendChild(self._print(m[i, j]))
+                row.appendChild(cell)
+            table.appendChild(row)
+        return table
 
 
 class Printer:
@@ -87,7 +114,9 @@ class Printer:
         times = {"mul_symbol": "dot"} if isinstance(side, PutIn) else {}
         printer = _MathML(names, times)
         found = str(printer._print(expression).toxml())
-        return found.replace("&amp;InvisibleTimes;", "&#8290;").replace("&InvisibleTimes;", "&#8290;")
+        for written, better in _BETTER:
+            found = found.replace(written, better)
+        return found
 
     def lines(self, side: Any) -> list[Any]:
         """A side as parts to be written below each other: terms of a long sum, else the side alone."""
@@ -99,7 +128,7 @@ class Printer:
         length = 0
         for term in expression.as_ordered_terms():
             wide = 6 + 3 * int(sympy.count_ops(term))
-            if length + wide > WIDE and len(found[-1]) >= _TERMS:
+            if length + wide > WIDE and found[-1]:
                 found.append([])
                 length = 0
             found[-1].append(term)

@@ -19,8 +19,16 @@ h2{font-size:1.3em;margin:1.8em 0 .5em;border-bottom:1px solid #c8c8c8}
 h3{font-size:1.05em;margin:1.3em 0 .3em}
 code{font-size:.88em;background:#f2f2f2;padding:0 .2em;border-radius:2px}
 .formula{overflow-x:auto;overflow-y:hidden;margin:.55em 0;padding:.25em 0 .25em 1.5em}
-.formula math{font-size:1.08em;text-align:left}
+math{font-family:"STIX Two Math","Cambria Math","Latin Modern Math","Libertinus Math",math,serif}
+.formula math{font-size:1.1em}
+mi[mathvariant=bold]{font-weight:bold;font-style:normal;text-transform:none}
 mtd{padding:.18em .45em}
+mtable.matrix{margin:0 .15em;padding:.1em 0;vertical-align:middle;
+background:linear-gradient(currentColor,currentColor) left top/.35em 1px,
+linear-gradient(currentColor,currentColor) left bottom/.35em 1px,
+linear-gradient(currentColor,currentColor) right top/.35em 1px,
+linear-gradient(currentColor,currentColor) right bottom/.35em 1px;background-repeat:no-repeat;
+border-left:1px solid;border-right:1px solid}
 mtable.lines>mtr>mtd{text-align:left;padding:.12em .15em}
 mtable.lines>mtr>mtd:first-child{text-align:right}
 .scroll{overflow-x:auto}
@@ -38,9 +46,7 @@ nav{columns:2;font-size:.95em}
 def write_html(title: str, sections: Sequence[Section], printer: Printer) -> str:
     """A page that stands alone."""
     body = [f"<h1>{_text(title)}</h1>"]
-    links = [
-        f"<li><a href='#s{k}'>{_text(s.title)}</a></li>" for k, s in enumerate(sections, 1) if s.level == 1
-    ]
+    links = [f"<li><a href='#s{k}'>{_text(s.title)}</a></li>" for k, s in enumerate(sections, 1) if s.level == 1]
     body.append(f"<nav><ol>{''.join(links)}</ol></nav>")
     for k, section in enumerate(sections, 1):
         tag = f"h{section.level + 1}"
@@ -70,12 +76,10 @@ def _piece(piece: Piece, printer: Printer) -> str:
         case Sentence():
             return f"<p>{_text(piece.text)}</p>"
         case Formula():
-            return f"<div class='formula'><math display='block'>{_formula(piece, printer)}</math></div>"
+            return f"<div class='formula'><math displaystyle='true'>{_formula(piece, printer)}</math></div>"
         case Table():
             head = "".join(f"<th>{_text(cell)}</th>" for cell in piece.head)
-            rows = "".join(
-                "<tr>" + "".join(f"<td>{_text(cell)}</td>" for cell in row) + "</tr>" for row in piece.rows
-            )
+            rows = "".join("<tr>" + "".join(f"<td>{_text(cell)}</td>" for cell in row) + "</tr>" for row in piece.rows)
             return f"<div class='scroll'><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
         case Picture():
             return f"<p>{image_html(piece.png, 'png', piece.width, piece.words)}</p>"
@@ -98,12 +102,12 @@ def _formula(formula: Formula, printer: Printer) -> str:
     if len(rows) == 1:
         return f"<mrow>{left}{rows[0]}</mrow>"
     cells = [f"<mtr><mtd>{left if k == 0 else ''}</mtd><mtd>{row}</mtd></mtr>" for k, row in enumerate(rows)]
-    return f"<mtable class='lines'>{''.join(cells)}</mtable>"
+    return f"<mtable class='lines' displaystyle='true'>{''.join(cells)}</mtable>"
 
 
 def _further(line: str) -> str:
     """A line that continues a sum, with its sign in front."""
-    for start in ("<mo>-</mo>", "<mrow><mo>-</mo>"):
+    for start in ("<mo>\N{MINUS SIGN}</mo>", "<mrow><mo>\N{MINUS SIGN}</mo>", "<mrow><mrow><mo>\N{MINUS SIGN}</mo>"):
         if line.startswith(start):
             return f"<mspace width='1.2em'/><mrow>{line}</mrow>"
     return f"<mspace width='1.2em'/><mo form='infix'>+</mo><mrow>{line}</mrow>"

@@ -19,7 +19,8 @@ _HEAD = r"""\documentclass[11pt,a4paper]{article}
 \setlength{\parskip}{5pt}
 \allowdisplaybreaks
 \providecommand{\dddot}[1]{\overset{...}{#1}}
-\newcommand{\fitted}[1]{\par\smallskip\noindent\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{$\displaystyle #1$}\par\smallskip}
+\newcommand{\fitted}[1]{\par\smallskip\noindent
+\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{$\displaystyle #1$}\par\smallskip}
 """
 _ESCAPES = {
     "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "%": r"\%", "_": r"\_",
