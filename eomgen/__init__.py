@@ -14,13 +14,14 @@ if TYPE_CHECKING:
     from .api.model import Model as Model
     from .api.model import from_sympy as from_sympy
     from .loading import load as load
+    from .loading import load_example as load_example
     from .runtime import Signal as Signal
     from .runtime import load_trajectory as load_trajectory
 
 __version__ = "0.1.0"
 _STARTED = time()  #: files of eomgen that are newer than this are not the code that runs
 
-_HOMES = {"Model": "api.model", "from_sympy": "api.model", "load": "loading"}
+_HOMES = {"Model": "api.model", "from_sympy": "api.model", "load": "loading", "load_example": "loading"}
 _HOMES |= {"Signal": "runtime", "load_trajectory": "runtime"}
 _ERRORS = (
     "AssemblyError",
@@ -45,7 +46,17 @@ _ERRORS = (
 )
 _HOMES |= dict.fromkeys(_ERRORS, "errors")
 
-__all__ = ["Model", "Signal", "__version__", "errors", "from_sympy", "load", "load_trajectory", *_ERRORS]
+__all__ = [
+    "Model",
+    "Signal",
+    "__version__",
+    "errors",
+    "from_sympy",
+    "load",
+    "load_example",
+    "load_trajectory",
+    *_ERRORS,
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -81,7 +81,7 @@ class Derivation(Readable):
 
     @property
     def system_size(self) -> tuple[int, int] | None:
-        """Unknowns and entries of the linear system of a method that keeps reactions as unknowns; else None."""
+        """Unknowns and nonzero entries of the linear system, of a method with unknown reactions; else None."""
         system = self.tree.system
         return None if system is None else (len(system.unknowns), len(system.places))
 
@@ -92,7 +92,7 @@ class Derivation(Readable):
             lines.append(f"  {name:<22}{operations.total:>7} operations")
         if self.system_size is not None:
             unknowns, entries = self.system_size
-            lines.append(f"  linear system of {unknowns} unknowns, {entries} entries that do not vanish")
+            lines.append(f"  linear system of {unknowns} unknowns, {entries} nonzero entries")
         if self.choice is not None:
             lines.append(f"  {self.choice}")
         return "\n".join(lines)

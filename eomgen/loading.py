@@ -1,4 +1,4 @@
-"""From the suffix of a file to a Model: model files through describe, robots through robots."""
+"""From the suffix of a file, or the name of an example, to a Model: through describe, or through robots."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from .describe import describe_yaml_file
 from .errors import ModelError, UsageError
 from .files.path_names import as_name
 from .numeric.rigid_inertia import CHECKS, word_of_check
+from .shipped import example_files, find_example
+from .suggestions import hint
+from .texts import shown
 
 #: Suffix of a file -> what it is; the table of what can be loaded.
 SUFFIXES = {".yaml": "a model file (YAML 1.2)", ".yml": "a model file (YAML 1.2)"}
@@ -20,7 +23,7 @@ ROBOTS = {".urdf": "a robot (URDF)", ".xml": "a robot (MJCF or URDF)"}
 def load(
     path: str | os.PathLike[str], *, allow_native: bool = False, check_inertia: bool | str | None = None, **robot: Any
 ) -> Model:
-    """A model from a file, by its suffix.
+    """Load a model from a file; the ending of its name says what it is.
 
     Parameters
     ----------
@@ -30,8 +33,9 @@ def load(
         Whether native functions of the file are compiled and run; else each is a fault of the model, and the files it
         names are not read.
     check_inertia : {'error', 'note', 'off'} or bool, optional
-        What becomes of masses and inertias that no body can have, and of motions without inertia: refused (the default,
-        True), taken and told in ``Model.notes``, or taken in silence (False).  The file's own word unless given.
+        What happens to masses and inertias that no body can have, and to motions without inertia: they are refused
+        ('error', True), noted in ``Model.notes`` ('note'), or accepted silently ('off', False).  By default
+        as the file says; if it says nothing, they are refused.
     **robot
         For robots: ``mimic`` ('coupling', the default, or 'independent'), ``limits`` ('note', the default, 'stop' or
         'off'), ``floating``, ``lock`` and the other fields of
@@ -61,16 +65,48 @@ def load(
         return _with_notes(Model.from_description(describe_file(path, **robot)))
     if suffix not in SUFFIXES:
         known = ", ".join(f"{s} {what}" for s, what in {**SUFFIXES, **ROBOTS}.items())
-        raise UsageError(f"{path}: files ending in {suffix or 'nothing'} cannot be loaded; supported: {known}")
+        example = f"; the example is load_example({path!r})" if find_example(path, example_files()) else ""
+        ending = suffix or "(none)"
+        raise UsageError(f"{path}: files with the ending {ending} cannot be loaded; supported are {known}{example}")
     if robot:
-        raise UsageError(f"{path}: {', '.join(robot)}: options of robot files, not of model files")
+        raise UsageError(f"{path} is a model file; only robot files take the options {', '.join(robot)}")
     model = Model.from_description(describe_yaml_file(path, allow_native=allow_native))
     if check_inertia is not None:
         word = word_of_check(check_inertia)
         if word is None:
-            raise UsageError(f"check_inertia={check_inertia!r}: allowed: {', '.join(CHECKS)}, True, False")
+            raise UsageError(f"check_inertia must be one of {', '.join(CHECKS)}, True, False, not {check_inertia!r}")
         model.check_inertia = word
     return _with_notes(model)
+
+
+def load_example(name: str, **options: Any) -> Model:
+    """One of the examples that come with eomgen; ``eomgen examples`` and the gallery list them.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``"slider_crank"``, or ``"arm.urdf"``.
+    **options
+        As for :func:`load`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    UsageError
+        There is no such example, or it is a script.
+    """
+    found = example_files()
+    file = find_example(name, found) if isinstance(name, str) else None
+    if file is None:
+        models = [key for key in found if not key.endswith(".py")]
+        near = hint(str(name), models, quoted=False) or f"there are: {', '.join(models)}"
+        raise UsageError(f"no example {shown(name)}; {near}")
+    if file.suffix == ".py":
+        raise UsageError(f"{name} is a script and no model; copy it by 'eomgen examples {name}' and run it")
+    return load(file, **options)
 
 
 def _with_notes(model: Model) -> Model:

@@ -60,14 +60,16 @@ def choose_method(mechanism: Mechanism, method: str) -> str:
     bare = mechanism.lagrangian is not None
     if mechanism.given is not None:
         if method not in ("auto", GIVEN):
-            raise UsageError(f"method {method!r} needs bodies; given equations are taken as they are: auto, {GIVEN}")
+            raise UsageError(f"method {method!r} needs bodies; for given equations there are: auto, {GIVEN}")
         return GIVEN
     if method == "auto" and bare:
         return "lagrange"
     if method not in ("auto", *METHODS):
         raise UsageError(f"no method {method!r}; there are: auto, {', '.join(METHODS)}")
     if bare and method not in OF_LAGRANGIANS:
-        raise UsageError(f"method {method!r} needs bodies; a bare Lagrangian has: auto, {', '.join(OF_LAGRANGIANS)}")
+        raise UsageError(
+            f"method {method!r} needs bodies; for a bare Lagrangian there are: auto, {', '.join(OF_LAGRANGIANS)}"
+        )
     return method
 
 
@@ -130,7 +132,7 @@ def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float])
     from .equations.augmented import stabilise
 
     if method != "augmented":
-        raise UsageError(f"baumgarte belongs to method 'augmented', not {method!r}; the others project their states")
+        raise UsageError(f"baumgarte works with method 'augmented' only, not {method!r}; other methods project states")
     try:
         alpha, beta = (float(x) for x in baumgarte)
     except (TypeError, ValueError):
@@ -138,7 +140,7 @@ def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float])
     if not (0.0 <= alpha < float("inf") and 0.0 <= beta < float("inf")):
         raise UsageError(f"baumgarte must be two finite numbers that are not negative, not {baumgarte!r}")
     if not kinematics.constraints.labels:
-        raise UsageError("baumgarte stabilises constraints, and this model has none")
+        raise UsageError("baumgarte stabilises constraints, and this model has no constraints; leave it out")
     return stabilise(kinematics, alpha, beta)
 
 
@@ -170,7 +172,7 @@ def check(model: Builder) -> MechanismReport:
     idle = require_inertia(equations.kinematics, equations.mobility, equations.tree)
     found = report(equations.kinematics, equations.mobility)
     note = note_lost_digits(equations.kinematics, equations.mobility, equations.tree)
-    more = [f"kinematics only: {idle}"] if idle else [note] if note else []
+    more = [f"kinematics only (no masses, so no equations of motion): {idle}"] if idle else [note] if note else []
     return replace(found, notes=[*found.notes, *more])
 
 
@@ -241,7 +243,7 @@ def _load(
         from .emit.numpy_functions import twins
 
         if options:
-            raise UsageError(f"target 'numpy' has no options, given: {', '.join(options)}")
+            raise UsageError(f"target 'numpy' has no options, and these are given: {', '.join(options)}")
         with _timed(seconds, "emit"):
             sources = emit_numpy(program)
         with _timed(seconds, "load"):

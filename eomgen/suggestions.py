@@ -15,11 +15,12 @@ SYNONYMS = {
     "rotational_damper": "torsional_damper", "limit bump endstop bumper": "stop",
     "contact collision": "sphere_plane point_plane stop", "wheel roll": "rolling", "skate": "knife_edge",
     "pulley": "belt", "link rigid_body part": "body", "frame site": "marker",
-    "simulate integrate solve play": "run compile", "animate animation movie video": "draw",
-    "show view picture": "draw plot", "eigenvalues eigenmodes frequencies": "modes", "linearise": "linearize",
-    "statics static trim": "equilibrium", "validate lint": "check", "build codegen export": "generate compile",
-    "inverse_dynamics id": "inverse driving_forces", "com": "center_of_mass", "forward_dynamics": "rhs",
-    "M": "mass_matrix",
+    "simulate integrate solve play": "run compile", "animate animation movie video gif film": "draw view",
+    "show view picture": "draw plot view", "draw sketch": "check", "eigenvalues eigenmodes frequencies": "modes",
+    "linearise": "linearize", "ensemble sweep batch monte_carlo montecarlo": "simulate_many ensemble",
+    "plot graph": "run", "statics static trim": "equilibrium", "validate lint": "check",
+    "build codegen export": "generate compile", "inverse_dynamics id": "inverse driving_forces",
+    "com": "center_of_mass", "forward_dynamics": "rhs", "M": "mass_matrix",
 }  # fmt: skip
 _MEANT = {word: meant.split() for words, meant in SYNONYMS.items() for word in words.split()}
 MOST = 2000  #: names beyond which a comparison with each takes long

@@ -12,7 +12,7 @@ from eomgen.joints import JOINTS
 from eomgen.suggestions import SYNONYMS, closest, hint
 
 METHODS = {name for name in dir(eg.Model("m")) if not name.startswith("_")}
-OTHERS = {"plot", "rhs", "marker", "mass_matrix", "driving_forces", *VERBS}
+OTHERS = {"plot", "rhs", "simulate_many", "marker", "mass_matrix", "driving_forces", *VERBS}
 
 
 def test_every_suggestion_exists() -> None:
@@ -41,6 +41,8 @@ def test_types_in_a_file_and_verbs() -> None:
         m.derive()
     assert closest("integrate", VERBS) == ["run"]
     assert closest("eigenvalues", VERBS) == ["modes"]
+    assert [closest(word, VERBS) for word in ("animate", "plot", "draw")] == [["view"], ["run"], ["check"]]
+    assert closest("sweep", ["simulate", "simulate_many"]) == ["simulate_many"]
 
 
 def test_what_a_name_is_not_near() -> None:

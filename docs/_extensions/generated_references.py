@@ -64,7 +64,7 @@ def entries(section: str) -> Iterator[tuple[str, str, Fields]]:
             yield name, kind.doc.partition(": ")[2], {key: x for key, x in kind.keys.items() if key != "type"}
     elif section in ("forces", "constraints"):
         for name, kind in (FORCES if section == "forces" else CONSTRAINTS).items():
-            only = f"  Exactly one of {', '.join(kind.one_of)} is given." if kind.one_of else ""
+            only = f"  Give exactly one of {', '.join(kind.one_of)}." if kind.one_of else ""
             yield name, kind.doc + only, dict(kind.keys)
     elif section == "solids":
         for name in table.SOLID:

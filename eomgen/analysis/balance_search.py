@@ -61,9 +61,9 @@ def _failure(search: Search, point: SearchPoint) -> EquilibriumError:
     if rates.size and rates.max() > MOVING:
         worst = int(here.surplus[rates.argmax()])
         return EquilibriumError(
-            f"{head}nonholonomic constraints move {layout.velocity_labels[worst]} at a rate of {here.v[worst]:.6g} "
-            f"even where the independent velocities are 0, at {where}; give another guess, or let their right-hand "
-            "side vanish somewhere",
+            f"{head}the nonholonomic constraints move {layout.velocity_labels[worst]} at a rate of {here.v[worst]:.6g} "
+            f"at {where} even if all independent velocities are 0, so the model cannot stand still there; give another "
+            "guess, or constraints that allow a state of rest",
             left,
         )
     scaled = np.abs(here.forces * layout.scales.q[here.velocities])

@@ -48,7 +48,7 @@ def consistent(
     p: Any = None,
     u: Any = None,
 ) -> Array:
-    """The state on the constraints that differs least from a given one, positions first, then velocities.
+    """Find the state on the constraints that is nearest to a given one: first its position, then its velocities.
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ def consistent(
         Any state.
     t : float
     weights : mapping of str to float, or 'mass', optional
-        What a change costs: weight times the square of the change, in radians or lengths of the model; 1 where
-        nothing is said.  The weight of a coordinate is that of its rate too, unless the rate is named.  ``'mass'``
+        Weights of the squared changes, in radians or lengths of the model; 1 for names not
+        given.  The weight of a coordinate is also that of its rate, unless the rate is named.  ``'mass'``
         takes the mass matrix of the tree as the metric.
     hold : sequence of str
         Coordinates and rates that keep their values exactly.
@@ -71,9 +71,9 @@ def consistent(
     Raises
     ------
     ProjectionError
-        The constraints cannot be met near the state, or not with these values held.
+        No state near the given one satisfies the constraints, or none with these values held.
     UsageError
-        An unknown name, or a weight that is not positive.
+        A name is unknown, or a weight is not positive.
 
     Notes
     -----
@@ -86,7 +86,8 @@ def consistent(
         raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
     if layout.given_rates:
         raise UsageError(
-            "consistent() needs q' = v; project(x) also serves models whose rates of coordinates are given"
+            "consistent() works for models with q' = v only, and the rates of this model's coordinates are given; "
+            "use project(x)"
         )
     held = read_names("hold", hold)
     if isinstance(weights, Mapping):
@@ -124,8 +125,8 @@ def _metric(
             return np.asarray(np.linalg.cholesky(module.mass_matrix(q, t=t)))
         except np.linalg.LinAlgError:
             raise UsageError(
-                "weights='mass' needs a positive definite mass matrix of the tree; there are bodies without mass, or "
-                "with negative inertia"
+                "weights='mass' needs a positive definite mass matrix of the tree, and this one is not: a body has no "
+                "mass, or a negative inertia; give weights={name: weight}"
             ) from None
     factors = np.ones(layout.n_v)
     if isinstance(weights, Mapping):
@@ -197,7 +198,8 @@ def _positions(
         C, _ = rows(start)
         worst = layout.constraint_labels[int(np.abs(C).argmax())]
         raise ProjectionError(
-            f"no consistent position was found{kept}: {worst} is open by {largest(C):.2g} (scaled) in the state given"
+            f"no consistent position was found{kept}: in the state given, the residual of the constraint {worst} is "
+            f"{largest(C):.2g} (scaled)"
         )
     share = 1.0
     for _ in range(STEPS if free.any() else 0):
@@ -247,5 +249,7 @@ def _velocities(
     if largest(rate) > ACCEPTED * max(1.0, largest(v / scales.q)):
         worst = layout.constraint_labels[int(np.abs(rate).argmax())]
         kept = f" with {', '.join(held)} held" if held else ""
-        raise ProjectionError(f"no consistent velocities{kept}: the rate of {worst} is left at {largest(rate):.2g}")
+        raise ProjectionError(
+            f"no consistent velocities were found{kept}: the rate of the constraint {worst} stays {largest(rate):.2g}"
+        )
     return v

@@ -93,7 +93,7 @@ def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: An
             f"x must have shape ({layout.n_x},) or ({layout.n_x}, k) [{', '.join(layout.x)}], not {state.shape}"
         )
     if not state.size and layout.n_x:
-        raise UsageError(f"x of shape {state.shape} holds no state")
+        raise UsageError(f"x of shape {state.shape} contains no state")
     single = state.ndim == 1
     columns = state[:, None] if single else state
     time = as_real(t)
@@ -136,7 +136,7 @@ def solve_multipliers(C_q: Array, force: Array, scales: Scales) -> Array:
 def multipliers(
     module: BoundModel, /, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
 ) -> Array:
-    """Lagrange multipliers l of all constraint rows, in ``M v' + h + C_q^T l = 0``.
+    """Compute the Lagrange multipliers l of all constraint rows, in ``M v' + h + C_q^T l = 0``.
 
     Parameters
     ----------

@@ -26,19 +26,19 @@ FAR = 100.0  #: length scales to search for a limit of a length
 
 
 class MotionRange(NamedTuple):
-    """How far a coordinate can go from a position, on the branch it is on, all other led ones standing still.
+    """The range of a coordinate from a position, on the same branch, with all other prescribed coordinates at rest.
 
     Attributes
     ----------
     name : str
     lower, upper : float
-        Its limits; infinite if it turns fully or none was found, or the bounds of the search where those were given.
+        Its limits; infinite if the coordinate turns fully or no limit was found, or the bounds of the search if given.
     stops : (Singular or None, Singular or None)
-        What is at the limits.
+        The singular positions at the limits.
     gaps : (str, str)
-        Which joint would stay open beyond them.
+        For each limit a text that names the joint that would open beyond it.
     singular : tuple of Singular
-        Change points on the way.
+        Change points between the limits.
     """
 
     name: str
@@ -65,7 +65,7 @@ def motion_range(
     t: float = 0.0,
     within: tuple[float, float] | None = None,
 ) -> MotionRange:
-    """The limits between which a coordinate can move the mechanism, followed both ways.
+    """Find the limits between which a coordinate can move, by following it in both directions.
 
     Parameters
     ----------
@@ -76,9 +76,10 @@ def motion_range(
     parameters, inputs : optional
         As for :meth:`bind`.
     t : float
-        Time (s); stands still unless ``name`` is ``t``.
+        Time (s), constant unless ``name`` is ``t``.
     within : (float, float), optional
-        Where to look; a full turn both ways for an angle, a hundred length scales or seconds else.
+        Bounds of the search; by default a full turn in both directions for an angle, else a hundred length scales or
+        seconds.
 
     Returns
     -------

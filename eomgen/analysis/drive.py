@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ActuatorForces:
-    """What drives exert so that the model moves as it should.
+    """Forces of drives that produce a given motion.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ def actuator_forces(
     p: Any = None,
     u: Any = None,
 ) -> ActuatorForces:
-    """Constrained inverse dynamics: the forces of chosen drives that make a motion, loops closed.
+    """Find the forces of chosen drives that make a motion (inverse dynamics of a constrained mechanism).
 
     Parameters
     ----------
@@ -95,11 +95,11 @@ def actuator_forces(
     x : (n_x,) or (n_x, k) array
         States; projected onto the constraints first.
     a : mapping of str to float or (k,) array, or (n_v,) or (n_v, k) array, optional
-        Accelerations: those of the independent coordinates by name (others 0), from which the rest follows, or all
+        Accelerations: those of the independent coordinates by name (0 for others), which determine the rest, or all
         of them, which must obey the constraints.  By default the independent accelerations are 0.
     actuated : sequence of str, optional
-        What is driven: coordinates of the tree or of cut joints, whose forces come on top of the model's own, or
-        inputs in which forces are linear, whose whole values are found.  By default the independent coordinates.
+        The drives: coordinates of the tree or of cut joints, whose forces are added to the model's own, or inputs in
+        which forces are linear, whose whole values are found.  By default the independent coordinates.
     p, u : optional
         As for ``bind``.
 
@@ -107,12 +107,12 @@ def actuator_forces(
     -------
     ActuatorForces
         ``forces["theta"]``, ``forces.forces`` (n,) or (n, k), ``multipliers``, ``reactions``.  With more drives
-        than freedoms the smallest sum of squares (torques, and forces times the model's length).
+        than degrees of freedom: the smallest sum of squares (torques, and forces times the model's length).
 
     Raises
     ------
     UsageError
-        An unknown name; accelerations that break the constraints; drives that cannot make the motion.
+        A name is unknown, the accelerations violate the constraints, or the drives cannot make the motion.
     """
     module = module if p is None and u is None else module.bind(p, u)
     layout = module.layout
@@ -191,8 +191,8 @@ def _check_inputs(
         size = np.abs(B).T @ (np.abs(S[:, :, k]) @ np.abs(forces[:, k]))
         if (np.abs(left) > REACHED * np.maximum(size, TINY)).any():
             raise UsageError(
-                f"forces are not linear in the inputs {', '.join(module.u_names[j] for _, j in inputs)} together (they "
-                "multiply each other); name one of them, or the coordinates that they drive"
+                f"the forces are not linear in the inputs {', '.join(module.u_names[j] for _, j in inputs)} together, "
+                "because these multiply each other; name one of them, or the coordinates that they drive"
             )
 
 
@@ -219,7 +219,7 @@ def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
             near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")
             raise UsageError(f"actuated: no coordinate or input {name!r}; {near}")
     if not names or len(set(names)) < len(names):
-        raise UsageError("actuated: at least one coordinate or input, each once")
+        raise UsageError("actuated must name at least one coordinate or input, and each only once")
     return names
 
 
@@ -252,7 +252,7 @@ def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: A
         for name in given:
             if name not in keys:
                 raise UsageError(
-                    f"a: {name!r} is no independent coordinate or its acceleration; there are {', '.join(keys)}"
+                    f"a: {name!r} is not an independent coordinate or its acceleration; there are {', '.join(keys)}"
                 )
         values = np.zeros((layout.n_v, count))
         for name, value in given.items():
@@ -268,8 +268,8 @@ def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: A
             part = B[chosen]
             if algebra.cond(part) > 1 / RANK:
                 raise UsageError(
-                    f"a: at t = {states.t[k]:g} the accelerations of {', '.join(rows)} do not tell the others (a dead "
-                    "centre): give a of all velocities"
+                    f"a: at t = {states.t[k]:g} the accelerations of {', '.join(rows)} do not determine the others (a "
+                    "dead centre); give the accelerations of all velocities as an array"
                 )
             result[:, k] += B @ algebra.solve(part, values[chosen, k] - free[chosen, k])
         return result
@@ -285,7 +285,7 @@ def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: A
         worst = np.unravel_index(int((np.abs(off) / (size + 1.0)).argmax()), off.shape)
         if np.abs(off[worst]) > REMAINDER * (size[worst] + 1.0):
             raise UsageError(
-                f"a breaks the constraint {layout.constraint_labels[int(worst[0])]} by {off[worst]:.3g} at "
+                f"a violates the constraint {layout.constraint_labels[int(worst[0])]} by {off[worst]:.3g} at "
                 f"t = {states.t[int(worst[1])]:g}; name the independent accelerations (a={{...}}) instead"
             )
     return result
@@ -321,7 +321,9 @@ def _input_effect(states: ProjectedStates, j: int) -> Array:
         h.append(np.asarray(module.bias(states.t, states.x, u=u)))
     slope, bend = 0.5 * (h[0] - h[2]), h[0] - 2.0 * h[1] + h[2]
     if np.abs(bend).max(initial=0.0) > AFFINE * max(*(np.abs(y).max(initial=0.0) for y in h), TINY):
-        raise UsageError(f"forces are not linear in the input {module.u_names[j]!r}; give the coordinate it drives")
+        raise UsageError(
+            f"the forces are not linear in the input {module.u_names[j]!r}; name the coordinate that it drives instead"
+        )
     return np.asarray(slope)
 
 

@@ -35,9 +35,9 @@ def equilibrium(
     hold: Mapping[str, float | None] | Sequence[str] = (),
     unknowns: Sequence[str] = (),
 ) -> Equilibrium:
-    """Find a position at rest in which all forces are in balance (virtual work) and nonholonomic rows allow rest.
+    """Find a position at rest in which all forces are in balance (by virtual work).
 
-    Newton's iteration, then the motion in a viscous fluid, then Levenberg's and Marquardt's steps.
+    Newton's iteration is tried first, then the motion in a viscous fluid, then the method of Levenberg and Marquardt.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def equilibrium(
     p, u : optional
         As for ``bind``.
     hold : mapping of str to float or None, or sequence of str
-        Coordinates, of the tree or of cut joints, and where they are held; None: where the guess is.  With
-        ``unknowns`` the parameters balance them, without they are supported (``supports`` says by what force).
+        Coordinates, of the tree or of cut joints, and the values at which they are held; None for that of the guess.
+        With ``unknowns`` these balance the held coordinates; otherwise supports hold them (forces in ``supports``).
     unknowns : sequence of str
         Parameters or inputs to solve for, such as a spring's free length: at least as many as held coordinates.
 
@@ -61,12 +61,12 @@ def equilibrium(
     Raises
     ------
     EquilibriumError
-        None was found from the guess; the message names the coordinate with the largest force left, or one that
+        No equilibrium was found from the guess; the message names the coordinate with the largest force, or one that
         nonholonomic constraints move even at rest.
     AssemblyError
         The loops do not close with the held values.
     UsageError
-        An unknown name, or too few unknowns.
+        A name is unknown, or there are too few unknowns.
     """
     require_velocities(module.layout)
     module = module if p is None and u is None else module.bind(p, u)
@@ -89,8 +89,8 @@ def equilibrium(
     rows = len(search.gradients(module, q))
     if unknowns and len(unknowns) < rows:
         raise UsageError(
-            f"{rows} held coordinates need as many unknowns to be in balance, given: {', '.join(unknowns)}; without "
-            "unknowns what is held is supported"
+            f"{rows} held coordinates need {rows} unknowns, and these are given: {', '.join(unknowns)}; give as many "
+            "unknowns as held coordinates, or none: supports then hold the coordinates"
         )
     point, steps = find_balance(search, q)
     return describe(search, point.module, point.q, point.unknowns, steps)
@@ -102,7 +102,7 @@ def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) 
     if guess is None or isinstance(guess, Mapping):
         values = {name: read_value(name, value) for name, value in (guess or {}).items()}
         if initial.sort(values).rates:
-            raise UsageError("a guess is a position: name coordinates, not rates")
+            raise UsageError("guess is a position: name coordinates in it, not rates")
         loose = {name: value for name, value in values.items() if name not in held}
         q = initial.from_guess(loose) if loose else initial.assembled({})
     else:

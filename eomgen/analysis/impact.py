@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Impact:
-    """What an impact does.
+    """The result of an impact: states before and after it, impulses and the energy lost.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ def impact(
     p: Any = None,
     u: Any = None,
 ) -> Impact:
-    """The state after an impact without friction, or after coordinates are locked at once.
+    """Compute the state after an impact without friction, or after coordinates are locked suddenly.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ def impact(
     x : (n_x,) array
         The state right before; projected onto the constraints first.
     gaps : mapping of str to float
-        Coordinates or outputs (functions of positions) that must not become negative and are 0 now -> coefficient
-        of restitution, 0 to 1.  Gaps that open are left alone.
+        Gaps and their coefficients of restitution, 0 to 1.  A gap is a coordinate or an output (a function of
+        positions) that is 0 now and must not become negative.  Gaps that open have no impact.
     lock : sequence of str
         Coordinates that stop (plastic, whatever the sign of the impulse).
     closed : bool
-        Take the gaps as closed whatever their values, as at a stop that is put where a coordinate is now.
+        Treat the gaps as closed at any value, as for a stop that is placed where a coordinate is now.
     p, u : optional
         As for ``bind``.
 
@@ -116,8 +116,8 @@ def impact(
     Raises
     ------
     UsageError
-        An unknown name; a gap that is not 0 (within 1e-6 lengths of the model, or rad); impulses that cannot do
-        it; a gap that drivers close.
+        A name is unknown; a gap is not 0 (within 1e-6 lengths of the model, or rad); no impulses satisfy the laws; or
+        drivers close a gap.
 
     Notes
     -----
@@ -191,15 +191,15 @@ def strike_events(
         for i in gaps:
             if change[i] != 0.0:
                 raise UsageError(
-                    f"event {events[i]['name']}: the input {layout.u[k]} depends on the state, and so does its rate, "
-                    "which an impact changes; write the gap itself in coordinates"
+                    f"event {events[i]['name']}: the gap depends on the input {layout.u[k]}, which depends on the "
+                    "state, so an impact would change its rate; write the gap in coordinates instead"
                 )
     slopes = dict(zip(gaps, module.kernels.rows("event_slopes", [*gaps], t, x, u), strict=True))
     states = _one_state(module, t, x)
     q, v = states.q[:, 0], states.v[:, 0]
     for i in gaps:
         if np.abs(slopes[i][layout.n_q :]).max(initial=0.0) > 0.0:
-            raise UsageError(f"event {events[i]['name']}: a gap is a function of positions, not of velocities")
+            raise UsageError(f"event {events[i]['name']}: a gap must depend on positions only, not on velocities")
     rows = np.array([by_velocity(layout, q, slopes[i][: layout.n_q]) for i in gaps])
     moved = moving_inputs(layout, u)
     rates = rows @ v + drift(lambda time: kernel(time, x, u=u + (time - t) * moved), t)[[*gaps]]
@@ -221,8 +221,8 @@ def _require_closed(gaps: Gaps, states: ProjectedStates) -> None:
             how = "open" if value > 0.0 else "closed too far"
             unit = gaps.layout.unit(name)
             raise UsageError(
-                f"gap {name} is {value:.6g}{' ' * bool(unit)}{unit}, {how}; an impact needs 0, within {limit:.2g}: "
-                "set the state there, or take it as closed whatever its value (closed=True, --closed)"
+                f"gap {name} is {value:.6g}{' ' * bool(unit)}{unit} ({how}); an impact needs a gap of 0, up to "
+                f"{limit:.2g}; give a state where the gap is 0, or treat any gap as closed (closed=True, --closed)"
             )
 
 
@@ -259,7 +259,7 @@ def _apply(states: ProjectedStates, rows: Array, rates: Array, e: Array, names: 
         if rates[i] < -rest[i] or (i >= len(e) and rates[i] > rest[i]):
             what = f"gap {names[i]} closes" if i < len(e) else f"lock: {names[i]} moves"
             raise UsageError(
-                f"{what} at the rate {rates[i]:.6g}, which drivers or constraints impose: no impulse changes it"
+                f"{what} at the rate {rates[i]:.6g}, which drivers or constraints prescribe: no impulse can change it"
             )
     if B.shape[1]:
         factor = definite_factor(B.T @ M @ B, "an impact")

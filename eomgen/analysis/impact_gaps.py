@@ -92,7 +92,7 @@ class Gaps:
             for i, j in self.outputs:
                 if np.abs(slopes[j, layout.n_q : layout.n_x + layout.n_v]).max(initial=0.0) > 0.0:
                     raise UsageError(
-                        f"gap {self.names[i]}: this output depends on velocities; a gap is a function of positions"
+                        f"gap {self.names[i]}: this output depends on velocities; a gap must depend on positions only"
                     )
                 rows[i] = by_velocity(layout, q, slopes[j, : layout.n_q])
         return rows
@@ -190,7 +190,7 @@ def check_gaps(
     if not gaps and not locked:
         raise UsageError("an impact needs gaps={name: restitution} or lock=[coordinates]")
     if layout.given_rates:
-        raise UsageError("impacts need q' = v; the rates of this model's coordinates are given")
+        raise UsageError("impacts need a model with q' = v, and the rates of this model's coordinates are given")
     coordinates = [*layout.velocity_labels, *layout.loops]
     placed = [name for name in coordinates if name in layout.q + layout.loops]
     for what, names, allowed in ((word, gaps or {}, [*placed, *layout.y]), (other, locked, coordinates)):
@@ -202,5 +202,5 @@ def check_gaps(
     for name, e in (gaps or {}).items():
         found[name] = read_number(f"{word}: the restitution of {name}", e)
         if not 0.0 <= found[name] <= 1.0:
-            raise UsageError(f"{word}: the restitution of {name} is between 0 and 1, not {e}")
+            raise UsageError(f"{word}: the restitution of {name} must be between 0 and 1, not {e}")
     return found, tuple(locked)

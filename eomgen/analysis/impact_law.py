@@ -62,7 +62,7 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
         change = np.asarray(algebra.lstsq(locks.T, -rates[count:], rcond=None))
     left = np.abs(locks.T @ change + rates[count:])
     if (left > rest[count:] + LEFT * np.abs(rates[count:]).max(initial=0.0)).any():
-        raise UsageError("no impulses obey the constraints: the locked coordinates cannot all stop")
+        raise UsageError("no impulses satisfy the constraints: the locked coordinates cannot all stop; lock fewer")
     free = gaps - locks @ algebra.lstsq(locks, gaps, rcond=None) if locks.shape[1] else gaps
     impulses = np.zeros(count)
     live = np.linalg.norm(free, axis=0) > FREE

@@ -63,7 +63,7 @@ def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]
     for name in named:
         base = next((c for c in coordinates if name in (c + "_dot", c + "_ddot")), None)
         if name not in names and base not in names:
-            raise UsageError(f"{name} is given, and no values of {base}; give both")
+            raise UsageError(f"{name} is given without values of {base}; give both")
     arrays = {name: _column(name, value) for name, value in named.items()}
     if t is not None:
         arrays["t"] = _column("t", t)
@@ -71,7 +71,7 @@ def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]
     if not sizes:
         raise UsageError("there is no range: give times t, or values of a coordinate, as an array")
     if len(set(sizes.values())) > 1:
-        raise UsageError(f"all must have one length, not {', '.join(f'{n}: {k}' for n, k in sizes.items())}")
+        raise UsageError(f"all arrays must have one length, not {', '.join(f'{n}: {k}' for n, k in sizes.items())}")
     n = next(iter(sizes.values()))
     require_room(f"a range of {n} points", n * (3.0 * layout.n_x + len(known)), "give fewer points")
 
@@ -106,10 +106,10 @@ def kinematic_analysis(
     partial: bool = False,
     **led: ArrayLike,
 ) -> KinematicAnalysis:
-    """Positions, velocities and accelerations over a range of time or of coordinates, without forces.
+    """Compute positions, velocities and accelerations over a range of time or of coordinates, without forces.
 
-    The range is followed from the initial position in small steps, so the mechanism stays on its branch, also through
-    change points, where others meet it.
+    The range is followed from the initial position in small steps, so the mechanism stays on its branch, even through
+    change points, where branches meet.
 
     Parameters
     ----------
@@ -124,8 +124,8 @@ def kinematic_analysis(
     partial : bool
         Return the part of the range that can be reached instead of raising an error.
     **led : (n,) arrays or floats
-        Values of coordinates, of the tree or of cut joints, at most as many as degrees of freedom; those left
-        over stand still.  ``theta_dot=`` and ``theta_ddot=`` give their rates over time (0 by default).
+        Values of the prescribed coordinates, of the tree or of cut joints, at most as many as degrees of freedom;
+        the others stand still.  ``theta_dot=`` and ``theta_ddot=`` give their rates over time (0 by default).
 
     Returns
     -------
@@ -199,7 +199,7 @@ def start_from(module: BoundModel, initial: Start, t0: float) -> tuple[float, Ar
     if isinstance(initial, Mapping):
         given = here.sort({name: read_value(name, value) for name, value in initial.items()})
         if given.rates:
-            raise UsageError(f"initial tells positions only, not {', '.join(given.rates)}")
+            raise UsageError(f"initial takes positions only, not {', '.join(given.rates)}")
         return t0, here.assembled(given.positions)
     q = np.array(read_numbers("initial", last_state(initial, module.x_names)))
     if q.shape == (layout.n_x,):
@@ -235,8 +235,8 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
         if name not in fine:
             place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, q, strict=True))
             raise PartitionError(
-                f"{name} cannot be prescribed from the initial position ({place}): it cannot move there, or "
-                "branches meet; give an initial position beside it",
+                f"{name} cannot be prescribed from the initial position ({place}): the coordinate cannot move there, "
+                "or branches meet there; give a slightly different initial position",
                 t,
                 q,
             )
@@ -252,7 +252,7 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
     if Q < SINGULAR:
         place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, q, strict=True))
         raise PartitionError(
-            f"the initial position is singular ({place}): branches meet there; give an initial position beside it", t, q
+            f"the initial position is singular ({place}): branches meet there; give a slightly different one", t, q
         )
     return result
 
@@ -263,9 +263,9 @@ def _refuse_long_ways(driven: DrivenCoordinates, names: Sequence[str], y: Array)
     k = int(ways.argmax()) if ways.size else 0
     if ways.size and ways[k] > LONGEST:
         raise UsageError(
-            f"the range of {names[k]}, followed from the initial position on, is {ways[k]:.6g} rad or length scales "
-            f"long ({ways[k] / (2 * np.pi):.6g} turns), and at most {LONGEST:.6g} are followed; positions of a turn "
-            "repeat, so give angles within a turn, or an initial position near the first point"
+            f"the path of {names[k]} from the initial position to the end of the range is {ways[k]:.6g} rad or length "
+            f"scales long ({ways[k] / (2 * np.pi):.6g} turns), and at most {LONGEST:.6g} are allowed; positions repeat "
+            "after a turn, so give angles within one turn, or an initial position near the first point"
         )
 
 
@@ -278,7 +278,8 @@ def _freedom(module: BoundModel, q: Array, t: float) -> str:
     if any((gap != gaps[0]).any() for gap in gaps):
         return "0 degrees of freedom: the drivers determine the whole motion; give t"
     return (
-        "0 degrees of freedom: the mechanism is locked, and nothing drives it; take a constraint away, or free a joint"
+        "0 degrees of freedom: the mechanism is locked, and no driver moves it; remove a constraint, or replace a "
+        "joint by one with more freedom"
     )
 
 
@@ -299,7 +300,7 @@ def follow_to_start(
     followed = FollowedPath(DrivenPath(driven, t, y, (t0 - t) / length, (y0 - y) / length), q, length)
     if followed.stop is not None:
         raise PartitionError(
-            f"the way from the initial position to the first point is blocked: {followed.stop}; give initial={{...}} "
+            f"the path from the initial position to the first point is blocked: {followed.stop}; give initial={{...}} "
             "nearer to the first point",
             t0,
             q,
@@ -342,8 +343,8 @@ def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: boo
     if count < n and not partial:
         gap = "" if stop is None else describe_gap(driven, float(asked.t[count]), asked.y[:, count], stop.q) + "; "
         error = PartitionError(
-            f"the range cannot be followed to its end: {stop}; {gap}partial=True gives the part that can be reached, "
-            f"{count} of {n} points",
+            f"the range cannot be followed to its end: {stop}; {gap}give partial=True for the part that can be reached "
+            f"({count} of {n} points)",
             None if stop is None else stop.t,
             None if stop is None else stop.q,
         )

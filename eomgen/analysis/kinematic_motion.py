@@ -55,14 +55,14 @@ class MotionColumns(Columns):
 
 
 class KinematicAnalysis(Trajectory):
-    """The motion over a range of time or of led coordinates; a :class:`~..runtime.trajectory.Trajectory` besides.
+    """The motion over a range of time or of prescribed coordinates, as a :class:`~..runtime.trajectory.Trajectory`.
 
     Attributes
     ----------
     q, v, a : (n_q, n_t), (n_v, n_t), (n_v, n_t) arrays
-        NaN velocities and accelerations where the led coordinates do not determine them.
+        Velocities and accelerations are NaN where the prescribed coordinates do not determine them.
     led : tuple of str
-        The coordinates that were led; none where drivers alone move the mechanism.
+        The prescribed coordinates; none if drivers alone move the mechanism.
     singular : list of Singular
         Singular positions met, in order.
     stop : Singular or None
@@ -105,12 +105,14 @@ class KinematicAnalysis(Trajectory):
         Raises
         ------
         UsageError
-            Nothing moves over time, or there is no such rate.
+            The time is constant in the range, or the column has no rate.
         """
         if name + "_dot" not in self.names:
             raise UsageError(f"{name!r} has no rate among the columns")
         if len(self.t) < 2 or not np.diff(self.t).any():
-            raise UsageError("the time is constant in this range, so there are no rates: give t, or rates over time")
+            raise UsageError(
+                "the time is constant in this range, so there are no rates; give t together with the values"
+            )
         y, rate = self[name], self[name + "_dot"]
         found = []
         for k in np.flatnonzero((rate[:-1] * rate[1:] < 0.0) | (rate[:-1] == 0.0)):

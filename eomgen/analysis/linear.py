@@ -85,7 +85,8 @@ def linearize(
             raise UsageError("independent= chooses the states of the minimal form; the full form has all of x")
         if layout.given_rates:
             raise UsageError(
-                "where rates of coordinates are given, A of the full form is jacobian(t, x), and no more is derived"
+                "the rates of this model's coordinates are given, and the full form of such models is not derived; use "
+                "jacobian(t, x), which is its A"
             )
         P = projected_directions(module, time, state, J)
         A, B, drift, states = J, U, rates, layout.x

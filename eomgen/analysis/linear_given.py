@@ -96,6 +96,7 @@ def refuse_inputs(layout: Layout) -> None:
     """
     if layout.n_u:
         raise UsageError(
-            f"the rates of the coordinates of model {layout.name!r} are given as functions of its velocities, and "
-            f"derivatives by its inputs ({', '.join(layout.u)}) are not derived; jacobian(t, x) is A of the full form"
+            f"model {layout.name!r} gives the rates of its coordinates as functions of its velocities; derivatives "
+            f"by the inputs ({', '.join(layout.u)}) of such a model are not derived; use jacobian(t, x), which is A of "
+            "the full form"
         )

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Linearization:
-    """The motion near a state: ``s' = drift + A s + B du``, ``dy = C s + D du``.
+    """Linear equations of the motion near a state: ``s' = drift + A s + B du``, ``dy = C s + D du``.
 
     In the minimal form s holds the n_z independent displacements, then the n_dof independent velocities; in the full
     form it is the change of x.  At a steady motion the matrices are those of the motion with respect to it.
@@ -101,7 +101,7 @@ class Linearization:
 
     @property
     def is_equilibrium(self) -> bool:
-        """Whether nothing moves, up to 1e-7 in units of the length scale, radians and seconds.
+        """Whether the state is an equilibrium, up to 1e-7 in units of the length scale, radians and seconds.
 
         Where the model's own forces are weaker than that, accelerations are compared with those that they would make.
         """
@@ -110,7 +110,7 @@ class Linearization:
 
     @property
     def is_steady(self) -> bool:
-        """Whether no velocity changes, up to 1e-7.
+        """Whether the state belongs to a steady motion: no velocity changes, up to 1e-7.
 
         Where forces are stiff, up to what a relative rounding of the state (100 eps) makes of them.
         """
@@ -215,7 +215,7 @@ class Linearization:
         """
         if self.mass is None or self.damping is None or self.stiffness is None:
             if self.layout.given_rates:
-                raise UsageError("rates of coordinates that are functions of other velocities have no such form; use A")
+                raise UsageError("no second-order form: the rates of the coordinates are given as functions; use A")
             raise UsageError("the full form has no second-order form; linearize with form='minimal'")
         chosen = names or self.position_names
         rows = []
@@ -227,8 +227,8 @@ class Linearization:
             which = np.flatnonzero(tangent.velocities == tangent.positions[positions.index(name)])
             if not which.size:
                 raise UsageError(
-                    f"the rate of {name} is no independent velocity here ({', '.join(self.velocity_names)} are), so "
-                    "that it has no equation of second order; name coordinates whose rates are independent"
+                    f"the rate of {name} is not one of the independent velocities ({', '.join(self.velocity_names)}), "
+                    f"so {name} has no equation of second order; name coordinates whose rates are independent"
                 )
             rows.append(int(which[0]))
         columns = [positions.index(name) for name in chosen]
@@ -240,11 +240,11 @@ class Linearization:
                 worst = int(np.abs(others).max(axis=0).argmax())
                 have = positions if label == "K" else [str(n) for n in self.velocity_names]
                 other = [n for k, n in enumerate(have) if k not in kept][worst]
-                raise UsageError(f"{other} acts on {', '.join(chosen)} through {label}; name it too")
+                raise UsageError(f"{other} acts on {', '.join(chosen)} through {label}; name {other} too")
             matrices.append(matrix[np.ix_(rows, kept)])
         kinematic = self.A[np.ix_(columns, range(len(positions), len(self.states)))] - np.eye(self.layout.n_dof)[rows]
         if np.abs(kinematic).max(initial=0.0) > COUPLED or np.abs(self.A[columns, : len(positions)]).max() > COUPLED:
-            raise UsageError(f"the rates of {', '.join(chosen)} are not their velocities alone; use A, B, C, D")
+            raise UsageError(f"the rates of {', '.join(chosen)} depend on other velocities too; use A, B, C, D")
         return matrices[0], matrices[1], matrices[2]
 
     def state_space(self) -> Any:
@@ -262,7 +262,9 @@ class Linearization:
         signal = require("scipy.signal", "scipy", "state_space")
         if not self.inputs or not self.outputs:
             missing = "inputs" if not self.inputs else "outputs"
-            raise UsageError(f"model {self.name!r} has no {missing}, and StateSpace needs some; A, B, C, D are arrays")
+            raise UsageError(
+                f"StateSpace needs inputs and outputs, and model {self.name!r} has no {missing}; use A, B, C, D"
+            )
         return signal.StateSpace(self.A, self.B, self.C, self.D)
 
     @property

@@ -50,7 +50,7 @@ class Damped(NamedTuple):
 
 
 class Modes:
-    """Small motions about an equilibrium.
+    """Natural frequencies, mode shapes and damping of small motions about an equilibrium.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class Modes:
         return f"{title}<table><tr>{head}</tr>{cells}</table>{as_html('', damped) if damped else ''}"
 
     def animate(self, mode: int = 1, file: str | Path | None = None, **options: Any) -> Any:
-        """Show a mode shape as it swings, enlarged until it is well seen; loops stay closed.
+        """Show an animation of a mode shape, enlarged so that it is visible; loops stay closed.
 
         Parameters
         ----------
@@ -147,7 +147,8 @@ class Modes:
         file : str or Path, optional
             ``.gif``, ``.mp4``, ``.html`` or a folder for frames, as of a trajectory; a k3d plot by default.
         **options
-            ``names``, ``axes``, ``trace``, ``fps``, ``dpi`` as of :meth:`~..runtime.trajectory.Trajectory.animate`.
+            ``format``, ``names``, ``axes``, ``trace``, ``fps``, ``dpi`` as of
+            :meth:`~..runtime.trajectory.Trajectory.animate`.
 
         Raises
         ------
@@ -202,8 +203,8 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
         values, complexes = algebra.eig(reduced)
         if np.abs(values.imag).max() > SYMMETRIC * max(1.0, np.abs(values).max()):
             raise UsageError(
-                "the undamped modes are not real, because the stiffness is not symmetric (forces that follow the "
-                "motion); see the eigenvalues of linearize"
+                "the undamped modes are not real, because the stiffness matrix is not symmetric (a force follows the "
+                "motion of a body); use the eigenvalues of linearize()"
             )
         order = np.argsort(values.real)
         squares, vectors = values.real[order], complexes.real[:, order]
@@ -263,7 +264,7 @@ def modes(
     if not linear.is_equilibrium:
         k = int(np.abs(linear.drift).argmax())
         raise UsageError(
-            f"modes are those about an equilibrium, and here {linear.states[k]} changes at a rate of "
-            f"{linear.drift[k]:.6g}; find one with equilibrium(), or take the eigenvalues of linearize()"
+            f"modes() needs an equilibrium, and at this state {linear.states[k]} changes at a rate of "
+            f"{linear.drift[k]:.6g}; find one with equilibrium(), or use the eigenvalues of linearize()"
         )
     return Modes(linear, module)

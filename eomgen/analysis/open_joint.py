@@ -29,20 +29,20 @@ def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> 
     position = system.position
     C = position(q)[0]
     if not C.size:
-        return "beyond, nothing is open"
+        return "beyond it, all joints close"
     gaps = np.abs(scales.residual(C))
     undefined = ~np.isfinite(position(np.array(near))[0])  # whatever the position, by the time
     if undefined.any():
         owners = dict.fromkeys(layout.constraint_labels[i].partition(".")[0] for i in np.flatnonzero(undefined))
         what = "no finite value: look for a root or logarithm of a negative number, or a division by zero"
-        return f"beyond, at t = {t:.6g} s, {', '.join(owners)} has {what}"
+        return f"beyond it, at t = {t:.6g} s, {', '.join(owners)} has {what}"
     place = ", ".join(f"{n} = {v:.6g}" for n, v in zip(driven.led, y, strict=True)) or f"t = {t:.6g} s"
     if not gaps.max() > CONTRADICTION:
-        return f"beyond, at {place}, it closes again: a driver's value jumps there, or it is out of reach in between"
+        return f"beyond it, at {place}, the loops close again: a driver's value jumps, or is out of reach in between"
     joints = [k for k, label in enumerate(layout.constraint_labels[: len(C)]) if not label.endswith(".motion")]
     if joints and gaps[joints].max() > CONTRADICTION:  # rather than the driver
         worst = joints[int(np.argmax(gaps[joints]))]
     else:
         worst = int(np.argmax(gaps))
     unit = "m" if layout.metadata["constraint_kinds"][worst] == "length" else "rad"
-    return f"beyond, at {place}, {layout.constraint_labels[worst]} stays open by {abs(C[worst]):.3g} {unit}"
+    return f"beyond it, at {place}, {layout.constraint_labels[worst]} stays open by {abs(C[worst]):.3g} {unit}"

@@ -82,7 +82,7 @@ def _reactions(
 def reactions(
     module: BoundModel, /, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
 ) -> Array:
-    """Reaction forces and moments of all joints.
+    """Compute the reaction forces and moments of all joints.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def reactions(
 
 @np.errstate(all="ignore")
 def undetermined_reactions(module: BoundModel, /, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> Any:
-    """Which components of :meth:`reactions` redundant constraints leave undetermined.
+    """Tell which components of :meth:`reactions` are undetermined, because constraints are redundant.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def undetermined_reactions(module: BoundModel, /, t: ArrayLike, x: ArrayLike, p:
 
 @np.errstate(all="ignore")
 def driving_forces(module: BoundModel, /, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> dict[str, Array]:
-    """Generalized forces that constraint elements (drivers, gears, rolling ...) exert, by name.
+    """Compute the generalized forces that constraint elements (drivers, gears, rolling, ...) exert, by name.
 
     Returns
     -------

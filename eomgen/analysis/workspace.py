@@ -34,7 +34,7 @@ RESOLUTION = {2: 400, 3: 100}  #: raster cells along each side
 
 
 class Workspace:
-    """What outputs reach over a grid of coordinates; ``ws["tip_x"]`` is an array shaped like the grid.
+    """The values that outputs reach over a grid of coordinates; ``ws["tip_x"]`` is an array shaped like the grid.
 
     Arrays have the axes of ``over`` last, in its order, and are NaN where the grid is not reached.  SI units, radians.
 
@@ -86,7 +86,7 @@ class Workspace:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What ``ws[name]`` gives."""
+        """Names that ``ws[name]`` accepts."""
         measures = ("smallest", "largest", "manipulability", "condition", "quality", "singular", "status")
         return tuple(dict.fromkeys((*self.over, *self.of, *self.q_names, *measures)))
 
@@ -106,7 +106,7 @@ class Workspace:
         return getattr(self, name)
 
     def area(self, resolution: int = RESOLUTION[2]) -> float:
-        """The area two outputs cover, each part counted once: of the images of the grid's cells, on a raster.
+        """Area that two outputs cover (each part counted once), from the images of the grid's cells on a raster.
 
         Parameters
         ----------
@@ -121,7 +121,7 @@ class Workspace:
         return self._extent(2, "area", resolution)
 
     def volume(self, resolution: int = RESOLUTION[3]) -> float:
-        """The volume three outputs cover; see :meth:`area`."""
+        """Volume that three outputs cover; see :meth:`area`."""
         return self._extent(3, "volume", resolution)
 
     def _extent(self, d: int, what: str, resolution: int) -> float:
@@ -198,7 +198,7 @@ class Workspace:
 
     @property
     def facts(self) -> list[tuple[str, str]]:
-        """What the workspace amounts to, as label and value."""
+        """Summary of the workspace, as pairs of label and value."""
         counts = {word: int(np.count_nonzero(self.status == word)) for word in (REACHED, "limits", OUT)}
         facts = [("points", ", ".join(f"{n} {word}" for word, n in counts.items() if n))]
         for k, name in enumerate(self.of):
@@ -219,7 +219,7 @@ class Workspace:
 
     @property
     def title(self) -> str:
-        """What of, over what."""
+        """One line: the outputs and the coordinates of the grid."""
         axes = ", ".join(f"{name} ({len(x)})" for name, x in self.over.items())
         return f"workspace of {self.name}: {', '.join(self.of)} over {axes}"
 
@@ -266,7 +266,7 @@ def workspace(
     limits: bool | Mapping[str, tuple[float | None, float | None]] = False,
     points: int = 100_000,
 ) -> Workspace:
-    """What outputs can reach over a grid of independent coordinates, and how well conditioned it is there.
+    """Find what outputs can reach over a grid of independent coordinates, and the conditioning there.
 
     The grid is followed from the initial position, neighbour to neighbour, so that the mechanism stays on its branch.
 

@@ -215,7 +215,7 @@ def _first(stage: Stage) -> tuple[Index, Array]:
             blocked = followed.stop or blocked
         if q is not None and stage.allowed(q, stage.at(index)[0]):
             return index, q
-    why = "all near it lie beyond the limits" if blocked is None else str(blocked)
+    why = "all grid points near it are beyond the limits" if blocked is None else str(blocked)
     raise PartitionError(
         f"no point of the grid can be reached from the initial position: {why}; give initial={{...}} inside the grid",
         stage.t,

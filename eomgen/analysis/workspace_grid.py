@@ -69,20 +69,20 @@ def read_grid(
     layout, points = module.layout, read_count("points", points)
     if not isinstance(over, Mapping) or not over:
         raise UsageError(
-            f"over names coordinates and their values, such as {{'theta': (0, 6.28, 73)}}, not {shown(over)}"
+            f"over must be a mapping of coordinates to values, such as {{'theta': (0, 6.28, 73)}}, not {shown(over)}"
         )
     coordinates = (*layout.q, *layout.loops)
     for name in over:
         if name not in (*coordinates, "t"):
             raise unknown("coordinate to vary", name, (*coordinates, "t"))
         if _kind(layout, name) == "parameter":
-            raise UsageError(f"{name} is an Euler parameter, which no grid can lead; take rotation: euler_angles")
+            raise UsageError(f"{name} is an Euler parameter, which a grid cannot vary; use rotation: euler_angles")
     if len(over) > MOST_AXES:
-        raise UsageError(f"a grid has 1 to {MOST_AXES} coordinates, not {len(over)}: {', '.join(over)}")
+        raise UsageError(f"a grid must have 1 to {MOST_AXES} coordinates, not {len(over)}: {', '.join(over)}")
     led = [name for name in over if name != "t"]
     if len(led) > layout.n_dof:
-        left = f"at most {layout.n_dof}" if layout.n_dof else "none is left, the drivers move all: vary t"
-        raise UsageError(f"{', '.join(led)} cannot all be varied: {layout.n_dof} degrees of freedom, {left}")
+        left = f"vary at most {layout.n_dof}" if layout.n_dof else "the drivers move all bodies: vary t"
+        raise UsageError(f"{', '.join(led)} cannot all be varied: {layout.n_dof} degrees of freedom; {left}")
     axes = tuple(read_axis(f"over {name}", given) for name, given in over.items())
     size = int(np.prod([len(axis) for axis in axes], dtype=object))
     if size > points:
@@ -94,7 +94,7 @@ def read_grid(
         if name not in known:
             raise unknown("output or coordinate", name, known)
     if not wanted or len(set(wanted)) < len(wanted):
-        raise UsageError(f"of names outputs or coordinates, each once, not {shown(of)}")
+        raise UsageError(f"of must name outputs or coordinates, and each only once, not {shown(of)}")
     return Grid(tuple(over), axes, wanted, _limits(module, limits))
 
 
@@ -135,7 +135,7 @@ def _limits(module: BoundModel, given: bool | Mapping[str, Any]) -> tuple[Limit,
         declared = module.layout.limits if given else {}
         pairs = {name: (kept.get("lower"), kept.get("upper")) for name, kept in declared.items()}
         if given and not any(x is not None for pair in pairs.values() for x in pair):
-            raise UsageError("limits=True, and no joint of the model has lower or upper limits; give limits={name: ..}")
+            raise UsageError("limits=True, but no joint of the model has lower or upper limits; give limits={name: ..}")
         pairs = {name: pair for name, pair in pairs.items() if name in coordinates}
     else:
         pairs = {}

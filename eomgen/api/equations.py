@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Equations(Derivation):
-    """The derived equations of motion of a model.
+    """The derived equations of motion of a model: to read, to count and to compile.
 
     Attributes
     ----------

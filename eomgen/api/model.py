@@ -22,7 +22,7 @@ SMALL = 30  #: bodies of a model that is drawn whenever a notebook shows it
 
 
 class Model(Builder):
-    """A mechanism under description.
+    """The description of a mechanism, to which bodies, joints and forces are added.
 
     Values are numbers, texts such as ``"m*r**2/12"`` or SymPy expressions; bodies, markers and joints are named by
     their handles or by text.  Names are looked up when the model is checked, so order does not matter.
@@ -36,7 +36,7 @@ class Model(Builder):
     doc : str, optional
         One sentence about the model.
     check_inertia : {'error', 'note', 'off'} or bool, optional
-        What becomes of masses and inertias that no rigid body can have, and of motions without inertia: by default
+        What happens to masses and inertias that no rigid body can have, and to motions without inertia: by default
         (``error``, True) they are refused; ``note`` takes them and says so in :attr:`notes`, ``off`` (False) is silent.
 
     Examples

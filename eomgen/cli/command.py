@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib import import_module
 
@@ -17,25 +18,25 @@ from .failures import USAGE
 #: verb -> what it does; the file of the same name in this folder holds the command of the same name.
 VERBS = {
     "run": "Derive, compile and simulate a model.",
-    "ensemble": "Run a model many times, with values from a table or drawn at random.",
-    "view": "Show how a mechanism moves, in a browser or a file.",
-    "kinematics": "Analyse the motion over a range of time or coordinates, without forces.",
+    "ensemble": "Run a model many times with different values.",
+    "view": "Show how a mechanism moves, in a browser or as a file.",
+    "kinematics": "Analyse the motion over a range, without forces.",
     "check": "Report a model's topology, mobility and faults.",
     "derive": "Derive the equations of motion and count their operations.",
     "explain": "Write the worked solution: every step to the equations, then numbers.",
     "linearize": "Linearize a model: A, B, C, D, eigenvalues.",
-    "modes": "Natural frequencies, mode shapes and damping ratios about an equilibrium.",
-    "equilibrium": "Find a static equilibrium, with parameters that make it one.",
-    "sensitivity": "Derivatives of a run by parameters, inputs and initial values.",
-    "consistent": "The state on the constraints that differs least from a rough one.",
-    "reactions": "Forces and moments in all joints, and which are undetermined.",
-    "inverse": "Forces of chosen drives that make a motion, loops closed.",
-    "impact": "State after an impact, impulses and energy lost.",
-    "verify": "Compare a compiled model with everything independent of how it was made.",
-    "generate": "Write a package that stands alone.",
+    "modes": "Find natural frequencies, mode shapes and damping ratios.",
+    "equilibrium": "Find a static equilibrium, and parameters for which it is one.",
+    "sensitivity": "Differentiate a run by parameters, inputs and initial values.",
+    "consistent": "Find the consistent state that is nearest to a rough one.",
+    "reactions": "Find forces and moments in all joints.",
+    "inverse": "Find the forces of chosen drives that make a motion.",
+    "impact": "Find the state after an impact, its impulses and energy loss.",
+    "verify": "Check a compiled model against independent computations.",
+    "generate": "Write a package that needs no eomgen.",
     "convert": "Write a robot (URDF, MJCF) as a model file.",
     "examples": "List the example models, copy one here, or run them all.",
-    "doctor": "Say whether this installation can derive, compile and simulate.",
+    "doctor": "Check that this installation can derive, compile and simulate.",
     "cache": "List, prune or clear the compiled modules.",
 }
 
@@ -77,9 +78,11 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
     cls=Verbs,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="`eomgen VERB --help` explains a verb.  Exit codes: 0 fine; 1 the model is at fault; 2 usage or file not "
-    "found; 3 compiler or package missing; 4 the integration failed.",
+    "found; 3 compiler or package missing; 4 the integration failed; 5 verify found a difference.",
 )
-@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version, help="Show it.")
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version, help="Show the version."
+)
 def eomgen() -> None:
     """Equations of motion of mechanisms: derived, compiled, simulated."""
 
@@ -92,7 +95,12 @@ def _check_words(words: Sequence[str]) -> None:
         except UnicodeEncodeError:
             bad = True
         if bad:
-            raise click.UsageError(f"{word!a:.80} holds a character that no command line can; write it without")
+            raise click.UsageError(f"{word!a:.80} contains a character that command lines cannot have; remove it")
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    """A warning without the place in Python, which is nothing of the user's."""
+    click.echo(f"warning: {visible(str(message))}", err=True)
 
 
 def run_command(arguments: Sequence[str] | None = None) -> int:
@@ -103,7 +111,9 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     try:
         _check_words(words)
-        code = eomgen.main(words, prog_name="eomgen", standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            code = eomgen.main(words, prog_name="eomgen", standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:  # wrong options, unknown verbs, files that cannot be read
         vars(error)["message"] = visible(error.message)

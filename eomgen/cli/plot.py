@@ -34,7 +34,7 @@ def require_plotting(file: Path, option: str = "--plot") -> None:
         raise MissingDependencyError(f"{option} needs matplotlib: pip install matplotlib") from error
     known = sorted(FigureCanvasBase.get_supported_filetypes())
     if file.suffix[1:].lower() not in known:
-        raise UsageError(f"{option} {file}: the ending of the name selects the kind of picture: .{', .'.join(known)}")
+        raise UsageError(f"{option} {file}: the name of a picture must end in one of .{', .'.join(known)}")
 
 
 def find_paths(mechanism: Mechanism) -> list[tuple[str, str]]:
@@ -71,7 +71,7 @@ def check_picture(file: Path | None, picture: Picture) -> None:
     if file is not None:
         require_plotting(file)
     elif picture != Picture():
-        raise UsageError("--columns, --against and --plot-as say what --plot FILE draws; give it too")
+        raise UsageError("--columns, --against and --plot-as need --plot FILE; give it too")
 
 
 def check_columns(module: Module, picture: Picture) -> None:
@@ -82,11 +82,11 @@ def check_columns(module: Module, picture: Picture) -> None:
     UsageError
     """
     from ..runtime.columns import column_names
-    from ..runtime.near_names import unknown
+    from ..runtime.near_names import plain_name, unknown
 
     known = ("t", *column_names(module.layout))
     for name in (*picture.columns, *((picture.against,) if picture.against else ())):
-        if name not in known:
+        if plain_name(name, known) not in known:
             raise unknown("column", name, known)
 
 
@@ -110,7 +110,7 @@ _PICTURE = (
         metavar="NAME",
         help="Columns that --plot draws, separated by commas; all coordinates by default.",
     ),
-    click.option("--against", metavar="NAME", help="The column they are drawn over, instead of time."),
+    click.option("--against", metavar="NAME", help="Column for the horizontal axis, instead of time."),
     click.option(
         "--plot-as",
         type=click.Choice(["time", "phase", "energy", "residuals", "spectrum"]),

@@ -51,7 +51,8 @@ baumgarte_option = shared_option(
     "--baumgarte",
     metavar="ALPHA,BETA",
     callback=_pair,
-    help="With --method augmented: hold constraints by C'' + 2 ALPHA C' + BETA^2 C = 0 (1/s), without projection.",
+    help="With --method augmented: stabilise constraints by C'' + 2 ALPHA C' + BETA^2 C = 0 (1/s) instead of "
+    "projecting.",
 )
 
 
@@ -76,7 +77,7 @@ _SOLVER = (
         callback=_find_solver,
         help="Integrator: DOP853, RK45, RK23, Radau, Taylor, BDF, LSODA, or RK4 with --step.",
     ),
-    shared_option(INTEGRATION, "--step", type=_TOLERANCE, metavar="H", help="Size of the steps of RK4 in s."),
+    shared_option(INTEGRATION, "--step", type=_TOLERANCE, metavar="H", help="Step size of RK4 in s."),
     shared_option(INTEGRATION, "--rtol", type=_TOLERANCE, metavar="X", help="Relative tolerance of the integrator."),
     shared_option(INTEGRATION, "--atol", type=_TOLERANCE, metavar="X", help="Absolute tolerance of the integrator."),
 )
@@ -119,7 +120,7 @@ independent_option = shared_option(
     multiple=True,
     callback=split_names,
     metavar="NAME",
-    help="Independent coordinate of a mechanism with loops; several: repeat it, or separate by commas.",
+    help="Independent coordinate of a mechanism with loops; for several repeat it, or separate names by commas.",
 )
 
 
@@ -147,41 +148,49 @@ def blaming_option(independent: tuple[str, ...]) -> Iterator[None]:
 _MIMIC, _ROTATIONS = ("independent", "coupling"), ("euler_angles", "euler_parameters")
 _ROBOT = (
     shared_option(ROBOTS, "--floating", is_flag=True, help="The base moves freely (URDF)."),
-    shared_option(ROBOTS, "--lock", multiple=True, metavar="JOINT[=VALUE]", help="Hold a joint; repeat it for more."),
+    shared_option(
+        ROBOTS,
+        "--lock",
+        multiple=True,
+        metavar="JOINT[=VALUE]",
+        help="Fix a joint at a value (0 by default); repeat it for more.",
+    ),
     shared_option(
         ROBOTS,
         "--mimic",
         type=click.Choice(["independent", "coupling"]),
-        help="Joints that mimic others are tied by a coupling (the default), or independent.",
+        help="Tie joints that mimic others by a coupling (the default), or leave them independent.",
     ),
     shared_option(
         ROBOTS,
         "--rotation",
         type=click.Choice(["euler_angles", "euler_parameters"]),
-        help="Free and ball joints in euler_angles or euler_parameters.",
+        help="Describe free and ball joints by euler_angles or euler_parameters.",
     ),
-    shared_option(ROBOTS, "--actuate", is_flag=True, help="An input tau_<joint> on every joint of one degree."),
+    shared_option(
+        ROBOTS, "--actuate", is_flag=True, help="Add an input tau_<joint> to every joint of one degree of freedom."
+    ),
     shared_option(
         ROBOTS,
         "--friction",
         type=NumberRange(min=0, min_open=True),
         metavar="VELOCITY",
-        help="Dry friction of joints acts, smoothed below this velocity (rad/s or m/s).",
+        help="Let the dry friction of joints act, smoothed below this velocity (rad/s or m/s).",
     ),
-    shared_option(ROBOTS, "--symbolic", is_flag=True, help="Masses and inertias become parameters."),
+    shared_option(ROBOTS, "--symbolic", is_flag=True, help="Make masses and inertias parameters."),
     shared_option(
         ROBOTS,
         "--check-inertia",
         type=click.Choice(["error", "note", "off"]),
-        help="Masses and inertias that no body can have, and motions without inertia: refuse, note, or take them.",
+        help="Refuse masses and inertias that no body can have and motions without inertia, note them, or accept them.",
     ),
     shared_option(
         ROBOTS,
         "--limits",
         type=click.Choice(["note", "stop", "off"]),
-        help="A run that passes a limit of a joint says so, stops push back there, or nothing happens.",
+        help="At the limits of joints: a run warns (note), elastic stops act (stop), or nothing happens (off).",
     ),
-    shared_option(ROBOTS, "--assets", metavar="DIR", help="The folder within which other files may be read (MJCF)."),
+    shared_option(ROBOTS, "--assets", metavar="DIR", help="Folder in which other files may be read (MJCF)."),
 )
 
 
@@ -261,18 +270,18 @@ def _read_stdin(options: dict[str, Any]) -> Model:
     from ..describe.yaml_file import describe_yaml
 
     if options:
-        raise UsageError(f"- is a model file's text on the standard input, without {', '.join(options)}; name a file")
+        raise UsageError(f"- reads a model file from the standard input and takes no {', '.join(options)}; name a file")
     return Model.from_description(describe_yaml(sys.stdin.read(), "<stdin>"))
 
 
 def _missing(path: Path) -> str:
     if what := kind_of(path):
-        return f"{path} is {what}, no plain file; " + (
-            "name a model file in it" if path.is_dir() else "copy what it gives into a file"
+        return f"{path} is {what}, not a plain file; " + (
+            "name a model file in it" if path.is_dir() else "copy its content into a file"
         )
-    from .example_files import example_names
+    from ..shipped import example_files
 
-    if path.stem in example_names():
+    if path.stem in example_files():
         return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"
     here = path.parent if path.parent.is_dir() else Path()
     names = [p.name for p in here.iterdir() if p.suffix in (".yaml", ".yml", ".urdf", ".xml")]
@@ -291,7 +300,7 @@ def require_folder(option: str, file: Path | None) -> None:
         return
     refuse_link(file)
     if file.is_dir():
-        raise UsageError(f"{option} {file}: is a folder; name a file in it")
+        raise UsageError(f"{option} {file}: this is a folder; name a file in it")
     above = file.absolute().parents
     folder = next(parent for parent in above if parent.exists())
     if folder == Path(file.absolute().anchor) != above[0]:  # rather a slip than a wish for a new folder there
@@ -323,7 +332,20 @@ def _parse_setting(word: str, option: str = "--set", example: str = "r=0.12") ->
     if not equals or not name or not text:
         raise UsageError(f"{option} {word}: write name=value, for example {option} {example}")
     try:
-        return name, float(text)
+        return name, parse_number(text)
+    except UsageError as error:
+        raise UsageError(f"{option} {word}: {error}") from None
+
+
+def parse_number(text: str) -> float:
+    """A number, or an expression of numbers such as ``pi/3``.
+
+    Raises
+    ------
+    UsageError
+    """
+    try:
+        return float(text)
     except ValueError:
         pass
     from ..describe.expressions import parse
@@ -331,12 +353,12 @@ def _parse_setting(word: str, option: str = "--set", example: str = "r=0.12") ->
     from ..graph.core import Graph
 
     def resolve(unknown: str) -> Any:
-        raise ExpressionError(f"{unknown!r} is not a number", 1, "numbers and pi are known here", text)
+        raise ExpressionError(f"{unknown!r} is not a number", 1, "only numbers and pi are allowed here", text)
 
     try:
         value = parse(text, Graph(), resolve).value
     except ExpressionError as error:
-        raise UsageError(f"{option} {word}: {error.message}; {error.remedy}") from None
+        raise UsageError(f"{error.message}; {error.remedy}") from None
     if value is None:
-        raise UsageError(f"{option} {word}: not a number")
-    return name, value
+        raise UsageError("the value is not a number")
+    return value

@@ -22,7 +22,7 @@ MEGABYTE = 1_000_000
 @click.group(invoke_without_command=True)
 @click.pass_context
 def cache(ctx: click.Context) -> None:
-    """List, prune or clear the compiled modules; EOMGEN_CACHE_DIR moves them."""
+    """List, prune or clear the compiled modules; EOMGEN_CACHE_DIR sets their folder."""
     if ctx.invoked_subcommand is None:
         ctx.invoke(show, as_json=False)
 
@@ -63,8 +63,10 @@ def show(as_json: bool) -> None:
 
 
 @cache.command()
-@click.option("--older-than", type=NumberRange(min=0), metavar="DAYS", help="Remove what was not used so long.")
-@click.option("--max-size", type=NumberRange(min=0), metavar="MB", help="Remove the oldest until so much is left.")
+@click.option(
+    "--older-than", type=NumberRange(min=0), metavar="DAYS", help="Remove entries that were not used for DAYS."
+)
+@click.option("--max-size", type=NumberRange(min=0), metavar="MB", help="Remove the oldest entries until MB are left.")
 @json_option
 @reports_failures
 def prune(older_than: float | None, max_size: float | None, as_json: bool) -> None:

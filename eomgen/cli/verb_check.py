@@ -54,7 +54,7 @@ def _print_schema(context: click.Context) -> None:
 def check(
     model: Path, allow_native: bool, as_json: bool, graph: Path | None, draw: Path | None, robot: dict[str, Any]
 ) -> None:
-    """Report bodies, joints, loops, constraints, rank and degrees of freedom, and everything wrong with a model.
+    """Report bodies, joints, loops, constraints, rank and degrees of freedom of a model, and all its faults.
 
     Faults are printed as FILE:LINE: path: what is wrong; the exit code is then 1.
     """

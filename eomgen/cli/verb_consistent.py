@@ -17,8 +17,10 @@ from .shared_options import parse_settings
 @verb_command()
 @analysis_options
 @time_option
-@click.option("--weight", multiple=True, metavar="NAME=W", help="What a change of a coordinate or rate costs; else 1.")
-@click.option("--mass", is_flag=True, help="Measure changes by the mass matrix of the tree instead.")
+@click.option(
+    "--weight", multiple=True, metavar="NAME=W", help="Weight of a change of a coordinate or rate; default 1."
+)
+@click.option("--mass", is_flag=True, help="Weight changes by the mass matrix of the tree instead.")
 @click.option("--hold", multiple=True, metavar="NAME", help="Coordinate or rate that keeps its value exactly.")
 def consistent(
     work: Prepared, t: float, weight: tuple[str, ...], mass: bool, hold: tuple[str, ...], as_json: bool
@@ -30,7 +32,7 @@ def consistent(
     rough = module.x0(t=t)
     for name, value in work.initial.items():
         if name not in module.x_names:
-            raise UsageError(f"--set {name}: a rough state has {', '.join(module.x_names)}")
+            raise UsageError(f"--set {name}: the names of a rough state are {', '.join(module.x_names)}")
         rough[module.x_names.index(name)] = value
     weights: Any = "mass" if mass else parse_settings(weight, "--weight", "theta=100") or None
     found = module.consistent(rough, t, weights=weights, hold=hold)

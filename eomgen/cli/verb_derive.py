@@ -87,7 +87,7 @@ def print_operations(derived: Equations) -> None:
         say(str(derived.choice))
     if derived.system_size:
         unknowns, entries = derived.system_size
-        say(f"a linear system of {unknowns} unknowns with {entries} entries that do not vanish")
+        say(f"a linear system of {unknowns} unknowns with {entries} nonzero entries")
     header = ["", "multiply", "add", "divide", "total", "functions"]
     print_table(header, rows, right=range(1, len(header)))
 

@@ -52,7 +52,7 @@ class Check(NamedTuple):
 @json_option
 @reports_failures
 def doctor(as_json: bool) -> None:
-    """Check Python, packages, the compiler (by compiling a small model) and the cache; each fault with its remedy."""
+    """Check Python, packages, the compiler (by compiling a small model) and the cache; name a remedy for each fault."""
     findings = [*_python(), *_packages(), *_compiler(), _compiles(), _cache()]
     well = all(f.ok for f in findings if f.needed)
     if as_json:
@@ -149,7 +149,7 @@ def _cache() -> Check:
         cache = Cache(cache_directory())
         cache.require_own()
     except EomgenError as error:
-        return Check("cache", False, "not safe to use, or not there", str(error))
+        return Check("cache", False, "not safe to use, or missing", str(error))
     entries = cache.entries()
     detail = f"{cache.root}: {len(entries)} entries, {readable_size(sum(e.size for e in entries))}"
     folder = next(p for p in (cache.root, *cache.root.parents) if p.exists())

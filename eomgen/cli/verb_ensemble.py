@@ -19,7 +19,7 @@ from .analysis import Prepared, analysis_options
 from .number_option import Number, NumberRange
 from .screen import finite, print_heading, print_json, print_table, say, stage
 from .sections import verb_command
-from .shared_options import require_folder
+from .shared_options import parse_number, require_folder
 from .workspace_request import read_axes
 
 if TYPE_CHECKING:
@@ -37,25 +37,32 @@ MOST_WORKERS = 4096  #: processes of a local cluster
     metavar="FILE",
     help="CSV with a column for each name (parameter, input, coordinate, rate), a row for each run.",
 )
-@click.option("--vary", multiple=True, metavar="NAME=LOW:HIGH", help="Draw a value evenly between both for each run.")
 @click.option(
-    "--grid", multiple=True, metavar="NAME=LOW:HIGH:COUNT", help="Take so many values evenly, in all combinations."
+    "--vary", multiple=True, metavar="NAME=LOW:HIGH", help="Draw a random value between LOW and HIGH for each run."
 )
-@click.option("--count", type=click.IntRange(min=1), metavar="N", help="Number of runs to draw.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the numbers drawn.")
+@click.option(
+    "--grid", multiple=True, metavar="NAME=LOW:HIGH:COUNT", help="Take COUNT evenly spaced values, in all combinations."
+)
+@click.option("--count", type=click.IntRange(min=1), metavar="N", help="Number of runs for --vary.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random numbers.")
 @click.option("--end", type=NumberRange(min=0, min_open=True), metavar="T", help="End time in s.")
-@click.option("--samples", type=click.IntRange(min=2), metavar="M", help="Keep the states at M times.")
-@click.option("--statistics", is_flag=True, help="Keep mean, deviation, least and greatest only.")
-@click.option("--solver", metavar="NAME", help="Integrator; that of the file by default.")
-@click.option("--step", type=Number(), metavar="H", help="Size of the steps of RK4 in s.")
+@click.option("--samples", type=click.IntRange(min=2), metavar="M", help="Keep the states at M evenly spaced times.")
+@click.option("--statistics", is_flag=True, help="Keep only mean, standard deviation, least and greatest values.")
+@click.option("--solver", metavar="NAME", help="Integrator; by default that of the file.")
+@click.option("--step", type=Number(), metavar="H", help="Step size of RK4 in s.")
 @click.option("--rtol", type=Number(), metavar="X", help="Relative tolerance.")
 @click.option("--atol", type=Number(), metavar="X", help="Absolute tolerance.")
-@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Runs at a time; all processors by default.")
-@click.option("--cluster", metavar="N|ADDRESS", help="Run on N dask workers here, or on those of a scheduler.")
 @click.option(
-    "--store", type=click.Path(path_type=Path), metavar="DIR", help="Keep finished runs and go on from there."
+    "--threads", type=click.IntRange(min=1), metavar="N", help="Number of runs at a time; by default all processors."
 )
-@click.option("--plot", nargs=2, metavar="NAME FILE", help="Draw a column to a picture.")
+@click.option("--cluster", metavar="N|ADDRESS", help="Run on N local dask workers, or on the workers of a scheduler.")
+@click.option(
+    "--store",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Keep finished runs in DIR, and continue from there.",
+)
+@click.option("--plot", nargs=2, metavar="NAME FILE", help="Draw column NAME to the picture FILE.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write results to FILE.npz or FILE.csv.")
 def ensemble(
     work: Prepared, cases: Path | None, vary: tuple[str, ...], grid: tuple[str, ...], count: int | None,
@@ -64,7 +71,7 @@ def ensemble(
     atol: float | None, threads: int | None, cluster: str | None, store: Path | None,
     plot: tuple[str, str] | None, out: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
-    """Run a model many times: from a table of cases, with values drawn at random, or over a grid."""
+    """Run a model many times: for a table of cases, for random values, or over a grid of values."""
     if out is not None and out.suffix not in (".npz", ".csv"):
         raise UsageError(f"--out {out}: ensembles are written as .npz or .csv")
     for word, path in (("--out", out), ("--plot", None if plot is None else Path(plot[1]))):
@@ -79,7 +86,7 @@ def ensemble(
     if cluster is not None and cluster.isdigit() and not 1 <= int(cluster) <= MOST_WORKERS:
         raise UsageError(f"--cluster {cluster}: give 1 to {MOST_WORKERS} workers, or the address of a scheduler")
     if grid and (cases is not None or vary or count is not None):
-        raise UsageError("--grid makes all runs itself; leave out --cases, --vary and --count")
+        raise UsageError("--grid defines all runs itself; leave out --cases, --vary and --count")
     axes = read_axes("--grid", grid)
     values = _read(cases) if cases is not None else {}
     values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
@@ -99,7 +106,7 @@ def ensemble(
         )  # fmt: skip
     if out is not None:
         if out.suffix == ".csv":
-            write_whole(out, found.to_pandas().to_csv(index=False))
+            write_whole(out, found.to_pandas(samples=times is not None and not statistics).to_csv(index=False))
         else:
             found.save(out)
     if plot is not None:
@@ -130,7 +137,7 @@ def _tell(work: Prepared, found: Ensemble, varied: list[str], files: list[str], 
 
 
 def _even(end: float, count: int) -> list[float]:
-    return [end * i / (count - 1) for i in range(count)]
+    return [end * (i / (count - 1)) for i in range(count)]  # the last is end itself
 
 
 def _cluster(given: str | None) -> int | str | None:
@@ -143,12 +150,12 @@ def _read(path: Path) -> dict[str, list[float]]:
         try:
             rows = [row for row in csv.reader(file) if row]
         except (UnicodeDecodeError, csv.Error) as error:
-            raise UsageError(f"--cases {path}: is no table of text (CSV, UTF-8): {error}") from None
+            raise UsageError(f"--cases {path}: this is not a table of text (CSV, UTF-8): {error}") from None
     if len(rows) < 2:
-        raise UsageError(f"--cases {path}: a line of names and a line for each run are needed")
+        raise UsageError(f"--cases {path}: the table needs a line of names and a line for each run")
     names = [name.strip() for name in rows[0]]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise UsageError(f"--cases {path}: the names {', '.join(twice)} stand there twice")
+        raise UsageError(f"--cases {path}: the table has the names {', '.join(twice)} twice")
     columns: dict[str, list[float]] = {name: [] for name in names}
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(names):
@@ -170,9 +177,9 @@ def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
         name, _, ends = words.partition("=")
         low, _, high = ends.partition(":")
         try:
-            limits = float(low), float(high)
-        except ValueError:
-            raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two numbers") from None
+            limits = parse_number(low), parse_number(high)
+        except UsageError as error:
+            raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two numbers; {error}") from None
         if not (isfinite(limits[0]) and isfinite(limits[1]) and limits[0] <= limits[1]):
             raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two finite numbers in order")
         if name.strip() in drawn:

@@ -13,9 +13,9 @@ import click
 
 from ..errors import UsageError
 from ..files.writing import write_whole
+from ..shipped import example_files, find_example
 from ..suggestions import hint
 from ..syntax_trees import parse_module
-from .example_files import example_files
 from .failures import reports_failures
 from .screen import print_json, print_table, say, stage
 from .sections import verb_command
@@ -40,7 +40,7 @@ def describe_example(file: Path) -> str:
 @verb_command()
 @click.argument("name", required=False)
 @click.option("--force", is_flag=True, help="Overwrite a file of that name.")
-@click.option("--all", "every", is_flag=True, help="Run every example for a tenth of its time; scripts as they are.")
+@click.option("--all", "every", is_flag=True, help="Run every example for a tenth of its time, scripts in full.")
 @target_option("numpy", "cython", default="numpy")
 @json_option
 @reports_failures
@@ -52,7 +52,7 @@ def examples(name: str | None, force: bool, every: bool, target: str, as_json: b
     found = example_files()
     if every:
         if name is not None:
-            raise UsageError(f"--all runs every example; leave {name} out, or --all")
+            raise UsageError(f"--all runs every example; leave out {name} or --all")
         _run_all(found, target, as_json)
         return
     if name is None:
@@ -106,7 +106,7 @@ def _row(run: ExampleRun) -> list[str]:
 
 
 def _copy(name: str, found: dict[str, Path], force: bool) -> Path:
-    file = found.get(name) or found.get(name.removesuffix(".yaml")) or found.get(f"{name}.urdf")
+    file = find_example(name, found)
     if file is None:
         near = hint(name, found, quoted=False) or f"there are: {', '.join(found)}"
         raise UsageError(f"no example {name!r}; {near}")

@@ -36,7 +36,9 @@ from .shared_options import (
 @independent_option
 @target_option(*TARGETS)
 @click.option(
-    "--slim", is_flag=True, help="Only calls, events and simulate, in a small package; the rest refuses by name."
+    "--slim",
+    is_flag=True,
+    help="Write a small package with calls, events and simulate only; other methods raise an error.",
 )
 @json_option
 @robot_options

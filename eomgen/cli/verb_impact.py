@@ -15,11 +15,13 @@ from .shared_options import parse_settings
 @verb_command()
 @analysis_options
 @time_option
-@click.option("--gap", multiple=True, metavar="NAME=E", help="Coordinate or output that closes, with its restitution.")
-@click.option("--stop", multiple=True, metavar="NAME", help="Coordinate that is locked; repeat it for more.")
-@click.option("--closed", is_flag=True, help="Take the gaps as closed whatever their values.")
+@click.option(
+    "--gap", multiple=True, metavar="NAME=E", help="Gap (coordinate or output) that closes, with its restitution."
+)
+@click.option("--stop", multiple=True, metavar="NAME", help="Coordinate that is locked suddenly; repeat it for more.")
+@click.option("--closed", is_flag=True, help="Treat the gaps as closed at any value.")
 def impact(work: Prepared, t: float, gap: tuple[str, ...], stop: tuple[str, ...], closed: bool, as_json: bool) -> None:
-    """An impact without friction at the initial state, by Newton's law of restitution."""
+    """Find the state after an impact at the initial state: without friction, by Newton's law of restitution."""
     from ..analysis.impact_gaps import check_gaps
 
     if not gap and not stop:

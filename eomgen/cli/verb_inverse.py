@@ -21,7 +21,7 @@ from .shared_options import parse_settings
     "--accelerate", multiple=True, metavar="NAME=VALUE", help="Acceleration of an independent coordinate, 0 by default."
 )
 def inverse(work: Prepared, t: float, actuated: tuple[str, ...], accelerate: tuple[str, ...], as_json: bool) -> None:
-    """Constrained inverse dynamics at the initial state: forces of drives for given accelerations, loops closed."""
+    """Find the forces of drives for given accelerations at the initial state; loops stay closed."""
     module = work.module
     x = module.x0(work.initial or None, t=t)
     found = module.actuator_forces(t, x, parse_settings(accelerate), actuated=actuated or None)

@@ -22,6 +22,7 @@ from .shared_options import (
     load_model,
     model_argument,
     native_option,
+    parse_number,
     parse_settings,
     require_folder,
     target_option,
@@ -48,18 +49,18 @@ SHOWN = 9  #: of them on the screen
     "ranges",
     multiple=True,
     metavar="NAME=START:END[:COUNT]",
-    help="Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges have one count.",
+    help="Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges must have the same count.",
 )
-@click.option("--limits", multiple=True, metavar="NAME", help="Find how far a coordinate can go from the start.")
+@click.option("--limits", multiple=True, metavar="NAME", help="Find how far a coordinate can move from the start.")
 @click.option(
     "--over",
     multiple=True,
     metavar="NAME=LOW:HIGH:COUNT",
-    help="Find the workspace of --of over a grid of coordinates, one --over for each (up to three); t for drivers.",
+    help="Find the workspace of --of over a grid of up to three coordinates, one --over for each; t for drivers.",
 )
 @click.option("--of", multiple=True, metavar="NAME", help="Outputs or coordinates of the workspace.")
-@click.option("--within-limits", is_flag=True, help="Keep the workspace within the limits of the joints.")
-@click.option("--partial", is_flag=True, help="Give the part of the range that can be reached.")
+@click.option("--within-limits", is_flag=True, help="Restrict the workspace to the limits of the joints.")
+@click.option("--partial", is_flag=True, help="If the range cannot be reached completely, give the part that can.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, or start position.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write all columns to FILE.npz or .csv.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw them, e.g. to FILE.png.")
@@ -158,13 +159,13 @@ def read_range(words: str) -> tuple[str, float, float, int | None]:
     if not equals or not name.strip() or len(parts) not in (2, 3):
         raise UsageError(f"--range {words}: write NAME=START:END[:COUNT], for example theta=0:2*pi:361")
     try:
-        numbers = parse_settings(tuple(f"{label}={part}" for label, part in zip(("START", "END"), parts, strict=False)))
+        start, end = (parse_number(part) for part in parts[:2])
         count = _count(parts[2]) if len(parts) == 3 else None
     except ValueError as error:  # a UsageError too
         raise UsageError(f"--range {words}: {error}") from None
     if count is not None and not 1 <= count <= 10_000_000:
         raise UsageError(f"--range {words}: the count is 1 to 10000000, not {count}")
-    return name.strip(), numbers["START"], numbers["END"], count
+    return name.strip(), start, end, count
 
 
 def _count(text: str) -> int:
@@ -183,10 +184,10 @@ def range_values(module: Module, asked: list[tuple[str, float, float, int | None
         asked = [("t", 0.0, float(module.metadata.get("simulation", {}).get("end") or 10.0), None)]
     names = [name for name, *_ in asked]
     if len(set(names)) < len(names):
-        raise UsageError(f"--range: {', '.join(names)}: each name once")
+        raise UsageError(f"--range: {', '.join(names)}: give each name once")
     counts = {count for *_, count in asked if count is not None} or {COUNT}
     if len(counts) > 1:
-        raise UsageError(f"--range: the counts {', '.join(map(str, sorted(counts)))} are not one")
+        raise UsageError(f"--range: the counts {', '.join(map(str, sorted(counts)))} must be equal")
     (count,) = counts
     values: dict[str, Any] = {name: np.linspace(start, end, count) for name, start, end, _ in asked}
     if "t" in values and len(asked) > 1 and count > 1:  # coordinates that are led over time have their rates

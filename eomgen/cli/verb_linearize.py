@@ -13,8 +13,10 @@ from .sections import verb_command
 @verb_command()
 @analysis_options
 @time_option
-@click.option("--equilibrium", "at_rest", is_flag=True, help="About the equilibrium found from the initial position.")
-@click.option("--full", is_flag=True, help="All of x as states, instead of the independent ones.")
+@click.option(
+    "--equilibrium", "at_rest", is_flag=True, help="Linearize about the equilibrium found from the initial position."
+)
+@click.option("--full", is_flag=True, help="Use all of x as states, not only the independent ones.")
 def linearize(work: Prepared, t: float, at_rest: bool, full: bool, as_json: bool) -> None:
     """Linearize a model about its initial state, or about an equilibrium.
 

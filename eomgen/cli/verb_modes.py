@@ -11,7 +11,7 @@ from .sections import verb_command
 @analysis_options
 @time_option
 def modes(work: Prepared, t: float, as_json: bool) -> None:
-    """Small motions about the equilibrium found from the initial position."""
+    """Find natural frequencies and mode shapes about the equilibrium found from the initial position."""
     module = work.module
     guess = {name: value for name, value in work.initial.items() if not name.endswith("_dot")}
     rest = module.equilibrium(guess or None, t)

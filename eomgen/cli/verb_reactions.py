@@ -24,13 +24,16 @@ COMPONENTS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 @analysis_options
 @time_option
 @click.option(
-    "--end", type=Number(), metavar="T", help="Simulate to T and give the largest values; else the initial state."
+    "--end",
+    type=Number(),
+    metavar="T",
+    help="Simulate to T and give the largest values; without it those of the initial state.",
 )
 @click.option(
-    "--out", type=click.Path(path_type=Path), metavar="FILE", help="With --end: histories to FILE.csv or .npz."
+    "--out", type=click.Path(path_type=Path), metavar="FILE", help="With --end: write histories to FILE.csv or .npz."
 )
 def reactions(work: Prepared, t: float, end: float | None, out: Path | None, as_json: bool) -> None:
-    """Forces and moments that each joint's predecessor exerts on its successor, in ground axes (N, N m).
+    """Find the force and moment that each joint's predecessor exerts on its successor, in ground axes (N, N m).
 
     Components that redundant constraints leave undetermined are marked with *; the smallest reactions are given.
     """

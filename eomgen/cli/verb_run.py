@@ -11,6 +11,7 @@ import click
 
 from ..analysis.tables import without_noise
 from ..errors import UsageError
+from ..limits.descriptions import RESTING
 from ..runtime.near_names import place_of_marker
 from .failures import after_integration, reports_failures
 from .number_option import NumberRange
@@ -65,24 +66,27 @@ POINTS = 5  #: change points listed
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write the run to FILE.npz or FILE.csv.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the run, e.g. to FILE.png.")
 @click.option(
-    "--animate", type=click.Path(path_type=Path), metavar="FILE", help="Show it move: FILE.gif, FILE.mp4 or FILE.html."
+    "--animate",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write an animation: FILE.gif, FILE.mp4 or FILE.html.",
 )
 @click.option(
     "--checkpoint",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Keep the run in FILE while it goes on; the same command again goes on from there, to the last bit.",
+    help="Save the run in FILE while it goes on; the same command continues it later, with exactly the same result.",
 )
 @click.option(
     "--checkpoint-every",
     type=NumberRange(min=0),
     metavar="SECONDS",
-    help="Write that file so often; 60 s by default.",
+    help="Time between two writes of that file; 60 s by default.",
 )
 @click.option(
     "--resume/--no-resume",
     default=None,
-    help="The checkpoint must be there / begin anew; by default go on if it is there.",
+    help="Require a checkpoint / ignore it; by default the run continues if there is one.",
 )
 @picture_options
 @json_option
@@ -128,7 +132,7 @@ def run(
     kept: dict[str, Any] = {"checkpoint": checkpoint, "checkpoint_every": checkpoint_every, "resume": resume}
     kept = {key: value for key, value in kept.items() if value is not None}
     if kept and checkpoint is None:
-        raise UsageError("--checkpoint-every and --resume belong to --checkpoint FILE")
+        raise UsageError("--checkpoint-every and --resume need --checkpoint FILE; give it too")
 
     with blaming_option(independent), stage("derive") as parts:
         described = load_model(model, allow_native, robot)
@@ -250,15 +254,16 @@ def _energy_rows(energy: EnergyBalance | None, uncounted: Sequence[str]) -> list
         return [("energy", "not known: the equations have no kinetic_energy")]
     change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
     if energy.work is not None and energy.power_balance not in (None, energy.drift):
+        work = without_noise([energy.work, energy.initial, energy.final])[0]
         return [
-            ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J"),
+            ("energy", f"{change}; work of forces and inputs {work:.9g} J"),
             ("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"),
         ]
     kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
     rows = [("energy", f"{change}{kept}")]
     if uncounted:
         names = ", ".join(uncounted)
-        rows.append(("power balance", f"not formed: {names} is C code without a Python twin (key python)"))
+        rows.append(("power balance", f"not computed: {names} is C code without a Python version (key python)"))
     return rows
 
 
@@ -291,4 +296,8 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None, uncou
     units = [trajectory.units.get(name, "") for name in names]
     sizes = [float(max(trajectory[name].max(), -trajectory[name].min())) for name in names]
     final = without_noise([trajectory[name][-1] for name in names], units, sizes)
+    error, states = header["atol"] or 0.0, set(trajectory.x_names)
+    for k, name in enumerate(names):  # a state that rests, to the error that the integrator admits
+        if name in states and abs(final[k]) <= error and sizes[k] <= RESTING * error:
+            final[k] = 0.0
     print_rows([(name, f"{x: .9g} {unit}") for name, x, unit in zip(names, final, units, strict=True)])

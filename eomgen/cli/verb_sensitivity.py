@@ -16,11 +16,13 @@ from .shared_options import require_folder
 
 @verb_command()
 @analysis_options
-@click.option("--by", multiple=True, metavar="NAME", help="Parameter, input or initial value; all parameters if none.")
+@click.option(
+    "--by", multiple=True, metavar="NAME", help="Parameter, input or initial value; by default all parameters."
+)
 @click.option("--end", type=NumberRange(min=0, min_open=True), metavar="T", help="End time in s.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write them to FILE.npz or FILE.csv.")
 def sensitivity(work: Prepared, by: tuple[str, ...], end: float | None, out: Path | None, as_json: bool) -> None:
-    """Integrate a model together with its derivatives, and report those at the end."""
+    """Integrate a model together with its derivatives, and report the derivatives at the end."""
     if out is not None and out.suffix not in (".npz", ".csv"):
         raise UsageError(f"--out {out}: sensitivities are written as .npz or .csv")
     require_folder("--out", out)

@@ -16,16 +16,16 @@ from .sections import verb_command
 @verb_command()
 @analysis_options
 @click.option("--states", type=click.IntRange(min=1), default=6, show_default=True, help="Number of random states.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random states.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random states.")
 @click.option(
     "--seconds",
     type=NumberRange(min=0.0),
     default=12.0,
     show_default=True,
-    help="For all of it; variants have what is left.",
+    help="Time limit for all checks in s; variants get what is left.",
 )
 def verify(work: Prepared, states: int, seed: int, seconds: float, as_json: bool) -> None:
-    """Compare a model with its graph, 50 digits, free bodies and variants; exits with 5 where a limit is broken."""
+    """Check a compiled model against independent computations; exit with 5 if a limit is broken."""
     from ..verification.verify import verify_model
 
     with stage("verify"):

@@ -39,7 +39,7 @@ from .verb_run import complete_parameters, sort_settings
     "ranges",
     multiple=True,
     metavar="NAME=START:END[:COUNT]",
-    help="Move a coordinate over a range, without forces, e.g. theta=0:2*pi; t for drivers.",
+    help="Move a coordinate over a range without forces, e.g. theta=0:2*pi; t for drivers.",
 )
 @click.option("--end", type=NumberRange(min=0, min_open=True), metavar="T", help="End time of the run in s.")
 @click.option(
@@ -96,7 +96,9 @@ def view(
     chosen = parse_settings(settings)
     asked = [read_range(words) for words in ranges]
     if asked and (end is not None or solver):
-        raise UsageError("--range moves the model without forces; --end and options of the integrator are for runs")
+        raise UsageError("--range moves the model without forces; leave out --end and options of the integrator")
+    if any(count == 1 for *_, count in asked):
+        raise UsageError("an animation needs two positions: give --range a COUNT of at least 2")
     file = out if out is not None else Path(gettempdir()) / f"eomgen_{model.stem}.html"
     require_kind(file)
     require_folder("--out", None if out is None or not out.suffix else out)

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from ..files.writing import save_figure
 from .screen import finite
-from .shared_options import parse_settings
+from .shared_options import parse_number
 
 if TYPE_CHECKING:
     from ..analysis.workspace import Workspace
@@ -25,12 +25,12 @@ def read_grid(over: tuple[str, ...], of: tuple[str, ...], within: bool, ranges: 
     """
     if not over:
         if of or within:
-            raise UsageError("--of and --within-limits belong to --over NAME=LOW:HIGH:COUNT")
+            raise UsageError("--of and --within-limits need --over NAME=LOW:HIGH:COUNT; give it too")
         return {}
     if not of:
         raise UsageError("--over needs --of NAME: the outputs or coordinates whose workspace it is")
     if ranges:
-        raise UsageError("--over and --range do not go together: one is a grid, the other a path")
+        raise UsageError("--over and --range cannot be used together: one is a grid, the other a path")
     return read_axes("--over", over)
 
 
@@ -48,13 +48,13 @@ def read_axes(option: str, over: tuple[str, ...]) -> dict[str, Any]:
         if not equals or not name.strip() or len(parts) != 3:
             raise UsageError(f"{option} {words}: write NAME=LOW:HIGH:COUNT, for example theta=0:2*pi:73")
         try:
-            ends = parse_settings((f"LOW={parts[0]}", f"HIGH={parts[1]}"))
+            low, high = (parse_number(part) for part in parts[:2])
             count = int(parts[2])
         except ValueError as error:  # a UsageError too
             raise UsageError(f"{option} {words}: {error}") from None
         if name.strip() in grid:
-            raise UsageError(f"{option} {words}: each name once")
-        grid[name.strip()] = (ends["LOW"], ends["HIGH"], count)
+            raise UsageError(f"{option} {words}: give each name once")
+        grid[name.strip()] = (low, high, count)
     return grid
 
 

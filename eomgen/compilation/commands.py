@@ -47,7 +47,7 @@ class Running:
         words = shlex.join(command)
         with self._lock:
             if self._stopped:
-                raise ToolchainError(f"the command {words} was not begun: the work was given up", words)
+                raise ToolchainError(f"the command {words} was not started, because the work was cancelled", words)
             try:
                 process = subprocess.Popen(
                     command, cwd=directory, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
@@ -68,8 +68,7 @@ class Running:
         out, err = (b"".join(parts).decode("utf-8", "replace") for parts in said)
         if trouble:
             raise ToolchainError(
-                f"the command {words} does not come to an end: it was ended after {trouble}. Try another compiler by "
-                "CC",
+                f"the command {words} did not finish: it was stopped after {trouble}. Try another compiler (set CC)",
                 words,
                 (err + out)[:2000],
             )

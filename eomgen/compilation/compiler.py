@@ -72,7 +72,7 @@ def _find(command: str | None, variable: str, search_path: str) -> CompilerInfo:
     try:
         wished = [tuple(shlex.split(wish))]
     except ValueError as error:  # a quotation without its end
-        raise ToolchainError(f"{origin} is no command: {error}: {wish}") from None
+        raise ToolchainError(f"{origin} is not a command: {error}: {wish}") from None
     tried = []
     for words in wished if wish else _candidates():
         found = _identify(words, search_path)
@@ -110,7 +110,7 @@ def _identify(words: tuple[str, ...], search_path: str) -> CompilerInfo | str:
         return (result.stderr or result.stdout).strip() or f"exit status {result.returncode}"
     version = result.stdout.strip()
     if not version:
-        return "not a compiler: it says nothing when asked for its --version"
+        return "not a compiler: it prints nothing for --version"
     if any(Path(word).stem in ("zig", "ziglang") for word in command):
         kind = "zig"
         version += f"\nzig {run([*command[:-1], 'version']).stdout.strip()}"  # the above is clang's

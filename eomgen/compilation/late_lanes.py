@@ -44,7 +44,8 @@ def find_lanes(file: Path) -> int:
         library, table = _load(entry, file)
     except (ToolchainError, OSError, ValueError, AttributeError) as error:
         warnings.warn(
-            f"batches of the model in {file} go one state after the other, as their lanes cannot be made: {error}",
+            f"batches of the model in {file} are computed one state at a time, because their vector code cannot be "
+            f"compiled: {error}",
             RuntimeWarning,
             stacklevel=2,
         )

@@ -56,8 +56,8 @@ def load_core(artifact: Artifact) -> ModuleType:
         except Exception as error:  # of the loader, or of the first lines of the module
             Cache(artifact.directory.parents[1]).discard(artifact.key)
             raise ToolchainError(
-                f"the compiled model {artifact.path} cannot be loaded: {error}. It is no longer in the cache; compile "
-                "the model again, with another compiler (CC) if this comes back"
+                f"the compiled model {artifact.path} cannot be loaded: {error}. It was removed from the cache; compile "
+                "the model again, and use another compiler (CC) if this happens again"
             ) from error
         offer_lanes(module, artifact.path)
         sys.modules[name] = module

@@ -21,7 +21,7 @@ LARGE_SOURCE = 800_000
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """How to compile.
+    """Options of the compilation.
 
     Attributes
     ----------

@@ -63,7 +63,7 @@ def require_library(path: Path, marks: Iterable[bytes], command: Sequence[str]) 
     """
     data = _read(path, command)
     if _kind(data) != _kind(_reference()):
-        raise _lies(path, command, "is no library for this machine")
+        raise _lies(path, command, "is not a library for this machine")
     for mark in marks:
         if mark not in data:
             raise _lies(path, command, f"is not what was linked: it lacks the mark {mark.decode()}")

@@ -27,10 +27,10 @@ from .profiles import Profile
 CAM_ANGLE = "theta"
 
 
-def _polar(cam: Marker, contour: Profile) -> Contour:
-    """The contour r(theta) about the axis of a cam."""
+def _polar(cam: Marker, contour: Profile, follower: Marker, face: bool = False) -> Contour:
+    """The contour r(theta) about the axis of a cam, and the marker that is held to it."""
     a, r = contour.local, contour.expression
-    return Contour(cam, (r * cos(a), r * sin(a), a.graph.zero), a, 0.0, 2.0 * math.pi)
+    return Contour(cam, (r * cos(a), r * sin(a), a.graph.zero), a, 0.0, 2.0 * math.pi, follower, face)
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class KnifeContact(Constraint):
     contour: Profile
 
     def drawn(self) -> list[Seen]:
-        return [_polar(self.cam, self.contour)]
+        return [_polar(self.cam, self.contour, self.follower)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         x, y, _ = view.relative(self.cam, self.follower).position
@@ -93,7 +93,7 @@ class FlatSupport(Constraint):
         a, h = self.support.local, self.support.expression
         slope = self.support.slope(a)
         x, y = h * cos(a) - slope * sin(a), h * sin(a) + slope * cos(a)
-        return [Contour(self.cam, (x, y, a.graph.zero), a, 0.0, 2.0 * math.pi)]
+        return [Contour(self.cam, (x, y, a.graph.zero), a, 0.0, 2.0 * math.pi, self.follower, True)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         face = view.relative(self.cam, self.follower)
@@ -118,7 +118,7 @@ class _Contact(Constraint):
     angle: Expr
 
     def drawn(self) -> list[Seen]:
-        return [_polar(self.cam, self.contour)]
+        return [_polar(self.cam, self.contour, self.follower)]
 
     def polar(self, view: ConstraintView) -> tuple[Expr, Expr, Frame]:
         """r, r' and the follower's marker in the axes (e_r, e_theta, axis) of the contact point."""
@@ -167,6 +167,9 @@ class FlatContact(_Contact):
 
     type_name: ClassVar[str] = "cam_flat_face"
 
+    def drawn(self) -> list[Seen]:
+        return [_polar(self.cam, self.contour, self.follower, face=True)]
+
     def toward(self, follower: Frame) -> tuple[Expr, Expr]:
         return follower.rotation[0][2], follower.rotation[1][2]
 
@@ -199,9 +202,9 @@ def _cam(e: Entry) -> CamLift | None:
     for key, found in (("cam", turning), ("follower", follower)):
         if found.kind not in ("angle", "length"):
             message = f"the coordinate {found.name!r} is neither an angle nor a length"
-            e.fault(key, message, "name one that is; rotation: euler_angles has angles")
+            e.fault(key, message, "name an angle or a length; with rotation: euler_angles a joint has angles")
     if e.values.get("periodic") is True and turning.kind == "length":
-        message = f"the cam slides: {turning.name!r} is a length, and its law repeats no turn"
+        message = f"the cam slides ({turning.name!r} is a length), so its profile has no turn to repeat after"
         e.fault("periodic", message, "leave it out, or write the repetition into lift, as with sin(2*pi*theta/l)")
     if e.at_fault():
         return None
@@ -220,9 +223,9 @@ def _cam_contact(e: Entry) -> Constraint | None:
     elif "radius" not in e.values:
         e.fault("radius", "is missing", "give the radius of the roller")
     if "support" in e.values and shape != "flat_face":
-        e.fault("support", "a support function is the law of a flat face", "give the contour r(theta) instead")
+        e.fault("support", "only a flat face takes a support function", "give the contour r(theta) instead")
     if shape == "knife_edge" or "support" in e.values:
-        e.refuse("coordinate", "its contact point is known without a coordinate of its own")
+        e.refuse("coordinate", "the contact point of this follower needs no coordinate of its own")
     if axis is None or follower is None or e.at_fault():
         return None
     profile = _profile(e, "support" if "support" in e.values else "contour")
@@ -240,20 +243,20 @@ def _cam_contact(e: Entry) -> Constraint | None:
 
 _TURN = {CAM_ANGLE: Field("expression", "", dimension=NONE)}
 _PERIODIC = Field(
-    "flag", "whether the profile repeats every turn; then value and slope at 2 pi must be those at 0", default=True
+    "flag", "whether the profile repeats every turn; if so, value and slope at 2 pi must equal those at 0", default=True
 )
 _JOINT = Field("joint", "a joint of one degree, or a coordinate", required=True)
 
 TYPES = table(
     ElementType(
         "cam",
-        "a follower that moves by a law: its coordinate is the lift.",
+        "a cam with a given lift: the follower's coordinate is a function of the cam's angle.",
         {
             "cam": _JOINT._replace(doc="joint of the cam"),
             "follower": _JOINT._replace(doc="joint of the follower"),
             "lift": Field(
                 "expression",
-                "the follower's coordinate over theta = the cam's angle less the phase, from 0 to a full turn",
+                "the follower's coordinate as an expression of theta, the cam's angle minus the phase (0 to 2 pi)",
                 required=True,
                 dimension=REACH,
                 along="follower",
@@ -270,17 +273,25 @@ TYPES = table(
         "cam_contact",
         "a follower that stays in contact with the contour of a plane cam.",
         {
-            "cam": Field("marker", "the cam's axis (z) and where polar angles start (x)", required=True),
-            "follower": Field("marker", "tip, centre of the roller, or face with z away from the cam", required=True),
+            "cam": Field("marker", "marker on the cam: z is its axis, polar angles count from x", required=True),
+            "follower": Field(
+                "marker",
+                "marker at the tip, at the centre of the roller, or on the flat face with z away from the cam",
+                required=True,
+            ),
             "shape": Field(
                 "choice", "shape of the follower", required=True, choices=("knife_edge", "roller", "flat_face")
             ),
             "contour": Field(
-                "expression", "r(theta), radius of the contour over its polar angle (m)", dimension=LENGTH, local=_TURN
+                "expression",
+                "radius r(theta) of the contour at the polar angle theta (m)",
+                dimension=LENGTH,
+                local=_TURN,
             ),
             "support": Field(
                 "expression",
-                "of a flat face: h(theta), distance of the tangent with its normal at theta (m)",
+                "for a flat face: support function h(theta), distance of the axis from the tangent whose normal points "
+                "at theta (m)",
                 dimension=LENGTH,
                 local=_TURN,
             ),

@@ -88,5 +88,5 @@ class Constraint(ABC):
 def on_two_bodies(e: Entry, key: str, a: Marker, b: Marker) -> bool:
     """Whether two markers are on different bodies, which is noted where they are not."""
     if a.body == b.body:
-        e.fault(key, f"{a.label} and {b.label} are on the same body", "choose another body")
+        e.fault(key, f"{a.label} and {b.label} are on the same body", "choose a marker on another body for one of them")
     return a.body != b.body

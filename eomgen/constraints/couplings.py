@@ -51,7 +51,7 @@ class Equation(Constraint):
 
 def _coupling(e: Entry) -> Linear | Equation | None:
     if "equation" in e.values:
-        e.refuse("offset", "an equation has no offset")
+        e.refuse("offset", "offset belongs to coordinates, not to an equation")
         return _equation(e)
     terms = e.factors("coordinates")
     if terms is None:
@@ -66,18 +66,20 @@ def _equation(e: Entry) -> Equation | None:
     for name, meant in used.items():
         if meant.level == 2:
             what = "acceleration" if meant.kind == "marker" else meant.kind
-            remedy = "a constraint knows t, inputs, coordinates, velocities"
-            e.fault("equation", f"the {what} {name!r} cannot stand here", remedy)
+            remedy = "a constraint can contain t, inputs, coordinates and velocities"
+            e.fault("equation", f"the {what} {name!r} cannot be used here", remedy)
         if meant.kind == "energy":
-            remedy = "a constraint is an equation of the motion"
-            e.fault("equation", f"the energy {name!r} cannot stand here", remedy)
+            remedy = "a constraint can contain t, inputs, coordinates and velocities, not energies"
+            e.fault("equation", f"the energy {name!r} cannot be used here", remedy)
     moving = [meant for meant in used.values() if meant.level is not None]
     rates = [name for name, meant in used.items() if meant.level == 1]
     if not moving and not e.at_fault("equation"):
-        e.fault("equation", "there is no coordinate in it", f"coordinates: {', '.join(e.known('coordinate'))}")
+        e.fault(
+            "equation", "the equation contains no coordinate", f"coordinates are: {', '.join(e.known('coordinate'))}"
+        )
     if {*rates} & symbols_of(gradient(expression, [e.graph.symbol(name) for name in rates])):
-        message = f"it is not linear in {', '.join(rates)}"
-        e.fault("equation", message, "a nonholonomic constraint is linear in the velocities")
+        message = f"the equation is not linear in {', '.join(rates)}"
+        e.fault("equation", message, "a nonholonomic constraint must be linear in the velocities")
     kind = "length" if any(meant.measure == "length" for meant in moving) else "angle"
     return Equation(e.name, expression, kind, VELOCITY if rates else POSITION)
 
@@ -87,12 +89,14 @@ TYPES = table(
         "coupling",
         "a relation between coordinates: a linear one, or any equation.",
         {
-            "coordinates": Field("factors", "coordinate -> factor: the sum of factor times coordinate is the offset"),
-            "offset": Field("expression", "offset of the sum, an expression of parameters", default=0),
+            "coordinates": Field(
+                "factors", "mapping of coordinates to factors: the sum of factor times coordinate equals the offset"
+            ),
+            "offset": Field("expression", "value of that sum, an expression of parameters", default=0),
             "equation": Field(
                 "expression",
-                "instead, what is held at 0: of t, parameters, coordinates, places of markers; with velocities, in "
-                "which it must be linear, the constraint is nonholonomic",
+                "instead of coordinates, an expression that is held at 0: of t, parameters, coordinates, places of "
+                "markers; with velocities the constraint is nonholonomic and must be linear in them",
                 level=OUTPUT,
             ),
         },

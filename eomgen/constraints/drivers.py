@@ -108,7 +108,7 @@ def _driver(e: Entry) -> Driver | None:
     value = _value(e)
     if "marker" not in e.values:
         for key in ("axis", "on"):
-            e.refuse(key, "belongs to a driver of a marker")
+            e.refuse(key, "only a driver of a marker takes this key")
     if "coordinate" in e.values:
         found = e.coordinate("coordinate")
         if found is not None and found.kind == "parameter":
@@ -133,15 +133,15 @@ def _value(e: Entry) -> Expr:
     for name in sorted(symbols_of([value])):
         kind = e.meaning(name).kind
         if kind not in ("", "time", "parameter", "input"):
-            remedy = "a driver moves by t, parameters and inputs; a coupling relates coordinates"
-            e.fault("value", f"the {kind} {name!r} cannot stand here", remedy)
+            remedy = "a driver's value can contain t, parameters and inputs; a coupling relates coordinates"
+            e.fault("value", f"the {kind} {name!r} cannot be used here", remedy)
     called = {graph.nodes[i][0] for i in reachable(graph, [value.id])} & graph.calls.keys()
     for function, orders in (graph.calls[operation] for operation in sorted(called)):
         table_kind = e.table_kind(function.name)
         if table_kind is not None and (table_kind in ROUGH or any(orders)):
             derived = f"of the derivative of table {function.name!r}"
             what = derived if any(orders) else f"of {table_kind} table {function.name!r}"
-            remedy = "take the value of a table of kind cubic, natural or periodic, whose curvature is continuous"
+            remedy = "use a table of kind cubic, natural or periodic: its curvature is continuous"
             e.fault("value", f"the acceleration {what} jumps at its points", remedy)
     return value
 
@@ -154,21 +154,23 @@ TYPES = table(
             "coordinate": Field("joint", "a joint of one degree, or a coordinate, that is driven"),
             "value": Field(
                 "expression",
-                "motion over time (rad or m), of t, parameters, inputs, functions; its second derivative should be "
-                "continuous",
+                "the motion over time (rad or m), an expression of t, parameters, inputs and functions; its second "
+                "derivative should be continuous",
                 required=True,
                 level=MOTION,
                 dimension=REACH,
                 along="coordinate",
             ),
-            "between": Field("pair", "two markers whose distance is driven; they must not meet"),
+            "between": Field("pair", "two markers whose distance is driven; the distance must not become 0"),
             "angle": Field(
                 "pair",
-                "two markers with z axes that stay in line; the turn of the second about z of the first is driven",
+                "two markers whose z axes stay in line; the angle of the second about z of the first is driven",
             ),
-            "marker": Field("marker", "a marker of which one coordinate is driven"),
-            "axis": Field("axis", "along which the marker's place counts, in the axes of on", default="x"),
-            "on": Field("marker", "from where the marker's place counts (ground)", default="ground"),
+            "marker": Field("marker", "a marker whose position along axis is driven"),
+            "axis": Field(
+                "axis", "direction in which the marker's position is measured, in the axes of on", default="x"
+            ),
+            "on": Field("marker", "body or marker from which the marker's position is measured", default="ground"),
         },
         _driver,
         one_of=("coordinate", "between", "angle", "marker"),

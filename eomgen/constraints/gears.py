@@ -114,26 +114,29 @@ def _rack(e: Entry) -> Rack | None:
     return Rack(e.name, e.symbol(pinion), e.symbol(travel), e.law("radius"), e.law("offset"))
 
 
-_JOINTS = Field("joints", "two joints of one degree, or coordinates, whose axes one part carries", required=True)
+_JOINTS = Field(
+    "joints", "two joints of one degree, or coordinates, whose axes are carried by the same part", required=True
+)
 _RADII = Field("two", "base or pitch circle radii (m), in the order of the joints", dimension=LENGTH)
 _TEETH = Field("two", "numbers of teeth", dimension=NONE)
-_PHASE = Field("expression", "first angle where the second is 0 (rad)", default=0, dimension=NONE)
+_PHASE = Field("expression", "first angle at which the second angle is 0 (rad)", default=0, dimension=NONE)
 _JOINT = Field("joint", "a joint of one degree, or a coordinate", required=True)
 
 TYPES = table(
     ElementType(
         "gear",
-        "two gears that mesh: r_a a + r_b b = r_a phase, with a minus where one is internal.",
+        "two gears that mesh: r_a a + r_b b = r_a phase, or r_a a - r_b b = r_a phase if one is internal.",
         {
             "joints": _JOINTS,
             "radii": _RADII,
             "teeth": _TEETH,
             "cones": Field(
                 "two",
-                "pitch cone angles of a bevel pair (rad), both z axes pointing away from where they meet, or to it",
+                "pitch cone angles of a bevel pair (rad); both z axes point away from their intersection, or both to "
+                "it",
                 dimension=NONE,
             ),
-            "internal": Field("flag", "whether both turn the same way", default=False),
+            "internal": Field("flag", "whether one gear is internal, so that both turn the same way", default=False),
             "phase": _PHASE,
         },
         _gear,
@@ -148,18 +151,22 @@ TYPES = table(
             "radius": Field(
                 "expression", "radius (m); negative if the rack moves the other way", required=True, dimension=LENGTH
             ),
-            "offset": Field("expression", "travel where the pinion's angle is 0 (m)", default=0, dimension=LENGTH),
+            "offset": Field(
+                "expression", "travel of the rack at which the pinion's angle is 0 (m)", default=0, dimension=LENGTH
+            ),
         },
         _rack,
     ),
     ElementType(
         "belt",
-        "a belt without slip on two pulleys: r_a a = r_b b, with a minus where it crosses.",
+        "a belt without slip on two pulleys: r_a (a - phase) = r_b b, or -r_b b if the belt crosses.",
         {
             "joints": _JOINTS,
             "radii": _RADII,
             "teeth": _TEETH,
-            "crossed": Field("flag", "whether the belt crosses, so that the pulleys turn opposite ways", default=False),
+            "crossed": Field(
+                "flag", "whether the belt crosses, so that the pulleys turn in opposite directions", default=False
+            ),
             "phase": _PHASE,
         },
         _belt,

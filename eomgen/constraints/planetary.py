@@ -96,17 +96,17 @@ def _planetary(e: Entry) -> Planetary | None:
     parts: dict[str, Found] = {part: x for part, x in found.items() if x is not None}
     for part in ("sun", "ring"):
         if part in parts and part not in sizes:
-            e.fault(key, f"the {part} has a joint, and no size", f"give {key} of the {part}")
+            e.fault(key, f"the {part} has a joint but no size", f"give {key} of the {part}")
     main = [parts[part] for part in ("sun", "ring", "carrier") if part in parts]
     for other in main[1:]:
         e.require_one_carrier("", main[0], other)
     outer = {"sun", "ring"} & sizes.keys()
     if not outer or ("planet" not in parts and len(outer) < 2):
-        e.fault(key, "no ratio follows from these wheels", "give sun and ring, or planet and one more")
+        e.fault(key, "these wheels do not determine a ratio", "give sun and ring, or planet and one more")
     if "planet" in parts and len(sizes) < 2:
-        e.fault(key, "one size gives no ratio", f"give two of {', '.join(WHEELS)}")
+        e.fault(key, "one size does not determine a ratio", f"give two of {', '.join(WHEELS)}")
     if len(parts) < (2 if "planet" in parts else 1) or not main:
-        e.fault("", "too few of its parts move", "give joints of sun, ring, carrier, planet")
+        e.fault("", "too few parts of the set can move", "give joints for more of sun, ring, carrier, planet")
     if e.at_fault():
         return None
     sun, ring, carrier = (e.symbol(parts[p]) if p in parts else e.graph.zero for p in ("sun", "ring", "carrier"))
@@ -119,10 +119,10 @@ def _fit(e: Entry, key: str, sizes: Mapping[str, Expr]) -> None:
     numbers = {wheel: size.value for wheel, size in sizes.items() if size.value is not None}
     if {"sun", "ring"} <= numbers.keys() and numbers["ring"] <= numbers["sun"]:
         message = f"ring {numbers['ring']:g} is not larger than sun {numbers['sun']:g}"
-        e.fault(key, message, "the sun stands inside the ring")
+        e.fault(key, message, "the sun must be smaller than the ring")
     elif len(numbers) == 3 and abs(numbers["ring"] - numbers["sun"] - 2 * numbers["planet"]) > TENSOR * numbers["ring"]:
         message = f"ring {numbers['ring']:g} is not sun {numbers['sun']:g} + 2 planet {numbers['planet']:g}"
-        e.fault(key, message, "the wheels of a planetary set fit into each other; leave one out")
+        e.fault(key, message, "the sizes must fit (ring = sun + 2 planet); leave one of them out")
 
 
 def _planet(e: Entry, parts: Mapping[str, Found], carrier: Expr) -> Expr | None:
@@ -135,7 +135,7 @@ def _planet(e: Entry, parts: Mapping[str, Found], carrier: Expr) -> Expr | None:
     if base == e.carrier(parts["carrier"]):
         return planet - carrier
     message = f"{parts['planet'].name!r} is measured neither from the carrier nor from the frame"
-    e.fault("planet", message, "make one of them the predecessor of its joint")
+    e.fault("planet", message, "make the carrier or the frame the predecessor of the planet's joint")
     return None
 
 
@@ -144,15 +144,18 @@ _FIXED = "joint that turns the {0} relative to the frame; fixed if left out"
 TYPES = table(
     ElementType(
         "planetary",
-        "the meshing wheels of a planetary set (Willis).",
+        "a planetary gear set: its meshing wheels follow Willis' equation.",
         {
             **{part: Field("joint", _FIXED.format(part)) for part in ("sun", "ring", "carrier")},
-            "planet": Field("joint", "joint of a planet, on the carrier or on the frame, if planets are bodies"),
-            "radii": Field("wheels", "radii of sun, planet, ring that are there (m)", dimension=LENGTH),
-            "teeth": Field("wheels", "numbers of teeth of sun, planet, ring that are there", dimension=NONE),
+            "planet": Field(
+                "joint", "joint of a planet on the carrier or on the frame, needed only if a planet is a body"
+            ),
+            "radii": Field("wheels", "radii of the wheels that exist: sun, planet, ring (m)", dimension=LENGTH),
+            "teeth": Field("wheels", "numbers of teeth of the wheels that exist: sun, planet, ring", dimension=NONE),
             "phase": Field(
                 "expression",
-                "what the equation of the sun gives in the reference position (rad)",
+                "phase in r_s sun + r_r ring = (r_s + r_r) (carrier + phase) (rad); with a planet, that of its mesh "
+                "with the sun",
                 default=0,
                 dimension=NONE,
             ),

@@ -143,9 +143,9 @@ class KnifeEdge(Constraint):
 def _rolling(e: Entry) -> Constraint | None:
     shape, wheel, plane, radius = e.choice("shape"), e.marker("wheel"), e.marker("plane"), e.positive("radius")
     if shape == "sphere":
-        e.refuse("tube", "a sphere has no edge")
+        e.refuse("tube", "only a disc has an edge with a tube radius")
     else:
-        e.refuse("no_spin", "only a sphere turns about the normal without slip along the plane")
+        e.refuse("no_spin", "only a sphere takes no_spin")
     if wheel is None or plane is None or not on_two_bodies(e, "plane", wheel, plane):
         return None
     if shape == "sphere":
@@ -165,26 +165,31 @@ TYPES = table(
         "rolling",
         "a wheel or ball that rolls on a plane without slip.",
         {
-            "wheel": Field("marker", "marker at the centre; z is the axle of a disc", required=True),
+            "wheel": Field("marker", "marker at the centre of the wheel; z is the axle of a disc", required=True),
             "plane": Field(
-                "marker", "marker in the plane; z is its normal, on the side of the wheel (ground)", default="ground"
+                "marker", "marker in the plane; z is its normal and points to the wheel's side", default="ground"
             ),
             "radius": Field("expression", "radius (m)", required=True, dimension=LENGTH),
             "shape": Field("choice", "shape of the wheel", default="disc", choices=("disc", "sphere")),
             "tube": Field(
-                "expression", "radius of the rounded edge of a disc, 0 for a sharp one (m)", default=0, dimension=LENGTH
+                "expression",
+                "radius of the rounded edge of a disc (m), 0 for a sharp edge",
+                default=0,
+                dimension=LENGTH,
             ),
-            "no_spin": Field("flag", "whether a sphere cannot turn about the normal", default=False),
+            "no_spin": Field(
+                "flag", "whether the sphere is kept from spinning about the plane's normal", default=False
+            ),
         },
         _rolling,
     ),
     ElementType(
         "knife_edge",
-        "a blade: a marker that does not move along an axis of its own.",
+        "a blade: a marker that cannot move sideways, along one of its own axes.",
         {
-            "marker": Field("marker", "where the blade touches", required=True),
-            "axis": Field("axis", "direction without motion, in the marker's axes", default="y"),
-            "on": Field("marker", "the body on which it moves (ground)", default="ground"),
+            "marker": Field("marker", "marker at the point where the blade touches", required=True),
+            "axis": Field("axis", "direction in which the marker cannot move, in its own axes", default="y"),
+            "on": Field("marker", "the body on which the blade moves", default="ground"),
         },
         _knife_edge,
     ),

@@ -26,7 +26,7 @@ class Contacts:
         """A marker at a cam's axis on a new body ``index`` without mass, whose x axis points to the contact point."""
         graph, name = reader.graph, f"{entry.name}_contact"
         if name in reader.bodies:
-            message = f"its contact point is a body {name!r}, which there is already"
+            message = f"the contact point needs a body named {name!r}, and there is one already"
             reader.faults.add(entry.path, message, "rename one of them")
             return None
         o = vec.zero(graph)

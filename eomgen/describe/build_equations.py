@@ -23,7 +23,7 @@ from .sympy_face import name_of
 from .values import Reader
 
 PATH = "equations"
-LINEAR = "write it as a sum of terms a(q, t)*v and b(q, t), each velocity to the first power"
+LINEAR = "write it as a sum of terms a(q, t)*v and b(q, t), with each velocity to the first power"
 
 
 def declare_equations(reader: Reader, given: Any, has_others: bool) -> dict[str, Any] | None:
@@ -36,7 +36,9 @@ def declare_equations(reader: Reader, given: Any, has_others: bool) -> dict[str,
         return {}
     if has_others:
         faults.add(
-            PATH, "the model has bodies, joints or a Lagrangian too", "describe bodies, a Lagrangian or equations"
+            PATH,
+            "the model has bodies, joints or a Lagrangian too",
+            "describe only one: bodies, a Lagrangian, equations",
         )
     check_keys(PATH, given, EQUATIONS, faults)
     values = dict(given)
@@ -87,7 +89,7 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
         if fault:
             faults.add(f"{PATH}.intermediates.{name}", *fault)
         elif name in reader.names.kinds:
-            message = f"the name is taken by the {reader.names.kinds[name]}"
+            message = f"the name is already used by the {reader.names.kinds[name]}"
             faults.add(f"{PATH}.intermediates.{name}", message, "rename one")
         local[name] = reader.expression(f"{PATH}.intermediates.{name}", part, MOTION, local)
     rates = _rates(reader, values.get("rates"), q, v, local)
@@ -127,7 +129,7 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
     for k, constraint in enumerate(constraints):
         _check_linear(reader, f"{PATH}.constraints[{k}]", constraint, v)
         if constraint.is_zero:
-            faults.add(f"{PATH}.constraints[{k}]", "is 0 whatever the motion", "leave it out")
+            faults.add(f"{PATH}.constraints[{k}]", "is 0 for every motion, so it constrains nothing", "leave it out")
     if named and len(named) != len(constraints):
         message = f"{len(named)} names for {len(constraints)} constraints"
         faults.add(f"{PATH}.multipliers", message, "name one for each constraint, in order")
@@ -144,7 +146,7 @@ def check_energies(given: GivenEquations | None, outputs: Sequence[Output], faul
         return
     for output in outputs:
         for name in sorted(symbols_of([output.expression]) & {f"{energy}()" for energy in ENERGIES}):
-            message = f"{name.removesuffix('()')} is not known: the equations are given without kinetic_energy"
+            message = f"{name.removesuffix('()')} is not known, because the equations are given without kinetic_energy"
             faults.add(f"outputs.{output.name}", message, f"give {PATH}.kinetic_energy")
 
 
@@ -193,7 +195,7 @@ def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequen
     used = symbols_of(flat)
     moving = sorted(used & set(v))
     if moving:
-        reader.faults.add(f"{PATH}.mass_matrix", f"depends on {', '.join(moving)}", "only q, t and parameters can")
+        reader.faults.add(f"{PATH}.mass_matrix", f"depends on {', '.join(moving)}", "allowed are q, t and parameters")
         return
     n = len(rows)
     values = {name: 0.37 + 0.61 * ((k * 0.618033988749895) % 1.0) for k, name in enumerate(sorted(used))}
@@ -204,5 +206,7 @@ def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequen
             gap = abs(numbers[i * n + j] - numbers[j * n + i])
             if gap > TENSOR * size:  # false where an entry is not finite there
                 message = f"is not symmetric: entries ({i}, {j}) and ({j}, {i}) differ"
-                reader.faults.add(f"{PATH}.mass_matrix", message, "give M of M v' = f with f all forces, as it is")
+                reader.faults.add(
+                    f"{PATH}.mass_matrix", message, "give the symmetric M of M v' = f, where f contains all forces"
+                )
                 return

@@ -35,7 +35,11 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
         expression = _instant(reader, f"{path}.expression", values["expression"])
     direction = values.get("direction", 0)
     if not is_number(direction) or direction not in (-1, 0, 1):
-        reader.faults.add(f"{path}.direction", f"{direction!r} is not 1, -1 or 0", "1 rising, -1 falling, 0 both")
+        reader.faults.add(
+            f"{path}.direction",
+            f"{direction!r} is not 1, -1 or 0",
+            "give 1 for a rising, -1 for a falling value, 0 for both",
+        )
         direction = 0
     reset = _reset(reader, f"{path}.reset", values.get("reset") or {})
     restitution = None
@@ -44,9 +48,10 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
         if restitution is not None and not 0.0 <= restitution <= 1.0:
             reader.faults.add(f"{path}.restitution", f"{restitution:g} is not between 0 and 1")
         if reset:
-            reader.faults.add(f"{path}.reset", "stands beside a restitution", "give one of the two")
+            reader.faults.add(f"{path}.reset", "is given beside a restitution", "give one of the two")
         if direction == 1:
-            reader.faults.add(f"{path}.direction", "an impact is a gap that closes", "give -1, or leave it out")
+            message = "with a restitution only a falling value (a gap that closes) is an impact"
+            reader.faults.add(f"{path}.direction", message, "give -1, or leave it out")
         direction = -1
     doc = reader.text(f"{path}.doc", values.get("doc", ""))
     terminal = _times(reader, f"{path}.terminal", values.get("terminal", False))
@@ -70,8 +75,8 @@ def _instant(reader: Reader, path: str, value: Any) -> Expr:
         if found is not None and QUANTITIES[found[0]][0] in _ACCELERATIONS:
             what = "acceleration"
         if what is not None:
-            remedy = "t, parameters, inputs, coordinates, velocities, positions and velocities of markers can"
-            reader.faults.add(path, f"the {what} {name!r} cannot stand in an event", remedy)
+            remedy = "allowed are t, parameters, inputs, coordinates, velocities, positions and velocities of markers"
+            reader.faults.add(path, f"the {what} {name!r} cannot be used in an event", remedy)
     return expression
 
 

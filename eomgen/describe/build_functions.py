@@ -26,7 +26,8 @@ def build_functions(reader: Reader, entries: list[DescribedEntry]) -> None:
     """Declare the functions of all entries; one at fault gets a stand-in, so that its calls are not at fault too."""
     for entry in entries:
         if isinstance(entry.name, str) and entry.name in QUANTITIES:
-            reader.faults.add(entry.path, f"{entry.name!r} is the motion of a marker", "choose another name")
+            message = f"{entry.name!r} is a built-in name for the motion of a marker"
+            reader.faults.add(entry.path, message, "choose another name")
         reader.names.declare("function", entry.name, entry.path)
         function = None if reader.faults.under(entry.path) else _build(reader, entry)
         if function is None:
@@ -68,7 +69,9 @@ def _table(reader: Reader, entry: DescribedEntry) -> Function | None:
         return None
     if surface:
         if kind not in ("cubic", "natural"):
-            faults.add(f"{path}.kind", f"{kind!r} is not for tables of two arguments", "allowed: cubic, natural")
+            faults.add(
+                f"{path}.kind", f"{kind!r} is not available for tables of two arguments", "allowed: cubic, natural"
+            )
         z = _grid(reader, f"{path}.z", values["z"], len(x), len(y))
         if z is None or faults.under(path):
             return None
@@ -80,10 +83,14 @@ def _table(reader: Reader, entry: DescribedEntry) -> Function | None:
         faults.add(f"{path}.y", f"has {len(y)} values for {len(x)} points", "give one for each x")
     elif kind == "periodic":
         if len(x) < 3:
-            faults.add(f"{path}.x", "a periodic table has at least three points", "the last repeats the first")
+            faults.add(
+                f"{path}.x",
+                "has fewer than three points",
+                "a periodic table needs three or more, of which the last repeats the first",
+            )
         elif abs(y[-1] - y[0]) > PERIODIC * np.max(np.abs(y)):
             faults.add(
-                f"{path}.y", f"ends with {y[-1]:g} and begins with {y[0]:g}", "a periodic table ends as it begins"
+                f"{path}.y", f"ends with {y[-1]:g} and begins with {y[0]:g}", "make the two values of a period equal"
             )
         y[-1] = y[0]
     if faults.under(path):
@@ -98,7 +105,7 @@ def _finite(reader: Reader, path: str, function: Function, numbers: Array) -> Fu
     """The function, unless its slopes are too large for doubles."""
     if np.isfinite(numbers).all():
         return function
-    reader.faults.add(path, "is too steep for doubles", "scale its values or its points")
+    reader.faults.add(path, "is too steep for double precision", "scale its values or its points")
     return None
 
 
@@ -114,12 +121,12 @@ def _points(reader: Reader, path: str, given: Any) -> Array | None:
     if x is None:
         return None
     if len(x) < 2:
-        reader.faults.add(path, "has fewer than two points", "a table has at least two")
+        reader.faults.add(path, "has fewer than two points", "give two or more")
         return None
     steps = np.diff(x)
     if not (steps > 0.0).all():
         k = int(np.argmax(~(steps > 0.0)))
-        reader.faults.add(f"{path}[{k + 1}]", f"{x[k + 1]:g} follows {x[k]:g}", "the points of a table increase")
+        reader.faults.add(f"{path}[{k + 1}]", f"{x[k + 1]:g} follows {x[k]:g}", "the points of a table must increase")
         return None
     if not np.isfinite(x[-1] - x[0]) or (steps < APART * np.max(np.abs(x))).any():
         reader.faults.add(path, "has points too close together, or too far apart, for double precision")

@@ -99,7 +99,7 @@ def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, .
         columns = reader.axis(f"{path}.axis", values["axis"]) if "axis" in values else TURNS["z"]
         if "axes" in values:
             if "axis" in values:
-                reader.faults.add(f"{path}.axes", "axis is given too", "leave one of them out")
+                reader.faults.add(f"{path}.axes", "axis is given too", "leave out one of them")
             columns = reader.axes(f"{path}.axes", values["axes"])
         if pair is None:
             continue
@@ -107,7 +107,7 @@ def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, .
             reader.faults.add(
                 f"{path}.between",
                 f"{pair[0].label} and {pair[1].label} are on the same body",
-                "a joint connects two bodies, or a body and ground",
+                "connect two bodies, or a body and ground",
             )
             continue
         if columns != TURNS["z"]:
@@ -160,7 +160,7 @@ def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
         if field.required and key not in entry.values and key != "type":
             reader.faults.add(f"{entry.path}.{key}", "is missing", f"give {KINDS[field.kind]}")
     if {"coordinate", "coordinates"} <= entry.values.keys():
-        reader.faults.add(f"{entry.path}.coordinates", "coordinate is given too", "leave one of them out")
+        reader.faults.add(f"{entry.path}.coordinates", "coordinate is given too", "leave out one of them")
     kind = JOINTS[type_name]
     options: dict[str, Any] = {}
     for option in kind.options:
@@ -212,7 +212,7 @@ def _shape(reader: Reader, path: str, value: Any, field: Field, own: tuple[str, 
     for name in sorted(symbols_of(point) - allowed):
         if name in reader.names.kinds:
             kind = reader.names.kinds[name]
-            reader.faults.add(path, f"the {kind} {name!r} cannot stand here", f"only parameters and {shown} can")
+            reader.faults.add(path, f"the {kind} {name!r} cannot be used here", f"allowed are parameters and {shown}")
     if not symbols_of(point) & set(own) and not reader.faults.under(path):
-        reader.faults.add(path, f"does not depend on {shown}", f"write it with the joint's own {shown}")
+        reader.faults.add(path, f"does not depend on {shown}", f"use the joint's own {shown} in the expressions")
     return Shape(point, tuple(reader.graph.symbol(name) for name in own))

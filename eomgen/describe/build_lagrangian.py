@@ -28,7 +28,9 @@ def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str
         reader.wrong("lagrangian", given, "table")
         return {}
     if has_bodies:
-        faults.add("lagrangian", "the model has bodies or joints too", "describe either bodies or a Lagrangian")
+        faults.add(
+            "lagrangian", "the model has bodies or joints too", "describe only one of them: bodies or a Lagrangian"
+        )
     check_keys("lagrangian", given, LAGRANGIAN, faults)
     values = dict(given)
     listed = items(values.get("coordinates", ()))
@@ -78,11 +80,11 @@ def _require_quadratic(reader: Reader, path: str, expression: Expr, names: list[
     if found:
         reader.faults.add(
             path,
-            "is not quadratic in the velocities: the mass matrix, its second derivatives by them, depends on "
+            "is not quadratic in the velocities: the mass matrix (its second derivatives by them) depends on "
             + ", ".join(found),
-            "write T as a sum of terms m(q, t)*a_dot*b_dot, b(q, t)*a_dot and c(q, t), products expanded; for another "
-            "Lagrangian give the equations of motion themselves: `equations:` of a model file, with mass_matrix 1 and "
-            "the accelerations as forcing",
+            "write T as a sum of terms m(q, t)*a_dot*b_dot, b(q, t)*a_dot and c(q, t), with all products expanded; for "
+            "another kind of Lagrangian give the equations of motion: `equations:` of a model file, with mass_matrix "
+            "1 and the accelerations as forcing",
         )
 
 
@@ -93,7 +95,7 @@ def _constraint(reader: Reader, path: str, given: Any, names: list[str]) -> Expr
     if not symbols_of([expression]).isdisjoint(rates):
         slopes = jacobian([expression], list(rates.values()))
         if not symbols_of(list(slopes.values())).isdisjoint(rates):
-            remedy = "write it as a sum of terms a(q, t)*q_dot and b(q, t), each velocity to the first power"
+            remedy = "write it as a sum of terms a(q, t)*q_dot and b(q, t), with each velocity to the first power"
             reader.faults.add(path, "is not linear in the velocities", remedy)
     return expression
 

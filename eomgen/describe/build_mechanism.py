@@ -28,7 +28,7 @@ from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .cam_turns import check_turns
-from .check_dimensions import check_dimensions
+from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
 from .dotted_names import undotted
@@ -79,8 +79,8 @@ def build(description: Description) -> Mechanism:
     if fault:
         faults.add("name", *fault)
     if values.get("attachments"):
-        remedy = "add this model to another as a component, which gives markers in their place"
-        faults.add("attachments", "stand for markers of another model", remedy)
+        remedy = "add this model to that one as a component, which gives a marker for each attachment"
+        faults.add("attachments", "attachments stand for markers of another model", remedy)
     parameters = tuple(_parameter(reader, entry) for entry in sections["parameters"])
     inputs = tuple(_input(reader, entry) for entry in sections["inputs"])
     numbers = reader.numbers = {p.name: p.value for p in parameters if p.value is not None}
@@ -124,6 +124,7 @@ def build(description: Description) -> Mechanism:
         check_connected(bodies, joints, faults)
     if faults:
         raise ModelError(faults.sorted())
+    outputs = with_units(reader, joints, outputs)
     described = len(bodies)
     bodies, joints = (*bodies, *contacts.bodies), (*joints, *contacts.joints)
     return Mechanism(
@@ -188,7 +189,8 @@ def _in_si(reader: Reader, path: str, value: float | None, unit: Unit) -> float 
         return value
     found = value * unit.size
     if not math.isfinite(found) or (value != 0.0 and abs(found) < sys.float_info.min):
-        reader.faults.add(path, f"{value:g} {unit.text} in {unit.si} is no number of double precision", "check both")
+        remedy = "check the value and its unit"
+        reader.faults.add(path, f"{value:g} {unit.text} in {unit.si} is outside the range of double precision", remedy)
         return None
     return found
 
@@ -218,10 +220,10 @@ def _with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:
     for name in sorted(symbols_of([expression])):
         if reader.names.kinds.get(name) == "input":
             reader.faults.add(
-                path, f"the input {name!r} cannot stand here", "t, coordinates, velocities, parameters can"
+                path, f"the input {name!r} cannot be used here", "allowed are t, coordinates, velocities and parameters"
             )
     if any(reader.graph.nodes[i][0] not in (*OPERATIONS, *LEAVES) for i in reachable(reader.graph, [expression.id])):
-        reader.faults.add(path, "a function that the model declares cannot stand here", "write the expression out")
+        reader.faults.add(path, "a function of the model cannot be used here", "write out its expression")
     return replace(given, signal=expression)
 
 
@@ -287,13 +289,13 @@ def _output(reader: Reader, entry: DescribedEntry) -> Output:
     if "expression" in entry.values:
         expression = reader.expression(f"{path}.expression", entry.values["expression"], OUTPUT)
     if unit.size != 1.0 and expression.value is not None:
-        faults.add(f"{path}.unit", "the unit of the plain number is not known", "name a parameter with a unit")
+        faults.add(f"{path}.unit", "the expression is a number whose unit is not known", "use a parameter with a unit")
     kind = reader.names.kinds.get(entry.name) if isinstance(entry.name, str) else None
     if kind in ("coordinate", "velocity", "acceleration", "multiplier"):
         if expression != reader.graph.symbol(entry.name):
             faults.add(path, f"{entry.name!r} is a {kind}", f"an output of that name must be {entry.name} itself")
         elif unit.size != 1.0:
-            remedy = f"leave the unit out, or give the output in {unit.text} a name of its own"
+            remedy = f"leave the unit out, or give the output in {unit.text} another name"
             faults.add(f"{path}.unit", f"{entry.name!r} is a {kind}, which is in SI units", remedy)
     elif kind != "output":
         reader.names.declare("output", entry.name, path)
@@ -359,6 +361,6 @@ def _simulation(reader: Reader, given: Any) -> Simulation:
         else:
             settings[key] = reader.number(path, given[key], positive=True)
     if (settings.get("method") == "RK4") != ("step" in settings):
-        remedy = "give step, in s" if "step" not in settings else "take it away, or set method to RK4"
+        remedy = "give step, in s" if "step" not in settings else "remove it, or set method to RK4"
         reader.faults.add("simulation.step", "only method RK4 takes steps of one size, and it needs their size", remedy)
     return Simulation(**settings)

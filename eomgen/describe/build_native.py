@@ -41,7 +41,7 @@ def build_native(reader: Reader, entry: DescribedEntry) -> Function | None:
     if not entry.trusted:
         faults.add(
             path,
-            "is native code, which a model file may bring only where that is allowed",
+            "is native code, and native code of model files is not allowed in this call",
             f"read {values['source']!r} and, if you trust it, use --allow-native (in Python load(path, "
             "allow_native=True))",
         )
@@ -68,10 +68,10 @@ def _check_signature(reader: Reader, path: str, name: str, arity: int, source: t
     if found is None:
         if not re.search(rf"\b{name}\b", text):
             reader.faults.add(
-                f"{path}.source", f"{file} has no function {name!r}", "a C function double f(double, ...)"
+                f"{path}.source", f"{file} has no function {name!r}", "it must be a C function double f(double, ...)"
             )
     elif found.foreign:
-        message = f"{name} in {file}:{found.line} has {found.foreign!r}, which is no double"
+        message = f"{name} in {file}:{found.line} has {found.foreign!r}, which is not double"
         reader.faults.add(f"{path}.source", message, f"write {one}")
     elif found.arguments != arity:
         message = f"{name} in {file}:{found.line} takes {found.arguments} arguments, not the {arity} declared"
@@ -103,7 +103,7 @@ def _names(reader: Reader, entry: DescribedEntry, arity: int) -> list[tuple[Orde
     if reader.faults.under(path):
         return None
     if len({name for _, _, name in wanted}) < len(wanted):
-        reader.faults.add(path, "names one C function twice", "each derivative is a function of its own")
+        reader.faults.add(path, "names one C function twice", "name a different C function for each derivative")
     return None if reader.faults.under(path) else [(orders, name) for _, orders, name in wanted]
 
 
@@ -115,8 +115,8 @@ def _listed(reader: Reader, path: str, given: Any, length: int) -> list[Any]:
         reader.wrong(path, given, "functions")
         return []
     if len(listed) != length:
-        what = f"{length} of them, null where the source has none"
-        reader.faults.add(path, f"has {len(listed)} entries", f"for as many arguments there are {what}")
+        what = f"with that many arguments it needs {length}, null where the source has none"
+        reader.faults.add(path, f"has {len(listed)} entries", what)
         return []
     return listed
 
@@ -174,6 +174,10 @@ def _twin(
         return None, ""
     missing = [name for _, name in names if not callable(getattr(module, name, None))]
     if missing:
-        reader.faults.add(path, f"{source[0]} has no function {', '.join(missing)}", "it bears the names of the C ones")
+        reader.faults.add(
+            path,
+            f"{source[0]} has no function {', '.join(missing)}",
+            "its functions must have the names of the C functions",
+        )
         return None, ""
     return Twin({orders: getattr(module, name) for orders, name in names}), source[1]

@@ -53,7 +53,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
 
     @classmethod
     def from_description(cls, description: Description) -> Self:
-        """A model around raw data, as the readers of model files make it."""
+        """Make a model from a description, as the readers of model files do."""
         model = cls.__new__(cls)
         model._start(description)
         return model
@@ -71,7 +71,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         inputs: Mapping[Any, Any] | None = None,
         latex: Mapping[Any, str] | None = None,
     ) -> Self:
-        """A model from a bare Lagrangian; see :func:`eomgen.describe.lagrangian.describe_lagrangian`."""
+        """Make a model from a Lagrangian; see :func:`eomgen.describe.lagrangian.describe_lagrangian`."""
         from .lagrangian import describe_lagrangian
 
         return cls.from_description(
@@ -82,7 +82,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
     def from_equations(
         cls, name: str, coordinates: Sequence[Any], mass_matrix: Any, forcing: Any, **further: Any
     ) -> Self:
-        """A model from M v' = f; see :func:`eomgen.describe.given_equations.describe_equations`."""
+        """Make a model from equations M v' = f; see :func:`eomgen.describe.given_equations.describe_equations`."""
         from .given_equations import describe_equations
 
         check_keywords("from_equations", further, keywords_of(describe_equations))
@@ -90,7 +90,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
 
     # -- quantities -----------------------------------------------------------------------------------------------
     def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "", latex: str = "") -> Any:
-        """Declare a constant that can change between runs.
+        """Declare a parameter: a constant that can change between runs.
 
         Parameters
         ----------
@@ -121,7 +121,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         signal: Value | None = None,
         latex: str = "",
     ) -> Any:
-        """Declare a quantity given from outside over time; ``value`` holds while none is given.
+        """Declare an input, a quantity that is given over time; ``value`` is used as long as a call gives none.
 
         ``signal``, an expression of t, coordinates, velocities and parameters, is what runs take that give none;
         calls of the module's own functions still take ``value``.  ``unit``, ``doc`` and ``latex`` are those
@@ -137,7 +137,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         return symbol(name)
 
     def output(self, name: str, expression: Value, unit: str = "", doc: str = "", latex: str = "") -> None:
-        """Declare a named result.
+        """Declare an output: a named result of the model.
 
         Parameters
         ----------
@@ -164,7 +164,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         restitution: Value | None = None,
         doc: str = "",
     ) -> None:
-        """Declare an event: a zero of an expression that runs find, and what happens there.
+        """Declare an event: runs find the time where an expression becomes zero, and can stop or reset the state there.
 
         Parameters
         ----------
@@ -252,7 +252,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
 
     @property
     def guess(self) -> Any:
-        """Rough coordinates where the assembly of loops starts: ``m.guess(phi=1.2)``."""
+        """Rough values of coordinates from which the loops are closed: ``m.guess(phi=1.2)``."""
         return self._description.values["guess"]
 
     @guess.setter
@@ -261,7 +261,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
 
     @property
     def independent(self) -> Any:
-        """Coordinates to integrate, where loops leave a choice: ``m.independent("theta")`` or assign a list."""
+        """Independent coordinates of a mechanism with loops: ``m.independent("theta")``, or assign a list."""
         return self._description.values["independent"]
 
     @independent.setter
@@ -280,16 +280,16 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
     # -- what comes next ------------------------------------------------------------------------------------------
     @property
     def notes(self) -> tuple[str, ...]:
-        """What an import left out or changed, and what was only to be noted, one sentence each."""
+        """Notes on what an import left out or changed, and on accepted doubtful values, one sentence each."""
         return tuple(self._description.notes)
 
     @property
     def renamed(self) -> dict[str, dict[str, str]]:
-        """Section -> name in an imported file -> name in the model, where they differ."""
+        """Names that an import changed: section -> name in the file -> name in the model."""
         return self._description.renamed
 
     def mechanism(self) -> Mechanism:
-        """Check the model and lower it to one graph.
+        """Check the model and translate it to one expression graph.
 
         Returns
         -------
@@ -309,7 +309,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         return yaml_text(self._description)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the model as a model file; one that is there already stays as it is where that fails."""
+        """Write the model to a model file; if writing fails, a file that already exists stays unchanged."""
         from ..files.writing import write_whole
 
         write_whole(path, self.to_yaml())

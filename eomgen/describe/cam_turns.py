@@ -12,8 +12,8 @@ from ..graph.substitute import symbols_of
 from .description import Faults
 
 REMEDY = (
-    "make value and slope at 2 pi those at 0, by pieces or a table of kind periodic; a cam that stays within one turn "
-    "has periodic: false"
+    "make value and slope at 2 pi equal to those at 0, with pieces or a table of kind periodic; give periodic: false "
+    "for a cam that stays within one turn"
 )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..elements.dimensions import ENERGY, FORCE, INERTIA, LENGTH, MASS, NONE, SPEED, SPIN, STIFFNESS, TIME, Dimension
@@ -18,7 +19,7 @@ from ..graph.traverse import reachable
 from ..operations import OPERATIONS
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MODEL, Field, acts_on_length, fields_of, part_fields
-from .mechanism import LEVEL_DIMENSIONS, JointSpec
+from .mechanism import LEVEL_DIMENSIONS, TURNING, JointSpec, Output
 from .scope import ENERGIES, RATES
 from .units import Unit, si_text
 from .values import Reader
@@ -87,8 +88,38 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
             wanted = units[entry.path].dimension
         if steps and steps[0] in ("initial", "guess", "reset"):
             wanted = names.get(str(steps[-1]), Known(None)).dimension
-        for message, remedy in check.faults(expression, wanted):
+        certain = section == "outputs" and check.is_certain(expression)
+        mass = _plain_mass(entry) if wanted == INERTIA and section == "bodies" else 0.0
+        for message, remedy in check.faults(expression, wanted, certain, mass):
             reader.faults.add(path, message, remedy)
+
+
+def with_units(reader: Reader, joints: tuple[JointSpec, ...], outputs: tuple[Output, ...]) -> tuple[Output, ...]:
+    """Outputs with the SI unit that follows from their expressions, where none is given and no number hides one.
+
+    A rate and a plain number have no unit, unless the expression is a sum of angles or of their rates.
+    """
+    names = _names(reader, reader.units, joints)
+    turned = {c for j in joints for c, k in zip(j.coordinates, j.joint.coordinates, strict=True) if k.kind == "angle"}
+    angles = {name + suffix for name in turned for suffix in RATES}
+    turns = {name: q.level in TURNING or (q.level == 0 and q.axis == 3) for name, q in reader.quantities.items()}
+    angles |= {name for name, turn in turns.items() if turn}
+    check = _Check(reader.graph, names)
+    found = []
+    for output in outputs:
+        faulty = bool(list(check.faults(output.expression, None)))
+        own = check.known[output.expression.id].dimension
+        if not output.unit and own is not None and not faulty:
+            nodes = [reader.graph.nodes[i] for i in reachable(reader.graph, [output.expression.id])]
+            sums = {node[0] for node in nodes} <= {"sym", "neg", "add", "sub"}
+            symbols = {str(node[1]) for node in nodes if node[0] == "sym"}
+            angle = sums and symbols <= angles
+            if sums and symbols <= {f"{name}()" for name in ENERGIES}:
+                output = replace(output, unit="J")
+            elif angle or (own != NONE and own.times(SPIN, -1) != NONE):
+                output = replace(output, unit=si_text(own, "rad" if angle else ""))
+        found.append(output)
+    return tuple(found)
 
 
 def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, ...]) -> dict[str, Known]:
@@ -144,6 +175,15 @@ def _field(section: str, entry: DescribedEntry | None, steps: list[Any]) -> tupl
     return row, entry.values
 
 
+def _plain_mass(entry: DescribedEntry | None) -> float:
+    """The mass of a body where it is a plain number, else 0."""
+    try:
+        mass = float(entry.values["mass"]) if entry is not None else 0.0
+    except (KeyError, TypeError, ValueError):
+        return 0.0
+    return mass if math.isfinite(mass) else 0.0
+
+
 class _Check:
     """The dimensions of the nodes of a graph, and what is wrong with them."""
 
@@ -152,11 +192,19 @@ class _Check:
         self.known: dict[int, Known] = {}
         self.wrong: dict[int, tuple[str, str]] = {}
 
-    def faults(self, expression: Expr, wanted: Dimension | None) -> Iterator[tuple[str, str]]:
+    def is_certain(self, expression: Expr) -> bool:
+        """Whether it is made of quantities alone, as ``x(tip) - s``, so that no number or law can hide a unit."""
+        nodes = [self.graph.nodes[i] for i in reachable(self.graph, [expression.id])]
+        known = all(self.names.get(str(node[1]), Known(None)).dimension for node in nodes if node[0] == "sym")
+        return known and {node[0] for node in nodes} <= {"sym", "neg", "add", "sub", "mul", "div"}
+
+    def faults(
+        self, expression: Expr, wanted: Dimension | None, certain: bool = False, mass: float = 0.0
+    ) -> Iterator[tuple[str, str]]:
         """Message and remedy of each fault of an expression.
 
         Where no given unit is in it, only sums are checked: in ``-rate**3`` or ``exp(-t)`` a factor of 1 has what unit
-        it needs.
+        it needs.  In an output that is ``certain`` there is no such factor.
         """
         nodes = reachable(self.graph, [expression.id])
         for i in nodes:
@@ -165,13 +213,38 @@ class _Check:
         found = [self.wrong[i] for i in nodes if i in self.wrong]
         yield from found
         result = self.known[expression.id]
-        if found or wanted is None or result.dimension is None or not result.declared:
+        if found or wanted is None or result.dimension is None or not (result.declared or certain):
+            return
+        if mass and result.dimension.alike(wanted.times(MASS, -1)) and self.holds_mass(expression.id, mass):
             return
         if not result.dimension.alike(wanted):
             message = (
-                f"{written(self.graph, expression.id)} is {named(result.dimension)}, and {named(wanted)} belongs here"
+                f"{written(self.graph, expression.id)} is {named(result.dimension)}, and {named(wanted)} is needed here"
             )
             yield message, self._remedy(nodes, f"give {named(wanted)}")
+
+    def holds_mass(self, i: int, mass: float, factor: float = 1.0) -> bool:
+        """Whether the mass of a body, given as a plain number, is among the factors of its inertia.
+
+        Of a body of ``mass: 4`` the moment ``4*l**2/12`` is in order: 4 is its mass and not a ratio of a formula.
+        """
+        kind, *operands = self.graph.nodes[i]
+        if kind in ("add", "sub"):
+            return any(self.holds_mass(k, mass, factor) for k in operands)
+        sums = []
+        pairs = [(i, 1)]
+        while pairs:
+            k, power = pairs.pop()
+            kind, *operands = self.graph.nodes[k]
+            if kind in ("mul", "div"):
+                pairs += [(operands[0], power), (operands[1], -power if kind == "div" else power)]
+            elif kind == "const" and operands[0]:
+                factor *= float(operands[0]) ** power
+            elif kind in ("add", "sub") and power == 1:
+                sums.append(k)
+        if sums:
+            return any(self.holds_mass(k, mass, factor) for k in sums)
+        return any(math.isclose(factor, ratio * mass) for ratio in _RATIOS)
 
     def _remedy(self, nodes: list[int], first: str) -> str:
         """What would be right, and the given units that led there."""
@@ -181,7 +254,7 @@ class _Check:
             f"{name} in {si_text(own.dimension)}" for name, own in known if own.dimension not in (None, NONE)
         )
         constant = any(self.graph.nodes[i][0] == "const" for i in nodes)
-        advice = "; a number with a unit is given as a parameter" if constant else ""
+        advice = "; give a number that has a unit as a parameter" if constant else ""
         return f"{first}; here {listed} in SI units{advice}" if listed else first
 
     def _node(self, i: int) -> Known:
@@ -205,7 +278,7 @@ class _Check:
         for other, k in some[1:]:
             if not other.alike(some[0][0]):
                 a, b = written(self.graph, some[0][1]), written(self.graph, k)
-                message = f"{written(self.graph, i)} puts together {named(some[0][0])}, {a}, and {named(other)}, {b}"
+                message = f"{written(self.graph, i)} combines {named(some[0][0])}, {a}, with {named(other)}, {b}"
                 nodes = reachable(self.graph, operands)
                 self.wrong[i] = (
                     message,
@@ -228,7 +301,7 @@ class _Check:
         for own, k in zip(parts, operands, strict=True):
             if own.declared and own.dimension is not None and not own.dimension.alike(NONE):
                 message = f"{written(self.graph, i)} is taken of {named(own.dimension)}"
-                remedy = "take it of an angle (rad) or a number without unit, such as a ratio of two alike"
+                remedy = "its argument must be an angle (rad) or a number without unit, such as a ratio of two lengths"
                 self.wrong[i] = message, self._remedy(reachable(self.graph, [k]), remedy)
         return NONE
 

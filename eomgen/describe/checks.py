@@ -41,7 +41,7 @@ def check_names(
         if fault:
             faults.add(entry.path, *fault)
         elif entry.name in reserved:
-            faults.add(entry.path, f"{entry.name!r} is a name of its own", f"choose another name for the {what}")
+            faults.add(entry.path, f"{entry.name!r} is a reserved name", f"choose another name for the {what}")
         elif entry.name in seen:
             faults.add(entry.path, f"the name is given to two {_PLURAL.get(what, what + 's')}", "rename one")
         else:
@@ -56,7 +56,7 @@ _PLURAL = {"body": "bodies"}
 #: Message and remedy for a body that only pure constraints (rods and the like) connect to ground.
 UNHELD = (
     "only constraints without coordinates connect it to ground",
-    "add a joint that gives it coordinates; a body that otherwise moves freely has a joint of type free",
+    "add a joint that has coordinates; if the body otherwise moves freely, use a joint of type free",
 )
 
 
@@ -69,7 +69,7 @@ def check_connected(bodies: Sequence[Body], joints: Sequence[JointSpec], faults:
             faults.add(
                 f"bodies.{body.name}",
                 "no chain of joints connects it to ground",
-                "add a joint; a body that moves freely has a joint of type free",
+                "add a joint; for a body that moves freely use a joint of type free",
             )
         elif k not in reached:
             faults.add(f"bodies.{body.name}", *UNHELD)

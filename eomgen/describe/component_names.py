@@ -98,7 +98,9 @@ class Renaming(Visitor):
             return self.prefix + name
         if name not in WORDS:
             self._foreign(
-                name, slot, "declare a parameter or an input of that name in it, to be given where it is added"
+                name,
+                slot,
+                "declare a parameter or an input of that name in it, and give it where you add the component",
             )
         return name
 
@@ -133,7 +135,9 @@ class Renaming(Visitor):
         if body in self.attached:
             return self._on_attachment(body, name, reference, slot)
         if body not in self.own.bodies:
-            self._foreign(body, slot, f"its bodies and attachments: {', '.join([*self.own.bodies, *self.attached])}")
+            self._foreign(
+                body, slot, f"it has the bodies and attachments {', '.join([*self.own.bodies, *self.attached])}"
+            )
             return reference if isinstance(reference, str) else super().marker(reference, slot)
         return super().marker(reference, slot)
 
@@ -155,7 +159,7 @@ class Renaming(Visitor):
             return placed_on(found.placed or {}, placed)
         except UsageError as error:
             path = f"{slot.entry.path}.{slot.key}" if slot.entry else slot.key
-            self.fault(path, f"at {attachment!r} it {error}", "give the component an attachment at that place itself")
+            self.fault(path, f"at {attachment!r} it {error}", "declare an attachment at that place in the component")
             return placed
 
     def _named(self, attachment: str, reference: Mapping[str, Any]) -> str:
@@ -166,5 +170,5 @@ class Renaming(Visitor):
 
     def _foreign(self, name: str, slot: Slot, remedy: str) -> None:
         if self.closed and slot.entry is not None:
-            message = f"{name!r} is no name of the component, which knows only its own names"
+            message = f"{name!r} is not declared in the component, and a component knows only its own names"
             self.fault(f"{slot.entry.path}.{slot.key}", message, remedy)

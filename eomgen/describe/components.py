@@ -58,7 +58,7 @@ class Components:
             return None
         if name in self.within:
             chain = ", ".join([*self.within[self.within.index(name) :], name])
-            self.fault(path, f"the component {name!r} adds itself: {chain}", "take one of them out")
+            self.fault(path, f"the component {name!r} adds itself: {chain}", "remove one of these additions")
             return None
         if name not in self.read:
             self.within.append(name)
@@ -79,7 +79,7 @@ class Components:
                 self.fault(f"{path}.{key}", "unknown key", unknown_key(key, COMPONENT))
         if "file" in given:
             if len(given) > 1:
-                self.fault(path, "has keys beside file", "the file says all of it")
+                self.fault(path, "has keys beside file", "give file alone; the file describes the whole component")
             return self._read_file(name, given["file"], path)
         start = f"{path}."
         lines = {key.removeprefix(start): place for key, place in self.lines.items() if key.startswith(start)}
@@ -96,7 +96,7 @@ class Components:
         try:
             description = self.open_file(file)
         except FileNotFoundError:
-            self.fault(f"{path}.file", f"there is no file {file}", "its path starts at the folder of the model file")
+            self.fault(f"{path}.file", f"there is no file {file}", "give its path from the folder of the model file")
             return None
         except UsageError as error:
             self.fault(f"{path}.file", str(error), "")
@@ -111,7 +111,7 @@ class Components:
     def _checked(self, component: Component) -> Component:
         for name in component.attachments:
             if name in component.names.bodies or name in (GROUND_NAME, "body"):
-                message = f"the attachment {name!r} bears the name of a body"
+                message = f"the attachment {name!r} has the name of a body"
                 self.fault(f"{component.place}attachments", message, "rename one of them")
         return component
 
@@ -140,7 +140,7 @@ class Components:
             self.fault(path, *wrong)
             return
         if not isinstance(keys, Mapping):
-            self.fault(path, f"is not {KINDS['table']}", "write component: NAME and the rest as keys")
+            self.fault(path, f"is not {KINDS['table']}", "write component: NAME and its other keys")
             return
         for key in keys:
             if key not in ADDED:
@@ -152,7 +152,7 @@ class Components:
         rounds = rounds_of(keys["for"], f"{path}.for", self.fault) if "for" in keys else [{}]
         prefix = keys.get("prefix", f"{name}_")
         if prefix != "" and fault_of_name(prefix):
-            self.fault(f"{path}.prefix", f"{prefix!r} cannot begin a name", "letters, digits and underscores")
+            self.fault(f"{path}.prefix", f"{prefix!r} cannot begin a name", "use letters, digits and underscores")
             return
         if component is None or rounds is None:
             return
@@ -217,7 +217,7 @@ def component_of(description: Description, name: str, place: str, fault: Fault) 
     """A component of the description of a whole model: its bodies, joints and what belongs to them."""
     for key in ("lagrangian", "equations"):
         if description.values.get(key) is not None:
-            fault("", f"{name} has {key}", "a component is made of bodies and joints")
+            fault("", f"{name} has {key}", "a component can contain only bodies, joints and what belongs to them")
     check = description.values.get("check_inertia")
     for entry in description.sections["bodies"]:
         if check is not None and entry.name != GROUND_NAME:

@@ -88,6 +88,9 @@ def independent_rows(forms: Forms, constants: Sequence[str], functions: Sequence
             1.0, abs(right[k]), float(np.abs(factors).max(initial=0))
         ):
             which = f"configuration constraint {k + 1}" if k < h else f"velocity constraint {k - h + 1}"
-            message = f"{which} contradicts the others: its velocities are theirs, its remainder is not"
+            message = (
+                f"{which} contradicts the others: it has the same velocity terms as they have, but other "
+                "remaining terms"
+            )
             raise ModelError([Problem("equations.constraints", message, f"check the {which}")])
     return [k for k in range(len(motion)) if fresh[h + k]], all(fresh[:h])

@@ -15,7 +15,7 @@ class Described:
 
     @property
     def description(self) -> Description:
-        """The raw data, in the layout of the model file."""
+        """The description of the model, with the same structure as a model file."""
         return self._description
 
     @property

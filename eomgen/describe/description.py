@@ -223,7 +223,8 @@ def label_of(reference: Mapping[str, Any]) -> str:
             text = f"{text[:-1]}, {key}={text_of(reference[key])})"
     if NO_TEXT in text:  # two such markers would bear one label
         raise UsageError(
-            f"the place of an unnamed marker of {shown(reference.get('body'))} has no text; name the marker"
+            f"the place of an unnamed marker of {shown(reference.get('body'))} cannot be written as a text; name the "
+            "marker"
         )
     return f"{reference.get('body')}.at{text}"
 

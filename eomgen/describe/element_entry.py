@@ -78,7 +78,7 @@ class ElementEntry:
             given = "joint" if "joint" in self.values and "joint" not in found.keys else key
             named = self.values.get(given)
             if given == "joint" or (isinstance(named, str) and named in names and named not in self.reader.markers):
-                self.fault(given, f"a {found.name} acts at a marker, and {named!r} is not one", remedy)
+                self.fault(given, f"a {found.name} acts at a marker, and {named!r} is not a marker", remedy)
                 return True
         return False
 
@@ -198,8 +198,8 @@ class ElementEntry:
         for k, item in enumerate(listed):
             stop = self._stop(f"{self._at(key)}[{k}]", item)
             if isinstance(stop, WrapCylinder) and found and isinstance(found[-1], WrapCylinder):
-                remedy = "put a marker that the path slides through between them"
-                self.fault(f"{key}[{k}]", "follows another cylinder", remedy)
+                remedy = "put a marker between the two cylinders"
+                self.fault(f"{key}[{k}]", "follows another cylinder directly", remedy)
             if stop is not None:
                 found.append(stop)
         return None if self.at_fault(key) else found
@@ -237,7 +237,9 @@ class ElementEntry:
         """A coordinate from the name of its joint, or its own."""
         found = find_coordinate(self.reader, self.around.joints, self._at(key), value)
         if found is not None and kind and found.joint is not None and found.kind != kind:
-            self.fault(key, f"the coordinate {found.name!r} is {_A[found.kind]}", f"give one that is {_A[kind]}")
+            self.fault(
+                key, f"the coordinate {found.name!r} is {_A[found.kind]}", f"name a coordinate that is {_A[kind]}"
+            )
             return None
         return found
 
@@ -255,7 +257,7 @@ class ElementEntry:
         if a is None or b is None:
             return None
         if a.name == b.name:
-            self.fault(key, f"{a.name!r} is named twice", "name two coordinates")
+            self.fault(key, f"{a.name!r} is named twice", "name two different coordinates")
             return None
         self.require_one_carrier(key, a, b)
         return a, b
@@ -270,7 +272,9 @@ class ElementEntry:
             factor = self.reader.expression(f"{self._at(key)}.{name}", value)
             if found is not None:
                 if any(found.name == other.name for other, _ in terms):
-                    self.fault(f"{key}.{name}", f"{found.name!r} is named twice", "add its factors up")
+                    self.fault(
+                        f"{key}.{name}", f"{found.name!r} is named twice", "name it once, with the sum of its factors"
+                    )
                 terms.append((found, factor))
         return terms
 
@@ -279,7 +283,7 @@ class ElementEntry:
         if first is None or second is None or first == second:
             return
         message = f"{a.name!r} and {b.name!r} are not measured from the same body"
-        remedy = "both joints must have the part that carries the two axes as predecessor; for a carrier that turns "
+        remedy = "give both joints the body that carries the two axes as predecessor; for a carrier that turns "
         self.fault(key, message, remedy + "use planetary, or a coupling")
 
     def carrier(self, coordinate: Found) -> int | None:

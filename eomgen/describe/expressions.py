@@ -32,13 +32,15 @@ Locate = Callable[[str, str], Expr]
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/()<>=! \t\r\n]")
 #: A number that runs into a word: Python reads it as two, with a warning of its own.
 _JOINED = re.compile(r"(?<![A-Za-z0-9_])[0-9.][0-9A-Za-z_.]*?(and|or|not|if|is|in|else)")
+#: A number with a unit: ``150 mm``, ``5cm``, ``30°``.
+_WITH_UNIT = re.compile(r"\s*([0-9.]+(?:e[+-]?[0-9]+)?)\s*(°|%|[A-Za-zµμ][A-Za-z0-9µμ*/^²³·-]*)\s*")
 _HINTS = {
     "^": "write ** for powers",
-    "%": "there is no remainder",
-    "'": "text has no place in an expression",
-    '"': "text has no place in an expression",
-    "[": "subscripts and lists have no place in an expression",
-    "{": "braces have no place in an expression",
+    "%": "there is no remainder operator",
+    "'": "text is not allowed in an expression",
+    '"': "text is not allowed in an expression",
+    "[": "subscripts and lists are not allowed in an expression",
+    "{": "braces are not allowed in an expression",
     ":": "neither ':=', lambda nor slices have a place in an expression",
     "&": "write 'and'",
     "|": "write 'or'",
@@ -53,14 +55,14 @@ _COMPARISONS: dict[type[ast.cmpop], tuple[str, bool, bool]] = {  # operation, op
     ast.NotEq: ("eq", False, True),
 }
 _REFUSED: dict[type[ast.AST], str] = {
-    ast.Attribute: "a dot is for markers inside x(...), vx(...) and the like, in outputs",
+    ast.Attribute: "a dot can be used only for markers inside x(...), vx(...) and the like, in outputs",
     ast.Tuple: "one expression is expected, not several",
-    ast.Starred: "'*' cannot stand before a name",
-    ast.Await: "'await' has no place in an expression",
-    ast.Yield: "'yield' has no place in an expression",
-    ast.YieldFrom: "'yield' has no place in an expression",
-    ast.GeneratorExp: "loops have no place in an expression",
-    ast.Lambda: "'lambda' has no place in an expression",
+    ast.Starred: "'*' cannot be used before a name",
+    ast.Await: "'await' is not allowed in an expression",
+    ast.Yield: "'yield' is not allowed in an expression",
+    ast.YieldFrom: "'yield' is not allowed in an expression",
+    ast.GeneratorExp: "loops are not allowed in an expression",
+    ast.Lambda: "'lambda' is not allowed in an expression",
 }
 
 
@@ -101,27 +103,41 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         raise ExpressionError("the expression is empty", 1, allowed(), text)
     foreign = _FOREIGN.search(text)
     if foreign:
+        _refuse_unit(text)
         mark = foreign.group()
         raise ExpressionError(
-            f"{mark!r} has no place in an expression", foreign.start() + 1, _HINTS.get(mark, allowed()), text
+            f"{mark!r} is not allowed in an expression", foreign.start() + 1, _HINTS.get(mark, allowed()), text
         )
     joined = _JOINED.search(text)
     if joined:
         word = joined.group(1)
-        raise ExpressionError(f"a number runs into {word!r}", joined.start(1) + 1, "write a space between them", text)
+        raise ExpressionError(
+            f"a number is followed directly by {word!r}", joined.start(1) + 1, "write a space between them", text
+        )
     line = re.sub(r"\s", " ", text)
     start = len(line) - len(line.lstrip())
     try:
         tree = parse_statement(line[start:].rstrip() + "\n")
     except SyntaxError as error:
+        _refuse_unit(text)
         column = (error.offset or 1) + start
         raise ExpressionError(f"not a valid expression ({error.msg})", column, allowed(), text) from None
     except (ValueError, MemoryError, RecursionError):
         raise ExpressionError("nested too deeply", 1, f"at most {DEPTH} levels", text) from None
     body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
-        raise ExpressionError("a statement, not an expression", start + 1, allowed(), text)
+        raise ExpressionError("this is a statement, not an expression", start + 1, allowed(), text)
     return _Walker(text, start, graph, resolve, locate, any_function).walk(body[0].value, 0)
+
+
+def _refuse_unit(text: str) -> None:
+    """Raise ExpressionError if the text is a number with a unit."""
+    measured = _WITH_UNIT.fullmatch(text)
+    if measured is not None:
+        number, unit = measured.groups()
+        angle = unit.lower() in ("deg", "degree", "degrees", "°")
+        remedy = f"write deg({number})" if angle else "write the number in SI units; a parameter may have another unit"
+        raise ExpressionError("a number with a unit is not an expression", measured.start(2) + 1, remedy, text)
 
 
 def names_in(text: str) -> list[str]:
@@ -178,7 +194,7 @@ class _Walker:
         if isinstance(node, ast.IfExp):
             parts = [self.walk(part, depth + 1) for part in (node.test, node.body, node.orelse)]
             return self.apply(node, "select", *parts)
-        raise self.fault(node, _REFUSED.get(type(node), f"{type(node).__name__} has no place in an expression"))
+        raise self.fault(node, _REFUSED.get(type(node), f"{type(node).__name__} is not allowed in an expression"))
 
     def number(self, node: ast.Constant) -> Expr:
         value = node.value
@@ -210,14 +226,14 @@ class _Walker:
         for link in reversed(chain):
             operation = _BINARY.get(type(link.op))
             if operation is None:
-                raise self.fault(link, f"the operator {type(link.op).__name__} has no place in an expression")
+                raise self.fault(link, f"the operator {type(link.op).__name__} is not allowed in an expression")
             self.size += 1
             value = self.apply(link, operation, value, self.walk(link.right, depth + 1))
         return value
 
     def unary(self, node: ast.UnaryOp, depth: int) -> Expr:
         if isinstance(node.op, ast.Invert):
-            raise self.fault(node, "the operator '~' has no place in an expression", "write 'not'")
+            raise self.fault(node, "the operator '~' is not allowed in an expression", "write 'not'")
         value = self.walk(node.operand, depth + 1)
         if isinstance(node.op, ast.USub):
             return -value
@@ -228,7 +244,7 @@ class _Walker:
         results = []
         for operator, a, b in zip(node.ops, values, values[1:], strict=False):
             if type(operator) not in _COMPARISONS:
-                raise self.fault(node, "'is' and 'in' have no place in an expression", "compare with < <= > >= == !=")
+                raise self.fault(node, "'is' and 'in' are not allowed in an expression", "compare with < <= > >= == !=")
             operation, exchanged, negated = _COMPARISONS[type(operator)]
             result = self.apply(node, operation, *((b, a) if exchanged else (a, b)))
             results.append(self.apply(node, "not", result) if negated else result)
@@ -289,7 +305,7 @@ class _Walker:
 
     def quantity(self, node: ast.Call, name: str) -> Expr:
         if self.locate is None:
-            raise self.fault(node, f"{name}(...) of a marker cannot be used here", "it is known in outputs only")
+            raise self.fault(node, f"{name}(...) of a marker cannot be used here", "use it in outputs only")
         argument = node.args[0] if len(node.args) == 1 else None
         if isinstance(argument, ast.Name):
             marker = argument.id

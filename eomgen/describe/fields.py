@@ -31,8 +31,8 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4")
 
-_UNIT = Field("unit", "unit of the value, such as mm or N*m/rad; converted to SI, and checked", default="")
-_DOC = Field("text", "one sentence, for display", default="")
+_UNIT = Field("unit", "unit of the value, such as mm or N*m/rad; the value is converted to SI", default="")
+_DOC = Field("text", "one sentence, shown in reports", default="")
 _LATEX = Field("latex", "how formulas and plots print it, in LaTeX (from its name unless given)", default="")
 _LATEXES = Field(
     "latexes", "how formulas and plots print its coordinates, in LaTeX: a text, a list or a mapping", default=()
@@ -40,15 +40,15 @@ _LATEXES = Field(
 _NAME = Field("name", "name of the model and of the generated module", required=True)
 
 PARAMETER: Fields = {
-    "value": Field("number", "value; may be left out until the model is compiled"),
+    "value": Field("number", "value; needed when the model is compiled"),
     "unit": _UNIT,
     "doc": _DOC,
     "latex": _LATEX,
 }
 INPUT: Fields = {
-    "value": Field("number", "value while none is given", default=0.0),
+    "value": Field("number", "value as long as a call gives none", default=0.0),
     "signal": Field(
-        "expression", "value over time of runs that give none; t, coordinates, velocities, parameters", level=MOTION
+        "expression", "value over time, in runs that give none: of t, coordinates, velocities, parameters", level=MOTION
     ),
     "unit": _UNIT,
     "doc": _DOC,
@@ -56,7 +56,7 @@ INPUT: Fields = {
 }
 OUTPUT_FIELDS: Fields = {
     "expression": Field(
-        "expression", "t, parameters, inputs, coordinates, their rates, motion of markers", required=True, level=OUTPUT
+        "expression", "the result: of t, parameters, inputs, coordinates, rates, markers", required=True, level=OUTPUT
     ),
     "unit": _UNIT,
     "doc": _DOC,
@@ -65,14 +65,14 @@ OUTPUT_FIELDS: Fields = {
 EVENT: Fields = {
     "expression": Field(
         "expression",
-        "its zeros are the event; t, parameters, inputs, coordinates, their rates, position and velocity of markers",
+        "the event is where it is 0: of t, parameters, inputs, coordinates, rates, positions, velocities of markers",
         required=True,
         level=OUTPUT,
     ),
-    "terminal": Field("times", "whether the run ends there, or at which time it happens", default=False),
-    "direction": Field("sign", "1: only where it rises, -1: where it falls, 0: both", default=0),
-    "reset": Field("rates", "new values of coordinates and velocities, from those before", default=(), level=OUTPUT),
-    "restitution": Field("number", "an impact: the expression is a gap that opens again this much slower (0 .. 1)"),
+    "terminal": Field("times", "whether the event ends the run, or how many do", default=False),
+    "direction": Field("sign", "1: only where it rises, -1: only where it falls, 0: both", default=0),
+    "reset": Field("rates", "new coordinates and velocities, from those before the event", default=(), level=OUTPUT),
+    "restitution": Field("number", "for an impact where the gap (the expression) closes: Newton's coefficient, 0 to 1"),
     "doc": _DOC,
 }
 FUNCTION: dict[str, Fields] = {
@@ -80,9 +80,9 @@ FUNCTION: dict[str, Fields] = {
         "x": Field("numbers", "points, strictly increasing", required=True),
         "y": Field("numbers", "values at the points; with z, points along the second argument", required=True),
         "z": Field("grid", "values on the grid of x and y, for a function of two arguments"),
-        "kind": Field("choice", "how to go through the points", default="cubic", choices=tuple(TABLES)),
+        "kind": Field("choice", "interpolation between the points", default="cubic", choices=tuple(TABLES)),
         "extrapolation": Field(
-            "choice", "beyond the points: slope or value of the end", default="linear", choices=("linear", "constant")
+            "choice", "beyond the points: keep the slope or the value", default="linear", choices=("linear", "constant")
         ),
     },
     "native": {
@@ -103,15 +103,15 @@ MARKER: Fields = {
     "matrix": Field("matrix", "3 x 3, its axes as columns in body axes, instead of rpy", dimension=NONE),
 }
 CYLINDER: Fields = {
-    "around": Field("marker", "its z axis is the axis of the cylinder", required=True),
+    "around": Field("marker", "marker whose z axis is the axis of the cylinder", required=True),
     "radius": Field("expression", "radius (m)", required=True, dimension=LENGTH),
-    "sense": Field("choice", "turn of the path about the axis", default="positive", choices=("positive", "negative")),
+    "sense": Field("choice", "sense of the path about the axis", default="positive", choices=("positive", "negative")),
 }
 PLACED: Fields = {"body": Field("name", "a body or ground", required=True), **MARKER}
 SHAPES = ("mesh", "box", "cylinder", "sphere", "capsule")
 DISPLAY: Fields = {
     "shape": Field("choice", "kind of shape", required=True, choices=SHAPES),
-    "file": Field("text", "file of a mesh, as the robot's file names it; it is not read"),
+    "file": Field("text", "file of a mesh (STL or OBJ), read when the model is drawn"),
     "scale": Field("vector", "scale of a mesh"),
     "size": Field("vector", "edges of a box (m)"),
     "radius": Field("number", "radius (m)"),
@@ -129,7 +129,7 @@ BODY: Fields = {
     "com": Field("vector", "centre of mass in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
     "inertia": Field(
         "inertia",
-        "inertia (kg m^2) about the centre of mass in body axes, unless about and axes say",
+        "inertia (kg m^2) about the centre of mass in body axes, or as about and axes say",
         default=(0, 0, 0),
         dimension=MOMENT_OF_INERTIA,
     ),
@@ -138,12 +138,12 @@ BODY: Fields = {
     "first_moment": Field(
         "vector", "first moment m c about the body's origin (kg m), instead of com", dimension=Dimension(1, 1)
     ),
-    "about": Field("about", "point the inertia is about; a marker gives its axes too", default="com", dimension=LENGTH),
+    "about": Field("about", "point of the inertia; a marker gives its axes too", default="com", dimension=LENGTH),
     "axes": Field("vector", "roll, pitch, yaw (rad) of the axes of inertia or principal in the body", dimension=NONE),
-    "solids": Field("solids", "solids of uniform density, from which mass, com and inertia follow", default=()),
-    "points": Field("points", "point masses, added to the rest", default=()),
-    "check_inertia": Field("check", "what becomes of a mass and inertia that no body can have (the model's own)"),
-    "display": Field("display", "shapes to draw, in body axes; data only", default=()),
+    "solids": Field("solids", "solids of uniform density, which give mass, com, inertia", default=()),
+    "points": Field("points", "point masses that are added", default=()),
+    "check_inertia": Field("check", "a mass and inertia that no body can have: as in the model, unless given"),
+    "display": Field("display", "shapes for pictures, in body axes", default=()),
 }
 POINT: Fields = {
     "mass": Field("expression", "mass (kg)", required=True, dimension=MASS),
@@ -151,15 +151,15 @@ POINT: Fields = {
 }
 _MASS = Field("expression", "mass (kg), instead of a density", dimension=MASS)
 _DENSITY = Field("expression", "density (kg/m^3)", dimension=Dimension(-3, 1))
-_SUBTRACT = Field("flag", "whether it is taken away: a hole", default=False)
+_SUBTRACT = Field("flag", "whether the solid is a hole", default=False)
 #: Type of solid -> its own keys; ``mesh`` is read from a file, the others are formulas.
 SOLID: dict[str, Fields] = {
     name: {key: Field(d.kind, d.doc, required=True, dimension=LENGTH) for key, d in solid.dimensions.items()}
-    | ({"axis": Field("axis", "where its z axis lies in the body", default="z")} if solid.has_axis else {})
+    | ({"axis": Field("axis", "direction of its z axis in the body", default="z")} if solid.has_axis else {})
     | {
         solid.content_key: _DENSITY
         if solid.content_key == "density"
-        else Field("expression", "mass of a metre (kg/m)", dimension=Dimension(-1, 1))
+        else Field("expression", "mass per length (kg/m)", dimension=Dimension(-1, 1))
     }
     for name, solid in SOLIDS.items()
 } | {
@@ -179,17 +179,17 @@ JOINT: Fields = {
         required=True,
     ),
 }
-AXIS = Field("axis", "axis of the joint in the markers", default="z")
+AXIS = Field("axis", "axis of the joint, in both markers", default="z")
 AXIS_PAIR = Field("axes", "axes of the cross in the markers: the first stays with P, the second with S")
 COORDINATE = Field("name", "name of the coordinate (the joint's name unless given)")
 COORDINATES = Field("names", "names of the coordinates, in order")
 #: Data of a joint that has coordinates; the last only where it has one.
 JOINT_DATA: Fields = {
-    "limits": Field("limits", "limits of the coordinate; nothing stops there, but a run that passes one says so"),
-    "dry_friction": Field("number", "Coulomb friction (N m or N); data only"),
+    "limits": Field("limits", "limits of the coordinate; a run that passes one warns, but nothing stops there"),
+    "dry_friction": Field("number", "Coulomb friction (N m or N); stored, but it does not act"),
     "armature": Field(
         "expression",
-        "inertia of the drive as the coordinate feels it (kg m^2 or kg)",
+        "inertia of the drive, referred to the coordinate (kg m^2 or kg)",
         dimension=ENERGY.times(TIME, 2).times(REACH, -2),
     ),
 }
@@ -208,8 +208,8 @@ LAGRANGIAN: Fields = {
 EQUATIONS: Fields = {
     "coordinates": Field("names", "generalized coordinates q, in order", required=True),
     "velocities": Field("names", "generalized velocities v, in order (<coordinate>_dot unless given)"),
-    "rates": Field("rates", "q' in q, v, t, linear in v (the velocities in order unless given)", level=MOTION),
-    "intermediates": Field("rates", "names for parts of the expressions, each in the ones before", level=MOTION),
+    "rates": Field("rates", "q' of q, v, t, linear in v (q' = v unless given)", level=MOTION),
+    "intermediates": Field("rates", "named parts of the expressions; each may use those before", level=MOTION),
     "mass_matrix": Field("matrix", "M in M v' = f, of q and t, symmetric", required=True, level=MOTION),
     "forcing": Field("expressions", "f, of q, v, t and inputs", required=True, level=MOTION),
     "constraints": Field(
@@ -225,7 +225,7 @@ SIMULATION: Fields = {
     "method": Field("choice", "integrator", default=Simulation.method, choices=SOLVERS),
     "rtol": Field("positive", "relative tolerance", default=Simulation.rtol),
     "atol": Field("positive", "absolute tolerance", default=Simulation.atol),
-    "step": Field("positive", "size of the steps of RK4 (s), and only of it"),
+    "step": Field("positive", "step size (s), for RK4 only"),
 }
 MODEL: Fields = {
     "name": _NAME,
@@ -241,40 +241,40 @@ MODEL: Fields = {
     "forces": Field("table", "force elements"),
     "constraints": Field("table", "equations between coordinates or markers"),
     "outputs": Field("table", "named results"),
-    "events": Field("table", "zeros of expressions to find during a run, and what happens there"),
-    "components": Field("table", "parts of mechanisms to be added, each as often as one likes"),
+    "events": Field("table", "events to find during a run, and what they do"),
+    "components": Field("table", "parts of mechanisms that can be added several times"),
     "add": Field("table", "instances of components"),
-    "attachments": Field("names", "names that stand for markers of the model that takes this one in as a component"),
+    "attachments": Field("names", "names for markers of the model to which this one is added"),
     "lagrangian": Field("table", "a bare Lagrangian, instead of bodies and joints"),
-    "equations": Field("table", "equations of motion M v' = f as they are, instead of bodies and joints"),
-    "independent": Field("names", "coordinates to integrate, when loops leave a choice", default=()),
+    "equations": Field("table", "equations of motion M v' = f, instead of bodies and joints"),
+    "independent": Field("names", "independent coordinates of a mechanism with loops", default=()),
     "initial": Field("table", "initial values by coordinate or <coordinate>_dot"),
-    "guess": Field("table", "rough values of coordinates, where the assembly of loops starts"),
+    "guess": Field("table", "rough values of coordinates, from which loops are closed"),
     "simulation": Field("table", "defaults of a simulation"),
     "limits": Field(
-        "choice", "whether a run that passes a limit of a joint says so", default="note", choices=("note", "off")
+        "choice", "whether a run that passes a limit of a joint warns", default="note", choices=("note", "off")
     ),
-    "check_inertia": Field("check", "what becomes of masses and inertias that no body can have", default=True),
+    "check_inertia": Field("check", "masses and inertias that no body can have: refused or noted", default=True),
 }
 
 #: Keys of a model file that hold parts of mechanisms and their use; what they bring stands in the sections then.
 PARTS = ("components", "add")
 COMPONENT: Fields = {
     "doc": _DOC,
-    "file": Field("file", "model file that describes it, its path from the folder of this one, instead of all else"),
+    "file": Field("file", "model file of the component (path from this file's folder), instead of all other keys"),
     "attachments": MODEL["attachments"],
     **{key: MODEL[key] for key in ("parameters", "inputs", "functions", "bodies", "joints", "forces")},
     **{key: MODEL[key] for key in ("constraints", "outputs", "events", "initial", "guess", "add")},
 }
 ADDED: Fields = {
     "component": Field("name", "name of a component", required=True),
-    "prefix": Field("prefix", "put before each name of the component (the entry's name and _ unless given)"),
-    "for": Field("loops", "variables and their values, side by side; an instance for each, numbered 1, 2, ..."),
-    "at": Field("attached", "a marker for each attachment by name, or one for the only attachment or for its ground"),
-    "parameters": Field("values", "values of its parameters: numbers, or expressions that take their place"),
-    "inputs": Field("values", "values of its inputs: numbers, or expressions that take their place"),
-    "initial": Field("values", "initial values by its own names of coordinates and velocities"),
-    "guess": Field("values", "rough coordinates by its own names"),
+    "prefix": Field("prefix", "text before each name of the component (the entry's name and _ unless given)"),
+    "for": Field("loops", "variables and their lists of values; one instance for each value, numbered 1, 2, ..."),
+    "at": Field("attached", "a marker for each attachment, or one for the only attachment or for its ground"),
+    "parameters": Field("values", "its parameters: numbers, or expressions that replace them"),
+    "inputs": Field("values", "its inputs: numbers, or expressions that replace them"),
+    "initial": Field("values", "initial values, by names within the component"),
+    "guess": Field("values", "rough coordinates, by names within the component"),
 }
 
 #: Sections whose entries may be written as one value: section -> the key it stands for.
@@ -285,7 +285,8 @@ def joint_type(type_name: str) -> ElementType:
     """One joint type as the type of an element."""
     text = " ".join((inspect.getdoc(JOINTS[type_name]) or "").partition("\n\n")[0].split())
     keys = {key: field for key, field in joint_fields(type_name).items() if key != "type"}
-    doc = f"a joint of type {type_name}: {text[:1].lower()}{text[1:]}".replace(". Allows", ".  Allows")
+    doc = f"a joint of type {type_name}: {text}".replace(", removes", " of 6 degrees of freedom, removes")
+    doc = doc.replace(". Allows", ".  Allows")
     return ElementType(type_name, doc, keys, ends=("predecessor", "successor"))
 
 

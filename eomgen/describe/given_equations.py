@@ -48,9 +48,9 @@ def describe_equations(
     rates : mapping, optional
         q' by coordinate, linear in v; the velocities in order unless given.
     intermediates : mapping, optional
-        Names for parts of the expressions, each in the ones before.
+        Named parts of the expressions; each may use those before it.
     constraints : sequence, optional
-        Each = 0: of coordinates and t, or linear in the velocities.
+        Expressions that are 0: functions of coordinates and t, or linear in the velocities.
     multipliers : sequence of str, optional
         Names of the multipliers of the constraints, for outputs: M v' + C_q^T l = f.
     kinetic_energy, potential_energy : optional

@@ -79,7 +79,7 @@ class MarkerHandle:
         return symbol(f"angle({self.label})")
 
     def note(self) -> None:
-        """Let the description know an unnamed marker whose motion is asked for."""
+        """Store an unnamed marker in the description, because an expression uses its motion."""
         if not isinstance(self.reference, str):
             self.model.description.motions[self.label] = self.reference
 
@@ -90,7 +90,7 @@ class MarkerHandle:
 
 
 class BodyHandle(MarkerHandle):
-    """A body, or ground; used as a marker it stands for the frame at its origin."""
+    """A body or the ground; where a marker is expected, it stands for the frame at its origin."""
 
     def __init__(self, model: Described, name: str, entry: DescribedEntry | None) -> None:
         super().__init__(model, name)
@@ -107,7 +107,7 @@ class BodyHandle(MarkerHandle):
         axes: Mapping[str, Any] | None = None,
         matrix: Any = None,
     ) -> MarkerHandle:
-        """An unnamed marker.
+        """Make an unnamed marker.
 
         Parameters
         ----------
@@ -140,7 +140,7 @@ class BodyHandle(MarkerHandle):
         axes: Mapping[str, Any] | None = None,
         matrix: Any = None,
     ) -> MarkerHandle:
-        """A named marker, known as ``body.name`` everywhere.
+        """Add a named marker; everywhere its name is ``body.name``.
 
         Parameters
         ----------
@@ -169,6 +169,18 @@ class BodyHandle(MarkerHandle):
         return MarkerHandle(self.model, f"{self.name}.{name}")
 
 
+def placed_markers(given: Any) -> Any:
+    """Markers by name as :meth:`BodyHandle.marker` keeps them; what is no mapping is left as it is."""
+    if not isinstance(given, Mapping):
+        return given
+    found = []
+    for name, place in given.items():
+        if isinstance(place, Mapping):
+            place = {**place, **_turned(place.get("axes"), place.get("matrix"))}
+        found.append((name, place))
+    return found
+
+
 def _turned(axes: Mapping[str, Any] | None, matrix: Any) -> dict[str, Any]:
     """Keys of a place for axes and matrix, those that are given."""
     rows = None if matrix is None else items(matrix)
@@ -177,7 +189,7 @@ def _turned(axes: Mapping[str, Any] | None, matrix: Any) -> dict[str, Any]:
 
 
 class JointHandle:
-    """A joint; its coordinates are SymPy symbols for use in forces and outputs.
+    """A joint of the model; its coordinates are SymPy symbols that forces and outputs can use.
 
     Attributes
     ----------

@@ -45,8 +45,10 @@ def add_rates(
     differentiated = _differentiated(reader, lagrangian, given, constraints, events, outputs)
     for expressions, _, why, place in differentiated:
         if place is not None and jumps_in_time(expressions):
-            message = f"{why} is differentiated by time, and jumps at a time that a condition on t gives"
-            reader.faults.add(place, message, "a jump is an impact: write it smoothly, or as an event with a reset")
+            message = f"{why} must have a derivative by time, and a condition on t makes it jump"
+            reader.faults.add(
+                place, message, "such a jump is an impact: write it smoothly, or as an event with a reset"
+            )
     for expressions, times, why, _ in differentiated:
         for name in sorted(symbols_of(expressions) & {u.name for u in inputs}):
             for k in range(1, times + 1):
@@ -59,7 +61,7 @@ def add_rates(
         base = next(u for u in inputs if split_rate(u.name)[0] == split_rate(rate)[0])
         kind = reader.names.kinds.get(rate)
         if kind is not None:
-            message = f"the name is the rate of {why}"
+            message = f"the name is reserved for the rate of {why}"
             reader.faults.add(reader.names.places[rate], message, f"rename the {kind}, or the input")
             continue
         reader.names.declare("input", rate, f"inputs.{base.name}")
@@ -136,7 +138,10 @@ def _rate_of_signal(reader: Reader, signal: Expr, name: str, order: int) -> Expr
     }
     for state in sorted(along):
         if kinds.get(along[state]) != "velocity":
-            message = f"{rate_of(name, order + 1)} is needed, and the rate of {state!r} is no velocity"
+            message = (
+                f"{rate_of(name, order + 1)} is needed, but the signal depends on {state!r}, whose rate is not "
+                "a velocity"
+            )
             reader.faults.add(f"inputs.{name}.signal", message, "write it in t and parameters")
             return None
     direction = {symbol(n): symbol(rate) for n, rate in along.items()}

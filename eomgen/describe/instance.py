@@ -126,7 +126,7 @@ def _attachments(
         if name in instance.at:
             attached = _attached(target, instance.at[name])
             if attached is None:
-                remedy = "give a body, body.marker, ground or {body, at, rpy}; a marker must be there already"
+                remedy = "give a body, body.marker, ground or {body, at, rpy}; the marker must be declared before"
                 fault(f"{path}.at.{name}", f"{instance.at[name]!r} is not a marker", remedy)
                 sound = False
             else:
@@ -179,8 +179,8 @@ def _values(
         elif not is_constant(value := entry.values.get("value")):  # in parameters of its own that stand before it
             if _is_converted(entry.values.get("unit")):
                 place = f"{entry.path}.unit"
-                remedy = "give an SI unit: what the expression gives from parameters in SI units is in SI units"
-                told(place, f"{str(value)!r} is an expression, which this unit would have to scale", remedy)
+                remedy = "give an SI unit: parameters are in SI units, so the expression is too"
+                told(place, f"{str(value)!r} is an expression, and its unit is not an SI unit", remedy)
                 sound = False
             renaming = Renaming(component.names, instance.prefix, dict(texts), {}, component.closed, told)
             texts[name] = str(renaming.scalar(value, Slot("parameters", "", "value", (), entry)))

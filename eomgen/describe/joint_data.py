@@ -40,7 +40,7 @@ def read_limits(reader: Reader, path: str, given: Any, coordinates: Sequence[str
             place = f"{path}.{key}" if listed is None else f"{path}.{key}[{k}]"
             number = None if value is None else reader.number(place, value)
             if number is not None and number < 0 and key in ("velocity", "effort"):
-                reader.faults.add(place, f"is {number:g}", "the largest size, 0 or positive")
+                reader.faults.add(place, f"is {number:g}", "give the largest size, 0 or positive")
             elif number is not None:
                 result[k].append((key, number))
     for name, found in zip(coordinates, result, strict=True):
@@ -55,7 +55,7 @@ def read_dry_friction(reader: Reader, path: str, given: Any) -> float:
     """Coulomb friction of a joint (N m or N), as data."""
     value = reader.number(path, given)
     if value is not None and value < 0:
-        reader.faults.add(path, f"is {value:g}", "a friction is 0 or positive")
+        reader.faults.add(path, f"is {value:g}", "friction must be 0 or positive")
     return value or 0.0
 
 
@@ -63,7 +63,7 @@ def read_armature(reader: Reader, path: str, given: Any) -> Expr:
     """Inertia of a drive, as the coordinate of its joint feels it (kg m^2 or kg)."""
     value = reader.expression(path, given)
     if value.value is not None and value.value < 0:
-        reader.faults.add(path, f"is {value.value:g}", "an inertia is 0 or positive")
+        reader.faults.add(path, f"is {value.value:g}", "an inertia must be 0 or positive")
     return value
 
 
@@ -90,7 +90,9 @@ def check_display(reader: Reader, path: str, given: Any) -> None:
                 if key == "scale" and any(x.is_zero for x in factors):
                     what = "leaves nothing of the mesh"
                     reader.faults.add(
-                        f"{place}.{key}", f"a scale of 0 {what}", "give three numbers; negative ones mirror"
+                        f"{place}.{key}",
+                        f"a scale of 0 {what}",
+                        "give three numbers other than 0; negative ones mirror",
                     )
             elif field.kind == "number":
                 reader.number(f"{place}.{key}", value)

@@ -26,7 +26,7 @@ def describe_lagrangian(
     inputs: Mapping[Any, Any] | None = None,
     latex: Mapping[Any, str] | None = None,
 ) -> Description:
-    """Describe a system by its Lagrangian.
+    """Describe a system by its Lagrangian L = T - V.
 
     Parameters
     ----------

@@ -36,14 +36,16 @@ def read_body(reader: Reader, entry: DescribedEntry, check: str) -> Body:
             faults.add(f"{path}.{pair[1]}", f"is given beside {pair[0]}", "give one of them")
     for key in ("about", "axes"):
         if key in values and not ("inertia" in values or "principal" in values):
-            faults.add(f"{path}.{key}", "there is no inertia that it belongs to", "give inertia or principal too")
+            faults.add(f"{path}.{key}", "is given without an inertia", "give inertia or principal too")
     if "check_inertia" in values:
         check = reader.check_word(f"{path}.check_inertia", values["check_inertia"])
     parts = read_parts(reader, path, values)
     own = [key for key in OWN if key in values]
     if "solids" in values and own:
         for key in own:
-            faults.add(f"{path}.{key}", "is given beside solids, from which it follows", "leave it out, or add points")
+            faults.add(
+                f"{path}.{key}", "is given beside solids, which already determine it", "leave it out, or add points"
+            )
     elif "mass" not in values and (own or not ("solids" in values or "points" in values or faults.under(path))):
         faults.add(f"{path}.mass", "is missing", f"give {KINDS['expression']}, solids or points")
     if "solids" in values or not own:
@@ -65,7 +67,9 @@ def _own(
     point = _about(reader, path, about)
     if point is not None and point[1] is not None:
         if "axes" in values:
-            reader.faults.add(f"{path}.axes", "is given beside a marker, whose axes count", "give about: [x, y, z]")
+            reader.faults.add(
+                f"{path}.axes", "is given beside a marker in about, which has axes already", "give about: [x, y, z]"
+            )
         rotation = point[1]
     plane = _plane(tensor)
     axis = None if plane is None else vec.transpose(rotation)[plane]
@@ -77,7 +81,7 @@ def _own(
     if "first_moment" in values:
         moment = reader.vector(f"{path}.first_moment", values["first_moment"])
         if mass.is_zero and not all(x.is_zero for x in moment):
-            reader.faults.add(f"{path}.first_moment", "a body without mass has none", "give it a mass")
+            reader.faults.add(f"{path}.first_moment", "a body without mass has no first moment", "give the body a mass")
         com = o if mass.is_zero else (moment[0] / mass, moment[1] / mass, moment[2] / mass)
     else:
         com = reader.vector(f"{path}.com", values["com"]) if "com" in values else o

@@ -257,7 +257,9 @@ class Mechanism:
         """A problem for each parameter without a value."""
         return [
             self.problem(
-                f"parameters.{p.name}", "has no value", "give it one in the model, or where the module is made"
+                f"parameters.{p.name}",
+                "has no value",
+                "give it a value in the model, or when you bind the module's parameters",
             )
             for p in self.parameters
             if p.value is None

@@ -76,17 +76,17 @@ def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[
     doc = f"{field.doc[:1].upper()}{field.doc[1:]}."
     default: Any = field.default if type(field.default) in (int, float) else None
     if isinstance(field.default, (str, bool)):  # which is no default of the method: given, it may contradict the rest
-        doc = f"{doc.removesuffix('.')}; {str(field.default).lower()} unless given."
+        doc = f"{doc} Default: {str(field.default).lower()}."
     anywhere = {"joint", "between"} <= {*found.one_of}
     if field.required and (anywhere or not later):  # what follows *between is given by its keyword
         default = Parameter.empty
     if {"joint", "body"} <= {*found.one_of} and key in ("joint", "body"):
-        on = "A joint or coordinate for one value, a body or marker for three."
+        on = "A joint or coordinate if value is one number, a body or marker if it is three."
         return [Argument("on", key, kind, annotation, Parameter.empty, on)] if key == "joint" else []
     if anywhere and key in ("joint", "between"):
         if key == "joint":
             return [Argument("joint", key, kind, annotation, None, "The joint, instead of ``between``.")]
-        return [Argument("*between", key, kind, "Any", None, "One joint or coordinate, or two markers.")]
+        return [Argument("*between", key, kind, "Any", None, "Where it acts: one joint or coordinate, or two markers.")]
     if field.required and field.kind in ("pair", "joints"):
         single = ARGUMENTS["marker"]
         return [Argument(name, key, single[0], single[1], Parameter.empty, doc) for name in found.ends]
@@ -124,7 +124,7 @@ def documentation_of(section: str, found: ElementType) -> str:
     summary, _, more = found.doc.partition(".  ")
     lines = textwrap.wrap(f"Add {summary.removesuffix('.')}.", _WIDTH)
     if found.one_of and not any(one.name in ("on", "*between") for one in arguments_of(found)):
-        more = f"{more}  Exactly one of {', '.join(found.one_of)} is given.".strip()
+        more = f"{more}  Give exactly one of {', '.join(found.one_of)}.".strip()
     lines += ["", *textwrap.wrap(more, _WIDTH)] if more else []
     lines += ["", "Parameters", "----------", "name : str", "    Identifier."]
     every, skip = arguments_of(found), False
@@ -215,7 +215,7 @@ def _where(model: Described, between: Sequence[Any], joint: Any) -> dict[str, An
         return {"joint": joint_reference(model, between[0])}
     if joint is None and len(between) == 2:
         return {"between": [marker_reference(model, marker) for marker in between]}
-    raise UsageError("give one joint or two markers, and then the values")
+    raise UsageError("give one joint or two markers first, and then the values by keyword")
 
 
 def _reference(model: Described, kind: str, value: Any) -> Any:
@@ -225,7 +225,9 @@ def _reference(model: Described, kind: str, value: Any) -> Any:
 def _converted(model: Described, found: ElementType, name: Any, key: str, value: Any) -> Any:
     kind = found.keys[key].kind
     if kind == "marker" and isinstance(value, JointHandle) and key in found.remedies:
-        raise UsageError(f"{found.name} {name!r} acts at a marker, which {value!r} is not; {found.remedies[key]}")
+        raise UsageError(
+            f"{found.name} {name!r} acts at a marker, and {value!r} is not a marker; {found.remedies[key]}"
+        )
     if kind in ("marker", "joint", "body"):
         return _reference(model, kind, value)
     if kind in ("pair", "joints"):

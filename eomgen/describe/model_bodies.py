@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .described import Described
-from .handles import BodyHandle
+from .handles import BodyHandle, placed_markers
 
 
 class BodyMethods(Described):
@@ -26,11 +26,12 @@ class BodyMethods(Described):
         solids: Sequence[Mapping[str, Any]] | None = None,
         points: Sequence[Mapping[str, Any]] | None = None,
         check_inertia: bool | str | None = None,
+        markers: Mapping[str, Any] | None = None,
         display: Sequence[Mapping[str, Any]] | None = None,
     ) -> BodyHandle:
         """Add a rigid body.
 
-        Values are numbers, texts or SymPy expressions of parameters; parameters stay symbols in all that follows.
+        Values are numbers, texts or SymPy expressions of parameters; parameters stay symbols in the equations.
 
         Parameters
         ----------
@@ -60,6 +61,10 @@ class BodyMethods(Described):
         check_inertia : {'error', 'note', 'off'} or bool, optional
             Whether a mass and inertia that no rigid body can have is refused, noted (``note``) or taken in silence
             (``off``, False); the model's own setting unless given.
+        markers : mapping, optional
+            Named markers, as in the model file: a position ``{"tip": (l, 0, 0)}`` (m, body axes), or a mapping of
+            ``at``, ``rpy``, ``axes`` and ``matrix`` as :meth:`.BodyHandle.marker` takes them.  Each is known as
+            ``body.name`` everywhere.
         display : sequence of mappings, optional
             Shapes to draw, as in the model file: ``shape``, its sizes, ``at``, ``rpy``; data only.
 
@@ -78,6 +83,7 @@ class BodyMethods(Described):
             "solids": solids,
             "points": points,
             "check_inertia": check_inertia,
+            "markers": placed_markers(markers),
             "display": display,
         }
         values = {key: value for key, value in given.items() if value is not None}
@@ -85,7 +91,7 @@ class BodyMethods(Described):
 
     @property
     def check_inertia(self) -> bool | str:
-        """What becomes of a mass and inertia that no rigid body can have: error (True), note or off (False)."""
+        """What happens to a mass and inertia that no rigid body can have: error (True), note or off (False)."""
         given: bool | str = self._description.values.get("check_inertia", True)
         return given
 

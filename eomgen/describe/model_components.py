@@ -67,7 +67,7 @@ class ComponentMethods(Described):
     """The part of Model that takes other models in."""
 
     def attachment(self, name: str) -> MarkerHandle:
-        """Declare a name that stands for a marker of the model that takes this one in; see :meth:`add`.
+        """Declare a name for a marker of the model to which this one is added as a component; see :meth:`add`.
 
         Parameters
         ----------
@@ -83,10 +83,10 @@ class ComponentMethods(Described):
         return MarkerHandle(self, name)
 
     def add(self, component: Any, /, prefix: str = "", at: Any = None, **parameters: Any) -> InstanceHandle:
-        """Add the bodies, joints, forces and all else of another model, under names of their own.
+        """Add all parts of another model (bodies, joints, forces, ...) with a prefix before their names.
 
-        The component stays as it is, and what is done to it later changes nothing here.  Its gravity, independent
-        coordinates and settings of simulations do not count.
+        The component is copied: later changes of it do not change this model.  Its gravity, independent
+        coordinates and settings of simulations are not used.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class ComponentMethods(Described):
         """
         part = _component(component)
         if prefix and fault_of_name(prefix):
-            raise UsageError(f"prefix={prefix!r} cannot begin a name; letters, digits and underscores")
+            raise UsageError(f"prefix={prefix!r} cannot begin a name; use letters, digits and underscores")
         values = {name: _plain(value) for name, value in parameters.items() if value is not None}
         description = self._description
         made = replace(description, lines=dict(description.lines), origins=dict(description.origins), problems=[])
@@ -159,7 +159,7 @@ def _component(given: Any) -> Component:
 
         description = plain_description(given.description)
     else:
-        raise UsageError(f"{given!r} is no component; give a Model, or the name of a model file")
+        raise UsageError(f"{given!r} is not a component; give a Model, or the name of a model file")
     name = str(description.values.get("name", "component"))
     part = component_of(description, name, f"components.{name}.", faults.add)
     for problem in (*description.problems, *faults.problems):

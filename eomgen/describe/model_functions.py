@@ -100,7 +100,9 @@ class FunctionMethods(Described):
         if twin is not None and not isinstance(twin, str):
             twin = PythonTwin(twin, *further)
         elif any(further):
-            raise UsageError("python_derivatives go with a callable python=; a file has functions of the C names")
+            raise UsageError(
+                "python_derivatives need a callable python=; a Python file holds derivatives under their C names"
+            )
         given = {
             "source": str(source),
             "function": function,

@@ -59,7 +59,7 @@ _HEADERS = frozenset(("python", "pythread", "structmember", "frameobject"))
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z", re.ASCII)
 LONGEST = 64  #: characters of a name
 
-IDENTIFIER_RULE = "a name starts with a letter and goes on with letters a to z, digits and underscores"
+IDENTIFIER_RULE = "a name must start with a letter and contain only letters a to z, digits and underscores"
 
 
 def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
@@ -85,24 +85,24 @@ def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
     if len(name) > LONGEST:
         return f"a name of {len(name)} characters is too long", f"at most {LONGEST} characters"
     if keyword.iskeyword(name):
-        return f"{name!r} is a word of Python", f"choose another name, e.g. {name}_"
+        return f"{name!r} is a reserved word of Python", f"choose another name, e.g. {name}_"
     if symbol:
         if name in _C_KEYWORDS:
-            return f"{name!r} is a word of C", f"choose another name, e.g. {name}_"
+            return f"{name!r} is a reserved word of C", f"choose another name, e.g. {name}_"
         if name == "t":
-            return "'t' is the time", "choose another name"
+            return "'t' is reserved for the time", "choose another name"
         if name == "pi":
-            return "'pi' is the number", "choose another name"
+            return "'pi' is reserved for the number pi", "choose another name"
         if name in function_words():
-            return f"{name!r} is a function", f"choose another name, e.g. {name}_"
+            return f"{name!r} is a built-in function", f"choose another name, e.g. {name}_"
     return None
 
 
 def fault_of_model_name(name: object) -> tuple[str, str] | None:
     """What is wrong with the name of a model, which is that of the package generated; see :func:`fault_of_name`."""
     if isinstance(name, str) and (name in _NEEDED or name in sys.stdlib_module_names):
-        whose = "that it needs" if name in _NEEDED else "of Python's library"
-        return f"a package {name!r} would hide the module {whose}", f"choose another name, e.g. {name}_model"
+        whose = "a module that eomgen needs" if name in _NEEDED else "a module of Python's library"
+        return f"a package {name!r} would hide {whose}", f"choose another name, e.g. {name}_model"
     if isinstance(name, str) and (name.lower() in _HEADERS or name.lower().startswith("eomgen")):
         return f"{name[:LONGEST]!r} is the name of a file that every package has", "choose another name, e.g. my_model"
     return fault_of_name(name, symbol=True)

@@ -106,10 +106,12 @@ def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> M
             lengths[key] = (reader.expression(place, values[key]),) * 3
         known = [reader.known(x) for x in lengths[key]]
         if any(x is not None and x < 0.0 for x in known):
-            reader.faults.add(place, f"{values[key]!r} is negative", "lengths are 0 or positive")
+            reader.faults.add(place, f"{values[key]!r} is negative", "a length must be 0 or positive")
     inner, outer = (lengths[key][0].value if key in lengths else None for key in ("inner_radius", "outer_radius"))
     if inner is not None and outer is not None and inner > outer:
-        reader.faults.add(f"{path}.inner_radius", f"{inner:g} exceeds the outer radius {outer:g}", "exchange them")
+        reader.faults.add(
+            f"{path}.inner_radius", f"{inner:g} exceeds the outer radius {outer:g}", "give a smaller inner radius"
+        )
     made, o = solid(lengths), graph.zero
     a, b, c = made.gyration()
     return MassProperties(made.content(), made.centre(), ((a, o, o), (o, b, o), (o, o, c)))
@@ -132,7 +134,7 @@ def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | No
     try:
         found = measure_mesh(_locate(reader, file))
     except UsageError as error:
-        reader.faults.add(place, str(error), "a mesh is a closed surface of triangles that face outwards")
+        reader.faults.add(place, str(error), "a mesh must be a closed surface of triangles that face outwards")
         return None
     one = graph.one if scale is None else scale
     x, y, z = (tuple(graph.constant(v / found.volume) * one * one for v in row) for row in found.inertia)

@@ -44,7 +44,7 @@ def check_bodies(
         found: list[tuple[str, str, str]] = []
         if mass is not None and mass[0] < 0:
             how = "" if body.mass.value is not None else " at the declared values"
-            found.append((f"{path}.mass", f"is {mass[0]:g}{how}", f"a mass is 0 or positive; {SWITCH}"))
+            found.append((f"{path}.mass", f"is {mass[0]:g}{how}", f"give a mass of 0 or more, {SWITCH}"))
         if not faults.under(f"{path}.inertia"):
             if not is_symmetric(body.inertia, tensor, COMPUTED * scale):
                 found.append((f"{path}.inertia", *ASYMMETRIC))
@@ -59,7 +59,7 @@ def check_bodies(
                 if remedy not in (EXCESS, ASYMMETRIC[1]):
                     negative[body.name] = None
                 if body.check == "note":
-                    notes.append(f"{place}: {message}; taken as it is")
+                    notes.append(f"{place}: {message}; it is used as given")
     return tuple(negative), tuple(notes)
 
 

@@ -74,14 +74,14 @@ def placed_on(outer: Placed, inner: Placed) -> dict[str, Any]:
     try:
         (a, turn), (b, own) = (_read(with_rpy(placed, {})) for placed in (outer, inner))
     except KeyError:
-        raise UsageError("places something on a frame whose matrix depends on parameters") from None
+        raise UsageError("is placed on a frame whose matrix depends on parameters") from None
     if turn is None:
         at = [total((1.0, 1.0), pair) for pair in zip(a, b, strict=True)]
         return {"at": at} if own is None else {"at": at, "rpy": own}
     if own is None and all(not isinstance(x, str) and x == 0 for x in b):
         return {"at": a, "rpy": turn}
     if not all(map(is_constant, [*turn, *(own or ())])):
-        raise UsageError("places something on a frame that is turned by angles which depend on parameters")
+        raise UsageError("is placed on a frame that is turned by angles which depend on parameters")
     rotation = from_roll_pitch_yaw([number_of(x, {}) for x in turn])
     at = [total([1.0, *row], [x, *b]) for row, x in zip(rotation.tolist(), a, strict=True)]
     if own is not None:
@@ -92,6 +92,6 @@ def placed_on(outer: Placed, inner: Placed) -> dict[str, Any]:
 def _read(placed: Placed) -> tuple[list[Any], list[Any] | None]:
     at, turn = (items(placed.get(key, (0, 0, 0))) for key in ("at", "rpy"))
     if at is None or turn is None or len(at) != 3 or len(turn) != 3:
-        raise UsageError("has a place that is not at: [x, y, z] with rpy: [roll, pitch, yaw]")
+        raise UsageError("has a place that is not given as at: [x, y, z] with rpy: [roll, pitch, yaw]")
     turned = any(isinstance(x, str) or x != 0 for x in turn)
     return at, turn if turned else None

@@ -32,7 +32,7 @@ def rounds_of(given: Any, path: str, fault: Fault) -> list[Round] | None:
             return None
         listed = _listed(values)
         if listed is None:
-            fault(place, f"{values!r} is nothing to go through", _REMEDY)
+            fault(place, f"{values!r} is not a list of values", _REMEDY)
             return None
         if not 1 <= len(listed) <= ROUNDS:
             wrong_count = f"has more than {ROUNDS} values" if listed else "has no values"
@@ -42,7 +42,11 @@ def rounds_of(given: Any, path: str, fault: Fault) -> list[Round] | None:
     counts = {name: len(values) for name, values in columns.items()}
     if len(set(counts.values())) > 1:
         shown = ", ".join(f"{name} has {count}" for name, count in counts.items())
-        fault(path, f"lists of different lengths: {shown}", "variables go through their lists side by side")
+        fault(
+            path,
+            f"lists of different lengths: {shown}",
+            "all lists must have the same length: the variables take their values side by side",
+        )
         return None
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 

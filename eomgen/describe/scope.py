@@ -23,10 +23,10 @@ LEVELS |= {"event": OUTPUT + 1}
 LEVELS |= {"function": OUTPUT + 1}  # by itself; calls are not looked up here
 
 _LEVEL_REMEDY = {
-    NUMBER: "numbers and pi can",
-    CONSTANT: "numbers, parameters and pi can",
-    MOTION: "t, parameters, inputs, coordinates and their velocities can",
-    OUTPUT: "t, parameters, inputs, coordinates, their rates, motion of markers and energies can",
+    NUMBER: "allowed are numbers and pi",
+    CONSTANT: "allowed are numbers, parameters and pi",
+    MOTION: "allowed are t, parameters, inputs, coordinates and their velocities",
+    OUTPUT: "allowed are t, parameters, inputs, coordinates, their rates, motion of markers and energies",
 }
 _QUANTITY = re.compile(rf"({'|'.join(QUANTITIES)})\((.+)\)\Z", re.DOTALL)
 RATES = ("", "_dot", "_ddot")
@@ -75,10 +75,10 @@ class Namespace:
                 self.places[n] = path
         if clash is not None:
             other = f"{self.kinds[clash]} at {self.places[clash]}"
-            own = "" if clash == name else f"; {clash!r} would be the rate of {name!r}"
+            own = "" if clash == name else f", and {clash!r} is the rate of {name!r}"
             self.faults.add(
                 path,
-                f"the name {clash!r} is taken by the {other}{own}",
+                f"the name {clash!r} is already used by the {other}{own}",
                 "parameters, inputs, functions, coordinates, outputs and events share one namespace, with the _dot "
                 "and _ddot of coordinates; rename one",
             )
@@ -130,7 +130,9 @@ class Scope:
         if name in self.local:
             kind = self.names.kinds.get(name) if self.exclusive else None
             if kind is not None:
-                message = f"{name!r} is the {kind} at {self.names.places.get(name, '?')} and the element's own too"
+                message = (
+                    f"{name!r} is a variable of the element and also the {kind} at {self.names.places.get(name, '?')}"
+                )
                 self.names.faults.add(self.path, message, f"rename the {kind}")
             return self.local[name]
         quantity = quantity_of(name)
@@ -174,9 +176,9 @@ class Scope:
             if marker != COM:
                 raise
         if quantity == "angle" or QUANTITIES[quantity][0] in TURNING:
-            raise ExpressionError("the centre of mass of all bodies does not turn", 0, "give a marker")
+            raise ExpressionError("the centre of mass of all bodies has no rotation", 0, "give a marker of a body")
         return None
 
     def _refuse(self, name: str, kind: str) -> None:
         remedy = f"only {_LEVEL_REMEDY[self.level]}"
-        self.names.faults.add(self.path, f"the {kind} {name!r} cannot stand here", remedy)
+        self.names.faults.add(self.path, f"the {kind} {name!r} cannot be used here", remedy)

@@ -54,7 +54,7 @@ def read_forms(method: Any) -> Forms:
         return _read_kane(method)
     if isinstance(method, LagrangesMethod):
         return _read_lagrange(method)
-    raise UsageError(f"from_sympy takes SymPy's {KNOWN}, formed, not {type(method).__name__}")
+    raise UsageError(f"from_sympy takes SymPy's {KNOWN} with its equations formed, not {type(method).__name__}")
 
 
 def _read_lagrange(method: Any) -> Forms:

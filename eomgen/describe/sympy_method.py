@@ -41,7 +41,7 @@ def describe_method(
     for key in given_parameters:
         if key not in constants:
             near = nearest(str(key), constants, "constants")
-            problems.append(Problem(f"parameters.{key}", f"no constant {key!r} in the equations", near))
+            problems.append(Problem(f"parameters.{key}", f"the equations have no constant {key!r}", near))
     if problems:
         raise ModelError(problems)
 
@@ -125,7 +125,7 @@ class _Known:
         for symbol, different in symbols.items():
             if symbol in self.names or symbol in functions:
                 what = "a coordinate or speed" if symbol in self.names else "a function of time"
-                message = f"{symbol!r} is a constant and {what} too"
+                message = f"{symbol!r} is both a constant and {what}"
                 self.problems.append(Problem(f"equations.{symbol}", message, "rename one"))
             elif len(different) > 1:
                 message = f"{len(different)} different symbols are called {symbol!r}"
@@ -135,7 +135,7 @@ class _Known:
         for name in inputs:
             if name not in functions and name not in symbols:
                 near = nearest(str(name), [*functions, *symbols], "known")
-                self.problems.append(Problem(f"inputs.{name}", f"no {name!r} in the equations", near))
+                self.problems.append(Problem(f"inputs.{name}", f"the equations do not contain {name!r}", near))
         constants = [name for name in symbols if name not in self.names and name not in driven]
         return sorted(set(constants) - functions), sorted({*functions, *driven})
 

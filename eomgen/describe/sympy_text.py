@@ -46,7 +46,9 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
 
         def _print_Heaviside(self, e: Any) -> str:
             if 2 * e.args[1] != 1:
-                raise UsageError(f"{shortened(e)} cannot be written as a text: heaviside is 1/2 at 0")
+                raise UsageError(
+                    f"{shortened(e)} cannot be written as a text: only heaviside with the value 1/2 at 0 can"
+                )
             return f"heaviside({self._print(e.args[0])})"
 
         def _print_Exp1(self, e: Any) -> str:
@@ -96,7 +98,9 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
             wanted = dict(e.variable_count)
             orders = [wanted.get(x, 0) for x in e.expr.args]
             if sum(orders) != sum(wanted.values()) or any(set(wanted) & x.free_symbols - {x} for x in e.expr.args):
-                raise UsageError(f"{shortened(e)} cannot be written as a text: write its chain rule out")
+                raise UsageError(
+                    f"{shortened(e)} cannot be written as a text: write out the chain rule of its derivative"
+                )
             call = f"{e.expr.func.__name__}({', '.join(self._print(x) for x in operands)})"
             return f"diff({', '.join([call, *map(str, orders)])})"
 
@@ -108,7 +112,9 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
     except RecursionError:
         raise UsageError(f"{shortened(expression)} is nested too deeply to be written as a text") from None
     except ValueError:  # Python writes whole numbers of some thousand digits and no longer ones
-        raise UsageError(f"{shortened(expression)} holds a number of too many digits to be written as a text") from None
+        raise UsageError(
+            f"{shortened(expression)} contains a number with too many digits to be written as a text"
+        ) from None
     graph = Graph()
     for call in expression.atoms(AppliedUndef) if isinstance(expression, sympy.Basic) else ():
         if call.func.__name__ in functions:

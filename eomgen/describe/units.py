@@ -99,7 +99,7 @@ def read_unit(text: str) -> Unit:
         The text is not made of units, or of units with an offset (degC).
     """
     if text and not text.strip():
-        raise UnitError(f"{quoted(text)} is not a unit", "leave it out where there is none")
+        raise UnitError(f"{quoted(text)} is not a unit", "leave the unit out if there is none")
     text = text.strip()
     if text in _MEANT:
         raise UnitError(f"{quoted(text)} is not a unit", f"write {_MEANT[text]}")
@@ -115,7 +115,7 @@ def read_unit(text: str) -> Unit:
         except OverflowError:
             size = math.inf
     if not (math.isfinite(size) and size > 0.0):
-        raise UnitError(f"{quoted(text)} is of no finite size", _FORM)
+        raise UnitError(f"{quoted(text)} has a size that is not finite", _FORM)
     return Unit(dimension, size, text if only_si else si_text(dimension, text), text)
 
 
@@ -132,7 +132,7 @@ def si_text(dimension: Dimension, text: str = "") -> str:
     angle = bool(re.search(r"\b(rad|deg|degree|degrees|rev|rpm|turn|revolution|[a-z]*rad)\b", text))
     written = _WRITTEN.get(dimension)
     if written is None:
-        powers = list(zip(_BASES, dimension, strict=True))
+        powers = sorted(zip(_BASES, dimension, strict=True), key=lambda pair: pair[0] != "kg")  # kg*m^2
         over = "*".join(_powered(base, power) for base, power in powers if power > 0)
         under = "/".join(_powered(base, -power) for base, power in powers if power < 0)
         written = over + (f"/{under}" if under else "")
@@ -203,14 +203,14 @@ def _looked_up(word: str, text: str) -> tuple[Dimension, float, bool]:
         raise UnitError(unknown, (f"did you mean {near[0]!r}? " if near else "") + _FORM) from error
     if not one._is_multiplicative:
         raise UnitError(
-            f"{quoted(word)}{of} has an offset, so that a product with it has no meaning",
+            f"{quoted(word)}{of} has a zero point of its own, so it cannot be multiplied",
             "give the temperature in K" if "[temperature]" in dict(unit.dimensionality) else "give it in an SI unit",
         )
     dimension = dimensions.NONE
     powers: dict[str, Any] = dict(unit.dimensionality)
     for base, power in powers.items():
         if base not in _PINT:
-            raise UnitError(f"{quoted(word)}{of} is a unit of {base.strip('[]')}, which no model knows", _FORM)
+            raise UnitError(f"{quoted(word)}{of} is a unit of {base.strip('[]')}, which models do not have", _FORM)
         dimension = dimension.times(_PINT[base], float(power))
     size: Any = one.to_base_units().magnitude
     return dimension, float(size), False

@@ -143,7 +143,7 @@ class Reader:
             return ""
         half = lone_surrogate(value)
         if half:
-            self.faults.add(path, f"holds {half}, half of a pair and no character", WHOLE)
+            self.faults.add(path, f"contains {half}, which is half of a character pair", WHOLE)
             return ""
         return join_surrogates(value)
 
@@ -154,7 +154,11 @@ class Reader:
             return None
         name = usable_name(value)
         if name is None:
-            self.faults.add(path, f"{value!r:.200} is empty, or holds a character that no file name can", "rename it")
+            self.faults.add(
+                path,
+                f"{value!r:.200} is empty, or contains a character that file names cannot have",
+                "give another name",
+            )
         return name
 
     def flag(self, path: str, value: Any) -> bool:
@@ -235,7 +239,9 @@ class Reader:
         if self.faults.under(path):
             return self.identity
         if abs(sum(x * y for x, y in zip(a, b, strict=True))) > PERPENDICULAR:
-            self.faults.add(path, f"the directions of {first} and {second} are not at right angles", "correct one")
+            self.faults.add(
+                path, f"the directions of {first} and {second} are not at right angles", "correct one of them"
+            )
             return self.identity
         columns = complete_axes("xyz".index(first), a, "xyz".index(second), b)
         return turn_matrix(self.graph, columns)
@@ -251,8 +257,8 @@ class Reader:
         if all(entry is not None for row in known for entry in row):
             numbers = np.array(known, dtype=float)
             if np.abs(numbers @ numbers.T - np.eye(3)).max() > PERPENDICULAR or np.linalg.det(numbers) < 0.0:
-                remedy = "its columns are three axes of length 1 at right angles, right-handed"
-                self.faults.add(path, "is no rotation", remedy)
+                remedy = "its columns must be three axes of length 1 at right angles, right-handed"
+                self.faults.add(path, "is not a rotation matrix", remedy)
         return (x, y, z)
 
     def moving(self, label: str) -> Marker:

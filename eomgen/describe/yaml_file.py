@@ -39,7 +39,7 @@ def describe_yaml_file(path: str | os.PathLike[str], *, allow_native: bool = Fal
     FileNotFoundError
         There is no such file.
     UsageError
-        It is no plain file.
+        It is not a plain file.
     ModelError
         The file is not YAML or not a mapping.
     """

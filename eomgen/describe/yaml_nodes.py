@@ -89,9 +89,7 @@ class Document:
             what = str(getattr(error, "reason", "") or error).split("\n")[0]
             raise self._stop(_line_of(error, text), f"not YAML: {what}") from None
         if not documents:
-            raise self._stop(
-                1, "the file is empty", "a model file has a name, bodies and joints, or a name and a lagrangian"
-            )
+            raise self._stop(1, "the file is empty", "write a name, bodies and joints, or a name and a lagrangian")
         return documents[0]
 
     def _documents(self) -> list[Any]:
@@ -100,7 +98,9 @@ class Document:
             kind = type(event).__name__
             if kind in ("ScalarEvent", "SequenceStartEvent", "MappingStartEvent", "AliasEvent"):
                 if documents:
-                    raise self._stop(event.start_mark.line + 1, "a second document begins", "a file holds one model")
+                    raise self._stop(
+                        event.start_mark.line + 1, "a second YAML document begins here", "write one model per file"
+                    )
                 documents.append(self._value(event, "", 0))
         return documents
 
@@ -112,12 +112,14 @@ class Document:
         if depth > DEPTH:
             raise self._stop(line, "nested too deeply", f"at most {DEPTH} levels", path)
         if kind == "AliasEvent":
-            self._note(path or "file", line, f"the alias *{event.anchor}", "write the value out; aliases are not read")
+            self._note(
+                path or "file", line, f"the alias *{event.anchor}", "aliases are not supported: write the value itself"
+            )
             return None
         if event.anchor is not None:
-            self._note(path or "file", line, f"the anchor &{event.anchor}", "leave it out; aliases are not read")
+            self._note(path or "file", line, f"the anchor &{event.anchor}", "anchors are not supported: leave it out")
         if event.ctag is not None:
-            self._note(path or "file", line, f"the tag {event.ctag}", "leave it out; tags are not read")
+            self._note(path or "file", line, f"the tag {event.ctag}", "tags are not supported: leave it out")
         if kind == "ScalarEvent":
             text = self._whole(path, line, event.value)
             plain = event.style is None or event.style == ""
@@ -130,7 +132,7 @@ class Document:
         """The text with its pairs of surrogates, as JSON escapes them, as characters; half a pair is a fault."""
         half = lone_surrogate(text)
         if half:
-            self._note(path or "file", line, f"holds {half}, half of a pair and no character", WHOLE)
+            self._note(path or "file", line, f"contains {half}, which is half of a character pair", WHOLE)
             return visible(text)
         return join_surrogates(text)
 
@@ -151,18 +153,18 @@ class Document:
                 break
             line = event.start_mark.line + 1
             if type(event).__name__ != "ScalarEvent":
-                self._note(path or "file", line, "a key that is not a name", "keys are plain names")
+                self._note(path or "file", line, "a key is not a name", "keys must be plain names")
                 self._value(event, path, depth + 1)
                 self._value(next(self._events), f"{path}.?", depth + 1)
                 continue
             key = self._whole(path, line, str(event.value))
             inner = f"{path}.{key}" if path else key
             if event.anchor is not None or event.ctag is not None:
-                self._note(inner, line, "a key with an anchor or a tag", "keys are plain names")
+                self._note(inner, line, "a key has an anchor or a tag", "keys must be plain names")
             repeated = key in result
             if repeated:
                 first = self.lines[inner][1]
-                self._note(inner, line, f"is given twice, first in line {first}", "remove or rename one")
+                self._note(inner, line, f"is given twice, first in line {first}", "remove or rename one of them")
             else:
                 self.lines[inner] = (self.file, line)
             value = self._value(next(self._events), f"{inner} (again)" if repeated else inner, depth + 1)

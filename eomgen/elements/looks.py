@@ -99,13 +99,18 @@ class PitchCircles(NamedTuple):
 
 
 class Contour(NamedTuple):
-    """A closed or open line in the axes of a marker: a point (m) as expressions of one symbol, from low to high."""
+    """A closed or open line in the axes of a marker: a point (m) as expressions of one symbol, from low to high.
+
+    ``follower``: the marker that is held to it, where there is one; ``face``: with a flat face across its z axis.
+    """
 
     marker: Marker
     point: tuple[Expr, Expr, Expr]
     parameter: Expr
     low: float
     high: float
+    follower: Marker | None = None
+    face: bool = False
 
 
 class RackAndPinion(NamedTuple):
@@ -117,7 +122,7 @@ class RackAndPinion(NamedTuple):
 
 
 class LiftCurve(NamedTuple):
-    """The curve that a follower that slides describes on its cam: its coordinate over the cam's angle less a phase."""
+    """The curve that a follower describes on its cam: its coordinate over that of the cam less a phase."""
 
     cam: Expr
     follower: Expr

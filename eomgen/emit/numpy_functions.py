@@ -76,8 +76,8 @@ def twin_files(program: Program) -> dict[str, str]:
         f.require_evaluator()
         if not f.native.twin_text:
             raise UsageError(
-                f"function {f.name!r}: a package of target numpy needs its Python twin as a file; give python= the "
-                f"path of a file that defines {', '.join(name for _, name in f.native.names)}"
+                f"function {f.name!r}: a package of target numpy needs this function in Python too, in a file; give "
+                f"python= the path of a file that defines {', '.join(name for _, name in f.native.names)}"
             )
         files[f"native_{f.name}.py"] = f.native.twin_text
     return files

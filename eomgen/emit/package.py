@@ -15,6 +15,7 @@ from ..targets import find_target
 from ..texts import summary_text
 from .c import emit_c
 from .carried import carry
+from .example_state import example_state
 from .layouts import describe_layouts
 from .numpy import emit_numpy
 from .python_calls import describe_calls
@@ -67,7 +68,9 @@ def emit_package(program: Program, target: str, slim: bool = False) -> SourceSet
     """
     row = find_target(target)
     if slim and not row.module:
-        raise UsageError(f"target {target} holds no Python that could be left out; slim is for target cython or numpy")
+        raise UsageError(
+            f"slim is for target cython or numpy; packages of target {target} contain no Python to leave out"
+        )
     program = replace(program, metadata={**program.metadata, "target": target})
     return SourceSet({"model.json": metadata_json(program), **row.files(program, _context(program, slim))})
 
@@ -99,7 +102,7 @@ def c_library(program: Program, context: dict[str, Any]) -> dict[str, str]:
     sources = emit_c(program)
     c_files = [name for name in sources if name.endswith(".c")]
     objects = [name.removesuffix(".c") + ".o" for name in c_files]
-    context |= {"c_files": c_files, "object_files": objects}
+    context |= {"c_files": c_files, "object_files": objects, "x_values": _numbers(example_state(program))}
     return {
         **sources,
         "Makefile": render("c/Makefile.j2", context),
@@ -122,7 +125,6 @@ def _python_files(context: dict[str, Any], core: Mapping[str, str]) -> dict[str,
 def _context(program: Program, slim: bool) -> dict[str, Any]:
     metadata = program.metadata
     doc = str(metadata.get("doc") or "").strip()
-    q = list(metadata.get("q_reference") or [0.0] * program.sizes.n_q)
     calls, methods = describe_calls(program), SLIM_METHODS if slim else METHODS
     attributes, forms = [*(name for name, _ in ANNOTATED), *methods], () if slim else ("minimal",)
     return {
@@ -142,7 +144,6 @@ def _context(program: Program, slim: bool) -> dict[str, Any]:
         "methods": methods,
         "p_values": _numbers(metadata.get("p_values")),
         "u_values": _numbers(metadata.get("u_values")),
-        "x_values": _numbers([*q, *[0.0] * program.sizes.n_v]),
     }
 
 

@@ -44,7 +44,7 @@ def write_package(sources: Mapping[str, str], folder: Path) -> Path:
     earlier = _earlier_files(folder)
     for name in sources:
         if earlier is not None and name not in earlier and os.path.lexists(folder / name):
-            raise UsageError(f"{folder / name} is in the way, not from eomgen; move it or choose another --out")
+            raise UsageError(f"{folder / name} exists and was not written by eomgen; move it, or choose another --out")
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as private:
         stage = Path(private) / folder.name

@@ -46,7 +46,7 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
         if given is not None and not isinstance(given, Mapping):
             raise UsageError(f"{what} must be given by name beside a grid")
         if twice := sorted({*grid} & {*without_dots(given or {})}):
-            raise UsageError(f"grid: {', '.join(twice)} stands in {what} too")
+            raise UsageError(f"grid: {', '.join(twice)} is given in {what} too; give it once")
     axes = [read_axis(f"grid {name}", values) for name, values in grid.items()]
     count = math.prod(map(len, axes))
     require_room(f"a grid of {count} runs", float(count) * len(axes), "give fewer values")

@@ -58,7 +58,7 @@ def open_client(cluster: Any) -> Iterator[Any]:
         try:
             client = distributed.Client(cluster)
         except (OSError, ValueError) as error:
-            raise UsageError(f"cluster {cluster}: no scheduler answers there ({error})") from None
+            raise UsageError(f"cluster {cluster}: no scheduler answers at this address ({error})") from None
         with client:
             yield client
     else:

@@ -37,7 +37,7 @@ class Failure(NamedTuple):
 
 
 class Ensemble:
-    """The result of :meth:`~..api.module.Module.simulate_many`.
+    """The results of many runs, from :meth:`~..api.module.Module.simulate_many`.
 
     ``ens["theta"]`` is the column (k,) at the end of the runs, or (m, k) at the times ``t_eval``: coordinates,
     velocities and outputs.  Runs that failed hold NaN; ``reached`` has the states they came to.
@@ -123,7 +123,8 @@ class Ensemble:
             return np.asarray(self.reduced["mean"][row])
         if self.x is None:
             raise UsageError(
-                f"this ensemble kept only the results of its reduction ({', '.join(self.reduced)}), not {name!r}"
+                f"this ensemble kept only the results of its reduction ({', '.join(self.reduced)}), not {name!r}; "
+                "run it with reduce='states'"
             )
         states = self.x[:, None] if self.samples is None else self.samples
         if row < len(self.x):
@@ -155,7 +156,7 @@ class Ensemble:
         if self._statistics:
             rows = [self.reduced[key][:, -1] for key in ("mean", "variance", "least", "greatest")]
         elif self.x is None:
-            raise UsageError("this ensemble kept no states to summarise")
+            raise UsageError("this ensemble kept no states to summarise; run it with reduce='states' or 'statistics'")
         else:
             parts = summarise(self._outputs(self.x, self.t_end))
             spread = parts["squares"] / np.maximum(parts["count"] - 1.0, 1.0)
@@ -183,26 +184,58 @@ class Ensemble:
         return {"initial": initial, "parameters": column["p"], "inputs": inputs, **watched}
 
     def trajectory(self, k: int, **options: Any) -> Trajectory:
-        """Run k again, with all its steps; options as for ``Module.simulate``."""
+        """Run case k again and keep all its steps; options as for ``Module.simulate``."""
         plan = self._plan
         settings = {"method": plan.method, **plan.options, **options}
         return simulate(self._module, plan.span, **self.case(k), **settings)
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """A row for each run: status, end, parameters that vary, and the columns at the end."""
+    def to_pandas(self, samples: bool = False) -> pandas.DataFrame:
+        """A table of the runs: what varies between them, and the columns at the end or at all kept times.
+
+        Parameters
+        ----------
+        samples : bool
+            A row for each run and time of ``t_eval``, with the columns ``run`` and ``t``, instead of a row for each
+            run at its end.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Initial values that vary are called ``initial_theta``; parameters, inputs and columns have their own names.
+
+        Raises
+        ------
+        UsageError
+            ``samples`` of an ensemble that kept none: it had no ``t_eval``, or a reduction.
+        """
         pd = require("pandas", "pandas", "to_pandas")
-        cases = self._cases
-        columns: dict[str, Any] = {"status": self.status, "t_end": self.t_end, "steps": self.steps}
-        if cases.p.ndim > 1:
-            columns |= {name: row for name, row in zip(self._module.p_names, cases.p, strict=True) if np.ptp(row)}
-        if self.x is not None:
+        columns: dict[str, Any] = {"status": self.status, "t_end": self.t_end, "steps": self.steps} | self._varied()
+        if samples:
+            if self.samples is None:
+                raise UsageError("this ensemble kept no samples; give t_eval (on the command line --samples)")
+            times = len(self.t)
+            columns = {"run": np.arange(self.count), **columns}
+            columns = {name: np.repeat(row, times) for name, row in columns.items()}
+            columns |= {"t": np.tile(self.t, self.count)}
+            columns |= {name: np.asarray(self[name]).T.ravel() for name in self.names}
+        elif self.x is not None:
             end = self._outputs(self.x, self.t_end)
             columns |= dict(zip(self.names, end, strict=True))
         return pd.DataFrame(columns)
 
+    def _varied(self) -> dict[str, Array]:
+        """The parameters, inputs and initial values (k,) that differ between the runs."""
+        cases, module = self._cases, self._module
+        found: dict[str, Array] = {}
+        for names, rows in ((module.p_names, cases.p), (module.u_names, cases.u)):
+            found |= dict(zip(names, rows, strict=True)) if rows.ndim > 1 else {}
+        starts = cases.values if cases.states is None else dict(zip(module.x_names, cases.states, strict=True))
+        found |= {f"initial_{name}": np.asarray(row) for name, row in starts.items() if np.ndim(row)}
+        return {name: row for name, row in found.items() if row.size and np.ptp(row)}
+
     @property
     def metadata(self) -> dict[str, Any]:
-        """What the runs have in common, as a trajectory's ``metadata`` has it; ``values`` is a digest of the others."""
+        """Metadata of all runs, as in a trajectory's ``metadata``; ``values`` is a digest of what differs."""
         plan, cases = self._plan, self._cases
         shared = zip(self._module.p_names, np.reshape(cases.p, (self._module.n_p, -1)), strict=True)
         return {
@@ -244,7 +277,7 @@ class Ensemble:
         name : str
         ax : matplotlib Axes, optional
         limit : int
-            Draw so many runs at most, evenly chosen.
+            Draw at most this number of runs, evenly chosen.
         """
         from .column_picture import draw
 

@@ -74,7 +74,7 @@ def describe(module: BoundModel) -> Handle:
     core: Any = eager(module.core)
     file = str(getattr(core, "__file__", "") or "")
     if not file or not Path(file).is_file():
-        raise UsageError(f"the module of {module.name!r} has no file that workers could load; use target cython")
+        raise UsageError(f"the module of {module.name!r} is not in a file that workers could load; use target cython")
     if hasattr(core, "take_lanes"):
         core.take_lanes()  # here, once, so that workers find them beside the module
     recipe = _recipe(Path(file))
@@ -130,7 +130,7 @@ def _open(name: str, file: str, wanted: str, recipe: str, needs: tuple[str, ...]
         compilation = import_module("eomgen.compilation")
     except ImportError as error:
         raise MissingDependencyError(
-            "a worker on another machine builds the module itself and needs eomgen: pip install eomgen"
+            "a worker on another machine builds the module itself, so it needs eomgen: pip install eomgen there"
         ) from error
     facts = json.loads(recipe)
     options = compilation.Options(**facts["options"])

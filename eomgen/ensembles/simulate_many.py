@@ -66,7 +66,7 @@ def simulate_many(
     """Integrate the equations of motion for many initial values, parameters and inputs.
 
     Every run has steps of its own.  The results do not depend, to the last bit, on how threads, workers and blocks are
-    chosen; they are those of ``simulate`` within the tolerance.  A run that fails is marked and holds up no other.
+    chosen; they agree with ``simulate`` within the tolerance.  A run that fails is marked, and the others go on.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def simulate_many(
     grid : mapping of str to list or (low, high, count), optional
         Values of parameters, inputs, coordinates and rates: a run for every combination, the last name fastest.
     count : int, optional
-        Number of runs, where no array tells it.
+        Number of runs, needed if no array gives it.
     method : str, optional
         DOP853, RK45, RK23, RK4, Radau and Taylor run in compiled code; other methods of ``simulate`` one run after the
         other.
@@ -89,7 +89,7 @@ def simulate_many(
     events : str, list of str, or mapping of names to expressions, optional
         As for ``simulate``, without functions; those of the model by default.
     keep_events : int
-        Keep so many events of each run, the first ones.
+        Number of events to keep of each run, the first ones.
     reduce : {'states', 'statistics', 'events'} or callable, optional
         What to keep: every run's last state, its states at t_eval and its events (default); its events alone; or count,
         mean, variance, least and greatest of states and outputs over the runs; or what ``reduce(block)`` returns for
@@ -173,7 +173,7 @@ def simulate_many(
     except (KeyError, ValueError, TypeError, IndexError) as error:
         if store_of is None:
             raise
-        raise UsageError(f"the blocks in store {store} do not fit each other: {error}; name another folder") from error
+        raise UsageError(f"the blocks in store {store} do not belong together: {error}; name another folder") from error
 
 
 def _run(

@@ -44,7 +44,7 @@ class Store:
             return
         remove_parts(manifest)  # of a call that was killed before the manifest was there
         if self.folder.is_dir() and any(self.folder.iterdir()):
-            raise UsageError(f"store {self.folder} is not empty and holds no ensemble; name another folder")
+            raise UsageError(f"store {self.folder} is not empty and does not contain an ensemble; name another folder")
         self.folder.mkdir(parents=True, exist_ok=True)
         write_whole(manifest, json.dumps(wanted, indent=1).encode())
 

@@ -31,9 +31,9 @@ def note_lost_digits(kinematics: Kinematics, mobility: Mobility, tree: TreeEquat
     if not least < WORTH_A_WORD:
         return ""
     kept = max(0, int(-np.log10(EPS / max(least, EPS))))
-    bodies = "" if kinematics.mechanism.lagrangian else f"; method {' and '.join(FREE)} keep all of them"
+    bodies = "" if kinematics.mechanism.lagrangian else f"; the methods {' and '.join(FREE)} keep all digits"
     return (
-        f"masses or lengths are so far apart that rounding leaves about {kept} of 16 digits of the accelerations "
+        f"masses or lengths differ so much in size that rounding leaves about {kept} of 16 digits of the accelerations "
         f"(smallest share of inertia {least:.1g}){bodies}"
     )
 

@@ -56,7 +56,7 @@ class IdleMotion:
         bodies = "; ".join(f"{name!r} about ({', '.join(f'{x:.3g}' for x in axis)})" for name, axis in turning)
         message = f"the motion of {together} has {self.what} behind it: it turns {bodies} in body axes"
         name = turning[0][0]
-        remedy = f"give {name!r} an inertia about that axis, or a joint that does not turn it so"
+        remedy = f"give {name!r} an inertia about that axis, or a joint that does not turn it about that axis"
         return mechanism.problem(path, message, remedy)
 
     def _turning(self, kinematics: Kinematics) -> list[tuple[str, Sequence[float]]]:

@@ -18,7 +18,7 @@ from ..numeric.partitions import partition
 from .idle import IdleMotion
 from .tree_equations import TreeEquations
 
-REMEDY = "give the body it moves a mass or an inertia; for kinematics alone, check_inertia: note"
+REMEDY = "give the body that it moves a mass or an inertia; for kinematics alone, check_inertia: note"
 SHOWN = 8  #: bodies that a message names
 
 
@@ -132,6 +132,6 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
             section = "lagrangian" if m.given is None else "equations"
             path = f"joints.{spec.name}" if spec else f"{section}.{names[j]}"
             what = "negative inertia" if size < -LEAST else "no inertia"
-            message = f"coordinate {names[j]!r} has {what} behind it: a motion along it moves no mass"
+            message = f"coordinate {names[j]!r} has {what} behind it: a motion along this coordinate moves no mass"
             problems.append(m.problem(path, message, REMEDY))
     return problems

@@ -63,7 +63,7 @@ class VelocityTransformation(NamedTuple):
 
 
 def transform_velocities(
-    kinematics: Kinematics, mobility: Mobility, values: Mapping[str, float], names: Names | None = None
+    kinematics: Kinematics, mobility: Mobility, values: Mapping[str, float], names: LoopNames | None = None
 ) -> VelocityTransformation:
     """B, b and c of the independent velocities of the mobility, with pivots judged by numbers as above.
 
@@ -93,13 +93,13 @@ def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
     return total
 
 
-class Names:
-    """Names for what is formed on the way to the dependent velocities.
+class LoopNames:
+    """LoopNames for what is formed on the way to the dependent velocities.
 
     Attributes
     ----------
     given : list of (str, Expr)
-        Names, which stand as symbols in what follows, and their values, in order.
+        LoopNames, which stand as symbols in what follows, and their values, in order.
     """
 
     def __init__(self, kinematics: Kinematics, independent: Sequence[str]) -> None:
@@ -138,7 +138,7 @@ def eliminate(
     given: Sequence[Sequence[Expr]],
     bound: Sequence[int],
     values: Mapping[str, float],
-    names: Names | None = None,
+    names: LoopNames | None = None,
 ) -> dict[int, list[Expr]]:
     """Solve rows, as many as there are columns ``bound``, for these columns: column -> its solved row.
 
@@ -189,7 +189,7 @@ def _blocks(given: Sequence[Sequence[Expr]], bound: Sequence[int]) -> list[tuple
 
 
 def _solve(
-    left: list[list[Expr]], right: list[list[Expr]], at: Mapping[str, float], names: Names | None
+    left: list[list[Expr]], right: list[list[Expr]], at: Mapping[str, float], names: LoopNames | None
 ) -> list[list[Expr]]:
     """left^-1 right; parts get names where there are names."""
     if len(left) == 1:
@@ -227,5 +227,5 @@ def _solve(
     return [rows[pivots[j]][n:] for j in range(n)]
 
 
-def _named(names: Names | None, value: Expr) -> Expr:
+def _named(names: LoopNames | None, value: Expr) -> Expr:
     return value if names is None else names.part("w", value)

@@ -55,5 +55,7 @@ def beside(file: str, name: str) -> str:
     folder = os.path.realpath(os.path.dirname(os.path.abspath(file)))
     path = os.path.realpath(os.path.join(folder, name))
     if os.path.isabs(name) or os.path.commonpath((folder, path)) != folder:
-        raise UsageError(f"{name} lies outside the folder of the model file, which a model file cannot reach")
+        raise UsageError(
+            f"{name} lies outside the folder of the model file; a model file can name only files in its own folder"
+        )
     return path

@@ -12,7 +12,7 @@ from typing import BinaryIO
 from ..errors import UsageError
 from .path_names import as_name
 
-#: What a name may stand for that is no plain file.
+#: What a name may stand for that is not a plain file.
 KINDS = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),
@@ -34,7 +34,7 @@ def open_plain(path: str | os.PathLike[str], *, follow: bool = True) -> BinaryIO
     Raises
     ------
     UsageError
-        It is no plain file, or the path is none, such as one with NUL.
+        It is not a plain file, or the path is none, such as one with NUL.
     OSError
         It is not there, or cannot be read.
     """
@@ -67,4 +67,4 @@ def _kind(mode: int) -> str:
 def _require_plain(name: str, status: os.stat_result) -> None:
     if not stat.S_ISREG(status.st_mode):
         what = _kind(status.st_mode)
-        raise UsageError(f"{name} is no plain file but {what}; name a file, or copy what it gives into one")
+        raise UsageError(f"{name} is not a plain file but {what}; name a plain file, or copy its content into one")

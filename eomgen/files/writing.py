@@ -130,8 +130,8 @@ def refuse_link(path: Path) -> None:
     if found is not None and not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
         return
     raise UsageError(
-        f"{path} is a symbolic link to {os.readlink(path)}, and links are not written through; name that "
-        "place itself, or remove the link"
+        f"{path} is a symbolic link to {os.readlink(path)}, and eomgen does not write through links; name that "
+        "file itself, or remove the link"
     )
 
 

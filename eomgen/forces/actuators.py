@@ -86,7 +86,7 @@ def _force(e: Entry) -> Force | None:
 
 def _torque(e: Entry) -> Force | None:
     if "joint" in e.values:
-        e.refuse("axes", "a torque on a joint has no axes")
+        e.refuse("axes", "a torque on a joint's coordinate has no axes")
         path, value = read_coordinate(e), e.law("value")
         return None if path is None else Actuator(e.name, path, value)
     marker = e.marker("body")
@@ -97,15 +97,15 @@ def _torque(e: Entry) -> Force | None:
 TYPES = table(
     ElementType(
         "force",
-        "a force at a marker's origin.",
+        "a force on a body, at the origin of a marker.",
         {
-            "marker": Field("marker", "where it acts", required=True),
+            "marker": Field("marker", "marker at whose origin the force acts", required=True),
             "value": Field("vector", "force (N)", required=True, level=MOTION, dimension=FORCE),
             "axes": _AXES,
         },
         _force,
         remedies={
-            "marker": "along a joint's coordinate take torque or actuator: N where it is a length, N m on an angle"
+            "marker": "for a force along a joint's coordinate use torque or actuator (N on a length, N m on an angle)"
         },
     ),
     ElementType(
@@ -116,7 +116,7 @@ TYPES = table(
             "body": Field("marker", "a body"),
             "value": Field(
                 "value",
-                "torque (N m): one on a joint (N where its coordinate is a length), three on a body",
+                "torque (N m): one value on a joint (a force in N if its coordinate is a length), three on a body",
                 required=True,
                 level=MOTION,
                 dimension=PUSH,
@@ -128,13 +128,13 @@ TYPES = table(
     ),
     ElementType(
         "actuator",
-        "a given force: on a joint's coordinate, or along the line or a path between two markers.",
+        "an actuator with a given force: on a joint's coordinate, or along the line or a path between two markers.",
         {
             "joint": ON_JOINT,
             "between": BETWEEN,
             "value": Field(
                 "expression",
-                "positive drives the coordinate up, or pushes the markers apart (N or N m)",
+                "force (N or N m); a positive value increases the coordinate, or pushes the markers apart",
                 required=True,
                 level=MOTION,
                 dimension=PUSH,

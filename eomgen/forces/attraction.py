@@ -91,10 +91,10 @@ def _point_gravity(e: Entry) -> PointGravity | None:
 TYPES = table(
     ElementType(
         "point_gravity",
-        "the gravity of a point on a body, whose reaction acts at the point.",
+        "the gravity that a point exerts on a body; the reaction acts at the point.",
         {
-            "center": Field("marker", "what attracts", required=True),
-            "body": Field("body", "the body that is attracted, at its centre of mass", required=True),
+            "center": Field("marker", "marker at the attracting point", required=True),
+            "body": Field("body", "the body that is attracted at its centre of mass", required=True),
             "mu": Field(
                 "expression",
                 "gravitational parameter G M of the centre (m^3/s^2)",
@@ -103,7 +103,8 @@ TYPES = table(
             ),
             "extent": Field(
                 "choice",
-                "the body as a point, or with its inertia to second order: gravity-gradient torque and its force",
+                "point takes the body as a point mass; maccullagh adds its inertia to second order: the "
+                "gravity-gradient torque and its force",
                 default="point",
                 choices=("point", "maccullagh"),
             ),

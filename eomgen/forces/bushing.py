@@ -135,7 +135,12 @@ def _bushing(e: Entry) -> Bushing | None:
         if difference.value is not None:
             e.fault(f"stiffness[{j}][{i}]", "the matrix is not symmetric", "[i][j] and [j][i] must be equal")
         else:
-            e.require(f"stiffness[{j}][{i}]", difference, lambda x: x == 0, "less [j][i]; they must be equal")
+            e.require(
+                f"stiffness[{j}][{i}]",
+                difference,
+                lambda x: x == 0,
+                "this is its difference from [j][i]; both must be equal",
+            )
     if pair is None or stiffness is None or damping is None:
         return None
     return Bushing(e.name, *pair, cast(Mat6, stiffness), cast(Mat6, damping))
@@ -144,7 +149,7 @@ def _bushing(e: Entry) -> Bushing | None:
 TYPES = table(
     ElementType(
         "bushing",
-        "a bushing: displacements of the second marker from the first, in its axes, times full matrices.",
+        "a bushing: force and torque are matrices times the displacement of the second marker in axes of the first.",
         {
             "between": BETWEEN._replace(required=True),
             "stiffness": Field(
@@ -155,7 +160,11 @@ TYPES = table(
                 dimension=ENERGY,
             ),
             "damping": Field(
-                "matrix6", "the same per velocity", default=(0,) * 6, level=MOTION, dimension=ENERGY.times(TIME)
+                "matrix6",
+                "the same form, for the velocity of the displacement (N s/m, N s, N m s/rad)",
+                default=(0,) * 6,
+                level=MOTION,
+                dimension=ENERGY.times(TIME),
             ),
         },
         _bushing,

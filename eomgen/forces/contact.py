@@ -149,13 +149,13 @@ _CONTACT: Fields = {**NORMAL, **FRICTION}
 TYPES = table(
     ElementType(
         "point_plane",
-        "contact of a point, the second marker, with the plane of the first, z pointing out of the solid.",
+        "contact of a point (the second marker) with a plane (x-y of the first marker, z out of the solid).",
         {"between": Field("pair", _ENDS.format("point"), required=True), **_CONTACT},
         _on_plane,
     ),
     ElementType(
         "sphere_plane",
-        "contact of a sphere about the second marker with the plane of the first, z pointing out of the solid.",
+        "contact of a sphere (about the second marker) with a plane (x-y of the first marker, z out of the solid).",
         {
             "between": Field("pair", _ENDS.format("sphere's centre"), required=True),
             "radius": Field("expression", "radius of the sphere (m)", required=True, dimension=LENGTH),
@@ -165,7 +165,7 @@ TYPES = table(
     ),
     ElementType(
         "sphere_sphere",
-        "contact of two spheres about two markers.",
+        "contact of two spheres, each centred at a marker.",
         {
             "between": Field("pair", "the centres", required=True),
             "radii": Field("radii", "radii of the spheres (m)", required=True, dimension=LENGTH),

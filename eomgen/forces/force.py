@@ -75,6 +75,10 @@ class Force(ABC):
         """What is to be seen of it in a picture; nothing unless a type says so."""
         return []
 
+    def push(self, value: Expr, rate: Expr) -> Expr | None:
+        """The force along its path at a value and a rate of it, for pictures; None of a type that has no such law."""
+        return None
+
     def remainder(self, view: View) -> list[Load]:
         """What the loads are beyond the slope of the potential, where there is one: friction, damping."""
         return []

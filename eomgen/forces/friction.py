@@ -75,14 +75,20 @@ class JointFriction(Force):
 FRICTION: Fields = {
     "friction": Field("expression", "coefficient of sliding friction", level=MOTION, dimension=NONE),
     "static_friction": Field(
-        "expression", "coefficient at the onset of sliding; needs stribeck", level=MOTION, dimension=NONE
+        "expression",
+        "coefficient of static friction, at the onset of sliding; give stribeck too",
+        level=MOTION,
+        dimension=NONE,
     ),
     "stribeck": Field(
-        "expression", "sliding velocity (m/s) over which static friction falls to sliding friction", dimension=RATE
+        "expression",
+        "Stribeck velocity (m/s): the sliding velocity at which static friction has largely dropped to "
+        "sliding friction",
+        dimension=RATE,
     ),
     "viscous_friction": Field(
         "expression",
-        "friction per normal force and velocity (s/m)",
+        "viscous friction coefficient per normal force and velocity (s/m)",
         default=0,
         level=MOTION,
         dimension=NONE.times(RATE, -1),
@@ -96,16 +102,16 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
     if dynamic not in e.values:
         for key in (static, "stribeck", "smoothing", *(() if alone else (viscous,))):
             if key in e.values:
-                e.fault(key, f"there is no {dynamic}", f"give {dynamic}, or leave it out")
+                e.fault(key, f"is given without {dynamic}", f"give {dynamic}, or leave {key} out")
         return None
     level = e.law(dynamic)
     e.require(dynamic, level, lambda x: x >= 0, "must be 0 or greater")
     if "smoothing" not in e.values:
-        e.fault("smoothing", "is missing", "give the velocity below which friction is smoothed")
+        e.fault("smoothing", "is missing", "give the velocity (greater than 0) below which friction is smoothed")
         return None
     if (static in e.values) != ("stribeck" in e.values):
         missing = "stribeck" if static in e.values else static
-        e.fault(missing, "is missing", f"{static} and stribeck go together")
+        e.fault(missing, "is missing", f"give {static} and stribeck together, or neither")
         return None
     onset = e.given(static)
     if onset is not None:
@@ -119,7 +125,7 @@ def _joint_friction(e: Entry) -> Force | None:
     path, viscous = read_coordinate(e), e.given("viscous")
     dry = read_friction(e, "coulomb", "static", "viscous", alone=True)
     if dry is None and "viscous" not in e.values and not e.at_fault():
-        e.fault("", "has no law", "give viscous, or coulomb and smoothing, or both")
+        e.fault("", "has no friction law", "give viscous, or coulomb with smoothing, or all three")
     if path is None:
         return None
     return (
@@ -132,16 +138,21 @@ def _joint_friction(e: Entry) -> Force | None:
 TYPES = table(
     ElementType(
         "friction",
-        "friction of a joint's coordinate: viscous, Coulomb's with Stribeck's effect, or both.",
+        "friction on a joint's coordinate: viscous, Coulomb (with the Stribeck effect if wanted), or both.",
         {
             "joint": ON_JOINT._replace(required=True),
             "viscous": Field("expression", "viscous coefficient (N m s/rad or N s/m)", level=MOTION, dimension=DAMPING),
             "coulomb": Field("expression", "Coulomb friction (N m or N)", level=MOTION, dimension=PUSH),
             "static": Field(
-                "expression", "friction at the onset of sliding; needs stribeck", level=MOTION, dimension=PUSH
+                "expression",
+                "static friction, at the onset of sliding (N m or N); give stribeck too",
+                level=MOTION,
+                dimension=PUSH,
             ),
             "stribeck": Field(
-                "expression", "velocity over which static friction falls to Coulomb's (rad/s or m/s)", dimension=RATE
+                "expression",
+                "Stribeck velocity (rad/s or m/s): where static friction has largely dropped to Coulomb friction",
+                dimension=RATE,
             ),
             "smoothing": Field(
                 "expression", "velocity below which Coulomb friction is smoothed (rad/s or m/s)", dimension=RATE

@@ -60,7 +60,7 @@ def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Ent
     def read(e: Entry) -> GeneralElement | None:
         where = path(e)
         if "law" not in e.values and "potential" not in e.values:
-            e.fault("", "has no law", "give law, potential or both")
+            e.fault("", "has no force law", "give law, potential or both")
         on = e.coordinate("joint") if "joint" in e.values and where is not None else None
         word = "angle" if angle or (on is not None and on.kind == "angle") else "length"
         value, rate = (e.graph.symbol(f"{name}[{e.name}]") for name in (word, "rate"))
@@ -78,15 +78,15 @@ def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
     return {
         "law": Field(
             "expression",
-            f"{unit} that drives the coordinate up or pushes the markers apart; an expression of {of}, ``rate`` "
-            "and all that forces know",
+            f"{unit}: a positive value increases the coordinate or pushes the markers apart; an expression of {of}, "
+            "``rate``, t, parameters, inputs, coordinates and velocities",
             level=MOTION,
             dimension=push,
             local=names,
         ),
         "potential": Field(
             "expression",
-            f"potential energy (J), of {of} and parameters; its force, minus its derivative, comes with it",
+            f"potential energy (J), an expression of {of} and parameters; the force is minus its derivative",
             dimension=ENERGY,
             local=names,
         ),
@@ -96,7 +96,7 @@ def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
 TYPES = table(
     ElementType(
         "element",
-        "a force of any law along a joint's coordinate, the line between two markers, or a path.",
+        "a force with a law of your own: along a joint's coordinate, the line between two markers, or a path.",
         {
             "joint": ON_JOINT,
             "between": BETWEEN,
@@ -108,7 +108,7 @@ TYPES = table(
     ),
     ElementType(
         "torsional_element",
-        "a torque of any law on an angle: of a joint, or of the second marker about the z axis of the first.",
+        "a torque with a law of your own on an angle: of a joint, or of the second marker about z of the first.",
         {"joint": ON_JOINT, "between": BETWEEN, **_law("``angle``", "torque (N m)", ENERGY, SPIN)},
         _element(read_angle, True),
         one_of=("joint", "between"),

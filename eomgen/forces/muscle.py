@@ -118,12 +118,16 @@ TYPES = table(
         "a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion.",
         {
             "between": BETWEEN._replace(required=True),
-            "activation": Field("expression", "activation, 0 to 1", required=True, level=MOTION, dimension=NONE),
+            "activation": Field(
+                "expression", "activation of the muscle, 0 to 1", required=True, level=MOTION, dimension=NONE
+            ),
             "force_max": Field("expression", "largest active force (N)", required=True, dimension=FORCE),
             "fiber_length": Field("expression", "optimal length of the fibres (m)", required=True, dimension=LENGTH),
             "slack_length": Field("expression", "length of the tendon (m)", required=True, dimension=LENGTH),
             "velocity_max": Field(
-                "expression", "fastest shortening of fibres (m/s), 10 lengths a second by default", dimension=SPEED
+                "expression",
+                "largest shortening velocity of the fibres (m/s); 10 fiber_length per second by default",
+                dimension=SPEED,
             ),
             "pennation": Field(
                 "expression",
@@ -131,7 +135,9 @@ TYPES = table(
                 default=0,
                 dimension=NONE,
             ),
-            "damping": Field("expression", "force at velocity_max over force_max", default=0.1, dimension=NONE),
+            "damping": Field(
+                "expression", "damping force at velocity_max, divided by force_max", default=0.1, dimension=NONE
+            ),
             "via": VIA,
         },
         _muscle,

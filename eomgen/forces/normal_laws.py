@@ -63,22 +63,22 @@ class HuntCrossley:
 NORMAL: Fields = {
     "stiffness": Field(
         "expression",
-        "stiffness k in the force k d**n max(0, 1 + dissipation d_dot) of the penetration d (N/m**n)",
+        "stiffness k (N/m**n) in the normal force k d**n max(0, 1 + dissipation d_dot), d the penetration",
         required=True,
         dimension=PUSH,
         exponent="exponent",
     ),
-    "exponent": Field("expression", "exponent n", default=EXPONENT, dimension=NONE),
+    "exponent": Field("expression", "exponent n of the penetration", default=EXPONENT, dimension=NONE),
     "dissipation": Field(
         "expression", "dissipation (s/m); or give restitution and velocity", dimension=NONE.times(RATE, -1)
     ),
     "restitution": Field(
-        "expression", "coefficient of restitution, from which the dissipation follows", dimension=NONE
+        "expression", "coefficient of restitution, from which the dissipation is computed", dimension=NONE
     ),
-    "velocity": Field("expression", "velocity of impact (m/s) to which the restitution belongs", dimension=RATE),
+    "velocity": Field("expression", "impact velocity (m/s) at which that restitution holds", dimension=RATE),
     "formula": Field(
         "choice",
-        "formula by which the dissipation follows from the restitution",
+        "formula that gives the dissipation from the restitution",
         default=RESTITUTIONS[0],
         choices=RESTITUTIONS,
     ),
@@ -88,7 +88,7 @@ NORMAL: Fields = {
 def read_normal_law(e: Entry) -> HuntCrossley:
     """The law of the keys :data:`NORMAL`."""
     stiffness, exponent = e.positive("stiffness"), e.law("exponent")
-    e.require("exponent", exponent, lambda n: n >= 1, "must be at least 1, and more than 1 for a slope without a jump")
+    e.require("exponent", exponent, lambda n: n >= 1, "must be at least 1; above 1 the stiffness begins without a jump")
     return HuntCrossley(stiffness, exponent, _dissipation(e))
 
 
@@ -99,16 +99,18 @@ def _dissipation(e: Entry) -> Expr:
     if "dissipation" in e.values:
         for key in ("restitution", "velocity", "formula"):
             if key in e.values:
-                e.fault(key, "the dissipation is given already", "leave out one of the two")
+                e.fault(key, "dissipation is given too", "give dissipation, or restitution with velocity")
         value = e.law("dissipation")
         e.require("dissipation", value, lambda x: x >= 0, "must be 0 or greater")
         return value
     if restitution is None and velocity is None:
         if "formula" in e.values:
-            e.fault("formula", "there is no restitution", "give restitution and velocity, or leave it out")
+            e.fault("formula", "is given without restitution", "give restitution and velocity, or leave formula out")
         return e.graph.zero
     if restitution is None or velocity is None:
-        e.fault("velocity" if velocity is None else "restitution", "is missing", "restitution and velocity go together")
+        e.fault(
+            "velocity" if velocity is None else "restitution", "is missing", "give restitution and velocity together"
+        )
         return e.stand_in
     e.require("restitution", restitution, lambda x: 0 < x <= 1, "must be greater than 0 and at most 1")
     e.require("velocity", velocity, lambda x: x > 0, "must be greater than 0")

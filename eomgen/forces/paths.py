@@ -127,7 +127,7 @@ def read_coordinate(e: Entry, angle: bool = False) -> JointCoordinate | None:
         e.fault("joint", f"{found.name!r} is an Euler parameter, which takes no torque", remedy)
         return None
     if angle and found.kind != "angle":
-        e.fault("joint", f"the coordinate {found.name!r} is a {found.kind}", "a torsional element acts on an angle")
+        e.fault("joint", f"the coordinate {found.name!r} is a {found.kind}", "a torsional element needs an angle")
         return None
     return JointCoordinate(found.name)
 

@@ -138,8 +138,8 @@ def _wrap(view: View, start: Marker, end: Marker, around: WrapCylinder) -> Piece
 
 VIA = Field(
     "via",
-    "what the path runs over, in order: markers that it slides through, and cylinders {around: marker, radius: r, "
-    "sense: positive or negative} about the z axis of a marker",
+    "points of the path between its ends, in order: markers that it slides through, and cylinders that it wraps "
+    "around, {around: marker, radius: r, sense: positive or negative}, about the z axis of a marker",
     default=(),
 )
 
@@ -156,5 +156,5 @@ def read_path(e: Entry) -> Path | None:
 def read_joint_or_path(e: Entry) -> Path | None:
     """A joint's coordinate, or a line or path between markers."""
     if "joint" in e.values and "via" in e.values:
-        e.fault("via", "a joint's coordinate has no path", "leave it out, or give between")
+        e.fault("via", "a force on a joint's coordinate has no path", "leave it out, or give between")
     return read_coordinate(e) if "joint" in e.values else read_path(e)

@@ -39,8 +39,11 @@ class Spring(Force):
         if isinstance(self.path, Line) and self.rest.is_zero:
             # linear in the distance, so that the markers may meet
             return self.path.pair(view, vec.scale(-self.stiffness, self.path.reach(view)))
-        value, _ = self.path.measure(view)
-        return self.path.loads(view, -self.stiffness * (value - self.rest))
+        value, rate = self.path.measure(view)
+        return self.path.loads(view, self.push(value, rate))
+
+    def push(self, value: Expr, rate: Expr) -> Expr:
+        return -self.stiffness * (value - self.rest)
 
     def drawn(self) -> list[Seen]:
         return [self.path.drawn(COIL, SPIRAL)]
@@ -69,8 +72,11 @@ class Damper(Force):
     damping: Expr
 
     def loads(self, view: View) -> list[Load]:
-        _, rate = self.path.measure(view)
-        return self.path.loads(view, -self.damping * rate)
+        value, rate = self.path.measure(view)
+        return self.path.loads(view, self.push(value, rate))
+
+    def push(self, value: Expr, rate: Expr) -> Expr:
+        return -self.damping * rate
 
     def drawn(self) -> list[Seen]:
         return [self.path.drawn(DASHPOT, TURNING_DASHPOT)]
@@ -108,7 +114,7 @@ TYPES = table(
         {
             "between": _MARKERS,
             "stiffness": _STIFFNESS,
-            "length": Field("expression", "length without force (m)", default=0, dimension=LENGTH),
+            "length": Field("expression", "free length (m), at which the force is 0", default=0, dimension=LENGTH),
             "via": VIA,
         },
         _spring(read_path, "length"),
@@ -121,35 +127,37 @@ TYPES = table(
     ),
     ElementType(
         "torsional_spring",
-        "a linear spring on an angle: of a joint, or of the second marker about the z axis of the first.",
+        "a linear torsional spring on an angle: of a joint, or of the second marker about the z axis of the first.",
         {
             **_ANGLE,
             "stiffness": _TURNING_STIFFNESS,
-            "angle": Field("expression", "angle without torque (rad)", default=0, dimension=NONE),
+            "angle": Field("expression", "angle (rad) at which the torque is 0", default=0, dimension=NONE),
         },
         _spring(read_angle, "angle"),
         one_of=("joint", "between"),
     ),
     ElementType(
         "torsional_damper",
-        "a viscous damper on an angle: of a joint, or of the second marker about the z axis of the first.",
+        "a viscous torsional damper on an angle: of a joint, or of the second marker about the z axis of the first.",
         {**_ANGLE, "damping": _TURNING_DAMPING},
         _damper(read_angle),
         one_of=("joint", "between"),
     ),
     ElementType(
         "joint_spring",
-        "a linear spring on any coordinate of a joint, an angle or a length.",
+        "a linear spring on one coordinate of a joint, an angle or a length.",
         {
             "joint": _COORDINATE,
             "stiffness": _STIFFNESS,
-            "rest": Field("expression", "the coordinate without force (rad or m)", default=0, dimension=REACH),
+            "rest": Field(
+                "expression", "value of the coordinate (rad or m) at which the force is 0", default=0, dimension=REACH
+            ),
         },
         _spring(read_coordinate, "rest"),
     ),
     ElementType(
         "joint_damper",
-        "a viscous damper on any coordinate of a joint, an angle or a length.",
+        "a viscous damper on one coordinate of a joint, an angle or a length.",
         {"joint": _COORDINATE, "damping": _DAMPING},
         _damper(read_coordinate),
     ),

@@ -67,14 +67,14 @@ def _stop(e: Entry) -> JointStop | None:
     if lower is None and upper is None:
         e.fault("", "has no limit", "give lower, upper or both")
     if lower is not None and upper is not None:
-        e.require("upper", upper - lower, lambda x: x > 0, "is upper - lower; lower must be less than upper")
+        e.require("upper", upper - lower, lambda x: x > 0, "this is upper - lower; lower must be less than upper")
     return None if path is None else JointStop(e.name, path, lower, upper, law)
 
 
 TYPES = table(
     ElementType(
         "stop",
-        "stops of a joint's coordinate: below ``lower``, above ``upper`` or both.",
+        "elastic stops of a joint's coordinate: below ``lower``, above ``upper`` or both.",
         {
             "joint": ON_JOINT._replace(required=True),
             "stiffness": NORMAL["stiffness"],

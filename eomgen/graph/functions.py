@@ -84,10 +84,10 @@ class Function:
             The function is native code without a Python twin.
         """
         if self.evaluator is None:
-            message = "is C code without a Python twin, and is evaluated in NumPy here"
+            message = "is a C function without a Python version, and must be evaluated in NumPy here"
             remedy = (
-                "give the twin under python; none is needed for target cython or c where masses, constraints and "
-                "initial values do not call the function"
+                "give the Python version under python; it is not needed for target cython or c if masses, constraints "
+                "and initial values do not call the function"
             )
             raise ModelError([Problem(f"functions.{self.name}", message, remedy, *self.place)])
         return self.evaluator

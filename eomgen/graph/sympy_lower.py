@@ -102,7 +102,7 @@ def _error(walk: _Walk, allowed: list[str]) -> LoweringError:
     unresolved = sorted(walk.unresolved, key=shortened)
     if unresolved:
         names = ", ".join(shortened(x) for x in unresolved)
-        lines.append(f"no meaning for {names}; " + (f"known are {', '.join(allowed)}" if allowed else "declare them"))
+        lines.append(f"unknown names {names}; " + (f"known are {', '.join(allowed)}" if allowed else "declare them"))
     first = walk.faults[0][0] if walk.faults else unresolved[0]
     return LoweringError(first, "\n".join(lines), unresolved)
 
@@ -162,7 +162,7 @@ class _Walk:
         if isinstance(part, (sympy.Xor, sympy.ITE, sympy.Implies, sympy.Equivalent)):
             return (part.to_nnf(simplify=False),), lambda g, ids: ids[0]
         if part is sympy.I or part is sympy.zoo:
-            raise _Fault("complex numbers have no meaning here")
+            raise _Fault("complex numbers are not allowed here")
         called = self._called(part)
         if called is not None:
             return called
@@ -213,7 +213,7 @@ class _Walk:
             other = _evaluated(part)
         if other == part or not isinstance(other, sympy.Basic):
             name = part.func.__name__
-            raise _Fault(f"{name} is not among what can be lowered: {_known()}")
+            raise _Fault(f"{name} cannot be translated; known are {_known()}")
         return (other,), lambda g, ids: ids[0]
 
     def _worked_out(self, part: Any) -> Any:
@@ -225,12 +225,12 @@ class _Walk:
             if not isinstance(inner, sympy.Basic):
                 raise _Fault(f"a SymPy scalar is expected, not {type(inner).__name__}")
             if not (inner.func in self.builders or isinstance(inner, DIFFERENTIABLE)):
-                raise _Fault(f"the derivative of {inner.func.__name__} is not among what can be lowered: {_known()}")
+                raise _Fault(f"the derivative of {inner.func.__name__} cannot be translated; known are {_known()}")
             if is_tower(inner):
                 raise _Fault("the power of numbers is too large")
             orders = [n for _, n in inner.variable_count] if isinstance(inner, sympy.Derivative) else []
             if not all(n.is_Integer for n in orders) or sum(orders) > ORDER:
-                raise _Fault(f"derivatives go up to order {ORDER}, a plain number")
+                raise _Fault(f"the order of a derivative must be a number up to {ORDER}")
         try:
             return part.doit()
         except Exception as error:  # of many classes: the part may be odd in any way
@@ -251,7 +251,7 @@ def _evaluated(part: Any) -> Any:
 def _number(part: Any) -> float:
     """The double nearest to a real number of SymPy."""
     if part is sympy.nan or not part.is_finite:
-        raise _Fault("infinities and NaN have no meaning here")
+        raise _Fault("infinities and NaN are not allowed here")
     if isinstance(part, sympy.NumberSymbol):
         part = part.evalf(40)
     try:
@@ -273,7 +273,7 @@ def _pieces(part: Any) -> Sequence[Any]:
     flat: list[Any] = []
     for pair in part.args:
         if not isinstance(pair, ExprCondPair):
-            raise _Fault("a Piecewise is made of (expression, condition) pairs")
+            raise _Fault("a Piecewise must consist of (expression, condition) pairs")
         if pair.cond is sympy.true:
             return [*flat, pair.expr]
         flat += [pair.expr, pair.cond]

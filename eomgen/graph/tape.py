@@ -46,7 +46,7 @@ def record_tape(expressions: Sequence[Expr], place: Callable[[str], tuple[str, i
                 a, b, c = (*(found[k] for k in given), 0, 0)[:3]
                 code.append((kind, a, b, c))
             else:
-                raise UsageError("functions that the model declares cannot stand in an input over time")
+                raise UsageError("functions of the model cannot be used in an input over time")
             found[i] = len(code) - 1
         out.append(found[expression.id])
     return code, numbers, out

@@ -23,7 +23,7 @@ ALONG_CURVE = (Coordinate("_s", "length"),)
 ON_SURFACE = (Coordinate("_u", "length"), Coordinate("_v", "length"))
 CURVE = Field(
     "shape",
-    "point of the curve in the predecessor's axes (m), by the joint's s",
+    "point of the curve in the predecessor's axes (m), as expressions of the joint's coordinate s",
     required=True,
     level=MOTION,
     own=1,
@@ -31,7 +31,7 @@ CURVE = Field(
 )
 SURFACE = Field(
     "shape",
-    "point of the surface in the predecessor's axes (m), by the joint's u, v",
+    "point of the surface in the predecessor's axes (m), as expressions of the joint's coordinates u and v",
     required=True,
     level=MOTION,
     own=2,

@@ -70,7 +70,7 @@ LENGTH = Field(
     "expression",
     "length of the rod (m)",
     required=True,
-    not_zero="a rod without length is a spherical joint",
+    not_zero="give a length other than 0; a rod without length is a spherical joint",
     dimension=dimensions.LENGTH,
 )
 

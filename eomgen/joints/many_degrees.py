@@ -17,7 +17,7 @@ from .rotation_coordinates import about, unit
 
 @dataclass(frozen=True)
 class Cylindrical(Joint):
-    """Slides along and turns about the common z axis.  Allows 2, removes 4."""
+    """S slides along the common z axis and turns about it.  Allows 2, removes 4."""
 
     sentence: ClassVar[str] = "S slides along the common z axis and turns about it."
     formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_z(q_2), \quad \mathbf{u} = q_1 \mathbf{e}_z"
@@ -43,7 +43,7 @@ class Cylindrical(Joint):
 
 @dataclass(frozen=True)
 class Planar(Joint):
-    """Moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
+    """S moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
 
     sentence: ClassVar[str] = "S moves in the x-y plane of P and turns about its z axis."
     formula: ClassVar[str] = (
@@ -77,7 +77,7 @@ class Planar(Joint):
 
 @dataclass(frozen=True)
 class Translational(Joint):
-    """Slides along x, y and z of P without turning.  Allows 3, removes 3."""
+    """S slides along x, y and z of P without turning.  Allows 3, removes 3."""
 
     sentence: ClassVar[str] = "S slides along the three axes of P without turning."
     formula: ClassVar[str] = (
@@ -106,7 +106,7 @@ class Translational(Joint):
 
 @dataclass(frozen=True)
 class Weld(Joint):
-    """No motion.  Allows 0, removes 6."""
+    """S is fixed to P.  Allows 0, removes 6."""
 
     sentence: ClassVar[str] = "S is fixed to P."
     formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{0}"

@@ -20,12 +20,12 @@ from .rotation_coordinates import about, unit
 
 @dataclass(frozen=True)
 class Revolute(Joint):
-    """Turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
+    """S turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
 
     sentence: ClassVar[str] = "S turns about the z axis that it shares with P; the origins coincide."
     formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_z(q), \quad \mathbf{u} = \mathbf{0}"
     type_name: ClassVar[str] = "revolute"
-    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (0.75, 2.2)),))
+    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (0.75, 2.5)),))
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
@@ -53,7 +53,7 @@ class Continuous(Revolute):
 
 @dataclass(frozen=True)
 class Prismatic(Joint):
-    """Slides along the common z axis without turning.  Allows 1, removes 5."""
+    """S slides along the common z axis without turning.  Allows 1, removes 5."""
 
     sentence: ClassVar[str] = "S slides along the z axis that it shares with P, without turning."
     formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q \mathbf{e}_z"
@@ -79,7 +79,7 @@ class Prismatic(Joint):
 
 @dataclass(frozen=True)
 class Screw(Joint):
-    """Turns about the common z axis and slides along it by ``pitch`` (m) a turn.  Allows 1, removes 5.
+    """S turns about the common z axis and slides along it by ``pitch`` (m) per turn.  Allows 1, removes 5.
 
     The coordinate is the angle; a positive pitch is a right-handed thread (Shabana, sec. 7.7, screw joint).
     """
@@ -93,9 +93,9 @@ class Screw(Joint):
     options: ClassVar[Fields] = {
         "pitch": Field(
             "expression",
-            "advance in one turn (m), negative for a left-handed thread",
+            "advance of S per turn (m), negative for a left-handed thread",
             required=True,
-            not_zero="a screw without advance is a revolute joint",
+            not_zero="give a pitch other than 0; a screw without advance is a revolute joint",
             dimension=LENGTH,
         )
     }

@@ -46,7 +46,7 @@ def apart(length: Expr, position: Vec3) -> Closure:
 
 @dataclass(frozen=True)
 class Distance(RodJoint):
-    """A massless rod with a ball at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
+    """A massless rod with a ball joint at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
 
     sentence: ClassVar[str] = (
         "The origins of P and S stay at the distance $l$, as by a massless rod with a ball at each end."
@@ -67,7 +67,7 @@ class Distance(RodJoint):
 
 @dataclass(frozen=True)
 class RevoluteSpherical(RodJoint):
-    """A massless rod that turns about z of P, with a ball at S: across z, ``length`` long.  Allows 4, removes 2."""
+    """A massless rod of ``length`` turns about z of P, across it, with a ball joint at S.  Allows 4, removes 2."""
 
     sentence: ClassVar[str] = "A massless rod of length $l$ turns about z of P and holds S by a ball."
     formula: ClassVar[str] = r"u_z = 0, \quad u_x^2 + u_y^2 - l^2 = 0"
@@ -142,7 +142,7 @@ class Perpendicular(RodJoint):
 
 @dataclass(frozen=True)
 class Orientation(RodJoint):
-    """All axes stay parallel, the origins are free: S does not turn against P.  Allows 3, removes 3."""
+    """S does not turn against P: all axes stay parallel, and the origins move freely.  Allows 3, removes 3."""
 
     sentence: ClassVar[str] = "The axes of S stay parallel to those of P; the origins are free."
     formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}"

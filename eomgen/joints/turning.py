@@ -71,7 +71,7 @@ class RotatingJoint(Joint):
 
 @dataclass(frozen=True)
 class Spherical(RotatingJoint):
-    """Turns about a point.  Allows 3, removes 3."""
+    """S turns freely about the common origin.  Allows 3, removes 3."""
 
     sentence: ClassVar[str] = "S turns about its origin, which stays at the origin of P."
     formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}(q_1,q_2,q_3), \quad \mathbf{u} = \mathbf{0}"
@@ -94,7 +94,7 @@ class Spherical(RotatingJoint):
 
 @dataclass(frozen=True)
 class Free(RotatingJoint):
-    """Six degrees of freedom: position of S in P axes, then its rotation.  Removes none."""
+    """S moves freely: three coordinates of its position in P axes, then its rotation.  Allows 6, removes 0."""
 
     sentence: ClassVar[str] = "S moves without hindrance: three displacements in the axes of P, then three rotations."
     formula: ClassVar[str] = (

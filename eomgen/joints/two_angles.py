@@ -19,7 +19,7 @@ TWO_ANGLES = (Coordinate("_1", "angle"), Coordinate("_2", "angle"))
 
 @dataclass(frozen=True)
 class Universal(Joint):
-    """A cross that turns about x of P and y of S, which stay perpendicular.  Allows 2, removes 4.
+    """A cross turns about x of P and y of S, which stay perpendicular.  Allows 2, removes 4.
 
     R = R_x(q1) R_y(q2); the shafts are the z axes, in line at zero (Shabana, sec. 7.7, universal joint).
     """
@@ -48,7 +48,7 @@ class Universal(Joint):
 
 @dataclass(frozen=True)
 class ConstantVelocity(Joint):
-    """Bends about any axis across the shaft and passes its turning on evenly.  Allows 2, removes 4.
+    """The shaft bends in any direction, and S turns exactly as fast as P.  Allows 2, removes 4.
 
     R = R_x(q1/2) R_y(q2) R_x(q1/2).  A palindrome of turns about x and y has no z part in its quaternion
     (e3 = 0): S is turned about an axis in the x-y plane of P, so the relative angular velocity lies in the plane that

@@ -138,15 +138,16 @@ def _explain(
         except AssemblyError:
             pass
         else:
-            held = f"{error}; at t = 0 the drivers hold {', '.join(drivers.values())} as well"
+            held = f"{error}; at t = 0 the drivers prescribe {', '.join(drivers.values())} too"
             return AssemblyError(held, error.rows)
     C = functions.position(q)[0]
     gaps = [f"{drivers[i]} by {abs(C[i]):.3g} {_unit(functions, i)}" for i in drivers]
     rows = [functions.kinematics.constraints.labels[i] for i in drivers]
     text = str(error).partition("; check")[0]
     words = (
-        f"the drivers ask at t = 0 for a position that the loops do not reach: {text}; where the loops do close next "
-        f"to the guess, they miss {', '.join(gaps)}; give the drivers values within reach, or a guess nearer to them"
+        f"the loops cannot reach the position that the drivers prescribe at t = 0: {text}; at the position nearest to "
+        f"the guess where the loops close, the drivers are off ({', '.join(gaps)}); give the drivers values within "
+        "reach, or a guess nearer to them"
     )
     return AssemblyError(words, [*rows, *error.rows])
 
@@ -176,14 +177,14 @@ def _contradiction(
     for row in spare:
         gap = f"{abs(C[row]):.3g} {_unit(functions, row)} at t = {t:.4g} s"
         verb = "moves" if freedoms == 1 else "move"
-        who = f"{' and '.join(others)} {verb} it already" if others else "it cannot move"
+        who = f"{' and '.join(others)} {verb} it already" if others else "the mechanism cannot move"
         if row in deaf:
             problems.append(
                 mechanism.problem(
                     f"constraints.{drivers[row]}",
-                    "the driver cannot act: no motion of the mechanism changes what it prescribes, "
-                    f"and it is off by {gap}",
-                    "drive a coordinate or markers that move against each other (not twice the same point or body)",
+                    "the driver has no effect: no motion of the mechanism changes the quantity that it prescribes, "
+                    f"and this is off by {gap}",
+                    "drive a coordinate, or two markers that move relative to each other",
                 )
             )
             continue

@@ -37,10 +37,10 @@ def require_finite(functions: ConstraintFunctions, q: Array) -> None:
     bad = [k.constraints.labels[i] for i in np.flatnonzero(~finite)]
     discs = {c.name for c in k.mechanism.constraints if isinstance(c, RollingDisc)}
     place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(k.names, q, strict=True))
-    what = f"{', '.join(bad)}: not finite at the initial configuration {place}"
+    what = f"{', '.join(bad)}: the constraint is not finite at the initial configuration {place}"
     if all(label.partition(".")[0] in discs for label in bad):
-        raise AssemblyError(f"{what}: {LYING}; tilt it in initial or guess", bad)
-    raise AssemblyError(f"{what}; give another one in initial or guess", bad)
+        raise AssemblyError(f"{what}: {LYING}; tilt the disc in initial or guess", bad)
+    raise AssemblyError(f"{what}; give another configuration in initial or guess", bad)
 
 
 def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> None:
@@ -68,10 +68,10 @@ def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> No
         if (written and slopes) or not all(vanishing(substitute(slopes, known))):
             used = sorted(symbols_of(slopes) & set(kinematics.parameter_names))
             what = f"{label} {IDLE} at all positions that were tried: its slopes are 0"
-            remedy = "take it away"
+            remedy = "remove it"
             if used:
                 what = f"{label} {IDLE} with the declared {', '.join(used)}: its factors are 0 or cancel"
-                remedy = "declare values with which it acts: they determine the degrees of freedom; or take it away"
+                remedy = "declare values with which it acts (they determine the degrees of freedom), or remove it"
             problems.append(kinematics.mechanism.problem(place_of(kinematics.mechanism, label), what, remedy))
     if problems:
         raise ModelError(problems)

@@ -278,7 +278,7 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: MarkerMotion, wrappin
         path = getattr(force, "path", None)
         if isinstance(path, Turn) and not path.is_exact(motion):
             message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
-            remedy = "turn the markers (rpy) so that z is the axis of the joint between them, or give joint="
+            remedy = "turn the markers (rpy) until z is the axis of the joint between them, or give joint="
             problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
         if force.uses_value and isinstance(path, JointCoordinate):
             used.add(path.name)

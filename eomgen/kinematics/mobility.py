@@ -130,12 +130,12 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
             message = f"{name!r} is an Euler parameter, which cannot vary on its own"
             remedy = f"choose the angular velocity instead, of {', '.join(kinematics.velocity_labels)}"
             if kinematics.given_rates:
-                message = f"{name!r} is no velocity's own coordinate: its rate is given as a function of velocities"
+                message = f"{name!r} cannot be independent, because its rate is given as a function of velocities"
                 remedy = f"choose of {', '.join(kinematics.velocity_labels)}"
             problems.append(kinematics.mechanism.problem("independent", message, remedy))
             continue
         if name in known:
-            message = f"{name!r} belongs to the joint that closes its loop, as the other joints were chosen too"
+            message = f"{name!r} follows from the other chosen coordinates, which belong to the same loop"
             problems.append(
                 kinematics.mechanism.problem("independent", message, "choose fewer coordinates of one loop")
             )
@@ -203,7 +203,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     n_dof = n - r
     if len(wanted) > n_dof:
         has = f"{n_dof} degree{'s' * (n_dof != 1)} of freedom"
-        message = f"{len(wanted)} coordinates chosen ({', '.join(wanted)}), the mechanism has {has}"
+        message = f"{len(wanted)} coordinates are chosen ({', '.join(wanted)}), but the mechanism has {has}"
         raise ModelError(
             [kinematics.mechanism.problem("independent", message, f"choose {n_dof} of {', '.join(names)}")]
         )

@@ -27,8 +27,8 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     if kinematics.constraints.labels and mobility.n_dof == 0 and not mobility.driven:
         held = _few([*dict.fromkeys(label.partition(".")[0] for label in kinematics.constraints.labels)])
         notes.append(
-            f"locked: no degree of freedom is left, and nothing drives the mechanism (held by {held}); "
-            "take a constraint away, or free a joint"
+            f"locked: the mechanism has no degree of freedom, and no driver moves it (held by {held}); "
+            "remove a constraint, or replace a joint by one with more freedom"
         )
     if mobility.redundant and not mobility.assumed:
         owners = [*dict.fromkeys(label.partition(".")[0] for label in mobility.redundant)]
@@ -40,13 +40,13 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
             remedies.append(f"leave {_few(spare)} out")
         notes.append(
             f"overconstrained: {_few(mobility.redundant)} follow{'s' if len(mobility.redundant) == 1 else ''} from the "
-            f"other constraints; motion is not affected, reactions there are not unique; "
-            f"{' and '.join(remedies)} if they matter"
+            f"other constraints; the motion is not affected, but the reactions there are not unique; if you need them, "
+            f"{' and '.join(remedies)}"
         )
     if mobility.instantaneous > mobility.n_dof and not mobility.assumed:
         notes.append(
             f"change point: {mobility.instantaneous} degrees of freedom at the initial configuration, {mobility.n_dof} "
-            "elsewhere, so which branch the motion takes is open there; start a little away from it"
+            "elsewhere, so the motion can continue on several branches; start a little away from this configuration"
         )
     elif mobility.n_dof and mobility.conditioning < POOR and mobility.candidates:
         better = [(name, x) for name, x in mobility.candidates if name not in mobility.independent]
@@ -57,13 +57,13 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
                 f"(conditioning {mobility.conditioning:.1g}); {name} would do better there ({value:.1g})"
             )
     notes += [
-        f"{name}: {', '.join(corners)} in a driver's value may make a corner, where its rate jumps: this is an impact, "
-        "which a driver does not compute; use a smooth motion, or events with restitution for a real impact"
+        f"{name}: {', '.join(corners)} in a driver's value can make a corner, where its rate jumps; a driver does not "
+        "compute the impact there; use a smooth motion, or events with restitution for a real impact"
         for name, corners in _drivers_with_corners(kinematics)
     ]
     notes += [
-        f"{name} turns about axes of which no moment of inertia is given, so they count as 0: give xx, yy and zz, or "
-        "take a joint that turns it about the axis of its only moment"
+        f"{name} turns about axes without a given moment of inertia, and these moments count as 0; give xx, yy and zz, "
+        "or a joint that turns the body about the axis of its only moment"
         for name in _turned_out_of_plane(kinematics)
     ]
     return notes

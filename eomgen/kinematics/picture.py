@@ -76,9 +76,7 @@ def draw(report: Counted, file: str | Path | None = None, ax: Any = None) -> Any
     if file is not None:
         known = ax.figure.canvas.get_supported_filetypes()
         if as_path("file", file).suffix[1:].lower() not in known:
-            raise UsageError(
-                f"{file}: the ending of the name selects the kind of picture: .{', .'.join(sorted(known))}"
-            )
+            raise UsageError(f"{file}: the name of a picture must end in one of .{', .'.join(sorted(known))}")
     _fill(report, ax)
     if file is not None:
         save_figure(ax.figure, file)

@@ -45,7 +45,7 @@ class MechanismReport:
         Coordinates that can be independent at the reference configuration, the best first, and their conditioning: 1 is
         perfect, 0 not at all.
     notes : list of str
-        What deserves attention, each with a remedy.
+        Facts that deserve attention, each with a remedy.
     """
 
     name: str
@@ -145,10 +145,10 @@ class MechanismReport:
             say("can be independent", _list([f"{name} {value:.2g}" for name, value in self.candidates.items()]))
         if self.loop_joints and not self.assumed:
             tries = f"{self.assembly_restarts} restart{'s' * (self.assembly_restarts != 1)}"
-            away = f"after {tries}: one of several ways to close it; a guess says which"
+            away = f"after {tries}: one of several ways to close the loops; give a guess to choose one"
             say("assembled", away if self.assembly_restarts else "on the branch next to the initial values and guess")
         if self.assumed:
-            lines.append("  some parameters have no value: random values were used to find the rank")
+            lines.append("  some parameters have no value; random values were used to find the rank")
         lines += [f"  note: {note}" for note in self.notes]
         return "\n".join(lines)
 

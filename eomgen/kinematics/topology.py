@@ -123,7 +123,7 @@ def _check_tree(mechanism: Mechanism, tree: Collection[int], branches: Sequence[
     for k, spec in enumerate(mechanism.joints):
         if spec.joint.role == "tree" and k not in tree:
             message = f"a {spec.joint.type_name} joint cannot close a loop, and all joints of its loop are of that kind"
-            remedy = "let one joint of the loop be of another type"
+            remedy = "use another type for one joint of the loop"
             problems.append(mechanism.problem(f"joints.{spec.name}", message, remedy))
     held = {branch.body for branch in branches}
     for k, body in enumerate(mechanism.bodies):

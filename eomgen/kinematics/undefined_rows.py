@@ -27,13 +27,15 @@ def find_undefined(mechanism: Mechanism, motion: MarkerMotion) -> list[Problem]:
         place = f"forces.{force.name}"
         if isinstance(path, Line) and _meet(motion, path.start, path.end):
             what = "both ends are always at the same point"
-            problems.append(mechanism.problem(place, what, "a line needs two points that can part; move one of them"))
+            problems.append(mechanism.problem(place, what, "a line needs two different points; move one of them"))
         if isinstance(path, Route):
             problems += _undefined_on_route(mechanism, motion, place, path)
     for constraint in mechanism.constraints:
         if isinstance(constraint, RollingDisc) and constraint.lies_flat(motion):
             what = f"{constraint.wheel.label} always lies flat: its axle (z) is along the plane's normal"
-            remedy = "turn the marker of the wheel or of the plane (rpy), or take a joint that lets the disc stand"
+            remedy = (
+                "turn the marker of the wheel or of the plane (rpy), or use a joint that lets the disc stand upright"
+            )
             problems.append(mechanism.problem(f"constraints.{constraint.name}", what, remedy))
     return problems
 
@@ -47,7 +49,7 @@ def _undefined_on_route(mechanism: Mechanism, motion: MarkerMotion, place: str, 
     stops = [route.start, *route.via, route.end]
     for k, (one, other) in enumerate(pairwise(stops)):
         if isinstance(one, Marker) and isinstance(other, Marker) and _meet(motion, one, other):
-            what = f"{one.label} and {other.label}, which follow each other, are always at the same point"
+            what = f"the neighbouring points {one.label} and {other.label} of the path always coincide"
             problems.append(mechanism.problem(place, what, "leave one of them out"))
         for cylinder, end in ((one, other), (other, one)):
             if isinstance(cylinder, WrapCylinder) and isinstance(end, Marker):
@@ -56,7 +58,7 @@ def _undefined_on_route(mechanism: Mechanism, motion: MarkerMotion, place: str, 
                 if number is not None and number < 0.0:
                     index = k if cylinder is other else k - 1
                     what = f"{end.label} lies inside the cylinder around {cylinder.marker.label}"
-                    remedy = "a path starts and ends outside; give a smaller radius or move the point"
+                    remedy = "a path must start and end outside; give a smaller radius, or move the point"
                     problems.append(mechanism.problem(f"{place}.via[{index}]", what, remedy))
     return problems
 
@@ -80,8 +82,8 @@ def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints) -> None:
     for label, row, left in zip(constraints.labels, constraints.jacobian, free, strict=True):
         moving = sorted(symbols_of([left]) & clock)
         if moving and all(x.is_zero for x in row):
-            what = f"{label} depends on {', '.join(moving)} and on no coordinate, so nothing can hold it"
-            remedy = "let a coordinate follow it, or take it away"
+            what = f"{label} depends on {', '.join(moving)} but on no coordinate, so no motion can satisfy it"
+            remedy = "write a coordinate into it, or remove it"
             problems.append(mechanism.problem(place_of(mechanism, label), what, remedy))
     if problems:
         raise ModelError(problems)

@@ -16,6 +16,8 @@ PERIODIC = 1e-12
 SHOWN_FORCE = 1e-13
 #: Part of the largest value of a unit below which one is shown as 0: the rounding of a zero.
 SHOWN = 1e-14
+#: A state that never gets beyond so many times the integrator's absolute tolerance rests: it is shown as 0 below that.
+RESTING = 100.0
 #: By which slopes of an angle may miss whole numbers in a loop that counts as plane: axes are written to nine digits.
 PLANE = 1e-9
 #: A gap whose gradient is below this part of its kind's size is of a loop that small: more digits would be lost.

@@ -18,8 +18,8 @@ from .space import Array
 
 def _failed(what: str, *matrices: Any) -> EvaluationError:
     if not all(np.isfinite(matrix).all() for matrix in matrices):
-        return NonFiniteError(f"{what}: a matrix holds entries that are no finite numbers")
-    return UnsolvedError(f"{what}: the matrix is singular, or its entries are too far apart in size")
+        return NonFiniteError(f"{what}: a matrix has entries that are not finite")
+    return UnsolvedError(f"{what}: the matrix is singular, or its entries differ too much in size")
 
 
 class _Told:

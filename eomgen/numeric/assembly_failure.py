@@ -82,12 +82,10 @@ class AssemblyFailure(NamedTuple):
                 return ""
         names = ", ".join(f"{label} (off by {gap:.3g})" for _, label, gap in gaps)
         if len(gaps) == 1:
-            return (
-                f"the constraint {names} can never hold: no coordinate changes it; take it away, or correct its values"
-            )
+            return f"the constraint {names} can never hold: no coordinate changes it; remove it, or correct its values"
         return (
             f"the constraints {names} contradict each other: they restrict the same motion and cannot hold together; "
-            "take one away, or make their values agree"
+            "remove one of them, or make their values agree"
         )
 
     def _advice(self) -> str:

@@ -52,7 +52,7 @@ def definite_factor(M: Array, what: str) -> Array:
         least = float(algebra.eigvalsh(correlated(M))[0])
         size = "negative inertia" if least < -SINGULAR else "no inertia"
         raise SingularMassMatrixError(
-            f"{what}: some motion has {size} behind it (smallest eigenvalue {least:.2g}), and the mass matrix must be "
+            f"{what}: a motion has {size} behind it (smallest eigenvalue {least:.2g}), but the mass matrix must be "
             "positive definite"
         ) from None
 

@@ -47,7 +47,7 @@ def gram_solver(J: Array, relative: float = GENTLE) -> Callable[[Array], Array]:
     try:
         L = np.linalg.cholesky(G)
     except np.linalg.LinAlgError:
-        raise ProjectionError("rounding leaves J J^T of the constraints indefinite") from None
+        raise ProjectionError("because of rounding, J J^T of the constraints is not positive definite") from None
     return lambda e: np.asarray(algebra.solve(L.T, algebra.solve(L, e)))
 
 

@@ -102,7 +102,7 @@ def follow(system: ConstraintSystem, start: Array, held: Mapping[str, float], en
     """
     path = HeldPath(system, start, held, end)
     if not path.length <= LONGEST:
-        raise AssemblyError(f"the way from the reference position is too long ({path.length:.3g} rad or length scales)")
+        raise AssemblyError(f"the path from the reference position is too long ({path.length:.3g} rad or lengths)")
     timed = path.end != system.t
     continuation = Continuation(path, start, fewest=FEWEST if timed else 1)
     found = continuation.reach(1.0, TRIALS)
@@ -113,8 +113,8 @@ def follow(system: ConstraintSystem, start: Array, held: Mapping[str, float], en
         t = system.t + last.s * (path.end - system.t)
         raise AssemblyError(f"the path from t = {system.t:.6g} to t = {path.end:.6g} s is blocked at t = {t:.6g} s")
     if not continuation.blocked:
-        raise AssemblyError(f"the path is too winding: {TRIALS} steps cover {100 * last.s:.0f} % of it")
+        raise AssemblyError(f"the path has too many bends: {TRIALS} steps cover {100 * last.s:.0f} % of it")
     raise AssemblyError(
-        f"the path is blocked after {100 * last.s:.0f} % of it: there the loops cannot close, or the mechanism jumps, "
-        "as at a dead centre of the prescribed coordinate; prescribe another one, or give a position on the other side"
+        f"the path is blocked after {100 * last.s:.0f} % of it: the loops cannot close there, or the mechanism jumps, "
+        "as at a dead centre of the prescribed coordinate; prescribe another one, or give a position beyond it"
     )

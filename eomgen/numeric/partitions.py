@@ -84,7 +84,7 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
                 row, column, best = row_any, column_any, best_any
         if not best > (STRICT if strict else RANK) * size:
             raise PartitionError(
-                "the chosen independent coordinates cannot move the mechanism here (a dead centre of theirs): "
+                "the chosen independent coordinates cannot move the mechanism here (it is at a dead centre): "
                 f"{step} of {rank} others follow from them; choose other independent coordinates"
                 if strict
                 else f"the constraints have rank {step} here and {rank} elsewhere"

@@ -111,7 +111,7 @@ class ClosedCurve:
         if self.T.shape[1]:
             size = largest(self.T @ self.heading)
             if not size > SLANT:
-                raise EvaluationError("the motion does not lead along the branch")
+                raise EvaluationError("the motion does not follow the branch")
             self.heading /= size
             d = self.T @ self.heading
         self.direction = d

@@ -21,15 +21,15 @@ from . import algebra
 CHECKS = ("error", "note", "off")
 
 
-SWITCH = "check_inertia: note takes it as it is (also of load, and --check-inertia)"
-SHIFTED = f"an inertia about another point is at least m d^2; {SWITCH}"
+SWITCH = "or accept it with check_inertia: note (an option of load too, and --check-inertia)"
+SHIFTED = f"give a moment of at least m d^2 about a point at the distance d, {SWITCH}"
 NEGATIVE = (
-    "check the products: xy, xz, yz bear the tensor's own sign (minus the integral of x y dm), and the point it is "
-    f"about; {SWITCH}"
+    "check the signs of the products (xy, xz, yz are entries of the tensor: minus the integral of x y dm) and the "
+    f"point that the inertia is about, {SWITCH}"
 )
 EXCESS = (
-    "no body has such an inertia; it is taken about the centre of mass unless about says otherwise, in kg m^2; "
-    f"{SWITCH}"
+    "no rigid body has such moments; check the units (kg m^2) and the point (the centre of mass, unless about gives "
+    f"another), {SWITCH}"
 )
 
 

@@ -121,5 +121,5 @@ class Balanced:
         limit[self.constraints] = max(LEFT, FAINT / weak)
         terms = np.abs(right) + np.abs(self.K) @ np.abs(z)
         if not (np.abs(defect) <= limit * terms + ROUNDED * terms.max(axis=0, initial=0.0)).all():
-            raise UnsolvedError("the equations of motion are left unsolved by rounding")
+            raise UnsolvedError("because of rounding the equations of motion could not be solved")
         return np.asarray((self.column * z.T).T.reshape(r.shape))

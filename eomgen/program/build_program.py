@@ -59,7 +59,7 @@ def build_program(
     terms.check_shapes()
     name = str(metadata["name"])
     if not (name.isidentifier() and name.isascii()) or name == "eomgen":
-        raise UsageError(f"{name!r} cannot name a generated module; letters, digits and _ are allowed, eomgen is taken")
+        raise UsageError(f"{name!r} cannot name a generated module; use letters, digits and _, but not the name eomgen")
     limits = limits or Limits()
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)

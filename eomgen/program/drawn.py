@@ -15,6 +15,7 @@ import numpy as np
 from ..describe.mechanism import JointSpec, Mechanism
 from ..elements.looks import Contour, Drawn, LiftCurve, PitchCircles, RackAndPinion, Seen, Wheel
 from ..errors import UsageError
+from ..forces import Force
 from ..frames import Frame, Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
@@ -35,6 +36,9 @@ class _Numbers:
         self.places = {p.name: ("p", k) for k, p in enumerate(mechanism.parameters)}
         self.places |= {name: ("s", k) for k, name in enumerate(RUNNING)}
         self.declared = {p.name: p.value for p in mechanism.parameters if p.value is not None}
+        coordinates = [spec.joint.coordinates for spec in mechanism.joints]
+        #: joints whose first coordinate is a length
+        self.sliding = {k for k, found in enumerate(coordinates) if found and found[0].kind == "length"}
         self.kept: list[Expr] = []
 
     def number(self, x: Expr) -> Any:
@@ -105,10 +109,11 @@ def describe_picture(mechanism: Mechanism) -> dict[str, Any] | None:
     n = _Numbers(mechanism)
     joints = [_joint(n, spec) for spec in mechanism.joints]
     owners = {name: k for k, spec in enumerate(mechanism.joints) for name in spec.coordinates}
-    things = [(f.name, f.drawn()) for f in mechanism.forces] + [(c.name, c.drawn()) for c in mechanism.constraints]
+    things = [(f.name, f.drawn(), _push(n, f)) for f in mechanism.forces]
+    things += [(c.name, c.drawn(), {}) for c in mechanism.constraints]
     elements = [
-        {"name": name, **found}
-        for name, every in things
+        {"name": name, **found, **(push if len(found.get("stops", ())) > 1 else {})}
+        for name, every, push in things
         for seen in every
         if (found := _element(n, seen, owners)) is not None
     ]
@@ -157,6 +162,13 @@ def _joint(n: _Numbers, spec: JointSpec) -> dict[str, Any]:
     return found
 
 
+def _push(n: _Numbers, force: Force) -> dict[str, Any]:
+    """The force along a way over its length and rate, where it depends on these and parameters alone."""
+    law = force.push(*(n.graph.symbol(name) for name in RUNNING))
+    found = None if law is None else n.curve([law])
+    return {} if found is None else {"point": [*found, 0.0, 0.0]}
+
+
 def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, Any] | None:
     """One thing to be seen; None where it depends on more than parameters."""
     if isinstance(seen, Drawn):
@@ -179,8 +191,11 @@ def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, An
         return {"kind": "rack", "a": pinion, "b": rack, "radius": n.number(seen.radius)}
     if isinstance(seen, LiftCurve):
         cam, follower = _owner(seen.cam, owners), _owner(seen.follower, owners)
-        lift = n.curve(substitute([seen.lift], {seen.parameter: n.graph.symbol(RUNNING[0])}), 0.0, 2.0 * math.pi)
-        if cam is None or follower is None or lift is None or not n.known([seen.phase]):
+        if cam is None or follower is None or not n.known([seen.phase]):
+            return None
+        span = (None, None) if cam in n.sliding else (0.0, 2.0 * math.pi)
+        lift = n.curve(substitute([seen.lift], {seen.parameter: n.graph.symbol(RUNNING[0])}), *span)
+        if lift is None:
             return None
         return {"kind": "lift", "a": cam, "b": follower, "phase": n.number(seen.phase), "point": [*lift, 0.0, 0.0]}
     assert isinstance(seen, Contour)
@@ -188,7 +203,9 @@ def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, An
     curve = n.curve(point, seen.low, seen.high)
     if curve is None:
         return None
-    return {"kind": "contour", "marker": n.marker(seen.marker), "point": curve, "low": seen.low, "high": seen.high}
+    ends = {"low": seen.low, "high": seen.high}
+    held = {} if seen.follower is None else {"stops": [_stop(n, seen.follower)], "face": seen.face}
+    return {"kind": "contour", "marker": n.marker(seen.marker), "point": curve, **ends, **held}
 
 
 def _owner(x: Expr | None, owners: Mapping[str, int]) -> int | None:

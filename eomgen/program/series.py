@@ -96,7 +96,7 @@ def make_series(program: Program) -> Series:
     """
     block = next((b for b in program.blocks if b.name == "rhs"), None)
     if program.has_loops:
-        raise NoSeriesError("closed loops are solved for at every state")
+        raise NoSeriesError("its closed loops are solved at every state")
     if block is None:
         raise NoSeriesError(TOO_LONG)
     return _Terms(program, block).series(block)
@@ -106,7 +106,7 @@ class NoSeriesError(Exception):
     """Why there are no terms: an operation on a value that changes has no recurrence, or there are too many."""
 
 
-TOO_LONG = f"its right-hand side has more than some {MOST_TERMS} operations"
+TOO_LONG = f"its right-hand side has more than about {MOST_TERMS} operations"
 
 
 class _Terms:
@@ -192,9 +192,9 @@ class _Terms:
             raise NoSeriesError("a table or a function of your own has no series")
         if self._smooth and varies and row.bends:
             word = "a condition" if row.chooses else "a comparison" if row.kind == CONDITION else kind
-            raise NoSeriesError(f"{word} of what moves has corners or jumps")
+            raise NoSeriesError(f"{word} of a moving quantity has corners or jumps")
         if self._smooth and varies and kind == "pow" and self._terms[operands[1]].varies:
-            raise NoSeriesError("a power whose exponent moves has no series")
+            raise NoSeriesError("a power with a changing exponent has no series")
         made = len(self._terms)
         place = self._add(Term(kind, operands, varies=varies))
         if place == made and self._smooth and varies and row.recurrence is not None:

@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from ..equations import METHODS
-from ..equations.reduction import Names, VelocityTransformation, transform_velocities
+from ..equations.reduction import LoopNames, VelocityTransformation, transform_velocities
 from ..equations.tree_equations import TreeEquations
 from ..errors import UnavailableError
 from ..frames import GROUND, Frame, Marker
@@ -103,8 +103,8 @@ class Quantities:
         return [*(x for row in self.mass_matrix_by_names for x in row), *self.force_by_names], self._by_names[0].given
 
     @cached_property
-    def _by_names(self) -> tuple[Names, VelocityTransformation]:
-        names = Names(self.kinematics, self.mobility.independent)
+    def _by_names(self) -> tuple[LoopNames, VelocityTransformation]:
+        names = LoopNames(self.kinematics, self.mobility.independent)
         return names, transform_velocities(self.kinematics, self.mobility, self.numbers, names)
 
     @cached_property

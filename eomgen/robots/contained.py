@@ -58,7 +58,7 @@ class Folder:
         str or Problem
             A path without links inside the folder; a problem where it lies outside, or nowhere.
         """
-        path, remedy = f"{element.tag}.file", "the path starts at the model's folder"
+        path, remedy = f"{element.tag}.file", "give its path from the model's folder"
         if (needed and not name) or len(name) > NAME:
             message = "names no file" if not name else f"{name[:20]!r}... is too long for the name of a file"
             return element.problem(path, message, f"at most {NAME:,} characters" if name else remedy)
@@ -66,7 +66,7 @@ class Folder:
             steps = [plain(step) for step in (*base[1:], name)]
             place = os.path.realpath(os.path.join(base[0], *steps))
             if not self.holds(place) or (os.name == "posix" and any(map(_ELSEWHERE.match, steps))):
-                message = f"{name!r} is outside the folder {self.path}; it is not read"
+                message = f"{name!r} is outside the folder {self.path}, so it is not read"
                 remedy = "name a folder that holds all files of the model: assets=..., or --assets"
                 return element.problem(path, message, remedy)
             if os.path.isfile(place):
@@ -79,7 +79,7 @@ class Folder:
         Raises
         ------
         ModelError
-            It is no plain file (a pipe, a device), has more than ``most`` bytes, or cannot be read.
+            It is not a plain file (a pipe, a device), has more than ``most`` bytes, or cannot be read.
         """
         try:
             with open_plain(path, follow=False) as file:

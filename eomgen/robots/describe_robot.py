@@ -212,7 +212,7 @@ class _Writer:
             return
         span = joint.limits.get("upper", math.inf) - joint.limits.get("lower", -math.inf)
         if span <= 0.0:
-            self.out.notes.append(f"no stops at {self.joints[joint.name]}, whose limits leave it no range")
+            self.out.notes.append(f"{self.joints[joint.name]} gets no stops, because its limits leave it no range")
             return
         span = span if math.isfinite(span) else 1.0
         effort = joint.limits.get("effort", 0.0)
@@ -337,12 +337,14 @@ class _Writer:
         limited = [j for j in moving if any(key != "effort" or j.clamp is None for key in j.limits)]
         if limited and self.options.limits == "note":
             names = self._few(limited)
-            remedy = "a run that passes one says so; limits='stop' puts stops there, limits='off' is silent"
-            self.out.notes.append(f"nothing stops at the limits of joints ({names}); {remedy}")
+            remedy = "a run that passes a limit warns; limits='stop' adds elastic stops, limits='off' does not warn"
+            self.out.notes.append(f"the limits of joints stop nothing ({names}); {remedy}")
         rubbing = [j for j in moving if j.dry_friction]
         if rubbing and not self.options.smoothing:
             names = self._few(rubbing)
-            self.out.notes.append(f"dry friction of joints is data and does not act ({names}); friction=0.01 lets it")
+            self.out.notes.append(
+                f"the dry friction of joints does not act ({names}); load with friction=0.01 to let it act"
+            )
 
     def _few(self, joints: list[RobotJoint]) -> str:
         names = [self.joints[joint.name] for joint in joints]

@@ -90,7 +90,7 @@ def build_bodies(robot: Robot, options: RobotOptions) -> Bodies:
         robot.problem(
             "robot",
             "no link can move",
-            "give it joints; the base of a URDF robot floats with floating=True, or --floating",
+            "give the robot joints; the base of a URDF robot moves with floating=True, or --floating",
             (robot.file, 1),
         )
     _check_masses(robot, found, options.check)
@@ -152,7 +152,10 @@ def _lock(robot: Robot, options: RobotOptions) -> None:
             continue
         if joint.type not in ("revolute", "prismatic", "weld"):
             robot.problem(
-                f"lock.{name}", f"is a {joint.type} joint", "only joints of one degree are locked", joint.place
+                f"lock.{name}",
+                f"is a {joint.type} joint",
+                "only joints of one degree of freedom can be locked",
+                joint.place,
             )
             continue
         axis = np.array(joint.axis) / max(map(abs, joint.axis))  # first, as squares of small numbers vanish
@@ -175,7 +178,9 @@ def _check_ends(robot: Robot) -> None:
         if joint.child and joint.child in carrier:
             other = carrier[joint.child].name
             message = f"the link {joint.child!r} is also the child of the joint {other!r}"
-            robot.problem(f"joint.{joint.name}.child", message, "the links of a URDF file make a tree", joint.place)
+            robot.problem(
+                f"joint.{joint.name}.child", message, "the links of a URDF file must form a tree", joint.place
+            )
         carrier.setdefault(joint.child, joint)
 
 
@@ -184,9 +189,11 @@ def _root(robot: Robot) -> str:
     children = {joint.child for joint in robot.joints.values()}
     roots = [link for link in robot.links.values() if link.name not in children]
     if robot.links and not roots:
-        robot.problem("robot", "the joints form a ring: no link is the root", "make them a tree", (robot.file, 1))
+        robot.problem(
+            "robot", "the joints form a ring: no link is the root", "connect the links as a tree", (robot.file, 1)
+        )
     for link in roots[1:]:
-        message = f"has no parent, like {roots[0].name!r}: a robot has one root"
+        message = f"has no parent, and neither has {roots[0].name!r}; a robot must have one root"
         robot.problem(f"link.{link.name}", message, "connect it by a joint, or remove it", link.place)
     if len(roots) == 1 and not robot.problems:
         reached, waiting = set(), [roots[0].name]
@@ -200,7 +207,7 @@ def _root(robot: Robot) -> str:
         for link in robot.links.values():
             if link.name not in reached:
                 message = f"the joints do not connect it to the root {roots[0].name!r}: they form a ring"
-                robot.problem(f"link.{link.name}", message, "make the joints a tree", link.place)
+                robot.problem(f"link.{link.name}", message, "connect the links as a tree", link.place)
     return roots[0].name if roots else ""
 
 
@@ -260,12 +267,12 @@ def _check_masses(robot: Robot, found: Bodies, check: str) -> None:
     moving = [body for body in found.bodies.values() if body.joint is not None]
     found.massless = bool(moving) and all(b.inertia().is_nothing and not b.joint.armature for b in moving if b.joint)
     if found.massless and check == "error":
-        robot.notes.append("for kinematics only: no link that moves has mass or inertia")
+        robot.notes.append("for kinematics only: no moving link has mass or inertia")
     elif check == "note" and idle:
         names = ", ".join(joint.name for joint in reversed(idle))
-        robot.notes.append(f"for kinematics only: joints that move nothing with mass or inertia ({names})")
+        robot.notes.append(f"for kinematics only, because these joints move no mass and no inertia: {names}")
     for joint in idle if check == "error" and not found.massless else ():
-        message = f"the link {joint.child!r} that it moves has no mass, nor has any link on it"
+        message = f"the joint moves no mass: link {joint.child!r} and all links on it have none"
         remedy = (
             f"give that link an <inertial>, make the joint fixed, or lock it: lock={{{joint.name!r}: 0}}; for "
             "kinematics alone, check_inertia='note' (--check-inertia note)"

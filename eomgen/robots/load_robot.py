@@ -79,21 +79,25 @@ def make_options(given: dict[str, Any]) -> RobotOptions:
             raise UsageError(f"no option {key!r} for a robot file; {nearest(key, known, 'options')}")
     for key, allowed in (("mimic", MIMIC), ("rotation", ROTATIONS), ("limits", LIMITS)):
         if key in given and not (isinstance(given[key], str) and given[key] in allowed):
-            raise UsageError(f"{key}={given[key]!r}: allowed: {', '.join(allowed)}")
+            raise UsageError(f"{key} must be one of {', '.join(allowed)}, not {given[key]!r}")
     if given.get("check_inertia") is not None:
         word = word_of_check(given["check_inertia"])
         if word is None:
-            raise UsageError(f"check_inertia={given['check_inertia']!r}: allowed: {', '.join(CHECKS)}, True, False")
+            raise UsageError(
+                f"check_inertia must be one of {', '.join(CHECKS)}, True, False, not {given['check_inertia']!r}"
+            )
         given = {**given, "check_inertia": word}
     friction = given.get("friction", False)
     if not isinstance(friction, bool | int | float) or not 0 <= friction < float("inf"):
-        raise UsageError(f"friction={friction!r}: True, or the velocity (rad/s or m/s) below which it is smoothed")
+        raise UsageError(
+            f"friction must be True, or the velocity (rad/s or m/s) below which it is smoothed, not {friction!r}"
+        )
     for key in ("floating", "merge", "symbolic"):
         if not isinstance(given.get(key, False), bool | np.bool_):
-            raise UsageError(f"{key}={given[key]!r}: allowed: True, False")
+            raise UsageError(f"{key} must be True or False, not {given[key]!r}")
     given = {key: _names(key, value) if key in ("actuate", "lock") else value for key, value in given.items()}
     if not _is_number(given.get("snap", 0.0)) or given.get("snap", 0.0) < 0.0:
-        raise UsageError(f"snap={given['snap']!r}: an angle (rad), 0 or positive")
+        raise UsageError(f"snap must be an angle (rad), 0 or positive, not {given['snap']!r}")
     if given.get("assets") is not None:
         as_name("assets", given["assets"])
     return RobotOptions(**given)
@@ -114,11 +118,11 @@ def _names(key: str, given: Any) -> Any:
     if key == "lock" and isinstance(given, Mapping):
         for name, value in given.items():
             if not _is_number(value):
-                message = f"a joint is held at a finite number (rad or m), at most {LARGEST:g}"
+                message = f"the value must be a finite number (rad or m), at most {LARGEST:g}"
                 raise UsageError(f"lock={{{name!r}: {value!r}}}: {message}")
         return given
     names = tuple(given) if isinstance(given, Iterable) and not isinstance(given, Mapping) else (None,)
     if not all(isinstance(name, str) for name in names):
         also = "True" if key == "actuate" else "a mapping of names to values"
-        raise UsageError(f"{key}={given!r}: names of joints, or {also}")
+        raise UsageError(f"{key} must be names of joints, or {also}, not {given!r}")
     return names

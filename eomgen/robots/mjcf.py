@@ -40,7 +40,7 @@ def read_mjcf(root: XmlElement, options: RobotOptions) -> Robot:
         The file names others outside its folder, or MuJoCo refuses it; with the line where it says one.
     """
     if options.floating:
-        raise UsageError(f"{root.file}: an MJCF file says itself which bodies float; leave floating out")
+        raise UsageError(f"{root.file}: an MJCF file itself defines which bodies float; leave floating out")
     scan = Scan(root, options.assets)
     compiled = compile_mjcf(Text(scan.trees, scan.folder, scan.problems), root)
     robot = _MjcfReader(compiled, root, scan.lines).read()
@@ -98,7 +98,7 @@ class _MjcfReader(Compiled):
         size = {"free": 6, "spherical": 3}.get(kind, 1)
         if size > 1:
             if m.dof_armature[dof : dof + size].any():
-                message = f"armature on a {kind} joint, which adds inertia that is not a body's"
+                message = f"armature on a {kind} joint is not supported: it adds inertia that belongs to no body"
                 self.robot.problem(f"joint.{name}.armature", message, 'set armature="0" there', place)
             damped = m.dof_damping[dof : dof + size].any() and not self.off("DAMPER")
             if damped or (m.jnt_stiffness[j] and not self.off("SPRING")):

@@ -71,8 +71,10 @@ def _why(answer: dict[str, Any]) -> tuple[str, str]:
     if code is None or code in (-getattr(signal, name, 0) for name in ("SIGXCPU", "SIGKILL")):
         return f"MuJoCo needs more time for it than the {SECONDS} s ({WAIT} s beside other work) it may have", _SMALLER
     if code < 0:
-        return f"MuJoCo crashes on it ({signal.Signals(-code).name})", "leave out parts until it loads, to find the one"
-    return f"MuJoCo ends without a model (exit {code})", "leave out parts until it loads, to find the one"
+        return (
+            f"MuJoCo crashes on it ({signal.Signals(-code).name})"
+        ), "leave out parts until it loads, to find the cause"
+    return f"MuJoCo ends without a model (exit {code})", "leave out parts until it loads, to find the cause"
 
 
 def _ask(text: Text) -> tuple[int | None, bytes]:

@@ -17,7 +17,7 @@ Range = tuple[float, float]  # lowest and highest value
 
 @dataclass(frozen=True)
 class RobotOptions:
-    """What ``eomgen.load`` and the command line may say about a robot file.
+    """Options for loading a robot file, of ``eomgen.load`` and of the command line.
 
     Attributes
     ----------
@@ -32,22 +32,24 @@ class RobotOptions:
     lock : names, or mapping of names to values
         Joints held at a value (0 unless given): they become welds.
     merge : bool
-        Whether links welded together make one body, their frames its markers; else each link is a body.
+        Whether links that are welded together become one body, with their frames as its markers; otherwise each link is
+        a body.
     symbolic : bool
-        Whether masses, centres of mass and inertias become parameters; else they are numbers, which fold.
+        Whether masses, centres of mass and inertias become parameters; otherwise they stay numbers, which gives shorter
+        code.
     actuate : bool or names
         Inputs ``tau_<joint>`` on all joints of one degree, or on these.
     friction : bool or float
-        Whether the dry friction of joints acts, smoothed below this velocity (rad/s or m/s; True: 0.01); else it is
-        data only.
+        Whether the dry friction of joints acts, smoothed below this velocity (rad/s or m/s; True: 0.01); otherwise it
+        does not act.
     snap : float
-        Angles this near (rad) to a multiple of pi/2 are taken as that multiple.
+        Angles that differ by less than this (rad) from a multiple of pi/2 are rounded to that multiple.
     check_inertia : {'error', 'note', 'off'} or bool
-        What becomes of masses and inertias that no body can have, and of joints that move no mass: refused, noted, or
-        taken in silence.  Unless given, principal moments of which one exceeds the sum of the others are noted, other
-        impossible inertias refused.  A robot without any mass is one for kinematics, which is noted.
+        What happens to masses and inertias that no body can have, and to joints that move no mass: they are refused,
+        noted, or accepted silently.  By default principal moments of which one exceeds the sum of the others are noted,
+        and other impossible inertias are refused.  A robot without any mass is loaded for kinematics, with a note.
     limits : {'note', 'stop', 'off'}
-        Whether a run that passes a limit of a joint says so, stops push back there, or nothing happens.
+        What limits of joints do: a run that passes one warns, elastic stops act there, or nothing happens.
     assets : str, optional
         Folder within which an MJCF file may read other files; its own folder by default.
     """

@@ -154,7 +154,7 @@ class _UrdfReader:
         else:
             mass = self.number(weight, "value", f"{path}.mass")
             if mass < 0.0 and self.options.check == "error":
-                self.fault(weight, f"{path}.mass", f"is {mass:g}", f"a mass is 0 or positive; {SWITCH}")
+                self.fault(weight, f"{path}.mass", f"is {mass:g}", f"give a mass of 0 or more, {SWITCH}")
         if tensor is None:
             return Inertia(mass, np.zeros(3), np.zeros((3, 3))).seen(frame)
         xx, xy, xz, yy, yz, zz = (
@@ -189,7 +189,12 @@ class _UrdfReader:
 
     def _check_scale(self, element: XmlElement, path: str, factors: list[float]) -> None:
         if not all(factors) and not any(problem.path == path for problem in self.robot.problems):
-            self.fault(element, path, "a scale of 0 leaves nothing of the mesh", "negative factors mirror it")
+            self.fault(
+                element,
+                path,
+                "a scale of 0 leaves nothing of the mesh",
+                "give three factors other than 0; negative ones mirror the mesh",
+            )
         elif min(factors) < 0.0:
             self.robot.notes.append(f"{path}: negative factors mirror the mesh")
 
@@ -250,7 +255,7 @@ class _UrdfReader:
                     result[key] = 0.0  # the format's default
         if result.get("lower", 0.0) > result.get("upper", math.inf):
             lower, upper = result.pop("lower"), result.pop("upper")
-            self.robot.notes.append(f"{path}.limit: lower {lower:g} is above upper {upper:g}; taken as no limit")
+            self.robot.notes.append(f"{path}.limit: lower {lower:g} is above upper {upper:g}; these limits are ignored")
         return result
 
     def _mimic(self, element: XmlElement, path: str) -> Mimic | None:

@@ -85,5 +85,5 @@ def note_urdf(root: XmlElement) -> list[str]:
             row = find_row(URDF, inside)
             if path != "robot" and row is not None and row.fate in (TAKEN, DATA) and len(element.all(tag)) > 1:
                 name = element.attributes.get("name", "")
-                notes.append(f"{path}.{name}: {len(element.all(tag))} <{tag}>; the first counts")
+                notes.append(f"{path}.{name}: {len(element.all(tag))} <{tag}>; only the first is used")
     return notes

@@ -56,7 +56,7 @@ def read_xml(path: str | os.PathLike[str]) -> XmlElement:
     FileNotFoundError
         There is no such file.
     UsageError
-        It is no plain file, or the path is none, such as one with NUL.
+        It is not a plain file, or the path is none, such as one with NUL.
     ModelError
         Not XML, a document type or an entity, or too large; with the line.
     MissingDependencyError
@@ -93,7 +93,7 @@ def parse_xml(data: bytes, file: str) -> XmlElement:
         parser.parse(source)
     except DefusedXmlException:
         message = "declares a document type or an entity"
-        remedy = "remove <!DOCTYPE ...>: entities are never expanded and no other file is read"
+        remedy = "remove <!DOCTYPE ...>; eomgen expands no entities and reads no other files"
         raise ModelError([Problem("file", message, remedy, file, parser.getLineNumber() or 1)]) from None
     except SAXParseException as error:
         message, line = f"not XML: {error.getMessage()}", error.getLineNumber() or 1

@@ -14,7 +14,9 @@ AXES = {"x": 0, "y": 1, "z": 2}
 def axes_of(sequence: str) -> tuple[int, int, int]:
     """Indices of the three axes; raises ValueError for anything but one of the 12 sequences."""
     if len(sequence) != 3 or not set(sequence) <= set("xyz") or sequence[1] in (sequence[0], sequence[2]):
-        raise ValueError(f"{sequence!r} is no sequence of Euler angles; like 'xyz' or 'zxz', neighbours different")
+        raise ValueError(
+            f"{sequence!r} is not a sequence of Euler angles; give three axes like 'xyz' or 'zxz', neighbours different"
+        )
     i, j, k = (AXES[letter] for letter in sequence)
     return i, j, k
 

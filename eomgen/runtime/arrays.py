@@ -39,7 +39,7 @@ def read_arrays(path: Path, compressed: bool = True) -> dict[str, Any]:
     ------
     FileNotFoundError
     UsageError
-        It is no plain file.
+        It is not a plain file.
     ValueError and others of :data:`BROKEN`
         It is damaged, or holds what is no array of numbers or of text.
     """
@@ -65,11 +65,11 @@ def _array(archive: ZipFile, member: ZipInfo, compressed: bool) -> Any:
         raise ValueError(f"{member.filename} has format {version}")
     shape, fortran, kind = npy.read_array_header_1_0(stream)
     if kind.kind not in "biufcU":
-        raise ValueError(f"{member.filename} holds {kind}, which are no numbers")
+        raise ValueError(f"{member.filename} holds {kind} instead of numbers")
     count = 1
     for size in shape:
         count *= size
     if min(shape, default=0) < 0 or count * kind.itemsize != len(data) - stream.tell():
-        raise ValueError(f"{member.filename} has {len(data)} bytes, which are no array of shape {shape}")
+        raise ValueError(f"{member.filename} has {len(data)} bytes, which is not an array of shape {shape}")
     flat = np.frombuffer(data, dtype=kind, count=count, offset=stream.tell()) if count else np.empty(0, kind)
     return flat.reshape(shape, order="F" if fortran else "C").copy(order="K")

@@ -45,7 +45,7 @@ class Assembled:
         u: Any = None,
         **named: float | str,
     ) -> Array:
-        """An assembled state.
+        """Find an initial state: loops closed and velocities consistent.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class Assembled:
         u: Any = None,
         **named: float | str,
     ) -> Array:
-        """Close the loops from a guess.
+        """Find a position with closed loops near a guess.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class Assembled:
         """
         initial, given = self._given(guess, named, t, p, u)
         if given.rates:
-            raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; x0 takes rates too")
+            raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; use x0 for rates")
         return initial.from_guess(given.positions) if given.positions else initial.assembled({})
 
     @both_names
@@ -128,18 +128,20 @@ class Assembled:
         u: Any = None,
         **named: float | str,
     ) -> list[Array]:
-        """All positions (n_q,) found that hold the given values, that of :meth:`x0` first.
+        """Find all positions (n_q,) with the given values; the first is that of :meth:`x0`.
 
-        The search is bounded and repeats exactly; it may miss a branch.
+        Without any, the declared initial values are held.  Where the held values leave freedom, the independent
+        coordinates keep the values of the first position.  The search is bounded and repeats exactly; it may miss a
+        branch.
         """
         initial, given = self._given(values, named, t, p, u)
         first = initial.assembled(given.positions, rough=True)
-        return initial.branches(given.positions or initial.sort(self.layout.initial).positions, first)
+        return initial.branches(given.positions, first)
 
     @both_names
     @np.errstate(all="ignore")
     def branch(self, x: ArrayLike, t: float = 0.0) -> int:
-        """Which side of the dead centres a state or position lies on.
+        """Tell on which side of the dead centres a state or position lies.
 
         Parameters
         ----------
@@ -182,7 +184,7 @@ class Assembled:
             scalar = isinstance(given, (float, int, np.number)) or (isinstance(given, np.ndarray) and not given.ndim)
             if scalar and name in layout.q + layout.loops + layout.v:
                 kind = "velocity" if name in layout.v else "coordinate"
-                raise UsageError(f"{name}= gives the {what}; the {kind} {name!r} goes in a dict: {{{name!r}: ...}}")
+                raise UsageError(f"{name}= gives the {what}; give the {kind} {name!r} in a dict: {{{name!r}: ...}}")
         kernels = (self if p is None and u is None else self.bind(p, u)).kernels
         return initial_of(kernels, read_number("t", t), names)
 

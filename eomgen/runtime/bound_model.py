@@ -103,7 +103,7 @@ class BoundModel(Assembled, Momenta):
 
     @both_names
     def bind(self, p: Any = None, u: Any = None) -> Self:
-        """The same model with other parameters and inputs.
+        """Make the same model with other parameters and inputs.
 
         Parameters
         ----------
@@ -183,7 +183,7 @@ class BoundModel(Assembled, Momenta):
         p: Any = None,
         u: Any = None,
     ) -> tuple[Array, Array, Array]:
-        """Motion of the whole tree from that of the independent coordinates.
+        """Compute the motion of the whole tree from that of the independent coordinates.
 
         A pure function: the dependent coordinates are found by leading the independent ones from the declared initial
         position in small steps along a straight line, so that the branch is that of this position.  Each column of a

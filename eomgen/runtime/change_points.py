@@ -32,7 +32,7 @@ SAME = 1e-3  #: of a neighbourhood: dips closer together are one
 
 
 class ChangePoint(NamedTuple):
-    """A moment at which the mechanism has more degrees of freedom than elsewhere."""
+    """A time at which the mechanism has more degrees of freedom than elsewhere."""
 
     time: float  #: when it is passed (s)
     degrees_of_freedom: int  #: at that moment

@@ -120,8 +120,8 @@ class Columns:
         t, x, u = (self.t, self.x, self.u) if self._steps is None else self._steps()
         if self._steps is not None and not len(t):
             raise UsageError(
-                "the run took too many steps for all to be kept besides t_eval: run it without t_eval, "
-                "or in parts, for its change points"
+                "the run took too many steps to keep all of them besides t_eval; for its change points run it without "
+                "t_eval, or in parts"
             )
         return find_change_points(self.module, t, x, u)
 
@@ -161,8 +161,7 @@ def _described(layout: Layout) -> dict[str, Any]:
         "y_names": list(layout.y),
         "u_names": list(layout.u),
         "model_method": layout.metadata.get("method"),
-        "docs": layout.metadata.get("docs", {}),
-        **{key: layout.metadata[key] for key in ("latex", "instances") if key in layout.metadata},
+        **{key: layout.metadata.get(key, {}) for key in ("docs", "latex", "instances")},
     }
 
 

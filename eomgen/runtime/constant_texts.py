@@ -19,7 +19,7 @@ def constant(text: str, what: str) -> float:
     """
 
     def resolve(name: str) -> Expr:
-        raise ExpressionError(f"{name!r} is no number", remedy="write numbers, pi and functions of them")
+        raise ExpressionError(f"{name!r} is not a number", remedy="write numbers, pi and functions of them")
 
     try:
         value = parse(text, Graph(), resolve).value

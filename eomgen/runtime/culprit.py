@@ -41,7 +41,7 @@ def find_culprit(
         if layout.metadata.get("indefinite"):
             return f"the eigenvalue nearest to 0 is {values[np.abs(values).argmin()]:.2g}"
         if values[0] > SINGULAR:
-            return "or its reactions cannot be told apart, since alone it is: method='embedding' needs none"
+            return "because its reactions are not unique; method='embedding' does not need them"
         weights = np.abs(vectors[:, 0])
         moved = zip(layout.independent, weights, strict=True)
         names = [layout.velocity_labels[i] for i, w in moved if w > 0.1 * weights.max()]
@@ -70,7 +70,7 @@ def _not_finite(kernels: Evaluates, t: float, x: Array, p: Array | None, u: Arra
         finite = kernels.state("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
         loads = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
         if loads:
-            why = "ends that meet or lie inside the cylinder, or a law outside its domain"
+            why = "its ends meet or lie inside the cylinder, or its law is outside its domain"
             return f"the loads of {loads} are not ({why})"
     if "mass_matrix" in kernels.core.names and x.size >= layout.n_q:
         M = kernels.state("mass_matrix", nan=True)(x[: layout.n_q], t=t, p=p, u=u)

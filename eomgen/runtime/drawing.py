@@ -33,8 +33,8 @@ def draw(
     Parameters
     ----------
     x : array (n_x,) or (n_q,), or mapping of str to float, optional
-        A state, a position, or values of coordinates that are assembled as by ``x0``; by default the declared initial
-        position.  An array is drawn as it is: a loop that it leaves open is seen to be open.
+        A state, a position, or values of coordinates, which are assembled as by ``x0``; by default the declared initial
+        position.  An array is drawn as given: loops that it leaves open are drawn open.
     ax : matplotlib Axes, optional
         Where to draw; a new figure by default.
     t : float
@@ -63,7 +63,7 @@ def draw(
 def explore(model: BoundModel, /, x: Any = None) -> Any:
     """Show the mechanism in a notebook with sliders for its independent coordinates and its lengths.
 
-    The loops are closed anew at each position, near the one before; where that cannot be done, a line says so.
+    At each position the loops are closed near the previous one; a line of text says where that is not possible.
 
     Parameters
     ----------
@@ -87,14 +87,20 @@ def explore(model: BoundModel, /, x: Any = None) -> Any:
 
 
 def draw_branches(
-    model: BoundModel, /, values: Mapping[str, float] | None = None, *, t: float = 0.0, names: bool | None = None
+    model: BoundModel,
+    values: Mapping[str, float] | None = None,
+    /,
+    *,
+    t: float = 0.0,
+    names: bool | None = None,
+    **named: float | str,
 ) -> Any:
-    """Draw every way in which the loops close with the given values, side by side in one scale.
+    """Draw all positions in which the loops close with the given values, side by side at the same scale.
 
     Parameters
     ----------
-    values : mapping of str to float, optional
-        Coordinates that are held; the declared initial ones by default.
+    values, **named : float
+        Coordinates that are held, as for :meth:`branches`; the declared initial ones by default.
     t, names
         As for :func:`draw`.
 
@@ -103,4 +109,4 @@ def draw_branches(
     array of matplotlib Axes
         In the order of ``module.branches``.
     """
-    return load_show("draw", "draw_branches").draw_branches(model, values, t=t, names=names)
+    return load_show("draw", "draw_branches").draw_branches(model, values, t=t, names=names, named=named)

@@ -18,7 +18,7 @@ SHOWN = 8  #: coordinates listed in a message
 WORDS = {
     1: (
         "the result is not finite",
-        "look for an input that is no number, a division by zero, or a root or logarithm of a negative number",
+        "look for an input that is not a number, a division by zero, or a root or logarithm of a negative number",
     ),
     2: (
         "the mass matrix of the degrees of freedom is not positive definite",
@@ -33,8 +33,8 @@ WORDS = {
         "choose other independent coordinates, or start a little away from a change point",
     ),
     5: (
-        "rounding leaves the linear system of the equations of motion unsolved",
-        "compile with method='embedding', or look for bodies or lengths of very different sizes",
+        "because of rounding the linear system of the equations of motion could not be solved",
+        "compile with method='embedding', or look for masses or lengths of very different sizes",
     ),
 }
 
@@ -89,13 +89,13 @@ class Fail:
             what, remedy = trouble
             status = 1
         elif status == 2 and (idle := self.layout.metadata.get("no_inertia")):
-            what, remedy = f"the model is one for kinematics only: {idle}", "give those bodies mass or inertia"
+            what, remedy = f"the model is for kinematics only: {idle}", "give those bodies mass or inertia"
         elif status in (1, 2, 4) and names and (trouble := self.trouble(x, t, p)):
             blame, remedy = f": {trouble[0]}", trouble[1]
         elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE_ROOT]):
             blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
         elif status == 4 and not len(self.layout.independent):
-            what = "the constraints are singular here, and the mechanism has no freedom"
+            what = "the constraints are singular here, and the mechanism has no degree of freedom"
             remedy = "start a little away from this position, or change the dimensions"
         elif self.culprit is not None and (names or not self.layout.n_x):
             if status == 5 and (found := self.culprit(1, t, x, p, u)):
@@ -117,7 +117,7 @@ def no_rotation(layout: Layout, x: Array) -> tuple[str, str] | None:
     for i, _ in layout.quaternion_slots:
         if not np.abs(x[i : i + 4]).max() > TINY_ROOT:
             four = f"{layout.q[i]} .. {layout.q[i + 3]}"
-            return f"the Euler parameters {four} are all zero", f"give a rotation; none is {layout.q[i]} = 1"
+            return f"the Euler parameters {four} are all zero", f"give a rotation ({layout.q[i]} = 1 for no rotation)"
     return None
 
 
@@ -133,7 +133,7 @@ def flat_disc(
         across = np.cross(turns[wheel] @ axle, turns[plane] @ normal)
         if np.linalg.norm(across) < FLAT:
             what = f"constraint {name!r}: the disc lies flat (axle along the plane's normal)"
-            return what, "it has fallen, or nearly so; end the run before, with an event for example"
+            return what, "the disc has fallen, or nearly; end the run before that, for example with an event"
     return None
 
 
@@ -144,7 +144,7 @@ def rotation_trouble(layout: Layout, x: Array) -> tuple[str, str] | None:
     for joint, k, vanishing in layout.metadata.get("euler_angles", ()):
         if abs(np.cos(x[k]) if vanishing == "cos" else np.sin(x[k])) < LOCKED:
             what = f"the Euler angles of joint {joint!r} are singular here ({layout.q[k]} = {np.degrees(x[k]):.6g} deg)"
-            return what, f"give joint {joint!r} rotation: euler_parameters, or another sequence"
+            return what, f"describe joint {joint!r} with rotation: euler_parameters, or with another sequence"
     return None
 
 

@@ -91,8 +91,8 @@ class Formula(Expressed):
         for state in states:
             if state not in layout.q or state not in moving:
                 raise UsageError(
-                    f"input {name}: the equations need its rate {rate}, and that of {self.text!r} depends on the rate "
-                    f"of {state}, which is an acceleration; write {name} in t and parameters, or give {rate} beside it"
+                    f"input {name}: the equations need its rate {rate}, but the rate of {self.text!r} contains that "
+                    f"of {state}, an acceleration; write {name} in t and parameters, or give {rate} too"
                 )
         along = {graph.symbol(q): graph.symbol(moving[q]) for q in states}
         other = object.__new__(type(self))

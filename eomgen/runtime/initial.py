@@ -70,8 +70,8 @@ class Initial:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")
             if name in layout.parameter_rates:
                 wanted = ", ".join(n for n in layout.v if not n.endswith("_dot"))
-                what = "angular velocity; give that" if layout.quaternion_slots else "velocities; give those"
-                raise UnknownNameError(f"{name!r} follows from the {what} instead, of {wanted}")
+                what = "angular velocity" if layout.quaternion_slots else "velocities"
+                raise UnknownNameError(f"{name!r} follows from the {what}; give one of {wanted} instead")
             if name not in self.coordinates and name not in rates:
                 raise unknown("coordinate or rate", name, self.coordinates + rates + layout.y)
         positions = {n: x for n, x in values.items() if n in self.coordinates}
@@ -90,7 +90,7 @@ class Initial:
         """From a closed position steadily to held values; raises AssemblyError when blocked."""
         q = follow(self.system, start, held)
         if not self.system.aligned(q):
-            raise AssemblyError("a joint's axes flipped on the way")
+            raise AssemblyError("the axes of a joint flipped on the path there")
         return q
 
     def reference(self) -> Array:
@@ -117,8 +117,8 @@ class Initial:
     def _tell_branch(self, what: str, error: AssemblyError | None) -> None:
         """Warn that a position was found by closing the loops anew."""
         warnings.warn(
-            f"{what} is not reached from the reference position without leaving its branch: {error}.  The loops are "
-            "closed from the nearest guess; branches() gives all positions found, assemble() the one near a guess",
+            f"{what} cannot be reached from the reference position on the same branch: {error}.  The loops are closed "
+            "from the nearest guess instead; branches() gives all positions found, assemble() the one near a guess",
             stacklevel=2,
         )
 
@@ -179,22 +179,29 @@ class Initial:
         return self.system.close(start, {}).q
 
     def branches(self, given: Mapping[str, float], first: Array, tries: int = 60) -> list[Array]:
-        """Every position found that holds the given values; `first` comes first."""
-        system, found = self.system.closure(given), [first]
+        """Every position found that holds the given values and, if they leave freedom, further ones of `first`."""
+        layout, found = self.layout, [first]
+        here = dict(zip(layout.q, first.tolist(), strict=True))
+        favoured = [n for i in layout.independent if (n := layout.velocity_labels[i]) in here]
+        rest = {} if given else self.sort(layout.initial).positions
+        more = self.compatible(first, given, rest | {n: here[n] for n in (*favoured, *layout.q)})
+        room = max(layout.n_q - layout.n_h - len(given), 0)  # a singular position seems to have more freedom
+        system = self.system.closure({**given, **dict([*more.items()][:room])})
         for start in starts(first, system.free, self.place, tries):
-            with np.errstate(all="ignore"):
-                q, residual = close(system, start)
+            q, residual = close(system, start)
             if closed(residual) and self.system.aligned(q) and all(self._apart(q, other) for other in found):
                 found.append(q)
         return found
 
     def _apart(self, a: Array, b: Array) -> bool:
         kinds = self.layout.coordinate_kinds if self.layout.given_rates else self.layout.velocity_kinds
-        gap = [
-            abs((x + np.pi) % (2 * np.pi) - np.pi) if kind != "length" else abs(x)
-            for x, kind in zip(self.place.distance(a, b), kinds, strict=True)
-        ]
-        return largest(np.array(gap)) > MEASURED
+        gap = np.abs(self.place.distance(a, b))
+        turns = np.array([kind != "length" for kind in kinds], dtype=bool)
+        gap[turns] = np.abs((gap[turns] + np.pi) % (2 * np.pi) - np.pi)
+        if largest(gap) <= MEASURED or largest(gap[~turns]) > MEASURED or not self.layout.n_bodies:
+            return largest(gap) > MEASURED
+        poses = self.kernels.state("poses", nan=True)  # Euler angles describe each rotation twice
+        return not largest((poses(a, t=self.t) - poses(b, t=self.t))[:, :3, :3].ravel()) <= MEASURED
 
     def side(self, q: Array) -> float:
         """det(J_d): its sign tells the branches of a position apart, 0 is a dead centre."""
@@ -238,10 +245,10 @@ class Initial:
                 ordered = dict.fromkeys([*layout.independent, *np.argsort(-moves, kind="stable")])
                 others = [layout.v[i] for i in ordered if moves[i] > 0.1]
                 instead = " or ".join(others[:2])
-                remedy = f"give {instead} instead, or another position" if others else "nothing can move"
+                remedy = f"give {instead} instead, or another position" if others else "no velocity is possible here"
                 raise AssemblyError(
-                    f"{name} = {value:.6g} cannot be reached: the constraints hold that coordinate still here, as at "
-                    f"a dead centre or across a blade{place(layout.q, q)}; {remedy}"
+                    f"{name} = {value:.6g} cannot be reached: the constraints allow no such velocity here, as "
+                    f"at a dead centre or across a blade{place(layout.q, q)}; {remedy}"
                 )
 
     def _solve_rates(self, q: Array, held: Mapping[str, float]) -> Rates:
@@ -255,15 +262,9 @@ class Initial:
             y_q, y_t, scales = map(np.array, zip(*(self.rate_equation(q, name) for name in others), strict=True))
             equations = VelocityEquations(y_q, y_t, np.array([held[name] for name in others]), scales, others)
         return assemble_velocity(
-            self._C_q(q, t=self.t),
-            self.rate(q),
-            self.scales,
-            guess=v,
-            held=indices,
-            equations=equations,
-            names=layout.v,
-            labels=layout.constraint_labels,
-        )
+            self._C_q(q, t=self.t), self.rate(q), self.scales, guess=v, held=indices, equations=equations,
+            names=layout.v, labels=layout.constraint_labels,
+        )  # fmt: skip
 
     def rate_equation(self, q: Array, name: str) -> tuple[Array, float, float]:
         """y_q (n,), y_t and the typical size of a rate y' = y_q v + y_t that is no velocity of the tree."""

@@ -30,6 +30,6 @@ def read_formula(layout: Layout, text: str, what: str, beside: Formula | None = 
         from .formulas import Formula
     except ImportError:
         raise MissingDependencyError(
-            f"{what}: an expression as text needs eomgen to be read: pip install eomgen, or give a function f(t, x)"
+            f"{what}: an expression as text needs eomgen to read it: pip install eomgen, or give a function f(t, x)"
         ) from None
     return Formula(layout, text, what, beside)

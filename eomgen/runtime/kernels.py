@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ENERGY = (
     "the energy of the model {!r} is not known: its equations of motion are given without kinetic_energy; "
-    "give equations.kinetic_energy, and potential_energy where forces have one"
+    "give equations.kinetic_energy, and equations.potential_energy if forces have a potential"
 )
 
 
@@ -58,7 +58,7 @@ class Kernels:
         """Refuse parameters whose lengths and masses scale nothing."""
         given = zip(self.layout.p, self.context.p, strict=True)
         bad = [f"{name} = {value:.6g}" for name, value in given if not np.isfinite(value)]
-        raise UsageError(f"the sizes that follow from the parameters are not finite{': ' * bool(bad)}{', '.join(bad)}")
+        raise UsageError(f"the sizes computed from the parameters are not finite{': ' * bool(bad)}{', '.join(bad)}")
 
     def timed(self, name: str, nan: bool = False) -> Timed:
         """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""

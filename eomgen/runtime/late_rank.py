@@ -30,6 +30,6 @@ def require_rank(kernels: Kernels, J: Array) -> None:
     found = rank(J).rank
     if found > layout.rank:
         raise UsageError(
-            f"with {', '.join(changed)} as given {found} constraint rows are independent, {layout.rank} with the "
-            "declared values, which determine the degrees of freedom; declare values with which all of them act"
+            f"with the given {', '.join(changed)}, {found} constraint rows are independent, but with the declared "
+            f"values {layout.rank} are, and these determine the degrees of freedom; declare values like the given ones"
         )

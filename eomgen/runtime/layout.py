@@ -30,7 +30,7 @@ class Layout:
     def __init__(self, metadata: str | Mapping[str, Any]) -> None:
         data: dict[str, Any] = json.loads(metadata) if isinstance(metadata, str) else dict(metadata)
         if data.get("abi") != ABI:
-            raise UsageError(f"the model's metadata has layout {data.get('abi')} and this version reads {ABI}")
+            raise UsageError(f"the model's metadata has layout {data.get('abi')}, and this version reads only {ABI}")
         self.metadata = data
         self.name: str = data["name"]
         self.q: tuple[str, ...] = tuple(data["q_names"])
@@ -151,9 +151,9 @@ class Layout:
         if self.given_rates:
             reason = "the rates of its coordinates are given as functions of velocities"
         elif self.n_h < self.n_c:
-            reason = "nonholonomic constraints restrict velocities and not positions"
+            reason = "nonholonomic constraints restrict velocities but not positions"
         elif turning:
-            reason = f"the independent {', '.join(turning)} are rates of no coordinate (rotation: euler_parameters)"
+            reason = f"the independent {', '.join(turning)} are not rates of coordinates (rotation: euler_parameters)"
         else:
             return
         remedy = "work with the full state x = [q; v]: rhs, x0, simulate"
@@ -208,7 +208,7 @@ class Layout:
         named = list(zip(self.p, given, declared, strict=True))
         changed = [f"{name} = {x:.6g}" for name, x, value in named if x != value]
         shown = changed or [f"{name} = {x:.6g}" for name, x, _ in named]
-        head = "the constants that follow from the parameters are not finite"
+        head = "the constants computed from the parameters are not finite"
         which = " (changed from their declared values)" if changed else ""
         masses = self.metadata.get("masses", {})
         nought = [f"{name} is the mass of body {masses[name]!r}" for name, x, _ in named if name in masses and x == 0.0]
@@ -222,8 +222,8 @@ class Layout:
             value = values[names.index(name)]
             if value < 0.0:
                 raise UsageError(
-                    f"parameter {name} is the mass of body {body!r}, which is 0 or positive, not {value:g}; "
-                    "check_inertia: false in the model lets it be negative"
+                    f"parameter {name} is the mass of body {body!r}, which must be 0 or positive, not {value:g}; "
+                    "write check_inertia: false in the model to allow negative masses"
                 )
 
 

@@ -28,7 +28,7 @@ def load_trajectory(path: str | Path) -> Trajectory:
     Raises
     ------
     UsageError
-        The file holds something else.
+        The file is not a trajectory saved by eomgen.
     FileNotFoundError
     """
     source = as_path("path", path)
@@ -46,7 +46,7 @@ def load_trajectory(path: str | Path) -> Trajectory:
     except FileNotFoundError:
         raise
     except (*BROKEN, RecursionError) as error:
-        told = "columns for other programs; load the .npz of the run" if str(source).endswith(".csv") else error
+        told = "a .csv is for other programs; load the .npz of the run" if str(source).endswith(".csv") else error
         raise UsageError(f"{source} is not a trajectory saved by eomgen: {told}") from None
     count = sum(key.startswith("t_events_") for key in arrays)
     return Trajectory(

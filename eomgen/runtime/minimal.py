@@ -39,7 +39,7 @@ class Memory(threading.local):
 
 
 class Minimal:
-    """The strictly minimal form of a model.
+    """The equations of motion in independent coordinates and velocities only: x = [q_i; v_i].
 
     The set of independent coordinates is fixed.  The dependent ones are solved by Newton's iteration, starting from the
     last converged position, which is the only memory a call leaves; :meth:`reset` sets it.  Each thread has a memory of
@@ -100,7 +100,7 @@ class Minimal:
         return np.concatenate([full[layout.independent_q], full[layout.n_q + layout.independent]])
 
     def expand(self, x_min: ArrayLike, t: ArrayLike = 0.0) -> Array:
-        """Full states from minimal ones.
+        """Compute full states x = [q; v] from minimal ones.
 
         Parameters
         ----------
@@ -208,7 +208,8 @@ class Minimal:
             if turned and np.abs(change).max() > SUDDEN * max(a, a_other) * gap:
                 self._memory.q = before
                 raise PartitionError(
-                    f"t = {t:.6g}: {', '.join(self.q_names)} passed a dead centre, where the branch is lost; "
+                    f"t = {t:.6g}: {', '.join(self.q_names)} passed a dead centre, so the branch is not known any "
+                    "more; "
                     "choose other independent coordinates, or integrate the full state",
                     t,
                     x,

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .near_names import unknown
-from .refined import states_at
+from ..texts import shown
+from .near_names import plain_name, unknown
+from .refined import refined, states_at
 from .show_parts import load_show
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ def module_of(trajectory: Any, model: BoundModel | None, purpose: str) -> BoundM
         The trajectory was read from a file or a pickle and no model is given, or one of other coordinates.
     """
     if model is not None:
+        if not hasattr(model, "x_names"):
+            raise UsageError(f"model must be a module, as Model.compile() returns, not {shown(model)}")
         if tuple(trajectory.x_names) != model.x_names:
             raise UsageError(
                 f"the trajectory of {trajectory.name!r} has states {', '.join(trajectory.x_names)}; module "
@@ -34,7 +37,7 @@ def module_of(trajectory: Any, model: BoundModel | None, purpose: str) -> BoundM
         return model.bind(p=trajectory.metadata.get("parameters"))
     found: BoundModel | None = getattr(trajectory.columns, "module", None)
     if found is None:
-        raise UsageError(f"{purpose} needs the model, which a saved trajectory does not hold: give model=module")
+        raise UsageError(f"{purpose} needs the model, which a saved trajectory does not contain; give model=module")
     return found
 
 
@@ -67,4 +70,11 @@ def animate(trajectory: Any, file: Path | str | None, model: BoundModel | None, 
     """See :meth:`.trajectory.Trajectory.animate`."""
     module = module_of(trajectory, model, "an animation")
     show = load_show("animate", "an animation")
-    return show.animate(trajectory, module, file, states=lambda t: states_at(trajectory, module, t), **options)
+    return show.animate(
+        trajectory,
+        module,
+        file,
+        states=lambda t: states_at(trajectory, module, t),
+        columns=lambda names: refined(trajectory, tuple(plain_name(name, trajectory.names) for name in names)),
+        **options,
+    )

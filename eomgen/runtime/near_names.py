@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from types import ModuleType
 from typing import Any
 
@@ -23,6 +23,12 @@ class UnknownNameError(UsageError, KeyError):
 def without_dots(given: Mapping[Any, Any]) -> dict[Any, Any]:
     """Values by name; ``leg1.hip`` of an instance of a component is ``leg1_hip``."""
     return {name.replace(".", "_") if isinstance(name, str) else name: value for name, value in given.items()}
+
+
+def plain_name(name: object, known: Container[str]) -> Any:
+    """The name, or that of ``leg1.hip`` as ``leg1_hip``, if only this is known."""
+    plain = name.replace(".", "_") if isinstance(name, str) else name
+    return plain if name not in known and plain in known else name
 
 
 def place_of_marker(name: object) -> tuple[str, str] | None:
@@ -102,7 +108,7 @@ def require_mapping(what: str, given: Any) -> None:
     UsageError
     """
     if not isinstance(given, Mapping):
-        raise UsageError(f"{what} must give values by name, as a mapping does, not {shown(given)}")
+        raise UsageError(f"{what} must be a mapping of names to values, not {shown(given)}")
 
 
 def require(module: str, extra: str, purpose: str) -> ModuleType:
@@ -131,4 +137,4 @@ def require_time_and_state(label: str, function: Callable[..., Any]) -> None:
     except TypeError:
         given = f"{getattr(function, '__name__', type(function).__name__)}{taken}"
         remedy = "write it with both, as lambda t, x: ..." if len(taken.parameters) < 2 else "bind its other arguments"
-        raise UsageError(f"{label} is called as f(t, x), which {given} does not take; {remedy}") from None
+        raise UsageError(f"{label} must be callable as f(t, x), and {given} is not; {remedy}") from None

@@ -73,7 +73,7 @@ def _calls(module: BoundModel) -> str:
     methods = ", ".join(f"<code>{html_text(n)}</code>" for n in own if _is_call(type(module), n))
     return (
         f"<details><summary>what can be called</summary><table>{head}{cells}</table>"
-        f"<p {LEFT}>and {methods}; <code>help(mod.simulate)</code> and the like say more.</p></details>"
+        f"<p {LEFT}>and {methods}; <code>help(mod.simulate)</code> explains a method.</p></details>"
     )
 
 

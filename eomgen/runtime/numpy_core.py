@@ -26,7 +26,7 @@ from .room import as_real, read_vector
 Block: TypeAlias = Callable[[Any, Array, Array, Array], Array]
 
 #: For values by name where a call takes an array.
-BY_NAME = "{0} of a call is an array in the order of {0}_names; by name: bind({0}={{...}})"
+BY_NAME = "{0} of a call must be an array in the order of {0}_names; to give values by name use bind({0}={{...}})"
 CODES = {error: status for status, error in STATUS.items()}
 NON_FINITE = CODES[NonFiniteError]
 

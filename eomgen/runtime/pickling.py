@@ -37,8 +37,8 @@ def reduce(module: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
     name, file = getattr(core, "__name__", ""), getattr(core, "__file__", None)
     if not file or find_module(name) is not core:
         raise TypeError(
-            f"the module of {module.name!r} cannot be pickled: its code is not in a file of its own (a core made by "
-            "hand, or the numpy target with native functions); target cython can be pickled"
+            f"the module of {module.name!r} cannot be pickled, because its code is not in a file of its own (a core "
+            "made by hand, or target numpy with native functions); use target cython"
         )
     late: Late | None = None
     if isinstance(module.core, LateCore):
@@ -63,7 +63,7 @@ def restore(kind: type[Any], name: str, file: str, p: Array, u: Array, late: Lat
     def load() -> Any:
         if made is None:
             rare = ", ".join(name for name in names if name not in core.names)
-            raise UsageError(f"the pickled module came without {rare}; call one of them before pickling it")
+            raise UsageError(f"the module was pickled without {rare}; call one of them before you pickle it")
         return _find_core(*made)
 
     return kind(LateCore(core, names, load), p, u)

@@ -12,8 +12,8 @@ from ..limits.pictures import FAINT
 from ..notation.labels import TIME, label
 from ..notation.notation import Notation
 from ..numeric.scales import Array
-from .near_names import read_names, require, unknown
-from .refined import FINE, refined, states_at
+from .near_names import plain_name, read_names, require, unknown
+from .refined import FINE, refined, refined_energy, states_at
 
 if TYPE_CHECKING:
     from .protocols import TrajectoryLike
@@ -69,19 +69,21 @@ def choose(
     UsageError
         Unknown names, or wishes that do not go together.
     """
-    names = (*names, *(() if y is None else read_names("y", y)))
     known = ("t", *trajectory.names)
+    asked = [one for name in names for one in read_names("a column", name)]  # a list of names is taken too
+    names = tuple(plain_name(name, known) for name in (*asked, *(() if y is None else read_names("y", y))))
+    x = plain_name(x, known)
     for name in (*names, *(() if x is None else (x,))):  # unknown names fail before a figure opens
         if name not in known:
             raise unknown("column", name, known)
     if kind not in KINDS:
         raise unknown("kind of plot", kind, KINDS)
     if y is not None and x is None:
-        raise UsageError("y= goes with x=, for example plot(x='x', y='y'); columns over time are given as they are")
+        raise UsageError("y= needs x=, for example plot(x='x', y='y'); for columns over time give their names alone")
     if x is not None and kind != "time":
-        raise UsageError(f"x= and kind={kind!r} do not go together; leave one out")
+        raise UsageError(f"x= and kind={kind!r} cannot be used together; leave out one of them")
     if x is not None and not names:
-        raise UsageError(f"plot(x={x!r}) has nothing to draw over it; give y= or names of columns")
+        raise UsageError(f"plot(x={x!r}) names no column to draw against it; give y= or names of columns")
     panels, across = KINDS[kind](trajectory, tuple(dict.fromkeys(names)), x)
     if not panels:
         raise UsageError(f"there is nothing to plot of kind {kind!r}: the run has no coordinates")
@@ -229,7 +231,7 @@ def _phases(trajectory: TrajectoryLike, names: tuple[str, ...], _: str | None) -
 
 def _energy(trajectory: TrajectoryLike, names: tuple[str, ...], x: str | None) -> tuple[list[Curves], str]:
     """Kinetic, potential and total energy, and the change of the total."""
-    t, (T, V, E) = trajectory.t, trajectory.energies
+    t, (T, V, E) = refined_energy(trajectory)
     parts = [("kinetic", t, T), ("potential", t, V), ("total", t, E)]
     return [Curves("energy (J)", parts), Curves("change of total (J)", [("total", t, E - E[0])])], TIME
 
@@ -238,7 +240,9 @@ def _residuals(trajectory: Any, _: tuple[str, ...], __: str | None) -> tuple[lis
     """Largest violation of the constraints over time, of the stored states, and the raw one's largest."""
     module = getattr(trajectory.columns, "module", None)
     if module is None:
-        raise UsageError("residuals over time need the model: plot the trajectory that simulate gave, unsaved")
+        raise UsageError(
+            "residuals over time need the model: plot the trajectory of simulate itself, not one read from a file"
+        )
     if not module.n_rows:
         raise UsageError(f"model {module.name!r} has no constraints, so there are no residuals")
     t, x = trajectory.t, trajectory.x

@@ -42,8 +42,8 @@ def require_agreement(forcing: Driven, start: float, end: float) -> None:
                 bound = base[layout.u.index(rate)] if rate in layout.u else 0.0
                 if first in layout.u and bound != 0.0:
                     raise UsageError(
-                        f"input {rate} is bound to {bound:.6g}, the rate of {name}, which is held; bind {rate} to 0, "
-                        f"or give {name} as it moves in inputs="
+                        f"input {rate} is bound to {bound:.6g}, but it is the rate of {name}, which is constant; bind "
+                        f"{rate} to 0, or give {name} over time in inputs="
                     )
             elif name in values and start != end:
                 f, g = (_of_time(forcing, n) for n in (name, rate))
@@ -55,14 +55,14 @@ def require_agreement(forcing: Driven, start: float, end: float) -> None:
                     t, changes, says = found
                     raise UsageError(
                         f"input {rate} is not the rate of {name}: at t = {t:.6g} s {name} changes by {changes:.6g} per "
-                        f"second, and {rate} says {says:.6g}; leave {rate} out where {name} is a number, a table or "
-                        "a text, or mend it"
+                        f"second, but {rate} is {says:.6g}; leave {rate} out if {name} is a number, a table or a "
+                        "text, or correct it"
                     )
                 jump = None if table else find_jump(lambda t, x, f=f: f(t), lambda t, x, g=g: g(t), NONE, start, end)  # type: ignore[misc]
                 if jump is not None:
                     raise UsageError(
-                        f"input {name}: the equations need its rate {rate}, and it jumps at t = {jump:.6g} s, which is "
-                        "an impact; write it smoother"
+                        f"input {name}: the equations need its rate {rate}, but {name} jumps at t = {jump:.6g} s; such "
+                        "a jump is an impact; write it smoothly"
                     )
 
 

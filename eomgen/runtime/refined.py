@@ -10,8 +10,10 @@ from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
+    from .columns import Columns
 
 FINE = 1000  #: points of a smooth curve, about
+ENERGIES = ("T", "V", "energy")  #: columns of every run, unless the model has these names for its own
 
 
 def cubic_between(t: Array, x: Array, slopes: Array | None, times: Array) -> Array:
@@ -57,8 +59,50 @@ def states_at(trajectory: Any, module: BoundModel, times: Array) -> tuple[Array,
     return states, u
 
 
+def monotone_slopes(t: Array, y: Array) -> Array:
+    """Slopes (m,) of a cubic through values (m,) that has no extremes between them (Fritsch and Butland 1984).
+
+    A constant stays constant and a drift shows at the steps only.  Where a time stands twice a new curve begins.
+    """
+    h = np.diff(t)
+    secants = np.where(h == 0.0, 0.0, np.diff(y) / np.where(h == 0.0, 1.0, h))
+    before, after = np.append(secants[0], secants), np.append(secants, secants[-1])
+    first, last = np.append(True, h == 0.0), np.append(h == 0.0, True)
+    same = before * after > 0.0
+    mean = np.where(same, 2.0 * before * after / np.where(same, before + after, 1.0), 0.0)
+    slopes: Array = np.where(first, after, np.where(last, before, mean))
+    return slopes
+
+
+def refined_energies(trajectory: Any, times: Array, columns: Columns) -> Array:
+    """Kinetic, potential and total energy (3, k) at times between the steps of a run.
+
+    States between the steps have the error of their cubics, which is far above what the integrator lets the energy
+    drift.  The total is taken at the steps; the potential energy, which needs positions only, at all times.
+    """
+    total = trajectory.energies[2]
+    slopes = monotone_slopes(trajectory.t, total)
+    E = cubic_between(trajectory.t, total[None], slopes[None], times)[0]
+    V = columns.energies[1]
+    return np.array([E - V, V, E])
+
+
 def refined(trajectory: Any, names: tuple[str, ...]) -> tuple[Array, dict[str, Array]]:
     """Times and columns of a run, with points between its steps where they are few and the model is at hand."""
+    t, columns, _ = _between_steps(trajectory, names, False)
+    return t, columns
+
+
+def refined_energy(trajectory: Any) -> tuple[Array, Array]:
+    """Times and kinetic, potential and total energy (3, k) of a run, likewise."""
+    t, _, energies = _between_steps(trajectory, (), True)
+    assert energies is not None
+    return t, energies
+
+
+def _between_steps(
+    trajectory: Any, names: tuple[str, ...], energies: bool
+) -> tuple[Array, dict[str, Array], Array | None]:
     from ..errors import EvaluationError
     from .columns import Columns
 
@@ -69,10 +113,16 @@ def refined(trajectory: Any, names: tuple[str, ...]) -> tuple[Array, dict[str, A
         steps = np.arange(parts) / parts
         times = np.append((t[:-1, None] + np.diff(t)[:, None] * steps).ravel(), t[-1])
         times = times[np.append(True, np.diff(times) != 0.0)]
+        layout = module.layout
+        own = [n for n in names if n in ENERGIES and n not in layout.x + layout.loops + layout.y + layout.u]
         try:
             states, u = states_at(trajectory, module, times)
             columns = Columns(module, times, states, np.empty((0, len(times))) if u is None else u)
-            return times, {name: columns[name] if name != "t" else times for name in names}
+            found = {name: columns[name] if name != "t" else times for name in names if name not in own}
+            three = refined_energies(trajectory, times, columns) if energies or own else None
+            if three is not None:
+                found |= {name: three[ENERGIES.index(name)] for name in own}
+            return times, found, three
         except EvaluationError:  # the cubic left what the model allows: its steps are drawn
             pass
-    return t, {name: trajectory[name] for name in names}
+    return t, {name: trajectory[name] for name in names}, trajectory.energies if energies else None

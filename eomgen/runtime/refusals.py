@@ -20,8 +20,8 @@ def require_velocities(layout: Layout) -> None:
     """
     if getattr(layout, "given_rates", False):
         raise UnavailableError(
-            f"the rates of the coordinates of model {layout.name!r} are given as functions of its velocities, and its "
-            "other analyses are not derived; rhs, jacobian, simulate and linearize are there"
+            f"model {layout.name!r} gives the rates of its coordinates as functions of its velocities; this analysis "
+            "is not available for such models, only rhs, jacobian, simulate and linearize are"
         )
 
 
@@ -34,8 +34,8 @@ def require_projection(layout: Layout) -> None:
     """
     if not layout.projects:
         raise UnavailableError(
-            f"model {layout.name!r} was derived with baumgarte=, so its right-hand side does not project, and its "
-            "derivatives by inputs and parameters are not derived; derive without baumgarte for analyses"
+            f"model {layout.name!r} was derived with baumgarte=, so its right-hand side does not project; analyses "
+            "of such models are not available; derive without baumgarte for analyses"
         )
 
 

@@ -29,8 +29,8 @@ def require_room(what: str, numbers: float, remedy: str) -> None:
     """
     if numbers > MOST_NUMBERS:
         raise UsageError(
-            f"{what} would keep {numbers:.3g} numbers ({8.0 * numbers / 2**30:.3g} GiB), and a call keeps "
-            f"{MOST_NUMBERS:.3g} at most; {remedy}"
+            f"{what} would keep {numbers:.3g} numbers ({8.0 * numbers / 2**30:.3g} GiB), and a call can keep at most "
+            f"{MOST_NUMBERS:.3g}; {remedy}"
         )
 
 
@@ -125,7 +125,7 @@ def read_times(what: str, given: Any, per_time: int) -> Array:
         length = len(given)
     except Exception:  # one number, or what is no list of times
         length = 0
-    require_room(f"{what} with {length} times", length * per_time, "give fewer, or run in parts")
+    require_room(f"{what} with {length} times", length * per_time, "give fewer times, or run in parts")
     return np.array(_floats(given, f"{what} must be a list of times in seconds"))
 
 
@@ -161,7 +161,7 @@ def read_value(what: str, given: Any) -> float:
     try:
         from .constant_texts import constant
     except ImportError:
-        raise UsageError(f"{what} must be a number, not {given!r}; texts are read by eomgen alone") from None
+        raise UsageError(f"{what} must be a number, not {given!r}; only eomgen itself reads texts") from None
     return read_number(what, constant(given, what))
 
 

@@ -22,4 +22,4 @@ def load_show(part: str, purpose: str) -> ModuleType:
         except ModuleNotFoundError as error:
             if error.name is None or not f"{home}.{part}".startswith(error.name):
                 raise
-    raise MissingDependencyError(f"{purpose} of a generated package needs eomgen beside it: pip install eomgen")
+    raise MissingDependencyError(f"{purpose} of a generated package needs eomgen too: pip install eomgen")

@@ -112,9 +112,9 @@ def require_smooth(forcing: Driven, start: float, end: float) -> None:
         if found:
             what = "its value" if times == 1 else "its slope" if times == 2 else f"its derivative {times - 1}"
             raise UsageError(
-                f"input {name}: the equations need {rate}, and {what} jumps in the {table.interpolation} table at "
-                f't = {found[0]:.6g} s, which is an impact; give Signal(times, values, "cubic") over all of the run, '
-                f"a text, or {rate} beside it"
+                f"input {name}: the equations need {rate}, but {what} jumps in the {table.interpolation} table at "
+                f't = {found[0]:.6g} s (an impact); give Signal(times, values, "cubic") over the whole run, a text, or '
+                f"{rate} too"
             )
     zero = np.zeros(layout.n_x)
     for first, of in layout.input_rates.items():
@@ -127,13 +127,13 @@ def require_smooth(forcing: Driven, start: float, end: float) -> None:
                 continue  # conditions have slope 0: only they can hide a jump
             what = f"input {name}: the equations need its rate {rate}"
             if f.depends_on_state:
-                raise UsageError(f"{what}, and conditions on the state may make it jump; write it without, or in t")
+                raise UsageError(f"{what}, but conditions on the state can make it jump; write it without them")
             value, slope = f.function(forcing.parameters), g.function(forcing.parameters)
             jump = find_jump(value, slope, zero, start, end)
             if jump is None:
                 jump = find_switch(value, slope, f.switches(forcing.parameters), zero, start, end)
             if jump is not None:
-                raise UsageError(f"{what}, and it jumps at t = {jump:.6g} s, which is an impact; write it smoother")
+                raise UsageError(f"{what}, but it jumps at t = {jump:.6g} s, which is an impact; write it smoothly")
 
 
 def find_jump(
@@ -255,7 +255,7 @@ def fill_rates(
             led = led or rate in signals
             if rate in given:
                 if not led and not (isinstance(given[rate], int | float) and given[rate] == 0):
-                    raise UsageError(f"input {rate} is the rate of {first}, which is held; give {first} as well")
+                    raise UsageError(f"input {rate} is the rate of {first}, which is constant; give {first} too")
                 led = True
                 last, order, value, at = rate, times, given[rate], times
             elif last:
@@ -283,6 +283,6 @@ def derive(name: str, rate: str, value: Any) -> Any:
     if found is not None:
         return of_time(found) if callable(found) else read_number(f"derivative of input {name}", found)
     raise UsageError(
-        f"input {name}: the equations need its rate {rate}, which is not known of a function; give {rate} beside it, "
+        f"input {name}: the equations need its rate {rate}, and the rate of a function is not known; give {rate} too, "
         f"or {name} as text, table or Signal, or as an object with a method derivative()"
     )

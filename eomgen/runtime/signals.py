@@ -25,7 +25,7 @@ ORDERS = {"linear": 1, "zero-order": 0, "cubic": 3}
 
 
 class Signal(Tabulated):
-    """An input over time by its values at given times, the same as the end values before and after.
+    """An input over time, given by values at certain times; before and after them the end values hold.
 
     Parameters
     ----------

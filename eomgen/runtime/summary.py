@@ -60,7 +60,7 @@ def line(module: BoundModel) -> str:
 
 
 def report(module: BoundModel, /) -> str:
-    """What the model is made of, as text."""
+    """Describe the model as a text: its sizes, names, constraints and how it was compiled."""
     lines = facts(module)
     width = max(len(label) for label, _ in lines)
     head = module.name + (f": {visible(module.doc)}" if module.doc else "")

@@ -97,12 +97,12 @@ class Trajectory:
 
     @property
     def columns(self) -> Source:
-        """Where the columns come from: the module's calls, or what a file holds."""
+        """The source of the columns: the module's calls, or the arrays of a file."""
         return self._columns
 
     @property
     def has_dense_output(self) -> bool:
-        """Whether :meth:`at` can be asked."""
+        """Whether the run kept dense output, so that :meth:`at` can be called."""
         return self._sample is not None
 
     @property
@@ -160,7 +160,7 @@ class Trajectory:
         return type(self), (self.t, self.x, columns, self.metadata, self.t_events, self.x_events)
 
     def at(self, t: ArrayLike) -> Trajectory:
-        """The trajectory at other times, from the dense output of the run.
+        """Evaluate the trajectory at other times, from the dense output of the run.
 
         Parameters
         ----------
@@ -174,10 +174,10 @@ class Trajectory:
         Raises
         ------
         UsageError
-            The run kept no dense output, or a time outside it.
+            The run kept no dense output, or a time lies outside the run.
         """
         if self._sample is None:
-            raise UsageError("no dense output was kept: simulate with dense_output=True")
+            raise UsageError("the run kept no dense output; simulate with dense_output=True")
         times = np.atleast_1d(read_numbers("t", t))
         low, high = sorted(self.metadata["span"])
         if times.ndim != 1 or not ((times >= low) & (times <= high)).all():
@@ -204,7 +204,7 @@ class Trajectory:
 
     @property
     def has_energies(self) -> bool:
-        """Whether the model knows its energy: equations of motion may be given without."""
+        """Whether the energy of the model is known; given equations of motion can lack it."""
         return self._columns.has_energies
 
     @property
@@ -220,7 +220,7 @@ class Trajectory:
 
     @property
     def change_points(self) -> list[ChangePoint]:
-        """Moments at which the mechanism has more degrees of freedom than elsewhere, so that its motion may branch.
+        """Times at which the mechanism has more degrees of freedom than elsewhere, so that its motion can branch.
 
         Each has a ``time``, the ``degrees_of_freedom`` there and the ``coordinates``.  The run itself goes straight on.
 
@@ -231,7 +231,7 @@ class Trajectory:
         """
         columns: Any = self._columns
         if not hasattr(type(columns), "change_points"):
-            raise UsageError("change points need the model: ask the trajectory that simulate gave, before it is saved")
+            raise UsageError("change points need the model: use the trajectory of simulate, not one read from a file")
         found: list[ChangePoint] = columns.change_points
         return found
 
@@ -277,7 +277,7 @@ class Trajectory:
         return poses(self, model)
 
     def position(self, name: str, model: BoundModel | None = None) -> Array:
-        """Where a named marker (``"rod.tip"``) or the origin of a body is, (3, n_t) in ground axes (m).
+        """Position (3, n_t) of a named marker (``"rod.tip"``) or of the origin of a body, in ground axes (m).
 
         Raises
         ------
@@ -289,14 +289,16 @@ class Trajectory:
         return position(self, name, model)
 
     def animate(self, file: str | Path | None = None, *, model: BoundModel | None = None, **options: Any) -> Any:
-        """Show the mechanism as it moves.
+        """Show the motion of the mechanism as an animation.
 
         Parameters
         ----------
         file : str or Path, optional
             ``.gif`` and ``.mp4`` are pictures by matplotlib; ``.html`` is one page with a time slider that can be
             turned and zoomed and needs no network (k3d); a name without an ending is a folder for PNG frames.
-            Without a file a page comes back that a notebook shows.
+            Without a file a page comes back that a notebook shows, or what ``format`` says.
+        format : {'gif', 'mp4', 'html'}, optional
+            Of an animation without a file: a GIF or a film that a notebook shows; its ``data`` are the bytes.
         model : Module, optional
             Of a trajectory that was read from a file: the module it was made with.
         fps : float
@@ -304,11 +306,11 @@ class Trajectory:
         speed : float
             Seconds of the run in one second of the animation; by default 1 where that lasts 3 to 12 s.
         trace : str or sequence of str
-            Markers (``"rod.tip"``) or bodies whose ways are drawn.
+            Markers (``"rod.tip"``) or bodies whose paths are drawn.
         plot : str or sequence of str
             Columns to draw over time under the mechanism, with a line where it is.
         forces : bool, str or sequence of str
-            Arrows of the forces that all joints, or those named, exert on their successors.
+            Arrows of all forces, or of those named: of joints on their successors, of springs and dampers on bodies.
         names, axes : bool
             As for ``module.draw``.
         dpi : float
@@ -316,7 +318,7 @@ class Trajectory:
 
         Returns
         -------
-        Path of the file, or the page, whose text ``str`` gives
+        Path of the file, or the page, whose text ``str`` gives, or the film, whose bytes ``bytes`` gives
 
         Raises
         ------

@@ -149,9 +149,10 @@ class DependentMotion:
     def _require_near(self, target: Array, length: float) -> None:
         if not length <= FOLLOWED:
             raise UsageError(
-                f"the way to {self._place(target)} is {length:.3g} rad or length scales long, and positions are led "
-                f"along {FOLLOWED:g} at most, in small steps that stay on the branch; give a nearer position (whole "
-                "turns less, where the mechanism repeats itself), or guess=, a position to start from"
+                f"the path to {self._place(target)} is {length:.3g} rad or length scales long, and at most "
+                f"{FOLLOWED:g} "
+                "are allowed, in small steps that stay on the branch; give a nearer position (without whole turns), "
+                "or guess=, a position to start from"
             )
 
     def _place(self, target: Array) -> str:
@@ -167,7 +168,7 @@ class DependentMotion:
         return type(error)(f"{self._place(target)}: {error}", t, target)
 
     def _too_far(self, target: Array, error: EvaluationError) -> EvaluationError:
-        return type(error)(f"the way to {self._place(target)} is blocked at {error}", error.time, target)
+        return type(error)(f"the path to {self._place(target)} is blocked at {error}", error.time, target)
 
 
 def motions(

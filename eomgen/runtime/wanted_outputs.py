@@ -123,7 +123,9 @@ def _output(kernels: Kernels, name: str, t: float) -> WantedPosition | WantedRat
     by_q, by_v, by_a = (np.nan_to_num(part) for part in np.split(found, (n_q, n_q + n_v, n_q + 2 * n_v), axis=-1)[:3])
     if by_a.any() or not np.allclose(by_v[:, 0], by_v[:, 1]):
         on = "accelerations" if by_a.any() else "velocities, and not linearly"
-        raise UsageError(f"the output {name!r} depends on {on}, so it cannot be an initial value; give coordinates")
+        raise UsageError(
+            f"the output {name!r} depends on {on}, so it cannot be given as an initial value; give coordinates"
+        )
 
     def position(q: Array, t: float) -> tuple[float, Array]:
         return float(outputs(q, zero, zero, t=t)[k]), np.asarray(slopes(q, zero, zero, t=t)[k, :n_q])
@@ -147,7 +149,7 @@ def _place(kernels: Kernels, name: str, marker: str, axis: int) -> WantedPositio
         raise unknown("marker", marker, data.markers)
     frame = data.markers[marker]
     if frame.body < 0:
-        raise UnknownNameError(f"{name!r} is a place on the ground, which does not move")
+        raise UnknownNameError(f"{name!r} is a position on the ground, which does not move")
 
     def value(q: Array, t: float) -> float:
         pose = poses(q, t=t)[frame.body]

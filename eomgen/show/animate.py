@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,10 +12,12 @@ from ..files.writing import whole_file
 from ..notation.labels import label
 from ..notation.notation import Notation
 from ..texts import shown
-from .film_frames import DPI, Frames
+from .film_frames import DPI, MOST_DOTS, Frames
+from .force_arrows import with_arrows
+from .player import InlineFilm, InlinePage
 from .scene import Scene
-from .shown_motion import ShownMotion, States, moving_scene, sample, with_arrows, with_fine_traces
-from .writers import WRITERS, kind_of, require_kind
+from .shown_motion import ShownMotion, States, moving_scene, sample, with_fine_traces
+from .writers import FILMS, WRITERS, kind_of, require_target
 
 
 class ShownColumn(NamedTuple):
@@ -32,6 +34,8 @@ def animate(
     file: Path | str | None = None,
     *,
     states: States,
+    columns: Callable[[tuple[str, ...]], tuple[Any, dict[str, Any]]],
+    format: str | None = None,
     fps: float = 25.0,
     speed: float | None = None,
     trace: Sequence[str] | str = (),
@@ -42,14 +46,16 @@ def animate(
     dpi: float = DPI,
 ) -> Any:
     """See :meth:`eomgen.runtime.trajectory.Trajectory.animate`."""
-    if file is not None:
-        require_kind(as_path("file", file))
+    require_target(file, format)
     trace = (trace,) if isinstance(trace, str) else tuple(trace)
     plot = (plot,) if isinstance(plot, str) else tuple(plot)
     forces = (forces,) if isinstance(forces, str) else forces
     if not isinstance(forces, bool | list | tuple):
-        raise UsageError(f"forces must be True, a joint or a list of joints, not {shown(forces)}")
-    columns = {name: trajectory[name] for name in plot}  # unknown names fail before anything is drawn
+        raise UsageError(
+            f"forces must be True, the name of a joint, spring or damper, or a list of names, not {shown(forces)}"
+        )
+    for name in plot:  # unknown names fail before anything is drawn
+        trajectory[name]
     motion = sample(trajectory, states, fps, speed)
     scene = moving_scene(module, motion, names, axes, trace)
     if trace and motion.t[0] != motion.t[-1]:
@@ -57,10 +63,11 @@ def animate(
     if forces:
         scene = with_arrows(scene, module, motion, forces)
     still = motion.t[0] == motion.t[-1]
-    over = motion.over if still else trajectory.t
+    times, values = columns(plot) if plot else (trajectory.t, {})
+    over = motion.over if still else times
     printed, units = Notation.of(trajectory.metadata).mathtext, trajectory.units
-    curves = [ShownColumn(label(printed(n), units.get(n, "")), over, values) for n, values in columns.items()]
-    return write(file, scene, motion, curves, dpi)
+    curves = [ShownColumn(label(printed(n), units.get(n, "")), over, row) for n, row in values.items()]
+    return write(file, scene, motion, curves, dpi, format)
 
 
 def write(
@@ -69,13 +76,17 @@ def write(
     motion: ShownMotion,
     curves: Sequence[ShownColumn] = (),
     dpi: float = DPI,
+    format: str | None = None,
 ) -> Any:
     """Write an animation as its ending says; without a file, something that a notebook shows."""
+    if isinstance(dpi, bool) or not isinstance(dpi, int | float) or not 1.0 <= dpi <= MOST_DOTS:
+        raise UsageError(f"dpi must be a number from 1 to {MOST_DOTS:g}, not {shown(dpi)}")
+    if format in FILMS:
+        return InlineFilm(FILMS[format](Frames.of(scene, motion, curves, dpi)), format)
     path = None if file is None else as_path("file", file)
     kind = "" if path is None else kind_of(path)
     if path is None or kind == ".html":
         from .browser import page
-        from .player import InlinePage
 
         text = page(scene, motion, curves)
         if path is None:

@@ -8,12 +8,15 @@ import numpy as np
 
 from ..limits.pictures import NOTHING
 from .colors import color_of, style_of
+from .data import Array
+from .flat import joined_limits
+from .label_places import NAME_STYLE, NAMES, name_offsets
 from .scene import Item, Scene, passed
 from .solids import Triangles
 
 ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees)
 ZOOM = 0.88  #: leaves room for the names of the axes
-COARSE = 4000  #: triangles of one item more than which are thinned out, as matplotlib draws them one by one
+IN_FRONT = 1e6  #: place of names over solids, of which each has a place of its own
 
 
 class Axes3DPicture:
@@ -30,6 +33,12 @@ class Axes3DPicture:
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
         self.scene, self.ax = scene, ax
+        vertical = int(np.argmax(np.abs(scene.up)))
+        limits = [(scene.low[k], scene.high[k]) for k in range(3)]
+        if scene.up[vertical] < 0.0:  # two axes are turned round, so that right hands stay right
+            for k in (vertical, (vertical + 1) % 3):
+                limits[k] = limits[k][::-1]
+        limits = joined_limits(ax, "xyz", limits)
         self.artists: list[tuple[Item, Any, Triangles | None]] = []
         light = np.array([0.4, -0.5, 0.77])
         for item in scene.items:
@@ -49,23 +58,37 @@ class Axes3DPicture:
             collection.set_edgecolor("none")
             ax.add_collection3d(collection)
             self.artists.append((item, collection, item.faces))
-        self.labels = [
-            ax.text(0, 0, 0, f" {label.text}", fontsize=8, color=color_of(label), parse_math=False, zorder=50)
-            for label in scene.labels
-        ]
-        vertical = int(np.argmax(np.abs(scene.up)))
-        limits = [(scene.low[k], scene.high[k]) for k in range(3)]
-        if scene.up[vertical] < 0.0:  # two axes are turned round, so that right hands stay right
-            for k in (vertical, (vertical + 1) % 3):
-                limits[k] = limits[k][::-1]
         ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
-        ax.set_box_aspect(scene.high - scene.low, zoom=ZOOM)
+        ax.set_box_aspect(np.abs(np.diff(limits)[:, 0]), zoom=ZOOM)
         ax.set_xlabel("x (m)", fontsize=8)
         ax.set_ylabel("y (m)", fontsize=8)
         ax.set_zlabel("z (m)", fontsize=8)
         ax.tick_params(labelsize=7)
         ax.view_init(ELEVATION, AZIMUTH, vertical_axis="xyz"[vertical])
         ax.locator_params(nbins=5)
+        self.labels = self._names()
+
+    def _names(self) -> list[Any]:
+        """Names on a light ground beside what they name, clear of the drawing as it is seen at first."""
+        from matplotlib.transforms import offset_copy
+        from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+        scene, ax = self.scene, self.ax
+        ax.apply_aspect()
+        matrix = ax.get_proj()
+
+        def page(points: Array) -> Array:
+            return np.column_stack(proj_transform(*points.T, matrix)[:2])
+
+        made = []
+        for label, offset in zip(scene.labels, name_offsets(scene, ax, page), strict=True):
+            color = NAMES if label.role == "joint" else color_of(label)
+            text = ax.text(
+                *label.at(scene.frames[0]), label.text, **NAME_STYLE, color=color, parse_math=False, zorder=IN_FRONT
+            )
+            text.set_transform(offset_copy(ax.transData, ax.figure, x=offset[0], y=offset[1], units="points"))
+            made.append(text)
+        return made
 
     def show(self, frame: int) -> None:
         """Move everything to a frame."""
@@ -79,5 +102,4 @@ class Axes3DPicture:
                     points = passed(points, frame, len(self.scene.frames))
                 artist.set_data_3d(*points.T)
         for label, text in zip(self.scene.labels, self.labels, strict=True):
-            pose = poses[label.body]
-            text.set_position_3d(pose[:3, :3] @ label.point + pose[:3, 3])
+            text.set_position_3d(label.at(poses))

@@ -12,7 +12,7 @@ import numpy as np
 from .colors import color_of, style_of
 from .data import Array
 from .optional import k3d
-from .player import player_html, player_script
+from .player import WIDE, player_html, player_script
 from .scene import Item, Scene
 from .shown_motion import ShownMotion
 
@@ -28,13 +28,19 @@ def _number(color: str) -> int:
 def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 600) -> Any:
     """A k3d plot of a scene; with a motion it moves, and displays itself in a notebook."""
     viewer = k3d("a picture in a browser")
-    span = scene.high - scene.low
+    low, high = scene.low, scene.high
+    if scene.view is None:  # a grid of round numbers
+        step = 10.0 ** np.floor(np.log10(float((high - low).max()) / 3.0))
+        low, high = step * np.floor(low / step), step * np.ceil(high / step)
+    span = high - low
     plot = viewer.plot(
         height=height,
         name=escape(scene.name),
         camera_auto_fit=False,
         camera_mode="trackball" if scene.view is None else "orbit",
         grid_visible=scene.view is None,
+        grid_auto_fit=False,
+        grid=[*low.tolist(), *high.tolist()],
         menu_visibility=True,
         axes_helper=0.8,
         camera_fov=35.0,
@@ -43,17 +49,17 @@ def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 60
     times = [0.0] if motion is None else motion.clock.tolist()
     for one in _objects(viewer, scene, times):
         plot += one
-    middle = 0.5 * (scene.low + scene.high)
+    middle = 0.5 * (low + high)
     if scene.view is not None:
         middle, toward, up = middle @ scene.view, scene.view[2], scene.view[1]
-        reach = float(max(span[1], 0.55 * span[0])) * 1.75
+        reach = float(max(span[1], WIDE * span[0])) * 1.75
     else:
         up = scene.up
         side = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
         other = np.cross(up, side)
         toward = 0.75 * side + 0.45 * other + 0.4 * up
         toward = toward / np.linalg.norm(toward)
-        reach = float(np.linalg.norm(span)) * 1.55
+        reach = float(np.linalg.norm(span)) * 1.7
     plot.camera = [*(middle + reach * toward), *middle, *up]
     if motion is not None:
         plot.fps = motion.fps
@@ -148,7 +154,8 @@ def page(scene: Scene, motion: ShownMotion, curves: Sequence[Any] = ()) -> str:
     """One HTML page that holds all it needs; it asks nothing of a network."""
     plot = scene_plot(scene, motion)
     plot.snapshot_type, plot.menu_visibility = "full", False
-    text: str = plot.get_snapshot(9, additional_js_code=player_script(motion))
+    wide, high = (scene.high - scene.low)[:2].tolist() if scene.view is not None else (1.0, 1.0)
+    text: str = plot.get_snapshot(9, additional_js_code=player_script(motion, (wide, high)))
     title = f"{scene.name}   {scene.note}" if scene.note else scene.name
     text = text.replace("<body>", f"<body>{player_html(motion, curves, title)}", 1)
     return re.sub(r"<title>.*?</title>", lambda _: f"<title>{escape(scene.name)}</title>", text, count=1)

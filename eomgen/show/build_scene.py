@@ -29,7 +29,7 @@ def build_scene(
     names: bool | None = None,
     axes: bool = False,
     trace: Sequence[str] = (),
-    loops: dict[str, Array] | None = None,
+    quiet: bool = False,
 ) -> Scene:
     """The scene of a module over frames.
 
@@ -49,13 +49,17 @@ def build_scene(
         Whether the axes of all bodies are drawn.
     trace : sequence of str
         Markers (``rod.tip``) or bodies, whose ways over the frames are drawn.
+    quiet : bool
+        Without warnings about meshes that cannot be drawn, where nobody asked for a picture.
     """
     data = read_picture(module.metadata, module.p)
     layout = module.layout
     tracked = [_tracked(data, name) for name in trace]  # unknown names fail before anything is evaluated
     poses = module.poses(q, t=t, u=u)
     if not np.isfinite(poses).all():
-        raise UsageError("the poses of the bodies are not finite at this position; give coordinates that are")
+        raise UsageError(
+            "the poses of the bodies are not finite at this position; give finite coordinates within the model's reach"
+        )
     frames = _with_ground(poses)
     start = np.array(q[:, 0])
     quaternions = [i for i, _ in layout.quaternion_slots]
@@ -64,10 +68,10 @@ def build_scene(
     points = attachments(data)
     symbol, extent = symbol_size(data, points, frames[0])
     known = {name: q[k] for k, name in enumerate(layout.q)}
-    items = link_items(data, points, symbol, extent)
+    items = link_items(data, points, symbol, extent, getattr(module, "description", None), quiet)
     items += joint_items(data, view, up, symbol, frames, known)
     items += wall_items(data, view, symbol, frames[0])
-    items += element_items(data, view, symbol, frames[0])
+    items += element_items(data, view, symbol, frames)
     if axes:
         items += frame_items(data, symbol)
     for name, marker in zip(trace, tracked, strict=True):

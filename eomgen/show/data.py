@@ -67,7 +67,9 @@ def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData
     data = metadata.get("picture")
     if data is None:
         why = (
-            "it is given by equations without bodies" if "picture" in metadata else "it was made by an earlier version"
+            "it is given by equations without bodies"
+            if "picture" in metadata
+            else "it was compiled by an earlier version of eomgen; compile it again"
         )
         raise UsageError(f"there is nothing to draw of model {metadata['name']!r}: {why}")
     code, numbers, out = data["tape"]

@@ -48,7 +48,8 @@ def draw_scene(scene: Scene, ax: Any = None, title: str | None = None) -> Any:
     pyplot = matplotlib("pyplot", "draw") if ax is None else None
     artist = new_artist(scene, pyplot, ax)
     artist.show(0)
-    artist.ax.set_title(scene.name if title is None else title, fontsize=10, parse_math=False)
+    if title is not None or not artist.ax.get_title():
+        artist.ax.set_title(scene.name if title is None else title, fontsize=10, parse_math=False)
     return artist.ax
 
 
@@ -66,9 +67,9 @@ def figure_of(scene: Scene) -> Any:
     return made
 
 
-def figure_at(module: Any) -> Any:
+def figure_at(module: Any, quiet: bool = False) -> Any:
     """A figure without a window, of the declared initial position."""
-    scene = build_scene(module, position(module, None, 0.0)[:, None])
+    scene = build_scene(module, position(module, None, 0.0)[:, None], quiet=quiet)
     figure = figure_of(scene)
     draw_scene(scene, figure.axes[0])
     return figure
@@ -76,7 +77,7 @@ def figure_at(module: Any) -> Any:
 
 def small_figure(module: Any) -> Any:
     """The same in the size that suits a notebook."""
-    figure = figure_at(module)
+    figure = figure_at(module, quiet=True)
     figure.set_size_inches(SMALL * figure.get_size_inches() / figure.get_size_inches().max())
     return figure
 
@@ -107,11 +108,11 @@ def new_artist(scene: Scene, pyplot: Any, ax: Any = None) -> Any:
 
 
 def draw_branches(
-    module: Any, values: Mapping[str, float] | None = None, *, t: float = 0.0, names: bool | None = None
+    module: Any, values: Mapping[str, float] | None, *, t: float, names: bool | None, named: Mapping[str, float | str]
 ) -> Any:
     """See :func:`eomgen.runtime.drawing.draw_branches`."""
     pyplot = matplotlib("pyplot", "draw_branches")
-    found: Sequence[Array] = module.branches(values or {}, t=t)
+    found: Sequence[Array] = module.branches(values, t=t, **named)
     scenes = [build_scene(module, q[:, None], t, names=names) for q in found]
     columns = min(3, len(scenes))
     rows = -(-len(scenes) // columns)
@@ -121,6 +122,6 @@ def draw_branches(
     for k, scene in enumerate(scenes):
         spatial = {} if scene.view is not None else {"projection": "3d"}
         ax = figure.add_subplot(rows, columns, k + 1, **spatial)
-        title = f"branch {k + 1}" + (" (the declared one)" if k == 0 and not values else "")
+        title = f"branch {k + 1}" + (" (the declared one)" if k == 0 and not (values or named) else "")
         panels.append(draw_scene(scene._replace(low=low, high=high), ax, title))
     return np.array(panels, dtype=object)

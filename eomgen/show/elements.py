@@ -1,4 +1,4 @@
-"""Stage show, elements: springs, dampers, cylinders and ropes, spirals at joints, wheels, gears and cams."""
+"""Stage show, elements: springs, dampers, cylinders and ropes, spirals at joints, wheels and gears."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..limits.pictures import NOTHING, ROUNDED, SAME
+from .cam_curves import contour_items, lift_items
 from .data import GROUND, Array, PictureData, PlacedFrame
 from .joints import GAP, move_frame
 from .scene import Item, attached, disc, placed
@@ -18,9 +19,10 @@ RACK = 14  #: those of its rack that are drawn
 BESIDE = 2.4  #: distance of elements between the same points, in sizes of a symbol
 
 
-def element_items(data: PictureData, view: Array | None, symbol: float, poses: Array) -> list[Item]:
-    """Items of all force elements and constraints that are to be seen."""
+def element_items(data: PictureData, view: Array | None, symbol: float, frames: Array) -> list[Item]:
+    """Items of all force elements and constraints that are to be seen, over frames (k, n_bodies + 1, 4, 4)."""
     items: list[Item] = []
+    poses = frames[0]
     ways = [_ends(data, one) for one in data.elements]
     counts = Counter(way for way in ways if way is not None)
     met: Counter[Any] = Counter()
@@ -39,11 +41,9 @@ def element_items(data: PictureData, view: Array | None, symbol: float, poses: A
         elif kind == "rack":
             items += _rack(data, element, symbol, poses)
         elif kind == "lift":
-            items += _lift(data, element, poses)
+            items += lift_items(data, element, symbol, frames)
         elif kind == "contour":
-            s = np.linspace(element["low"], element["high"], 145)
-            points = move_frame(element["marker"], element["points"](s))
-            items.append(Item("wheel", name, element["marker"].body, points))
+            items += contour_items(element, poses)
     return items
 
 
@@ -230,20 +230,6 @@ def _rack(data: PictureData, element: dict[str, Any], symbol: float, poses: Arra
     points = (np.vstack([line, back]) - pose[:3, 3]) @ pose[:3, :3]
     rack = Item("wheel", element["name"], b.S.body, points)
     return [*_wheel(element["name"], a.S, radius, symbol), rack]
-
-
-def _lift(data: PictureData, element: dict[str, Any], poses: Array) -> list[Item]:
-    """The curve that the origin of a follower that slides describes on the cam in one turn."""
-    a, b = data.joints[element["a"]], data.joints[element["b"]]
-    if a.slides or not b.slides or a.P.body != b.P.body:
-        return []
-    theta = np.linspace(0.0, 2.0 * np.pi, 361)
-    (turn, center), (guide, start) = placed(poses, a.P), placed(poses, b.P)
-    ways = (start + np.outer(element["points"](theta)[:, 0], guide[:, 2]) - center) @ turn  # in axes of the cam's P
-    back = -(theta + float(element["phase"]))
-    c, s = np.cos(back), np.sin(back)
-    points = np.column_stack([c * ways[:, 0] - s * ways[:, 1], s * ways[:, 0] + c * ways[:, 1], ways[:, 2]])
-    return [Item("wheel", element["name"], a.S.body, move_frame(a.S, points))]
 
 
 def _belt(first: PlacedFrame, second: PlacedFrame, r_a: float, r_b: float, opened: bool) -> Callable[[Array], Array]:

@@ -175,7 +175,9 @@ class Explorer:
         off = [name for name, value in wanted.items() if abs(value - reached[name]) > HELD * max(1.0, abs(value))]
         if not off:
             return ""
-        return "the loops do not close there; shown is " + ", ".join(f"{name} = {reached[name]:.4g}" for name in off)
+        return ("the loops do not close there; the picture shows ") + ", ".join(
+            f"{name} = {reached[name]:.4g}" for name in off
+        )
 
     def __repr__(self) -> str:
         return f"<Explorer of {self.module.name}: {', '.join(self.sliders)}>"

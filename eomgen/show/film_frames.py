@@ -14,6 +14,10 @@ from .scene import Scene
 from .shown_motion import ShownMotion
 
 DPI = 80  #: of the frames
+LETTER = 0.0836  #: width of a letter of a title (inch)
+TITLE_MARGIN = 4.0  #: beside a title (dots)
+LEAST_TITLE = 4.5  #: size of its letters (points)
+MOST_DOTS = 1200.0  #: in an inch
 BELOW = 1.7  #: height of the plot below (inch)
 SPACE = (6.4, 5.6)  #: of a spatial mechanism (inch)
 
@@ -32,6 +36,7 @@ class Frames:
         self.figure, self.motion = figure, motion
         self.canvas = agg.FigureCanvasAgg(figure)
         self.updates: list[Callable[[int], None]] = []
+        self.titles: list[Any] = []
 
     @classmethod
     def of(cls, scene: Scene, motion: ShownMotion, curves: Sequence[Any] = (), dpi: float = DPI) -> Frames:
@@ -42,7 +47,8 @@ class Frames:
         grid = figure.add_gridspec(2 if curves else 1, 1, height_ratios=[height, below] if curves else [1])
         spatial = {} if scene.view is not None else {"projection": "3d"}
         frames = cls(figure, motion)
-        note = f"   {scene.note}" if scene.note else ""
+        letters = len(f"{scene.name}  {motion.words[0]}   {scene.note}")
+        note = f"{'   ' if LETTER * letters < width else chr(10)}{scene.note}" if scene.note else ""
         frames.add_scene(scene, figure.add_subplot(grid[0], **spatial), f"{scene.name}  {{}}{note}")
         if curves:
             frames.add_curves(figure.add_subplot(grid[1]), curves)
@@ -59,6 +65,7 @@ class Frames:
             above.set_text(title.replace("{}", self.motion.words[k]))
 
         self.updates.append(update)
+        self.titles.append(above)
 
     def add_curves(self, ax: Any, curves: Sequence[Any]) -> None:
         """Draw curves, with a line where the frame is."""
@@ -71,6 +78,11 @@ class Frames:
         self.show(0)
         self.canvas.draw()
         self.figure.set_layout_engine("none")
+        wide = self.canvas.get_width_height()[0]
+        for title in self.titles:  # a narrow picture cuts nothing off
+            box = title.get_window_extent(self.canvas.get_renderer())
+            room = min(box.x0 + box.x1, 2 * wide - box.x0 - box.x1) - TITLE_MARGIN
+            title.set_fontsize(max(title.get_fontsize() * min(1.0, room / max(box.width, 1.0)), LEAST_TITLE))
 
     def __len__(self) -> int:
         return len(self.motion.t)

@@ -9,6 +9,7 @@ import numpy as np
 from ..limits.pictures import SAME
 from .colors import color_of, style_of
 from .data import Array
+from .label_places import NAME_STYLE, NAMES, name_offsets, outline
 from .scene import ROLES, Item, Scene, passed
 
 SPACE = 7.0  #: largest edge of a figure of its own (inch)
@@ -33,10 +34,13 @@ class Flat:
     """
 
     def __init__(self, scene: Scene, ax: Any) -> None:
+        from matplotlib.collections import PolyCollection
+        from matplotlib.colors import to_rgb
         from matplotlib.patches import Polygon
 
         assert scene.view is not None
         self.scene, self.ax = scene, ax
+        limits = joined_limits(ax, "xy", [(scene.low[k], scene.high[k]) for k in (0, 1)])
         self.artists: list[tuple[Item, Any]] = []
         for item in sorted(scene.items, key=lambda item: ROLES.index(item.role)):
             style, depth = style_of(item.role), 2 + ROLES.index(item.role)
@@ -44,34 +48,44 @@ class Flat:
             if item.faces is None:
                 line = ax.plot([], [], color=color, linewidth=style.width, zorder=depth, solid_capstyle="round")[0]
                 self.artists.append((item, line))
+            elif not item.convex:
+                tint = 1.0 - style.alpha * (1.0 - np.array(to_rgb(color)))  # in place of layers that shine through
+                triangles = PolyCollection([], closed=True, zorder=depth, facecolor=tint, edgecolor=tint, linewidth=0.4)
+                ax.add_collection(triangles, autolim=False)
+                self.artists.append((item, triangles))
             else:
                 patch = Polygon(np.zeros((3, 2)), closed=True, zorder=depth, linewidth=style.width)
                 patch.set(facecolor=style.face or color, edgecolor=style.edge or color, alpha=style.alpha)
                 ax.add_patch(patch)
                 self.artists.append((item, patch))
-        self.labels = [
+        ax.set_aspect("equal", adjustable="box")
+        ax.set(xlim=limits[0], ylim=limits[1])
+        right, up = (_axis_name(scene.view[k]) for k in (0, 1))
+        ax.set_xlabel(ax.get_xlabel() or f"{right} (m)")
+        ax.set_ylabel(ax.get_ylabel() or f"{up} (m)")
+        ax.tick_params(labelsize=8)
+        ax.set_axisbelow(True)
+        ax.grid(alpha=0.25)
+        self.labels = self._names()
+
+    def _names(self) -> list[Any]:
+        """Names on a light ground beside what they name, clear of the drawing of the first frame."""
+        scene, ax = self.scene, self.ax
+        ax.apply_aspect()
+        return [
             ax.annotate(
                 label.text,
                 (0, 0),
-                xytext=(6, 6) if label.role == "joint" else (0, -11),
+                xytext=tuple(offset),
                 textcoords="offset points",
-                fontsize=8,
-                color="0.25" if label.role == "joint" else color_of(label),
+                **NAME_STYLE,
+                color=NAMES if label.role == "joint" else color_of(label),
                 zorder=20,
                 parse_math=False,
                 annotation_clip=True,
             )
-            for label in scene.labels
+            for label, offset in zip(scene.labels, name_offsets(scene, ax, self.page), strict=True)
         ]
-        ax.set_aspect("equal", adjustable="box")
-        ax.set_xlim(scene.low[0], scene.high[0])
-        ax.set_ylim(scene.low[1], scene.high[1])
-        right, up = (_axis_name(scene.view[k]) for k in (0, 1))
-        ax.set_xlabel(f"{right} (m)")
-        ax.set_ylabel(f"{up} (m)")
-        ax.tick_params(labelsize=8)
-        ax.set_axisbelow(True)
-        ax.grid(alpha=0.25)
 
     def page(self, points: Array) -> Array:
         """Points (n, 2) on the page."""
@@ -84,15 +98,29 @@ class Flat:
         poses = self.scene.frames[frame]
         for item, artist in self.artists:
             points = self.page(item.at(poses, frame))
-            if item.faces is not None:
+            if item.faces is not None and not item.convex:
+                artist.set_verts(points[item.faces])
+            elif item.faces is not None:
                 artist.set_xy(outline(points))
             else:
                 if item.role == "trace":
                     points = passed(points, frame, len(self.scene.frames))
                 artist.set_data(points[:, 0], points[:, 1])
         for label, text in zip(self.scene.labels, self.labels, strict=True):
-            pose = poses[label.body]
-            text.xy = tuple(self.page((pose[:3, :3] @ label.point + pose[:3, 3])[None])[0])
+            text.xy = tuple(self.page(label.at(poses)[None])[0])
+
+
+def joined_limits(ax: Any, axes: str, limits: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Limits that a picture needs, wide enough for what is on the axes already and turned round where theirs are."""
+    found = []
+    for name, own in zip(axes, limits, strict=True):
+        theirs = (
+            getattr(ax, f"get_{name}lim")() if ax.has_data() or not getattr(ax, f"get_autoscale{name}_on")() else own
+        )
+        low, high = min(*own, *theirs), max(*own, *theirs)
+        turned = own[0] > own[1] or theirs[0] > theirs[1]
+        found.append((high, low) if turned else (low, high))
+    return found
 
 
 def _axis_name(direction: Array) -> str:
@@ -101,24 +129,3 @@ def _axis_name(direction: Array) -> str:
     if abs(direction[k]) < 1.0 - SAME:
         return "right" if k == 0 else "up"
     return ("" if direction[k] > 0.0 else "-") + "xyz"[k]
-
-
-def outline(points: Array) -> Array:
-    """Corners (m, 2) of the convex hull of points (n, 2), in order (Andrew's monotone chain)."""
-    order = np.unique(points.round(12), axis=0)
-    if len(order) < 3:
-        return order
-
-    def chain(several: Array) -> list[Array]:
-        found: list[Array] = []
-        for p in several:
-            while len(found) > 1 and _turn(found[-2], found[-1], p) <= 0.0:
-                found.pop()
-            found.append(p)
-        return found[:-1]
-
-    return np.array(chain(order) + chain(order[::-1]))
-
-
-def _turn(a: Array, b: Array, c: Array) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

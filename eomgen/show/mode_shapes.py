@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import EvaluationError
-from ..files.path_names import as_path
 from ..limits.pictures import STEP
 from .animate import write
 from .build_scene import build_scene
@@ -18,7 +17,7 @@ from .film_frames import DPI, Frames
 from .optional import matplotlib
 from .scene import Scene, attachments
 from .shown_motion import ShownMotion
-from .writers import gif_bytes, require_kind
+from .writers import gif_bytes, require_target
 
 PERIOD = 2.0  #: seconds in which a mode is shown
 FPS = 12.0  #: of the pictures in a notebook
@@ -79,6 +78,7 @@ def animate_mode(
     shape: tuple[Array, str],
     file: Path | str | None,
     *,
+    format: str | None = None,
     fps: float = 25.0,
     names: bool | None = None,
     axes: bool = False,
@@ -86,18 +86,17 @@ def animate_mode(
     dpi: float = DPI,
 ) -> Any:
     """See :meth:`eomgen.analysis.modes.Modes.animate`."""
-    if file is not None:
-        require_kind(as_path("file", file))
+    require_target(file, format)
     look = {"names": names, "axes": axes, "trace": (trace,) if isinstance(trace, str) else tuple(trace)}
     scene, motion = mode_scene(module, x, shape, max(2, round(fps * PERIOD)), **look)
-    return write(file, scene, motion, dpi=dpi)
+    return write(file, scene, motion, dpi=dpi, format=format)
 
 
 def swinging_gif(module: Any, x: Array, shapes: Sequence[tuple[Array, str]]) -> bytes:
     """Several modes side by side, as a GIF."""
     figures = matplotlib("figure", "a picture")
     count = round(FPS * PERIOD)
-    made = [mode_scene(module, x, shape, count, names=False) for shape in shapes]
+    made = [mode_scene(module, x, shape, count, names=False, quiet=True) for shape in shapes]
     figure = figures.Figure(figsize=(CELL * len(made), CELL + 0.3), dpi=72, layout="constrained")
     frames = Frames(figure, made[0][1])
     for k, ((scene, _), (_, title)) in enumerate(zip(made, shapes, strict=True)):

@@ -13,8 +13,14 @@ from .film_frames import draw_curves
 from .optional import matplotlib
 from .shown_motion import ShownMotion
 
+WIDE = 0.55  #: height over width of the window for which the camera is set
 BAR = 40  #: height of the bar (dots)
 PLOT = 190  #: of the curves above it
+#: What a page says where a browser cannot draw it.
+NO_WEBGL = (
+    "This animation needs WebGL 2, which this browser does not offer here. Switch on hardware acceleration, open the "
+    "page in another browser, or write the animation as .gif."
+)
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 
 
@@ -33,6 +39,32 @@ class InlinePage:
     def _repr_html_(self) -> str:
         style = f"width:100%;height:{self.height}px;border:0"
         return f'<iframe style="{style}" srcdoc="{escape(self.text, quote=True)}"></iframe>'
+
+
+class InlineFilm:
+    """A GIF or a film that a notebook shows.
+
+    Attributes
+    ----------
+    data : bytes
+        The file, as it would be written.
+    format : {'gif', 'mp4'}
+    """
+
+    def __init__(self, data: bytes, format: str) -> None:
+        self.data, self.format = data, format
+
+    def __bytes__(self) -> bytes:
+        return self.data
+
+    def __repr__(self) -> str:
+        return f"<InlineFilm: {self.format} of {len(self.data) / 1e6:.2f} MB>"
+
+    def _repr_html_(self) -> str:
+        text = b64encode(self.data).decode()
+        if self.format == "gif":
+            return f'<img alt="animation" src="data:image/gif;base64,{text}">'
+        return f'<video controls loop autoplay muted src="data:video/{self.format};base64,{text}"></video>'
 
 
 def curves_html(motion: ShownMotion, curves: Sequence[Any]) -> str:
@@ -64,21 +96,37 @@ def player_html(motion: ShownMotion, curves: Sequence[Any], title: str) -> str:
   align-items: center; background: #fff; font: 14px sans-serif; box-sizing: border-box; border-top: 1px solid #ddd; }}
 #player button {{ width: 34px; height: 28px; }} #player input {{ flex: 1; }} #words {{ min-width: 9em; }}
 #curves {{ position: fixed; bottom: {BAR}px; height: {PLOT}px; left: 50%; transform: translateX(-50%); }}
+#curves {{ box-shadow: 0 0 0 100vmax #fff; clip-path: inset(0 -100vmax); }}
 #curves img {{ height: 100%; }}
+#missing {{ position: fixed; top: 40%; left: 10%; right: 10%; font: 16px sans-serif; text-align: center; z-index: 6; }}
 #cursor {{ position: absolute; top: 2%; bottom: 20%; width: 1px; background: #333; }}
 #title {{ position: fixed; left: 14px; top: 10px; font: 15px sans-serif; z-index: 5; pointer-events: none; }}
 </style>
 <div id="title">{escape(title)}</div>{plot}
+<script>(function () {{
+  if (document.createElement("canvas").getContext("webgl2")) return;
+  const words = document.createElement("div");
+  words.id = "missing";
+  words.textContent = "{NO_WEBGL}";
+  document.body.appendChild(words);
+}})();</script>
 <div id="player"><button id="play" title="play or pause">&#10074;&#10074;</button>
 <input id="time" type="range" min="0" max="{float(clock[-1])!r}" step="any" value="0" aria-label="time">
 <span id="words"></span><select id="speed" title="speed">{speeds}</select></div>
 """
 
 
-def player_script(motion: ShownMotion) -> str:
-    """What moves a page; ``K3DInstance`` is k3d's."""
-    data = {"clock": motion.clock.tolist(), "over": motion.over.tolist(), "words": motion.words}
-    return _SCRIPT.replace("DATA", json.dumps(data).replace("<", "\\u003c"))
+def player_script(motion: ShownMotion, extent: tuple[float, float] = (1.0, 1.0)) -> str:
+    """What moves a page; ``K3DInstance`` is k3d's.
+
+    Parameters
+    ----------
+    motion : ShownMotion
+    extent : (float, float)
+        Width and height of what is shown: in a window that is too narrow for it the camera stands further away.
+    """
+    data = {"clock": motion.clock.tolist(), "over": motion.over.tolist(), "words": motion.words, "extent": extent}
+    return _SCRIPT.replace("WIDE", f"{WIDE:g}").replace("DATA", json.dumps(data).replace("<", "\\u003c"))
 
 
 _SCRIPT = """(function (k3d) {
@@ -86,7 +134,7 @@ _SCRIPT = """(function (k3d) {
   const get = (id) => document.getElementById(id);
   const slider = get("time"), button = get("play"), words = get("words"), speed = get("speed");
   const curves = get("curves"), cursor = get("cursor");
-  let now = 0, playing = true, last = null;
+  let now = 0, playing = true, last = null, frames = 0;
   function show(t) {
     now = t;
     slider.value = t;
@@ -105,6 +153,8 @@ _SCRIPT = """(function (k3d) {
     button.textContent = on ? "\\u275a\\u275a" : "\\u25b6";
   }
   function step(stamp) {
+    if (frames < 3) k3d.setCamera(camera);  // k3d sets its own once more when all is loaded
+    frames += 1;
     if (playing) {
       if (last !== null) {
         const t = now + (stamp - last) / 1000 * speed.value;
@@ -118,6 +168,10 @@ _SCRIPT = """(function (k3d) {
   slider.oninput = () => { play(false); show(+slider.value); };
   window.onresize = () => k3d.resizeHelper && k3d.resizeHelper();
   show(0);
-  k3d.setCamera(k3d.parameters.camera);  // or k3d believes that all names are out of sight
+  const camera = k3d.parameters.camera.slice(), target = get("canvasTarget");
+  const aspect = target.clientWidth / target.clientHeight || 1, [wide, high] = data.extent;
+  const away = Math.max(1, Math.max(high, wide / aspect) / Math.max(high, WIDE * wide));
+  for (let k = 0; k < 3; k += 1) camera[k] = camera[k + 3] + away * (camera[k] - camera[k + 3]);
+  k3d.setCamera(camera);  // or k3d believes that all names are out of sight
   requestAnimationFrame(step);
 })(K3DInstance);"""

@@ -6,12 +6,13 @@ Nothing here knows how it is drawn: the backends ask every :class:`Item` where i
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..limits.pictures import SAME
 from .data import GROUND, Array, JointData, PictureData, PlacedFrame
+from .mesh_files import mesh_of
 from .solids import ROUND, Mesh, Triangles, box, rounded, solid, sphere, turned
 
 SYMBOL = 0.02  #: of the extent of a mechanism: the size of a symbol
@@ -43,6 +44,8 @@ class Item(NamedTuple):
         Poses (n_bodies + 1, 4, 4) -> points (n, 3) in ground axes, of what is fixed to no body.
     path : (k, n, 3) array or None
         Or its points in ground axes at each frame.
+    convex : bool
+        Whether the outline of a solid is that of its vertices.
     """
 
     role: str
@@ -52,6 +55,7 @@ class Item(NamedTuple):
     faces: Triangles | None = None
     follow: Callable[[Array], Array] | None = None
     path: Array | None = None
+    convex: bool = True
 
     def at(self, poses: Array, frame: int = 0) -> Array:
         """Points in ground axes (n, 3) at poses (n_bodies + 1, 4, 4) of a frame, the last of which is ground's."""
@@ -70,6 +74,10 @@ class Label(NamedTuple):
     body: int
     point: Array
     role: str
+
+    def at(self, poses: Array) -> Array:
+        """The point (3,) in ground axes at poses (n_bodies + 1, 4, 4)."""
+        return move(poses[self.body], self.point)
 
 
 class Scene(NamedTuple):
@@ -228,17 +236,31 @@ def symbol_mesh(shape: str, sizes: list[float], axis: str, symbol: float) -> Mes
     return mesh[0] @ TO_AXIS[axis].T, mesh[1]
 
 
-def link_items(data: PictureData, points: list[Array], symbol: float, extent: float) -> list[Item]:
-    """Bodies: the shapes that they were given, else bars and plates between what is attached to them."""
+def link_items(
+    data: PictureData,
+    points: list[Array],
+    symbol: float,
+    extent: float,
+    description: Any = None,
+    quiet: bool = False,
+) -> list[Item]:
+    """Bodies: the shapes that they were given, else bars and plates between what is attached to them.
+
+    ``description`` of the model tells where files of meshes lie; ``quiet``: without warnings about them.
+    """
     items: list[Item] = []
     shaped = set()
     for shape in data.shapes:
-        mesh = solid(shape["kind"], shape["sizes"], BAR * symbol, ROUND)
         body = shape["body"]
+        name = "ground" if body == GROUND else data.bodies[body]
+        if shape["kind"] == "mesh":
+            mesh = mesh_of(shape, name, description, quiet)
+        else:
+            mesh = solid(shape["kind"], shape["sizes"], BAR * symbol, ROUND)
         if mesh is not None:
             shaped.add(body)
-            name = "ground" if body == GROUND else data.bodies[body]
-            items.append(Item("shape", name, body, *attached(shape["frame"], mesh)))
+            here = attached(shape["frame"], mesh)
+            items.append(Item("shape", name, body, *here, convex=shape["kind"] != "mesh"))
     hidden = data.hidden
     blocks = {joint.S.body for joint in data.joints if joint.pieces and joint.slides and _is_block(data, joint, symbol)}
     wheels = {element["marker"].body for element in data.elements if element["kind"] in ("wheel", "contour")}

@@ -11,7 +11,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..errors import MissingDependencyError, UsageError
+from ..files.path_names import as_path
 from ..files.writing import refuse_link, whole_file
+from ..texts import shown
 from .film_frames import Frames
 from .optional import k3d, matplotlib
 
@@ -25,6 +27,24 @@ def kind_of(path: Path) -> str:
     return path.suffix.lower() if path.suffix and not path.is_dir() else FOLDER
 
 
+def require_target(file: Any, format: Any) -> None:
+    """Refuse a file or a format without a file that cannot be, before any work.
+
+    Raises
+    ------
+    UsageError, MissingDependencyError
+    """
+    if format is None:
+        if file is not None:
+            require_kind(as_path("file", file))
+        return
+    if not isinstance(format, str) or format not in FORMATS:
+        raise UsageError(f"format must be one of {', '.join(map(repr, FORMATS))}, not {shown(format)}")
+    if file is not None:
+        raise UsageError("format= is for an animation without a file; the ending of the file's name selects the kind")
+    _require_libraries(f".{format}")
+
+
 def require_kind(path: Path) -> None:
     """Refuse an ending that says no kind of animation, and a kind whose library is missing, before any work.
 
@@ -32,19 +52,30 @@ def require_kind(path: Path) -> None:
     ------
     UsageError, MissingDependencyError
     """
-    kind = kind_of(path)
+    kind, word = kind_of(path), path.name.removeprefix(".").lower()
+    if word in FORMATS and kind == FOLDER and not path.is_dir():
+        raise UsageError(
+            f"{str(path)!r} has no ending, so it would be a folder for PNG frames; give the name of a file such as "
+            f"'run.{word}', or format={word!r} without a file for one that a notebook shows"
+        )
     if kind not in (*WRITERS, ".html"):
         raise UsageError(
-            f"{path}: the ending of the name selects the kind of animation: .gif, .mp4, .html, "
-            "and a name without an ending is a folder for PNG frames"
+            f"{path}: the name of an animation must end in .gif, .mp4 or .html, or have no ending (a folder for PNG "
+            "frames)"
         )
-    if kind == ".html":
-        k3d("an animation as a page")
-        return
     if kind == FOLDER:
         refuse_link(path)
         if path.exists() and (not path.is_dir() or any(path.iterdir())):
-            raise UsageError(f"{path}: frames go into a new or an empty folder; name another, or empty it")
+            raise UsageError(
+                f"{path}: the folder for frames must be new or empty; name another folder, or empty this one"
+            )
+    _require_libraries(kind)
+
+
+def _require_libraries(kind: str) -> None:
+    if kind == ".html":
+        k3d("an animation as a page")
+        return
     matplotlib("figure", "an animation")
     if kind == ".mp4":
         _find_ffmpeg()
@@ -63,8 +94,8 @@ def _find_ffmpeg() -> str:
         return str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
     except (ImportError, RuntimeError):
         raise MissingDependencyError(
-            "an animation as .mp4 needs ffmpeg: pip install imageio-ffmpeg, or that of the system "
-            "(Debian: apt install ffmpeg); .gif and .html need neither"
+            "an animation as .mp4 needs ffmpeg: pip install imageio-ffmpeg, or install it on the system "
+            "(Debian: apt install ffmpeg); .gif and .html do not need it"
         ) from None
 
 
@@ -88,13 +119,8 @@ def gif_bytes(frames: Frames) -> bytes:
     return buffer.getvalue()
 
 
-def _write_gif(path: Path, frames: Frames) -> None:
-    data = gif_bytes(frames)
-    with whole_file(path) as handle:
-        handle.write(data)
-
-
-def _write_mp4(path: Path, frames: Frames) -> None:
+def mp4_bytes(frames: Frames) -> bytes:
+    """All frames as a film."""
     animation, pyplot = (matplotlib(part, "an animation") for part in ("animation", "pyplot"))
     with TemporaryDirectory() as folder, pyplot.rc_context({"animation.ffmpeg_path": _find_ffmpeg()}):
         part = os.path.join(folder, "part.mp4")
@@ -105,9 +131,7 @@ def _write_mp4(path: Path, frames: Frames) -> None:
             for k in range(len(frames)):
                 frames.show(k)
                 writer.grab_frame()
-        data = Path(part).read_bytes()
-    with whole_file(path) as handle:
-        handle.write(data)
+        return Path(part).read_bytes()
 
 
 def _write_frames(path: Path, frames: Frames) -> None:
@@ -122,5 +146,22 @@ def _write_frames(path: Path, frames: Frames) -> None:
             handle.write(buffer.getvalue())
 
 
+def _whole(make: Callable[[Frames], bytes]) -> Callable[[Path, Frames], None]:
+    """What writes the bytes of an animation as one file."""
+
+    def write(path: Path, frames: Frames) -> None:
+        data = make(frames)
+        with whole_file(path) as handle:
+            handle.write(data)
+
+    return write
+
+
+#: Formats of one file that matplotlib makes, and their bytes.
+FILMS: dict[str, Callable[[Frames], bytes]] = {"gif": gif_bytes, "mp4": mp4_bytes}
+FORMATS = (*FILMS, "html")
 #: Endings of files that matplotlib makes.
-WRITERS: dict[str, Callable[[Path, Any], None]] = {".gif": _write_gif, ".mp4": _write_mp4, FOLDER: _write_frames}
+WRITERS: dict[str, Callable[[Path, Any], None]] = {
+    **{f".{name}": _whole(make) for name, make in FILMS.items()},
+    FOLDER: _write_frames,
+}

@@ -1,4 +1,4 @@
-"""Stage simplify: what polynomials are made of: symbols, sines, cosines, other calls, sums under fractions and roots."""
+"""Stage simplify: what polynomials are made of: symbols, sines, cosines, other calls, sums below or under roots."""
 
 from __future__ import annotations
 
@@ -42,6 +42,7 @@ class Atoms:
     def __init__(self) -> None:
         self.table: list[Atom] = []
         self._ids: dict[Atom, int] = {}
+        self._names: list[frozenset[int]] = []
 
     def id(self, kind: str, what: Any) -> int:
         """The number of an atom, the same for the same atom."""
@@ -59,6 +60,14 @@ class Atoms:
             return set()
         parts = [what] if kind in (*TURNS, *SUMS) else what
         return {a for part in parts for monomial, _ in part for a, _ in monomial}
+
+    def names(self, poly: Poly) -> frozenset[int]:
+        """The atoms of names that stand in a polynomial, at any depth."""
+        while len(self._names) < len(self.table):  # what is inside an atom has smaller numbers
+            k = len(self._names)
+            own = frozenset({k} if self.table[k].kind == "name" else ())
+            self._names.append(own.union(*(self._names[part] for part in self.inside(k))))
+        return frozenset().union(*(self._names[a] for monomial in poly for a, _ in monomial))
 
     def poly(self, kind: str, what: Any) -> Poly:
         """The polynomial of one atom."""

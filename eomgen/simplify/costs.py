@@ -67,7 +67,7 @@ class Costs:
 
     def of_number(self, value: Number) -> float:
         """A coefficient without its sign, and the sign that joins it; nothing for 1."""
-        size: Number = abs(value)
+        size: Number = value if value > 0 else -value
         if isinstance(size, float):
             return len(repr(size)) + OPERATION + 1.0
         return sum((len(str(n)) + OPERATION + 1.0 for n in (size.numerator, size.denominator) if n != 1), 0.0)

@@ -8,7 +8,6 @@ from math import gcd, lcm
 
 from ..graph.core import Graph
 from ..graph.traverse import reachable
-from .angles import Angles
 from .atoms import (
     ONE,
     Atoms,
@@ -27,6 +26,7 @@ from .atoms import (
     ratio,
     scaled,
 )
+from .joined_angles import JoinedAngles
 
 MANY = 24  #: terms beyond which the sines and cosines of a sum are joined before it is used
 
@@ -37,7 +37,7 @@ class Expansion:
     Attributes
     ----------
     atoms : Atoms
-    angles : Angles
+    angles : JoinedAngles
         Simplifies sines and cosines.
     """
 
@@ -45,7 +45,7 @@ class Expansion:
         self.graph = graph
         self.work = work
         self.atoms = Atoms()
-        self.angles = Angles(self.atoms, work)
+        self.angles = JoinedAngles(self.atoms, work)
         self._of: dict[int, Poly] = {}
 
     def expand(self, i: int) -> Poly:

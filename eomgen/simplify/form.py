@@ -19,7 +19,7 @@ from ..operations import CONDITION, operations_with
 from ..records import dataclass
 from .atoms import Poly, TooLongError, Work
 from .expansion import Expansion
-from .factor import Factoring
+from .factoring import Factoring
 from .inline import EACH, NAME, Named, inlined
 from .literal import Literal
 
@@ -153,6 +153,8 @@ class _Attempt:
         self.literal = Literal(self.expansion)
         self.factoring = Factoring(self.expansion.atoms, work, rates)
         self.named: Named = []
+        for name in sorted(node[1] for node in graph.nodes if node[0] == "sym"):  # so that ties fall alike
+            self.expansion.atoms.id("sym", name)
 
     def form(self, exprs: Sequence[Expr], given: Sequence[tuple[str, Expr]], cuts: Sequence[int], prefix: str) -> Form:
         known = {self.graph.symbol(name).id: (x.id, name) for name, x in given}

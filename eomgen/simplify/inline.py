@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .atoms import Poly, TooLongError, add, join, multiply, ratio
 from .expansion import Expansion
-from .factor import Factoring
+from .factoring import Factoring
 
 NAME = 20.0  #: what a name costs a reader, beyond its definition
 ONCE = 60.0  #: length up to which a definition that is used once is put in its place
@@ -20,7 +20,7 @@ def inlined(expansion: Expansion, factoring: Factoring, named: Named, polys: lis
     kept = []
     for k in range(len(named)):
         atom, value = every[k]
-        users = [n for n in range(k + 1, len(every)) if _uses(expansion, every[n][1], atom)]
+        users = [n for n in range(k + 1, len(every)) if atom in expansion.atoms.names(every[n][1])]
         if len(value) == 1 and len(users) > 1:  # named without its symbols and numbers, which may cancel
             inner, outer = _parted(expansion, value)
             moved = multiply({((atom, 1),): 1}, outer)
@@ -64,26 +64,12 @@ def _put_in(expansion: Expansion, factoring: Factoring, poly: Poly, atom: int, v
         return replaced
 
 
-def _uses(expansion: Expansion, poly: Poly, atom: int) -> bool:
-    """Whether an atom stands in a polynomial, at any depth."""
-    seen: set[int] = set()
-    stack = [a for m in poly for a, _ in m]
-    while stack:
-        a = stack.pop()
-        if a == atom:
-            return True
-        if a > atom and a not in seen:  # what is inside has smaller numbers
-            seen.add(a)
-            stack.extend(expansion.atoms.inside(a))
-    return False
-
-
 def _can_replace(expansion: Expansion, poly: Poly, atom: int, value: Poly) -> bool:
     for m in poly:
         for a, n in m:
             if a == atom and (n != int(n) or (n < 0 and len(value) != 1)):
                 return False
-            if a != atom and _uses(expansion, {((a, 1),): 1}, atom):
+            if a != atom and atom in expansion.atoms.names({((a, 1),): 1}):
                 return False
     return True
 

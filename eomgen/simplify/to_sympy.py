@@ -11,7 +11,7 @@ import sympy
 from ..graph.core import Graph
 from ..graph.sympy_raise import as_number, raise_operation
 from .atoms import SMALL, Atoms, Monomial, Number, Poly
-from .factor import Factoring
+from .factoring import Factoring
 
 
 class Raising:

@@ -58,7 +58,7 @@ class Checkpoint:
         path = as_path("checkpoint", file)
         every = read_number("checkpoint_every", every)
         if every < 0.0:
-            raise UsageError(f"checkpoint_every must be a number of seconds from 0, not {every}")
+            raise UsageError(f"checkpoint_every must be a number of seconds, 0 or more, not {every}")
         if not isinstance(resume, bool | None):
             raise UsageError(f"resume must be True, False or None, not {shown(resume)}")
         self.file, self.every, self.resume = path, every, resume
@@ -100,8 +100,8 @@ class Checkpoint:
     def damaged(self, why: object) -> UsageError:
         """The error for a file that cannot be gone on from."""
         return UsageError(
-            f"checkpoint {self.file} is damaged or none of eomgen's: {why}; begin anew with resume=False, or name "
-            "another file"
+            f"checkpoint {self.file} is damaged, or is not a checkpoint of eomgen: {why}; begin anew with "
+            "resume=False, or name another file"
         )
 
     def save(self, arrays: dict[str, Any]) -> None:

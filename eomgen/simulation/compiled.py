@@ -34,7 +34,7 @@ MESSAGES = {
     ENDED: WORDS[0],
     TERMINAL: WORDS[1],
     STOPPED: "The run was interrupted.",
-    RESET_FAILED: "The state after an event cannot be evaluated, or not be brought onto the constraints.",
+    RESET_FAILED: "The state after an event cannot be evaluated, or cannot be brought onto the constraints.",
 }
 
 
@@ -52,18 +52,18 @@ def can_run(module: BoundModel, method: Any, forcing: Forcing) -> bool:
             raise UsageError(no_series(module))
         if not forcing.stepwise:
             raise UsageError(
-                "method Taylor takes inputs that are constant between corners: numbers, and tables that hold their "
-                'values (interpolation "zero-order"); for others take DOP853'
+                "method Taylor takes only inputs that are constant between corners: numbers, and tables with "
+                'interpolation "zero-order"; for other inputs use DOP853'
             )
     return there and not forcing.foreign
 
 
 def no_series(module: BoundModel) -> str:
     """Why a module has no Taylor method."""
-    why = module.metadata.get("no_series", "its module has none compiled, as with target='numpy'")
+    why = module.metadata.get("no_series", "its module was compiled without one, as with target='numpy'")
     return (
-        f"{module.name} has no Taylor series: {why}; the method is there for trees of bodies whose equations are "
-        "smooth and not too long; take DOP853"
+        f"{module.name} has no Taylor series: {why}; the method works for open chains of bodies whose equations are "
+        "smooth and not too long; use DOP853"
     )
 
 

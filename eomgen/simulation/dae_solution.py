@@ -38,7 +38,7 @@ OWN = ("eventsfn", "num_events", "jacfn", "userdata", "algebraic_idx")  #: optio
 
 
 class Dae(DaeForm):
-    """The differential-algebraic form of a model, with a solver."""
+    """The differential-algebraic form F(t, y, y') = 0 of a model, with a solver."""
 
     def solve(
         self,
@@ -80,7 +80,7 @@ class Dae(DaeForm):
         MissingDependencyError
             scikit-sundae is not installed.
         SimulationError
-            IDA gave up.
+            IDA could not reach the end.
         ZenoError
             Events that reset the state follow each other ever faster.
         """
@@ -103,7 +103,9 @@ def integrate_dae(
     ida = require("sksundae.ida", "scikit-sundae", "dae.solve")
     for name in OWN:
         if name in options:
-            raise UsageError(f"dae.solve sets {name} of IDA itself; events= takes events as simulate does")
+            raise UsageError(
+                f"dae.solve sets {name} of IDA itself, so it cannot be given; give events= as for simulate"
+            )
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata["simulation"]["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
@@ -174,7 +176,7 @@ class _DaeRun:
                 jumped = after is not None and not np.array_equal(after, x)
                 x = x if after is None else after
             elif t == t_before:
-                raise SimulationError(f"IDA makes no headway at t = {t:.6g} s")
+                raise SimulationError(f"IDA makes no progress at t = {t:.6g} s")
 
     def _begin(self, t: float, x: Array) -> Array:
         """The state after events whose value is zero at the start and does not leave it against their direction."""
@@ -244,8 +246,8 @@ class _DaeRun:
             self.calls += 1
             if self.calls > 10 * ENOUGH and abs(end - t) * self.calls > 10 * ENDLESS * abs(t - start):
                 raise SimulationError(
-                    f"IDA has evaluated its equations {self.calls} times to t = {t:.6g} s of {end:.6g} s and would not "
-                    "come to the end; take a shorter span, or looser tolerances"
+                    f"IDA has evaluated its equations {self.calls} times up to t = {t:.6g} s of {end:.6g} s, so it "
+                    "would not reach the end; give a shorter span, or looser tolerances"
                 )
             form.residual(t, y, yp, res, forcing(t, y[:n_x]))
 

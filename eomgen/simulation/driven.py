@@ -60,7 +60,9 @@ def follow_drivers(
             )
         return None
     if checkpoint is not None:
-        raise UsageError(f"{module.name} is moved by its drivers, position by position: no checkpoint is kept")
+        raise UsageError(
+            f"{module.name} is moved by its drivers, position by position; such a run cannot keep a checkpoint"
+        )
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
@@ -82,8 +84,8 @@ def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method:
     if led and method == "kinematic":
         names = ", ".join(module.u_names[i] for i in module.layout.constraint_inputs)
         raise UsageError(
-            f"method 'kinematic' follows drivers that are expressions of t, and inputs ({names}) move {module.name}; "
-            "leave method= out, and it is integrated"
+            f"method 'kinematic' needs drivers that are expressions of t, but the inputs {names} move {module.name}; "
+            "leave method= out to integrate it"
         )
     return led
 
@@ -119,7 +121,10 @@ def simulate_driven(
     """
     for name in given:
         if name not in ("rtol", "atol", "max_step", "first_step"):
-            raise UsageError(f"a mechanism that drivers move entirely takes no option {name!r}; give method= as well")
+            raise UsageError(
+                f"a run of a mechanism that drivers move entirely has no option {name!r}; give method= "
+                "too to integrate it"
+            )
     start, end = span
     nothing = np.empty(0)
     if initial is None:
@@ -137,7 +142,7 @@ def simulate_driven(
         beyond = 0.9 * followed.reached + 0.1 * followed.end
         gap = describe_gap(driven, *followed.path.at(beyond), followed.stop.q)
         raise SimulationError(
-            f"the drivers cannot go on from t = {followed.stop.t:.6g} s of {end:.6g} s: {followed.stop}; {gap}; "
+            f"the drivers cannot move further at t = {followed.stop.t:.6g} s of {end:.6g} s: {followed.stop}; {gap}; "
             "change the drivers' values, or the dimensions"
         )
     own = followed.nodes[followed.nodes <= followed.end]

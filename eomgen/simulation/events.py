@@ -202,7 +202,7 @@ class Events:
         """The same, of named events."""
         return ZenoError(
             f"the events {', '.join(names)} follow each other faster and faster near t = {t:.6g} s, after {count} "
-            "resets (Zeno), or a reset repeats without an end: end the run there (terminal: a number of times), use a "
+            "resets (Zeno), or a reset repeats without an end; end the run there (terminal: a number of events), use a "
             "contact force for a body that comes to rest, or change the reset"
         )
 
@@ -244,7 +244,7 @@ def _of_model(event: Mapping[str, Any], chosen: bool) -> RunEvent:
 
 def _only_in_c(t: float, x: Array) -> float:
     """In place of an event's value until :meth:`Events.listed` binds it; compiled loops evaluate it themselves."""
-    raise UsageError("an event by its name or text has a value in a run only; give a function f(t, x) instead")
+    raise UsageError("an event given by name or text has values only in a run; give a function f(t, x) instead")
 
 
 def _unwatched(t: float, x: Array) -> float:
@@ -258,7 +258,7 @@ def _times(name: str, given: Any) -> int:
     found = int(given or 0) if plain else as_count(given)
     if found is None or found < 0:
         raise UsageError(
-            f"event {name}: terminal must be true, false, or at which time it ends the run (1, 2, ...), "
+            f"event {name}: terminal must be true, false, or the number of events that ends the run (1, 2, ...), "
             f"not {shown(given)}"
         )
     return found
@@ -286,8 +286,8 @@ def warn_of_unknown(names: Sequence[str]) -> None:
     """Tell the line of the user's that called of events that were no number throughout a run."""
     if names and not _SILENT.get():
         warnings.warn(
-            f"event{'s' * (len(names) > 1)} {', '.join(names)}: no number (NaN) at any step of the run, so nothing was "
-            "found; look for a logarithm, root or quotient outside its domain",
+            f"event{'s' * (len(names) > 1)} {', '.join(names)}: the value was not a number (NaN) at every step, so "
+            "nothing was found; look for a logarithm, root or quotient outside its domain",
             stacklevel=calls_within() + 1,
         )
 

@@ -43,7 +43,7 @@ def simulate_impacts(
     most: int = 1000,
     **options: Any,
 ) -> ImpactRun:
-    """Integrate, with an impact whenever a gap closes.
+    """Integrate the equations of motion, with an impact whenever a gap closes.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def simulate_impacts(
     initial, parameters, inputs : optional
         As for ``simulate``.
     most : int
-        Impacts after which the run is given up: they accumulate as a body comes to rest.
+        Number of impacts after which the run ends: impacts accumulate as a body comes to rest.
     **options
         method, rtol, atol, max_step, first_step, as for ``simulate``.
 
@@ -68,14 +68,14 @@ def simulate_impacts(
     Raises
     ------
     UsageError
-        A gap is negative at the start, an unknown name, or a mechanism without freedom.
+        A gap is negative at the start, a name is unknown, or the mechanism has no degree of freedom.
     SimulationError, AssemblyError, MissingDependencyError
         As for ``simulate``; also where a gap is found negative without an impact before.
     """
     for key in ("events", "t_eval", "dense_output"):
         if key in options:
             raise UsageError(
-                f"simulate_impacts has no {key}=; the run it returns has t_events, and at(t) for any times"
+                f"simulate_impacts has no {key}=; use t_events of the run that it returns, and at(t) for any times"
             )
     most = read_count("most, the number of impacts,", most, 1)
     found, _ = check_gaps(module.layout, gaps)
@@ -100,8 +100,8 @@ def _ending(module: BoundModel) -> list[str]:
     for event in declared:
         if int(event.get("terminal") or 0) > 1:
             raise UsageError(
-                f"event {event['name']} ends a run when it has happened {event['terminal']} times, which "
-                "simulate_impacts does not count; give the gaps as events with restitution, and simulate"
+                f"event {event['name']} ends a run after {event['terminal']} times, and simulate_impacts cannot "
+                "count them; give the gaps as events with restitution, and use simulate"
             )
     return [str(event["name"]) for event in declared if event.get("terminal")]
 
@@ -136,7 +136,7 @@ class _ImpactRun:
         values = self.gaps.values(t, x)
         low = values < -np.maximum(self.limits, allowance(self.module.layout, self.gaps.names, BEYOND))
         for i in np.flatnonzero(low):
-            raise UsageError(f"gaps: {self.gaps.names[i]} is {values[i]:.3g} at the start; a gap is 0 or positive")
+            raise UsageError(f"gaps: {self.gaps.names[i]} is {values[i]:.3g} at the start; a gap must be 0 or positive")
         fired, idle = np.zeros(len(values), dtype=bool), 0
         while True:
             closed = fired | (self.gaps.values(t, x) <= self.limits)
@@ -270,5 +270,5 @@ class _ImpactRun:
             i = int(np.flatnonzero(beyond[:, k])[0])
             raise SimulationError(
                 f"the gap {self.gaps.names[i]} is {values[i, k]:.6g} at t = {t[k]:.6g} s without an impact before: "
-                "it jumps there, or closes and opens within less than a step; give max_step"
+                "it jumps there, or it closes and opens within one step; give max_step"
             )

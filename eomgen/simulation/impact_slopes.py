@@ -129,7 +129,7 @@ def after_reset(
     if off > OFF:
         raise NoDerivativeError(
             f"{what} resets coordinates to values that do not close the loops (the projection moves them by {off:.2g}, "
-            "scaled): its derivative there is not known; reset all coordinates so that the loops stay closed"
+            "scaled), so the derivative is not known; reset all coordinates so that the loops stay closed"
         )
     strike, scales = Strike(module, t, x), layout.scales
     dq = dq - _back(run, module, strike, dq, move)

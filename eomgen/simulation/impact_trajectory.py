@@ -35,7 +35,7 @@ class ImpactRun(Trajectory):
     def of(
         cls, parts: tuple[Any, ...], impacts: Sequence[tuple[float, Impact]], breaks: Sequence[int], ended: str
     ) -> ImpactRun:
-        """What a Trajectory is made of, and the impacts."""
+        """Make the run from the parts of a Trajectory and the impacts."""
         run = cls(*parts)
         run.impacts, run.breaks, run.ended = list(impacts), list(breaks), ended
         return run
@@ -51,7 +51,7 @@ class ImpactRun(Trajectory):
 
     @property
     def count(self) -> str:
-        """How many impacts there were, and how it ended."""
+        """The number of impacts and the reason for the end, as a text."""
         reasons = {
             "end": "",
             "impacts": "; as many as allowed (most=)",

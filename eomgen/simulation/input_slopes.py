@@ -99,6 +99,6 @@ class AtOneState:
         except Exception:
             self.function(t, x)  # a fault of its own comes out as it is
         raise UsageError(
-            f"input {self.name} is a Python function that reads the state, whose derivatives are not known: give it as "
-            'an expression in a text, such as "-k*theta", or as a function of time alone'
+            f"input {self.name} is a Python function of the state, and its derivatives are not known; give it as an "
+            'expression in a text, such as "-k*theta", or as a function of time alone'
         )

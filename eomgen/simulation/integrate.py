@@ -320,8 +320,8 @@ def require_end(solution: Solution, end: float) -> None:
     """
     if solution.status == 0 and solution.ends[1] != end:
         raise SimulationError(
-            f"the integrator says that it is at the end, t = {end:.6g} s, and is at t = {solution.ends[1]:.6g} s: "
-            "a fault of the integrator (of eomgen, unless the method is your own); run in parts, or take another method"
+            f"the integrator reports the end, t = {end:.6g} s, but stopped at t = {solution.ends[1]:.6g} s; this is "
+            "a fault of the integrator (of eomgen, unless the method is your own); run in parts, or use another method"
         )
 
 

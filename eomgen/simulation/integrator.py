@@ -32,7 +32,7 @@ OPTIONS = ("method", "rtol", "atol", "max_step", "first_step", "step")
 
 
 class Integrator:
-    """Integrates from one state to another, again and again, with all that stays the same checked beforehand.
+    """Integrates from one state to another many times; everything that stays the same is checked only once.
 
     A call costs a microsecond or two besides the steps themselves, and no call depends on those before it.
 
@@ -74,7 +74,7 @@ class Integrator:
                 f"{module.name} has no degree of freedom to integrate: its drivers determine the motion; use simulate"
             )
         if Events(module.layout, None).resets:
-            raise UsageError(f"events of {module.name} reset its state, and an integrator watches none; simulate it")
+            raise UsageError(f"events of {module.name} reset its state, and an integrator finds no events; simulate it")
         self._given = (module, method, rtol, atol, max_step, first_step, step)
         self.module, self.method = module, method
         self._step = check_method(method, step)
@@ -91,7 +91,7 @@ class Integrator:
             self._compiled = make(method, module.kernels.context, 0.0, nowhere, 1.0, plan=plan, **settings)
             self._compiled.make_stall_check = self._stall_check
         elif step is not None:
-            raise UsageError("method RK4 runs in compiled code only: target='cython'")
+            raise UsageError("method RK4 needs compiled code: use target='cython'")
         else:
             choose_solver(method)
 
@@ -131,7 +131,7 @@ class Integrator:
             if not isfinite(end):
                 raise ValueError(f"t + h must be finite, not {t} + {h}")
             if end == t and h != 0.0:
-                raise ValueError(f"h = {h} is lost in rounding at t = {t}")
+                raise ValueError(f"h = {h} is too small at t = {t}: t + h equals t in double precision")
             if "max_step" in self._options:
                 require_steps("max_step" if self._step is None else "step", self._options["max_step"], t, end)
             advance = self._plainly if self._compiled is None else self._compiled.advance
@@ -202,7 +202,7 @@ class Integrator:
 def integrator(
     module: BoundModel, /, parameters: Any = None, inputs: Any = None, *, method: str | None = None, **options: Any
 ) -> Integrator:
-    """An integrator held ready, for many short integrations: control, shooting, filters, learning.
+    """Make an integrator for many short integrations, as in control, shooting methods, filters and learning.
 
     Parameters
     ----------

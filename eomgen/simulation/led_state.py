@@ -64,8 +64,8 @@ def find_led_state(layout: Layout, forcing: Forcing, t: float, assembled: Callab
     names = ", ".join(layout.u[i] for i in places)
     given, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
     raise AssemblyError(
-        f"the inputs {names} change with the state that the constraints give at t = {t:.6g} s, and no "
-        f"state was found that fits both: the last one was assembled with {given} and gives them as {gives}; "
+        f"the inputs {names} change with the state that the constraints give, and no state that fits both was found at "
+        f"t = {t:.6g} s: the last state was assembled with {given}, but there the inputs are {gives}; "
         "give initial values nearer to such a state, or write the inputs in t",
         [],
     )

@@ -49,8 +49,8 @@ def refuse_lost_branches(module: BoundModel, forcing: Forcing, run: Trajectory, 
             length = float(np.linalg.norm(C[:, k]))
             if length > 0.0 and float(np.linalg.norm(lost.T @ C[:, k])) > OPENS * length:
                 raise NoDerivativeError(
-                    f"the run passes a change point at t = {point.time:.6g} s, and a change of {name} opens the "
-                    f"crossing of its branches there, so that there is no derivative by {name}; end the run before"
+                    f"the run passes a change point at t = {point.time:.6g} s, and a change of {name} separates the "
+                    f"branches that meet there, so there is no derivative by {name}; end the run before it"
                 )
 
 

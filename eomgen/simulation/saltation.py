@@ -49,7 +49,7 @@ class Saltation:
     ) -> None:  # fmt: skip
         if events.functions:
             raise UsageError(
-                f"event {events.functions[0].name} is a Python function, whose derivatives are not known: give its "
+                f"event {events.functions[0].name} is a Python function, and its derivatives are not known; give its "
                 "expression as a text"
             )
         self.run, self.events, self.span, self.tolerances, self.corners = run, events, span, tolerances, corners
@@ -142,7 +142,7 @@ class Saltation:
             if j in self.run.forcing.varying and layout.u[j] not in layout.input_rates:
                 raise NoDerivativeError(
                     f"event {self.events.declared[index]['name']}: the gap moves with input {layout.u[j]}, and the "
-                    "derivative of such an impact is not derived; write the motion into the gap's expression"
+                    "derivative of such an impact is not available; write the motion into the gap's expression"
                 )
 
     # -- the time of an event -------------------------------------------------------------------------------------
@@ -178,8 +178,8 @@ class Saltation:
             if needed:
                 raise NoDerivativeError(
                     f"event {name} at t = {t:.6g} s only grazes its surface (its rate is {rate:.3g}): "
-                    "the run has no derivative there, nor where impacts die away; end it before, or take tighter "
-                    "tolerances if it does cross"
+                    "the run has no derivative there, nor where impacts die away; end the run before it, or give "
+                    "tighter tolerances if the event does cross"
                 )
             return np.full(S.shape[1], np.nan)
         along = self.run.move(t, x, S).along(gradient, f"event {name}", self.module.layout.u)
@@ -223,7 +223,8 @@ class Saltation:
                 raise self._at_an_end(t, self.names[own], what)
         if any(abs(t - corner) <= near for corner in self.corners):
             raise NoDerivativeError(
-                f"event {self.names[own]} happens at t = {t:.6g} s, at which an input jumps or bends: the run has no "
+                f"event {self.names[own]} happens at t = {t:.6g} s, exactly where an input jumps or bends; the run "
+                "has no "
                 "derivative there"
             )
 
@@ -247,12 +248,12 @@ class Saltation:
     @staticmethod
     def _at_an_end(t: float, name: str, what: str) -> NoDerivativeError:
         return NoDerivativeError(
-            f"event {name} happens at the {what} of the run, t = {t:.6g} s: a small change takes it "
-            "out of the run, which has no derivative there; take another span"
+            f"event {name} happens at the {what} of the run, t = {t:.6g} s, so a small change can move it "
+            "out of the run, which has no derivative there; give another span"
         )
 
     def _at_once(self, t: float, names: Sequence[str]) -> NoDerivativeError:
         return NoDerivativeError(
-            f"the events {' and '.join(names)} happen at once at t = {t:.6g} s: which comes first after a small change "
-            "decides what follows, so that the run has no derivative there"
+            f"the events {' and '.join(names)} happen at once at t = {t:.6g} s; a small change decides which of them "
+            "comes first, so the run has no derivative there"
         )

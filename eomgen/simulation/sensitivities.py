@@ -186,7 +186,7 @@ def _refuse_change_point(module: BoundModel, forcing: Forcing, t: float, x: Arra
     if singular_values(module, np.array([t]), x[:, None], u)[0, module.layout.rank - 1] < SINGULAR:
         raise NoDerivativeError(
             f"the run passes a change point at t = {t:.6g} s{place(module.layout.x, x)}: the mobility changes there, "
-            "and a small change of a parameter may close or open the branch, so there is no derivative; end the run "
+            "and a small change of a parameter can close or open the branch, so there is no derivative; end the run "
             "before it"
         )
 
@@ -201,8 +201,8 @@ def _require_same(found: Trajectory, alone: Trajectory) -> None:
     for name, ours, theirs in zip(found.t_events.names, found.t_events, alone.t_events, strict=True):
         if len(ours) != len(theirs):
             raise SimulationError(
-                f"event {name} is found {len(theirs)} times by simulate and {len(ours)} times together with the "
-                "derivatives: it comes and goes within one step of the solver; give max_step"
+                f"event {name} is found {len(theirs)} times by simulate, but {len(ours)} times together with the "
+                "derivatives, because it comes and goes within one step of the solver; give max_step"
             )
 
 

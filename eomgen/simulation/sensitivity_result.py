@@ -76,7 +76,7 @@ class Sensitivities:
 
     def __getitem__(self, key: tuple[str, str]) -> Array:
         if not (isinstance(key, tuple) and len(key) == 2):
-            raise UsageError(f"ask for sensitivities[state or output, parameter], not {key!r}")
+            raise UsageError(f"write sensitivities[state or output, parameter], not {key!r}")
         what, name = key
         if what not in self._rows:
             raise unknown("state or output", what, self._rows)

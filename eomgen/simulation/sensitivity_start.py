@@ -66,14 +66,14 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
         elif name in (*layout.x, *layout.loops, *layout.loop_rates):
             which = f"{', '.join(held)} {'are' if len(held) > 1 else 'is'}" if held else "nothing is"
             raise UsageError(
-                f"{name} is not held at the start ({which}), so nothing depends on it alone; name it in hold="
+                f"{name} is not held at the start ({which}), so there is no derivative by it; name it in hold="
             )
         else:
             raise unknown("parameter, input or initial value", name, (*layout.p, *layout.u, *held))
     if not names:
         raise UsageError("name at least one parameter, input or initial value")
     if len(set(names)) != len(names):
-        raise UsageError(f"each name counts once: {', '.join(names)}")
+        raise UsageError(f"give each name only once: {', '.join(names)}")
     return Differentiated(tuple(names), tuple(parameters), tuple(inputs), tuple(initial))
 
 
@@ -85,7 +85,7 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
     q, found = x[: layout.n_q], []
     if outputs := [name for name in given or () if name in layout.y or place_of_marker(name)]:
         raise UsageError(
-            f"the start is differentiated where coordinates and rates are held, not {', '.join(outputs)}; give the "
+            f"derivatives need a start with held coordinates and rates, not {', '.join(outputs)}; give the "
             "coordinates that x0(...) finds for it"
         )
     declared, chosen = initial.sort(layout.initial), initial.sort(dict(given or {}))
@@ -135,7 +135,7 @@ def start_sensitivity(
     wanted = {name: np.zeros(count) for name in held}
     for column, name in columns.initial:
         if len(initial.gradients(x[:n_q], name)) != 1:
-            raise UsageError(f"{name} cannot change alone; take the angular velocity, or rotation: euler_angles")
+            raise UsageError(f"{name} cannot change alone; use the angular velocity, or rotation: euler_angles")
         wanted[name][column] = 1.0
     N = scales.rates(x[:n_q], np.eye(n_v))
     # positions

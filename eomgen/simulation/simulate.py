@@ -71,10 +71,10 @@ def simulate(
         Those not named keep their bound values.
     inputs : mapping of str to number, (times, values), Signal, expression or callable f(t, x), optional
         Tables are linear in between (a :class:`~..runtime.signals.Signal` may hold the last value, or be a cubic
-        spline) and constant outside; their corners are stepped on exactly.  An expression is a text as in model
+        spline) and constant outside; steps end exactly at their corners.  An expression is a text as in model
         files, of t, coordinates, velocities and parameters.
-        Rates of an input that the equations need (``u_dot``, ``u_ddot`` among ``u_names``) follow from it; a function
-        of which none is known is refused unless they are given beside it.
+        Rates of an input that the equations need (``u_dot``, ``u_ddot`` among ``u_names``) are derived from it; for a
+        function without a method ``derivative`` they must be given too.
     method : str or OdeSolver subclass, optional
         A method of SciPy: RK23, RK45, DOP853 (default), Radau (stiff), BDF, LSODA.  The first four run in compiled code
         with SciPy's steps unless there are inputs that are functions; in large mechanisms with loops (more than 8
@@ -134,7 +134,7 @@ def simulate(
 
         kept = Checkpoint(checkpoint, checkpoint_every, resume)
     elif resume is not None:
-        raise UsageError("resume needs checkpoint=, the file to go on from")
+        raise UsageError("resume needs checkpoint=, the file to continue from")
     if (isinstance(method, str) and method == "kinematic") or (method is None and not module.n_dof):
         from .driven import follow_drivers
 
@@ -150,7 +150,7 @@ def simulate(
     forcing = Forcing(module.layout, inputs)
     compiled = can_run(module, method, forcing) and options.keys().isdisjoint(IMPLICIT)
     if method == "RK4" and not compiled:
-        raise UsageError("method RK4 runs in compiled code only: target='cython', and no input that is a function")
+        raise UsageError("method RK4 needs compiled code: use target='cython', and no input that is a function")
     if compiled:
         solver, title = None, str(method)
         check_names("option of simulate", options, (), OPTIONS)

@@ -49,8 +49,8 @@ class Pause:
         name = solver.__name__
         if name not in STATE or not solver.__module__.startswith("scipy."):
             raise UsageError(
-                f"no checkpoint can be kept with method {name}: its state cannot be read; "
-                f"take one of {', '.join(STATE)}"
+                f"a run with method {name} cannot keep a checkpoint, because its state cannot be read; "
+                f"use one of {', '.join(STATE)}"
             )
         if dense:
             raise UsageError(
@@ -130,11 +130,11 @@ class Pause:
         for name in self.names:
             parts = [kept[f"solver_{name}_{i}"] for i in range(2) if f"solver_{name}_{i}" in kept]
             if any(part.dtype.kind not in "bifc" for part in parts):
-                raise ValueError(f"{name} is no number")
+                raise ValueError(f"{name} is not a number")
             if len(parts) == 2:  # a matrix and the rows that were exchanged
                 matrix, rows = parts
                 if matrix.shape != (n, n) or rows.shape != (n,) or not np.isin(rows, np.arange(n)).all():
-                    raise ValueError(f"{name} is no factored matrix of {n} rows")
+                    raise ValueError(f"{name} is not a factored matrix of {n} rows")
                 self.carried[name] = (matrix, rows.astype(np.int32))
             elif not parts:
                 self.carried[name] = None

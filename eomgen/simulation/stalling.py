@@ -20,7 +20,7 @@ from .stalled import Crawling
 WINDOW = 200  #: steps judged together
 MANY = 100_000  #: steps left that a run may take at any stall_check
 REMEDY = (
-    "look for a force that jumps (smooth it), a singular position, or motions far faster than the run is long (try an "
+    "look for a force that jumps (smooth it), a singular position, or very fast motions in a long run (try an "
     "implicit method, Radau)"
 )
 
@@ -79,15 +79,15 @@ class StallCheck:
         """Refuse to go on for ever, or to fill the memory."""
         if self.taken * self.kept > MOST_NUMBERS:
             raise SimulationError(
-                f"the run has taken {self.taken} steps to t = {t:.6g} s of {self.end:.6g} s, and no more are kept; "
-                "take a shorter span, or in Python give the times to store, t_eval"
+                f"the run has taken {self.taken} steps up to t = {t:.6g} s of {self.end:.6g} s, and more cannot be "
+                "kept; give a shorter span, or in Python the times to store, t_eval"
             )
         wanted, gone = abs(self.end - t) * self.taken, abs(t - self.start)
         if (self.taken > ENOUGH and wanted > ENDLESS * gone) or (self.taken > FEW and wanted > HOPELESS * gone):
             more = abs(self.end - t) / max(abs(t - self.start), TINY) * self.taken
             raise SimulationError(
-                f"the run has taken {self.taken} steps to t = {t:.6g} s and needs {more:.1e} more to "
-                f"t = {self.end:.6g} s, which would not end; take a shorter span, or looser tolerances"
+                f"the run has taken {self.taken} steps up to t = {t:.6g} s and needs {more:.1e} more to reach "
+                f"t = {self.end:.6g} s, which would take too long; give a shorter span, or looser tolerances"
             )
 
 

@@ -133,13 +133,13 @@ def solver_class(core: Any, name: str) -> Any:
 
 def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:
     """In place of a class that SciPy does not have."""
-    raise UsageError("method Taylor takes the rhs of its module, with its inputs constant, and no other function")
+    raise UsageError("method Taylor can integrate only the rhs of its module, with constant inputs")
 
 
 def step(
     module: BoundModel, /, t: float, x: ArrayLike, h: float, u: ArrayLike | None = None, out: Array | None = None
 ) -> Array:
-    """One Runge-Kutta step (order 4) of size h, for real time: every step costs the same.
+    """Take one Runge-Kutta step (order 4) of size h, for real time: every step takes the same work.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def step(
     """
     if module.layout.n_events and Events(module.layout, None).resets:
         raise UsageError(
-            f"events of {module.name} reset its state, and a single step watches none; simulate over (t, t + h)"
+            f"events of {module.name} reset its state, and a single step finds no events; simulate over (t, t + h)"
         )
     core = eager(module.core)
     if hasattr(core, "march"):

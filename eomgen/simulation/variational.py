@@ -37,7 +37,7 @@ class Move(NamedTuple):
         by_u = slopes[:, n_x + 1 : n_x + 1 + n_u]
         for j in np.flatnonzero(by_u.any(axis=0) & ~np.isfinite(self.u).all(axis=1)):
             raise UsageError(
-                f"{what} depends on input {names[j]}, a Python function whose rate is not known: give it as an "
+                f"{what} depends on input {names[j]}, a Python function, and its rate is not known; give it as an "
                 "expression in a text, or as a table"
             )
         known = np.isfinite(self.u).all(axis=1)

@@ -47,11 +47,13 @@ def measure_mesh(path: str) -> MeshProperties:
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror}") from None
     if not S_ISREG(stat.st_mode):
-        raise UsageError(f"{path} is no plain file")
+        raise UsageError(f"{path} is not a plain file")
     if not path.lower().endswith(".stl"):
         raise UsageError(f"{path}: only STL files (.stl) can be read")
     if stat.st_size > MESH:
-        raise UsageError(f"{path} has {stat.st_size:,} bytes; at most {MESH:,}: leave out triangles")
+        raise UsageError(
+            f"{path} has {stat.st_size:,} bytes, and {MESH:,} is the most; use a mesh with fewer triangles"
+        )
     return _measure(os.path.abspath(path), stat.st_mtime_ns, stat.st_size)
 
 
@@ -71,7 +73,7 @@ def _measure(path: str, _changed: int, _size: int) -> MeshProperties:
     finally:
         log.disabled = told
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0 or not np.isfinite(mesh.vertices).all():
-        raise UsageError(f"{path} holds no triangles, or vertices that are not finite")
+        raise UsageError(f"{path} has no triangles, or vertices that are not finite")
     if not mesh.is_watertight:
         raise UsageError(f"{path} does not bound a solid: its surface has holes (edges of one triangle only)")
     if not mesh.is_winding_consistent:

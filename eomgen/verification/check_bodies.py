@@ -171,7 +171,7 @@ def _power(bench: Bench) -> Finding:
     """
     check = "power: rate of energy, forces and drivers"
     if bench.mechanism.bare or "energy" not in bench.graph_kernels:
-        return Finding.skipped(check, "there are no bodies, so that it is not known which forces have a potential")
+        return Finding.skipped(check, "there are no bodies, so it is not known which forces have a potential")
     found, layout = Comparison(check), bench.layout
     for k, truth in enumerate(bench.truths):
         a = bench.rhs(truth.case)[bench.module.n_q :]

@@ -105,7 +105,7 @@ def _along(bench: Bench) -> Finding:
         why = "the mass matrix is not written out" if bench.terms.by_columns else "rates of coordinates are given"
         return Finding.skipped(check, why)
     if not bench.module.n_dof:
-        return Finding.skipped(check, "the constraints leave no motion")
+        return Finding.skipped(check, "the constraints allow no motion")
     found, rng = Comparison(check), np.random.default_rng(1)
     for k, truth in enumerate(bench.truths):
         case = truth.case
@@ -227,7 +227,7 @@ def _compare(
         slopes.append(slope)
         errors.append(error)
     if left_out:
-        found.note = f"without {', '.join(left_out)}: no state nearby"
+        found.note = f"without {', '.join(left_out)}: no consistent state was found nearby"
     expected, error = np.array(slopes).T, np.array(errors).T
     size = max(size_of(expected), size_of(bench.rhs(bench.cases[0])), least)
     limit = error + rounding * size

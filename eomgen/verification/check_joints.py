@@ -27,7 +27,7 @@ def check(bench: Bench) -> list[Finding]:
 
 def _rigid(bench: Bench) -> Finding:
     """R^T R = 1 and det R = 1 for every body."""
-    check = "poses: rotations are rotations"
+    check = "poses: rotation matrices are orthonormal"
     if not bench.layout.n_bodies:
         return Finding.skipped(check, "there are no bodies")
     found = Comparison(check)
@@ -63,7 +63,7 @@ def _joints(bench: Bench) -> Finding:
     Joints of the tree and cut ones alike, which tells whether loops have all the equations they need; joints without
     coordinates by their own equations.
     """
-    check = "joints: ends where their coordinates say"
+    check = "joints: poses match their coordinates"
     if not bench.mechanism.joints:
         return Finding.skipped(check, "there are no joints")
     found, graph = Comparison(check), bench.kinematics.graph

@@ -50,7 +50,7 @@ def _derived(bench: Bench) -> list[Finding]:
 
 def _batches(bench: Bench) -> Finding:
     """A batch gives what single calls give; the vector library's functions may differ by units in the last place."""
-    module, found = bench.module, Comparison("batches: as single calls")
+    module, found = bench.module, Comparison("batches: same as single calls")
     case = bench.cases[0]
     rng = np.random.default_rng(COLUMNS)
     q = case.q[:, None] + 0.1 * rng.standard_normal((module.n_q, COLUMNS))

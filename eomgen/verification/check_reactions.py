@@ -37,7 +37,7 @@ def _inapplicable(bench: Bench) -> str:
     if not bench.layout.projects:
         return "derived with baumgarte="
     if bench.mechanism.constraints:
-        return "constraint elements act on bodies too, and reactions are those of joints"
+        return "constraint elements act on bodies too, and reactions contain only the joints"
     plain = {s.coordinates[0] for s in bench.mechanism.joints if isinstance(s.joint, (*TURNING, Prismatic))}
     loaded = {load.coordinate for terms in bench.kinematics.forces for load in terms.coordinate_loads}
     loaded |= {s.coordinates[0] for s in bench.mechanism.joints if s.armature is not None}

@@ -33,7 +33,7 @@ def context() -> Any:
     try:
         from mpmath import MPContext  # type: ignore[import-untyped]
     except ImportError:
-        message = "verify compares with 50 digits, for which it needs mpmath (it comes with SymPy); pip install mpmath"
+        message = "verify computes with 50 digits and needs mpmath for this (it comes with SymPy): pip install mpmath"
         raise MissingDependencyError(message) from None
     made = MPContext()
     made.dps = DIGITS

@@ -13,7 +13,7 @@ HEADER = ("", "check", "worst", "limit", "where")
 
 
 class Finding(NamedTuple):
-    """What one check found: the worst figure over all states tried, beside the limit that rounding allows."""
+    """The result of one check: the worst figure over all states tried, and the limit that rounding allows."""
 
     check: str  #: what was compared, such as "accelerations: free-body balance"
     worst: float  #: the largest difference found, relative to the size of what was compared; nan where left out
@@ -52,7 +52,7 @@ class Finding(NamedTuple):
 
 
 class Verification(NamedTuple):
-    """All findings about one model."""
+    """The results of all checks of one model."""
 
     name: str  #: of the model
     findings: tuple[Finding, ...]
@@ -70,7 +70,7 @@ class Verification(NamedTuple):
 
     @property
     def breaches(self) -> tuple[Finding, ...]:
-        """The checks that do not keep their limits."""
+        """The checks whose figures exceed their limits."""
         return tuple(finding for finding in self.findings if not finding.ok)
 
     @property
@@ -92,7 +92,7 @@ class Verification(NamedTuple):
         left_out = len(self.findings) - len(checked)
         ending = f"{len(checked)} checks, {len(self.breaches)} breaches"
         ending += f", {left_out} left out" if left_out else ""
-        ending += f", {self.not_reached} of them not reached: give more seconds" if self.not_reached else ""
+        ending += f", {self.not_reached} of them for lack of time: give more seconds" if self.not_reached else ""
         return f"verification of {self.name}\n\n{self.table}\n\n{'ok' if self.ok else 'BREACH'}: {ending}"
 
     def __repr__(self) -> str:

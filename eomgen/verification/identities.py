@@ -38,7 +38,7 @@ def identities(module: BoundModel, cases: Sequence[Case]) -> list[Finding]:
     found = []
     for name, check in CHECKS.items():
         if module.metadata.get("no_inertia") and check not in KINEMATIC:
-            found.append(Finding.skipped(name, "the model is there for kinematics only"))
+            found.append(Finding.skipped(name, "the model is for kinematics only"))
             continue
         try:
             found.append(check(module, cases))
@@ -61,7 +61,7 @@ def _definite(module: BoundModel, cases: Sequence[Case]) -> Finding:
     if not module.n_dof or module.layout.given_rates:
         return Finding.skipped(check, "there is no degree of freedom" if not module.n_dof else "equations are given")
     if module.metadata.get("indefinite"):
-        return Finding.skipped(check, "the model allows masses and inertias that no body has")
+        return Finding.skipped(check, "the model accepts masses and inertias that no body can have")
     found = Comparison(check, "asymmetry; or the smallest eigenvalue at unit diagonal, sign reversed")
     for c in cases:
         M = module.embedded_mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
@@ -121,7 +121,7 @@ def _along_q(module: BoundModel, c: Case, way: Array) -> Callable[[float], Array
 
 def _projection(module: BoundModel, cases: Sequence[Case]) -> Finding:
     """Projected twice is projected once; loops are closed there, and at ``x0``."""
-    found, scales = Comparison("project: idempotent, loops closed, as x0 leaves them"), module.layout.scales
+    found, scales = Comparison("project: idempotent, closes loops, keeps x0"), module.layout.scales
     for c in cases:
         x = module.project(c.x, t=c.t, p=c.p, u=c.u)
         again = module.project(x, t=c.t, p=c.p, u=c.u)
@@ -170,7 +170,7 @@ def condition_at(module: BoundModel, c: Case) -> float:
 
 def _holding(module: BoundModel, cases: Sequence[Case]) -> Finding:
     """d/dt (C_q v + C_t) = 0 along x' = rhs, inputs moving at their rates where those are inputs too."""
-    check = "rhs: constraints go on holding"
+    check = "rhs: constraints stay satisfied"
     if not module.n_rows or not module.layout.projects:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "derived with baumgarte=")
     found = Comparison(check)
@@ -225,9 +225,9 @@ CHECKS: dict[str, Check] = {
     "energy: T = v M v / 2": _kinetic,
     "inverse_dynamics: M a + h": _inverse,
     "constraint_jacobian: extrapolated differences": _slopes,
-    "project: idempotent, loops closed, as x0 leaves them": _projection,
+    "project: idempotent, closes loops, keeps x0": _projection,
     "rhs: forces in balance along free motions": _balance,
-    "rhs: constraints go on holding": _holding,
+    "rhs: constraints stay satisfied": _holding,
     "minimal: the same accelerations": _minimal,
 }
 #: Those that need no inertia.

@@ -66,7 +66,7 @@ def _compare(module: BoundModel, check: str, name: str, by: str, cases: Sequence
             found.add(c.number, *compared, size, pairs([f"{n}'" for n in layout.x], [label]))
     found.cases = len(cases)
     if left_out:
-        found.note = f"without {', '.join(sorted(left_out))}: no state nearby"
+        found.note = f"without {', '.join(sorted(left_out))}: no consistent state was found nearby"
     return found.finding()
 
 

@@ -32,16 +32,16 @@ def recorded_findings(module: BoundModel, file: Path | None = None) -> list[Find
     try:
         data: dict[str, Any] = json.loads(place.read_text(encoding="utf-8"))
         if data["name"] != module.name:
-            return [_unusable(f"{FILE} is that of the model {str(data['name'])[:80]!r}")]
+            return [_unusable(f"{FILE} belongs to the model {str(data['name'])[:80]!r}")]
         found = [_compare(module, name, figures, data["states"]) for name, figures in data["kernels"].items()]
     except (EomgenError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         return [_unusable(f"{FILE} is damaged ({type(error).__name__}: {str(error)[:80]})")]
-    return found or [Finding.skipped("recorded figures", f"{FILE} has none: all kernels call code in C")]
+    return found or [Finding.skipped("recorded figures", f"{FILE} has no figures, because all kernels call code in C")]
 
 
 def _unusable(why: str) -> Finding:
     """Figures that cannot be compared are a breach: nothing else tells a package that is not what was generated."""
-    return Finding("recorded figures", FAILED, 0.0, note=f"{why}; install it again, or generate it anew")
+    return Finding("recorded figures", FAILED, 0.0, note=f"{why}; install the package again, or generate it anew")
 
 
 def _compare(module: BoundModel, name: str, figures: list[dict[str, Any]], states: list[dict[str, Any]]) -> Finding:

@@ -47,8 +47,8 @@ def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, second
     seed : int
         Of the states.
     seconds : float
-        Time for all of it.  Variants of the model, the same mechanism described differently, have what is left, and
-        at least 2 s; those that are not reached are left out and counted.
+        Time for all checks.  Variants of the model (the same mechanism described differently) get the time that is
+        left, and at least 2 s; variants for which no time is left are counted.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, second
     MissingDependencyError
         mpmath or SciPy is not installed.
     UsageError
-        ``states``, ``seed`` or ``seconds`` is none.
+        ``states``, ``seed`` or ``seconds`` is not a valid number.
 
     Notes
     -----
@@ -88,7 +88,9 @@ def _read(states: object, seed: object, seconds: object) -> tuple[int, int]:
         or not isinstance(seconds, int | float | np.integer | np.floating)
         or not seconds >= 0.0
     ):
-        raise UsageError(f"verify: seconds must be the time for all of it, a number from 0, not {shown(seconds)}")
+        raise UsageError(
+            f"verify: seconds must be the time for all checks, a number of 0 or more, not {shown(seconds)}"
+        )
     most = read_count("verify: states, the number of random states,", states, 1, MOST_STATES)
     return most, read_count("verify: seed, of the random states,", seed)
 
@@ -102,7 +104,7 @@ def _of_module(module: BoundModel, states: int, seed: int) -> list[Finding]:
     equations = getattr(module, "equations", None)
     if equations is None:
         found += jacobians(module, cases)
-        why = "they need the equations, which a package does not carry: verify the model that it was made from"
+        why = "they need the equations, and a package does not contain them: verify the model that it was made from"
         found.append(Finding.skipped("graph, free bodies, derivatives, runs", why))
     else:
         found += _with_equations(module, equations, cases)
@@ -115,7 +117,7 @@ def _of_fixed_bodies(module: BoundModel) -> list[Finding]:
     worst = float(np.abs(R @ np.moveaxis(R, 1, 2) - np.eye(3)).max(initial=0.0))
     why = "the model has no coordinate: its bodies are fixed to ground"
     return [
-        Finding("poses: rotations are rotations", worst, 16.0 * EPS, cases=1),
+        Finding("poses: rotation matrices are orthonormal", worst, 16.0 * EPS, cases=1),
         Finding.skipped("all that moves", why),
     ]
 
@@ -144,9 +146,13 @@ def _variants(module: BoundModel, model: Any, seed: int, seconds: float) -> list
     """Variants of a model or description; left out where it is not known or has no motion to compare."""
     check = "variants: the same mechanism described differently"
     if model is None:
-        return [Finding.skipped(check, "the model is not known: compile with Model.compile, or use eomgen verify")]
+        return [
+            Finding.skipped(
+                check, "the description of the model is not known: compile with Model.compile, or use eomgen verify"
+            )
+        ]
     if module.metadata.get("no_inertia"):
-        return [Finding.skipped(check, "the model is there for kinematics only")]
+        return [Finding.skipped(check, "the model is for kinematics only")]
     if not module.n_x:
         return [Finding.skipped(check, "the model has no coordinate")]
     if why := _only_in_c(getattr(module, "equations", None)):
@@ -164,7 +170,7 @@ def _only_in_c(equations: Derivation | None) -> str:
     """Why nothing but the compiled module can evaluate some equations; empty where Python can."""
     functions = equations.kinematics.graph.functions.values() if equations is not None else ()
     blind = [function.name for function in functions if function.evaluator is None]
-    return f"{', '.join(blind)} is C code without a Python twin, so that nothing else can evaluate it" if blind else ""
+    return f"{', '.join(blind)} is C code without a Python version, so nothing else can evaluate it" if blind else ""
 
 
 def _with_equations(module: BoundModel, equations: Derivation, cases: list[Case]) -> list[Finding]:
@@ -179,7 +185,7 @@ def _with_equations(module: BoundModel, equations: Derivation, cases: list[Case]
     parts = equations.kinematics, equations.mobility, equations.tree
     idle = module.metadata.get("no_inertia")
     if idle:
-        why = f"the model is there for kinematics only: {idle}"
+        why = f"the model is for kinematics only: {idle}"
         found.append(Finding.skipped("bodies, joints, reactions, derivatives, runs", why))
     elif equations.method not in FREE and (note := note_lost_digits(*parts)):
         share = smallest_share(*parts)

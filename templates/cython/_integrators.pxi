@@ -42,7 +42,7 @@ cdef class Integrator(Journey):
             constants = compute_constants(vector(p, MODEL.n_p, "p", ValueError), ValueError)
         result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n, ValueError)
         if not self.turn.acquire(False):
-            raise ValueError("it is at work in another thread; make one for each")
+            raise ValueError("it is already working in another thread; make one integrator for each thread")
         try:
             memcpy(run.y, cnp.PyArray_DATA(state), n * sizeof(double))
             memcpy(run.u, cnp.PyArray_DATA(inputs), MODEL.n_u * sizeof(double))

@@ -74,7 +74,7 @@ cdef method_pointer find_method(str name) except NULL:
                 if seen_series(SERIES) == NULL:
                     raise RuntimeError(
                         f"method Taylor: the series of {MODEL.name.decode()} could not be compiled; "
-                        "a warning said why: mend that and start again, or take DOP853"
+                        "the warning before says why; correct that and start Python again, or use DOP853"
                     )
             return METHODS[i]
     raise ValueError(f"no method {name}")

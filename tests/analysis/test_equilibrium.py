@@ -144,12 +144,12 @@ def test_mistakes(compiled: Compiled) -> None:
     mod = compiled("spring_four_bar")
     for options, message in (
         ({"guess": {"phii": 1.0}}, "did you mean phi"),
-        ({"guess": {"phi_dot": 1.0}}, "name coordinates, not rates"),
+        ({"guess": {"phi_dot": 1.0}}, "name coordinates in it, not rates"),
         ({"hold": {"phi_dot": 1.0}}, "not rates"),
         ({"hold": ["phii"]}, "did you mean phi"),
         ({"unknowns": ["L1"]}, "L0"),
         ({"guess": [1.0]}, "must name coordinates or have shape"),
-        ({"hold": {"phi": 2.0, "psi": 2.0}, "unknowns": ["L0"]}, "2 held coordinates need as many unknowns"),
+        ({"hold": {"phi": 2.0, "psi": 2.0}, "unknowns": ["L0"]}, "2 held coordinates need 2 unknowns"),
     ):
         with pytest.raises(eg.UsageError, match=message):
             mod.equilibrium(**options)

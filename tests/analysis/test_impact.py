@@ -146,7 +146,7 @@ def test_what_is_refused(compiled: Callable[..., Any]) -> None:
     for words, message in (
         ({}, "an impact needs gaps"),
         ({"gaps": {"ss": 0.5}}, r"gaps: no coordinate or output 'ss'"),
-        ({"gaps": {"s": 1.5}}, "restitution of s is between 0 and 1"),
+        ({"gaps": {"s": 1.5}}, "restitution of s must be between 0 and 1"),
         ({"gaps": {"s": None}}, "restitution of s must be a number"),
         ({"gaps": {"s": "a"}}, "restitution of s must be a number"),
         ({"gaps": {"s": [0.5]}}, "restitution of s must be a number"),
@@ -155,20 +155,20 @@ def test_what_is_refused(compiled: Callable[..., Any]) -> None:
         ({"lock": [0]}, "lock must be a list"),
         ({"lock": ["tau"]}, "lock: no coordinate or output 'tau'"),
         ({"gaps": {"speed": 0.5}}, "depends on velocities"),
-        ({"gaps": {"s": 0.5}}, r"gap s is 0\.\d+ m, open; an impact needs 0"),
+        ({"gaps": {"s": 0.5}}, r"gap s is 0\.\d+ m \(open\); an impact needs a gap of 0"),
     ):
         with pytest.raises(eg.UsageError, match=message):
             mod.impact(0.0, x, **words)
     with pytest.raises(eg.UsageError, match="t must be a number"):
         mod.impact("a", x, lock=["s"])
-    with pytest.raises(eg.UsageError, match=r"gap z is -0\.1 m, closed too far"):
+    with pytest.raises(eg.UsageError, match=r"gap z is -0\.1 m \(closed too far\)"):
         ball().impact(0.0, [-0.1, -1.0], {"z": 0.5})
     for words, message in (
-        ({"initial": {"z": 0.0}}, "gap is -0.1 at the start; a gap is 0 or positive"),
+        ({"initial": {"z": 0.0}}, "gap is -0.1 at the start; a gap must be 0 or positive"),
         ({"span": -1.0}, "forward in time"),
         ({"gaps": {}}, "needs gaps"),
         ({"most": 0}, "most, the number of impacts, must be a whole number of at least 1, not 0"),
-        ({"t_eval": [0.0]}, r"no t_eval=; the run it returns has t_events, and at\(t\)"),
+        ({"t_eval": [0.0]}, r"no t_eval=; use t_events of the run that it returns, and at\(t\)"),
     ):
         with pytest.raises(eg.UsageError, match=message):
             ball().simulate_impacts(**{"span": 1.0, "gaps": {"gap": 0.5}, "initial": {"z": 1.0}, **words})

@@ -141,7 +141,7 @@ def test_what_drivers_impose() -> None:
     m.revolute("A", m.ground, m.body("b", mass=1.0), coordinate="a")
     m.driver("d", "A", value="-2*t")
     mod = m.compile(target="numpy")
-    with pytest.raises(eg.UsageError, match="gap a closes at the rate -2, which drivers or constraints impose"):
+    with pytest.raises(eg.UsageError, match="gap a closes at the rate -2, which drivers or constraints prescribe"):
         mod.impact(0.0, mod.x0(), {"a": 0.5})
     with pytest.raises(eg.UsageError, match="has no degree of freedom"):
         mod.simulate_impacts(1.0, {"a": 0.5})

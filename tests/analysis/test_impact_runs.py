@@ -232,5 +232,5 @@ def test_an_event_of_the_model_ends_a_run_with_impacts() -> None:
     run = m.compile(target="numpy").simulate_impacts(2.0, {"h": 0.5})
     assert (run.ended, run.t[-1], len(run.impacts)) == ("event", pytest.approx(0.6, abs=1e-9), 1)
     m.event("often", "h - 0.5", terminal=2)
-    with pytest.raises(eg.UsageError, match="event often ends a run when it has happened 2 times"):
+    with pytest.raises(eg.UsageError, match="event often ends a run after 2 times"):
         m.compile(target="numpy").simulate_impacts(2.0, {"h": 0.5})

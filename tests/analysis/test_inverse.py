@@ -123,11 +123,11 @@ def test_what_is_refused(compiled: Callable[..., Any]) -> None:
     x = crank.x0()
     with pytest.raises(eg.EomgenError, match=r"no coordinate or input 'thet'; did you mean 'theta'\?"):
         crank.actuator_forces(0.0, x, actuated=["thet"])
-    with pytest.raises(eg.EomgenError, match=r"a breaks the constraint C\.r_"):
+    with pytest.raises(eg.EomgenError, match=r"a violates the constraint C\.r_"):
         crank.actuator_forces(0.0, x, np.array([1.0, 2.0, 3.0]))
     with pytest.raises(eg.EomgenError, match=r"a must have shape \(3,\)"):
         crank.actuator_forces(0.0, x, np.zeros(2))
-    with pytest.raises(eg.EomgenError, match="is no independent coordinate"):
+    with pytest.raises(eg.EomgenError, match="is not an independent coordinate"):
         crank.actuator_forces(0.0, x, {"s": 1.0})
-    with pytest.raises(eg.EomgenError, match="each once"):
+    with pytest.raises(eg.EomgenError, match="each only once"):
         crank.actuator_forces(0.0, x, actuated=["theta", "theta"])

@@ -244,7 +244,7 @@ def test_a_range_may_turn_back(free_crank: eg.Module) -> None:
         ({"theta": 0.1}, "there is no range"),
         ({"theta": [0, 1], "s": [0.3, 0.4]}, "theta, s cannot all be prescribed: 1 degree of freedom"),
         ({"thet": [0, 1]}, "no coordinate or rate 'thet'.*theta"),
-        ({"theta": [0, 1], "s_dot": 1}, "s_dot is given, and no values of s"),
+        ({"theta": [0, 1], "s_dot": 1}, "s_dot is given without values of s"),
         ({"theta": [0, 1, 2], "theta_dot": [1, 2]}, "one length, not theta: 3, theta_dot: 2"),
         ({"theta": [0, np.nan]}, "theta must be a finite number"),
         ({"t": [0, 1], "theta": [0, 1]}, "theta varies with t: give theta_dot"),

@@ -155,7 +155,7 @@ def test_the_second_order_form_of_chosen_coordinates(compiled: Compiled) -> None
     np.testing.assert_allclose(M, np.diag([0.625, 0.125]), rtol=1e-12)  # 5/4 m r^2, m r^2/4
     np.testing.assert_allclose(K, np.diag([-9.81, 0.0]), rtol=0, atol=1e-12)  # -m g r
     np.testing.assert_allclose(C, 3.0 * np.array([[0.0, -0.75], [0.25, 0.0]]), rtol=0, atol=1e-12)
-    with pytest.raises(eg.UsageError, match="the rate of x is no independent velocity"):
+    with pytest.raises(eg.UsageError, match="the rate of x is not one of the independent velocities"):
         found.second_order("x")
 
 

@@ -102,7 +102,7 @@ def test_a_standing_disc(compiled: Compiled) -> None:
 
 def test_no_equilibrium_no_modes(compiled: Compiled) -> None:
     mod = compiled("slider_crank")
-    with pytest.raises(eg.UsageError, match="modes are those about an equilibrium"):
+    with pytest.raises(eg.UsageError, match="needs an equilibrium, and at this state"):
         mod.modes(mod.x0())
     assert mod.modes().frequencies.shape == (1,)
 

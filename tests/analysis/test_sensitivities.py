@@ -132,7 +132,7 @@ def test_inputs_over_time(compiled: Compiled) -> None:
     np.testing.assert_allclose(feedback["s", "s_dot"], np.sin(2.0 * times) / 2.0, atol=1e-8)
     timed = mod.sensitivities(["F", "k"], 1.0, inputs={"F": lambda t, x: float(np.interp(t, *table))}, t_eval=times)
     np.testing.assert_allclose(timed.dx, found.dx, atol=1e-6)  # its corners are not stepped on
-    with pytest.raises(eg.UsageError, match="input F is a Python function that reads the state.*expression in a text"):
+    with pytest.raises(eg.UsageError, match="input F is a Python function of the state.*expression in a text"):
         mod.sensitivities(["s_dot"], 1.0, inputs={"F": lambda t, x: -3.0 * x[0]})
 
 
@@ -164,7 +164,7 @@ def test_mistakes_and_files(compiled: Compiled, tmp_path: Path) -> None:
     mod = oscillator().compile(target="numpy")
     for names, options, message in (
         (["kk"], {}, "did you mean k"),
-        (["k", "k"], {}, "each name counts once"),
+        (["k", "k"], {}, "each name only once"),
         ([], {}, "name at least one"),
         (["s_dot"], {"hold": ["s"]}, "s_dot is not held"),
         (["k"], {"hold": ["z"]}, "no coordinate or rate 'z'"),

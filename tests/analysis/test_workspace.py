@@ -254,13 +254,13 @@ def test_tables_files_and_pictures(arm: eg.Module, tmp_path: Path) -> None:
         np.testing.assert_array_equal(data["jacobian"], ws.jacobian)
     rows = ws.save(tmp_path / "ws.csv").read_text().splitlines()
     assert len(rows) == 13
-    assert rows[0].startswith("q1 [rad],q2 [rad],x,y,")
+    assert rows[0].startswith("q1 [rad],q2 [rad],x [m],y [m],")
     with pytest.raises(eg.UsageError, match=r"written as .npz or .csv"):
         ws.save(tmp_path / "ws.txt")
     assert "4 limits" in str(ws)
     assert len(ws.plot()) == 2
     assert ws.plot("condition", ax=ws.plot()[0]) is not None
-    with pytest.raises(eg.UsageError, match="coloured by numbers"):
+    with pytest.raises(eg.UsageError, match="coloured only by a column of numbers"):
         ws.plot("status")
     line = arm.workspace({"q1": (0, 1, 5)}, "x")
     assert len(line.plot()) == 2
@@ -285,10 +285,10 @@ def test_an_exported_package_has_it(arm: eg.Module, tmp_path: Path) -> None:
     ("over", "of", "rest", "said"),
     [
         ({"q9": (0, 1, 3)}, "x", {}, "no coordinate to vary 'q9'"),
-        ({}, "x", {}, "over names coordinates"),
+        ({}, "x", {}, "over must be a mapping of coordinates"),
         ({"q1": (0, 1, 3)}, "z", {}, "no output or coordinate 'z'"),
         ({"q1": (0, 1, 3)}, "speed", {}, "depends on velocities"),
-        ({"q1": (0, 1, 3)}, [], {}, "of names outputs"),
+        ({"q1": (0, 1, 3)}, [], {}, "of must name outputs"),
         ({"q1": (0, 1, 1)}, "x", {}, "from 2 to 10000000, not"),
         ({"q1": [0, 2, 1]}, "x", {}, "rising or falling"),
         ({"q1": (0, 1, 1000), "q2": (0, 1, 1000)}, "x", {}, "1000 x 1000 = 1000000 grid points, more than points="),
@@ -305,7 +305,7 @@ def test_what_it_refuses(arm: eg.Module, over: Any, of: Any, rest: Any, said: st
 
 def test_too_many_or_unreachable() -> None:
     four = models.build("four_bar").compile(target="numpy")
-    with pytest.raises(eg.UsageError, match=r"theta, psi cannot all be varied: 1 degrees of freedom, at most 1"):
+    with pytest.raises(eg.UsageError, match=r"theta, psi cannot all be varied: 1 degrees of freedom; vary at most 1"):
         four.workspace({"theta": (0, 1, 3), "psi": (0, 1, 3)}, "bend")
     with pytest.raises(eg.UsageError, match="no joint of the model has lower or upper limits"):
         four.workspace({"theta": (0, 1, 3)}, "bend", limits=True)

@@ -104,7 +104,7 @@ def test_consistent(call: Call) -> None:
     light, heavy = (abs(call(*words, *rough, "--weight", f"s={w}").json["change"]["s"]) for w in ("1e-4", "1e4"))
     assert heavy < 0.1 * light
     assert call("consistent", CRANK, "--weight", "s", "--target", "numpy").code == 2
-    assert "a rough state has" in call("consistent", CRANK, "--set", "C=1", "--target", "numpy").err
+    assert "the names of a rough state are" in call("consistent", CRANK, "--set", "C=1", "--target", "numpy").err
 
 
 def test_sensitivity(call: Call, tmp_path) -> None:
@@ -162,9 +162,9 @@ def test_impact(call: Call) -> None:
         (["--gap", "s"], "--gap s: write name=value, for example --gap s=0.5"),
         (["--gap", "s=abc"], "--gap s=abc: 'abc' is not a number"),
         (["--gap", "ss=0.5"], "--gap: no coordinate or output 'ss'"),
-        (["--gap", "s=2"], "--gap: the restitution of s is between 0 and 1"),
+        (["--gap", "s=2"], "--gap: the restitution of s must be between 0 and 1"),
         (["--stop", "q"], "--stop: no coordinate or output 'q'"),
-        (["--gap", "s=0.5"], "open; an impact needs 0"),
+        (["--gap", "s=0.5"], "(open); an impact needs a gap of 0"),
     ):
         result = call("impact", CRANK, "--target", "numpy", *option)
         assert result.code == 2

@@ -48,6 +48,26 @@ def test_values_drawn_at_random(call: Call, tmp_path: Path) -> None:
     assert other["x"]["mean"] != again["x"]["mean"]
 
 
+def test_a_table_keeps_samples_and_varied_starts(call: Call, tmp_path: Path) -> None:
+    out = tmp_path / "runs.csv"
+    words = ("--grid", "theta1=-pi/2:pi/2:3", "--end", "0.2", "--samples", "4", "--out", out)
+    assert call("ensemble", PENDULUM, *words).code == 0
+    import pandas
+
+    table = pandas.read_csv(out)
+    assert len(table) == 3 * 4
+    first = table[table["t"] == 0.0]
+    np.testing.assert_allclose(first["theta1"], [-np.pi / 2, 0.0, np.pi / 2], atol=1e-15)
+    np.testing.assert_array_equal(first["initial_theta1"], first["theta1"])
+
+
+def test_values_are_drawn_between_expressions(call: Call) -> None:
+    found = call("ensemble", PENDULUM, "--vary", "theta1=-pi/8:deg(5)", "--count", "30", "--end", "1e-9", "--json").json
+    at_start = found["summary"]["theta1"]
+    assert -np.pi / 8 <= at_start["least"] < -0.2
+    assert -0.05 < at_start["greatest"] <= np.pi / 36
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

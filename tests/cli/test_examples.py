@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from eomgen.cli import verb_examples
-from eomgen.cli.example_files import example_files
+from eomgen.shipped import example_files
 
 from .conftest import EXAMPLES, Call
 
@@ -93,4 +93,4 @@ def test_what_fails_is_told_and_the_others_run(
 def test_a_name_and_all_is_a_slip(call: Call) -> None:
     result = call("examples", "pendulum", "--all")
     assert result.code == 2
-    assert "leave pendulum out" in result.err
+    assert "leave out pendulum" in result.err

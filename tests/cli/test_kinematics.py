@@ -56,7 +56,7 @@ def test_settings_and_text(call: Call) -> None:
         (("--range", "theta"), 2, "write NAME=START:END"),
         (("--range", "theta=0:x"), 2, "'x' is not a number"),
         (("--range", "theta=0:1:0"), 2, "the count is 1 to"),
-        (("--range", "theta=0:1:3", "--range", "t=0:1:4"), 2, "are not one"),
+        (("--range", "theta=0:1:3", "--range", "t=0:1:4"), 2, "must be equal"),
         (("--range", "theta=0:1", "--range", "theta=0:2"), 2, "each name once"),
         (("--range", "thet=0:1"), 2, "no coordinate or rate 'thet'"),
         (("--range", "psi=1.2:2.5"), 1, "stop at psi = 2.24592786: psi can go no further; theta, bend can still move"),
@@ -106,7 +106,9 @@ def test_a_workspace(call: Call, model_file: Callable[[str], Path], tmp_path: Pa
     assert found["range"]["x"] == pytest.approx([-0.8, 0.8])
     assert len(found["singular"]) == 74
     table = np.genfromtxt(tmp_path / "ws.csv", delimiter=",", names=True, usecols=range(4))
-    assert table["x"] == pytest.approx(0.5 * np.cos(table["q1_rad"]) + 0.3 * np.cos(table["q1_rad"] + table["q2_rad"]))
+    assert table["x_m"] == pytest.approx(
+        0.5 * np.cos(table["q1_rad"]) + 0.3 * np.cos(table["q1_rad"] + table["q2_rad"])
+    )
     assert (tmp_path / "ws.png").stat().st_size > 10_000
     result = call("kinematics", path, *FAST, *words, "--within-limits")
     assert result.code == 0
@@ -118,11 +120,11 @@ def test_a_workspace(call: Call, model_file: Callable[[str], Path], tmp_path: Pa
     ("words", "said"),
     [
         (("--over", "q1=0:1:3"), "--over needs --of"),
-        (("--of", "x"), "belong to --over"),
+        (("--of", "x"), "need --over"),
         (("--over", "q1=0:1", "--of", "x"), "write NAME=LOW:HIGH:COUNT"),
         (("--over", "q1=0:1:x", "--of", "x"), "--over q1=0:1:x: "),
         (("--over", "q1=0:1:3", "--over", "q1=0:1:3", "--of", "x"), "each name once"),
-        (("--over", "q1=0:1:3", "--of", "x", "--range", "q1=0:1"), "do not go together"),
+        (("--over", "q1=0:1:3", "--of", "x", "--range", "q1=0:1"), "cannot be used together"),
         (("--over", "q1=0:1:3", "--of", "z"), "no output or coordinate 'z'"),
     ],
 )

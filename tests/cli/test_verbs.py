@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from eomgen.cli.command import VERBS
-from eomgen.cli.example_files import example_files
 from eomgen.cli.sections import SHARED
 from eomgen.cli.verb_examples import describe_example
+from eomgen.shipped import example_files
 
 from .conftest import EXAMPLES, Call
 

@@ -60,9 +60,9 @@ def test_frames_go_into_a_new_folder(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--range", "theta=0:1", "--end", "2"], "--end and options of the integrator are for runs"),
+        (["--range", "theta=0:1", "--end", "2"], "leave out --end and options of the integrator"),
         (["--range", "theta"], "write NAME=START:END"),
-        (["--out", "x.avi"], "selects the kind of animation: .gif, .mp4, .html"),
+        (["--out", "x.avi"], "must end in .gif, .mp4 or .html"),
         (["--range", "thet=0:1:3", "--out", "x.gif"], "did you mean theta"),
         (["--trace", "coupler.Q", "--out", "x.gif", "--end", "0.1"], "no marker or body 'coupler.Q'"),
     ],
@@ -85,3 +85,48 @@ def test_plots_take_columns(tmp_path: Path) -> None:
         file.unlink()
     assert code_of([*words, "--columns", "theta"]) == 2
     assert code_of([*words, "--plot", str(tmp_path / "p.png"), "--columns", "thet"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["view", FOUR_BAR, "--range", "theta=0:zz"], "--range theta=0:zz: 'zz' is not a number"),
+        (["view", FOUR_BAR, "--range", "theta=0:30deg"], "a number with a unit is not an expression; write deg(30)"),
+        (["view", FOUR_BAR, "--range", "theta=0:1:1"], "an animation needs two positions"),
+        (["run", FOUR_BAR, "--set", "theta=5cm"], "--set theta=5cm: a number with a unit is not an expression; write"),
+        (["ensemble", FOUR_BAR, "--grid", "theta=0:x:2"], "--grid theta=0:x:2: 'x' is not a number"),
+        (["ensemble", FOUR_BAR, "--vary", "theta=0:x"], "--vary theta=0:x: write NAME=LOW:HIGH with two numbers"),
+        (["animate", FOUR_BAR], "no verb 'animate'; did you mean view?"),
+    ],
+)
+def test_what_is_wrong_is_said_in_the_words_of_the_option(
+    words: list[str], told: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert code_of([*words, "--target", "numpy"]) == 2
+    assert told in " ".join(capfd.readouterr().err.split())
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_warning_is_told_without_a_place_in_python(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "hinge.yaml"
+    file.write_text(
+        "name: hinge\ngravity: [0, -9.81, 0]\nbodies: {rod: {mass: 1, com: [0.5, 0, 0], inertia: {zz: 0.1}}}\n"
+        "joints: {a: {type: revolute, between: [ground, rod], limits: {lower: -1, upper: 1}}}\n"
+    )
+    assert code_of(["run", str(file), "--target", "numpy", "--end", "1"]) == 0
+    lines = [line for line in capfd.readouterr().err.splitlines() if "limits" in line]
+    assert len(lines) == 1
+    assert lines[0].startswith("warning: the run passes limits of joints: a lower -1")
+
+
+def test_columns_of_an_instance_are_drawn_by_its_dotted_names(tmp_path: Path) -> None:
+    file = tmp_path / "legs.yaml"
+    file.write_text(
+        "name: legs\ngravity: [0, -9.81, 0]\ncomponents:\n  leg:\n"
+        "    bodies: {rod: {mass: 1, com: [0.5, 0, 0], inertia: {zz: 0.1}}}\n"
+        "    joints: {hip: {type: revolute, between: [ground, rod]}}\nadd: {leg: {component: leg, for: {k: 2}}}\n"
+    )
+    run = ["run", str(file), "--target", "numpy", "--end", "0.2"]
+    assert code_of([*run, "--plot", str(tmp_path / "a.png"), "--columns", "leg1.hip,leg2.hip_dot"]) == 0
+    view = ["view", str(file), "--target", "numpy", "--end", "0.2", "--fps", "5"]
+    assert code_of([*view, "--plot", "leg2.hip", "--out", str(tmp_path / "a.gif")]) == 0

@@ -94,7 +94,7 @@ def test_workers_are_told_of_sound_sources_only(pendulum: Callable[..., Any], mo
 def test_lanes_are_not_taken_from_others(pendulum: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
     file = code(pendulum("lanes"))
     give_away(file.parent / "manifest.json", monkeypatch)
-    with pytest.warns(RuntimeWarning, match=f"one state after the other.*{FOREIGN}"):
+    with pytest.warns(RuntimeWarning, match=f"one state at a time.*{FOREIGN}"):
         assert find_lanes(file) == 0
 
 

@@ -145,7 +145,11 @@ def goes_plainly(module: Any, reason: str) -> None:
     """A warning, once, and the right numbers."""
     x = states(5000)
     expected = np.stack([module.rhs(0.0, np.ascontiguousarray(x[:, j])) for j in range(100)], axis=1)
-    with pytest.warns(RuntimeWarning, match=rf"(?s)go one state after the other, as their lanes.*{reason}"):
+    with pytest.warns(
+        RuntimeWarning,
+        match=rf"(?s)are computed one state at a time, because their vector "
+        rf"code.*{reason}",
+    ):
         found = module.rhs(0.0, x)
     np.testing.assert_array_equal(found[:, :100], expected)
     with warnings.catch_warnings():

@@ -23,8 +23,8 @@ def test_cams_of_coordinates_that_do_not_fit_are_told() -> None:
         f"constraints.{x}" for x in ("a.cam", "b.follower", "c.periodic")
     ]
     words = str(caught.value)
-    assert "'B_e1' is neither an angle nor a length; name one that is" in words
-    assert "the cam slides: 'S' is a length, and its law repeats no turn; leave it out" in words
+    assert "'B_e1' is neither an angle nor a length; name an angle or a length" in words
+    assert "the cam slides ('S' is a length), so its profile has no turn to repeat after; leave it out" in words
 
 
 @pytest.mark.parametrize("follower", ["prismatic", "revolute"])

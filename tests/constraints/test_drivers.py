@@ -202,7 +202,7 @@ def test_drivers_that_agree_may_stay() -> None:
 
 def test_a_driver_out_of_reach_is_told() -> None:
     with pytest.raises(
-        eg.AssemblyError, match=r"constraints.drive: .*C.r_y 0.09.*miss drive by .* rad; give the drivers"
+        eg.AssemblyError, match=r"constraints.drive: .*C.r_y 0.09.*off \(drive by .* rad\); give the drivers"
     ):
         slider_crank("1.5 + t", l=0.2, r=0.3).check()
 
@@ -215,5 +215,5 @@ def test_a_loop_that_cannot_close_is_not_blamed_on_the_driver() -> None:
 def test_initial_values_that_contradict_a_driver() -> None:
     m = slider_crank()
     m.initial(A=0.3)
-    with pytest.raises(eg.AssemblyError, match="A = 0.3 are inconsistent.*at t = 0 the drivers hold drive"):
+    with pytest.raises(eg.AssemblyError, match="A = 0.3 are inconsistent.*at t = 0 the drivers prescribe drive"):
         m.check()

@@ -21,7 +21,7 @@ def driven(value: str) -> eg.Model:
 )
 def test_corners_are_noted(value: str, word: str) -> None:
     (note,) = driven(value).check().notes
-    assert f"motor: {word} in a driver's value may make a corner" in str(note)
+    assert f"motor: {word} in a driver's value can make a corner" in str(note)
 
 
 def test_smooth_motions_are_not_noted() -> None:
@@ -30,7 +30,7 @@ def test_smooth_motions_are_not_noted() -> None:
 
 def test_a_motion_that_ends_is_told_as_such() -> None:
     mod = driven("sqrt(1 - t)").compile(target="numpy")
-    with pytest.raises(SimulationError, match=r"from t = 1 s .*motor has no finite value: look for a root"):
+    with pytest.raises(SimulationError, match=r"at t = 1 s .*motor has no finite value: look for a root"):
         mod.simulate((0, 2))
 
 

@@ -326,8 +326,12 @@ def test_faults_of_adding(folder: Path, old: str, new: str, told: str) -> None:
             "x(rod.ned)",
             "parts/link.yaml:11: outputs.end_x.expression: 'left_upper_rod' has no marker 'ned'",
         ),
-        ("m*l**2/12", "m*l**2/12*s", "parts/link.yaml:6: bodies.rod.inertia: 's' is no name of the component"),
-        ("[base, rod]", "[base, cart]", "parts/link.yaml:7: joints.hinge.between: 'cart' is no name of the component"),
+        ("m*l**2/12", "m*l**2/12*s", "parts/link.yaml:6: bodies.rod.inertia: 's' is not declared in the component"),
+        (
+            "[base, rod]",
+            "[base, cart]",
+            "parts/link.yaml:7: joints.hinge.between: 'cart' is not declared in the component",
+        ),
         (
             "bodies:",
             "lagrangian: {coordinates: [q], expression: q_dot**2}\nbodies:",
@@ -371,7 +375,7 @@ def test_python_refuses_at_once(folder: Path) -> None:
         m.add(link, "a_")
     with pytest.raises(eg.UsageError, match="belongs to the model 'link'"):
         m.add(link, "a_", at=link.ground)
-    with pytest.raises(eg.UsageError, match="3 is no component"):
+    with pytest.raises(eg.UsageError, match="3 is not a component"):
         m.add(3)
     assert m.bodies == {}  # what was refused left nothing behind
     m.add(link, "a_", at=m.ground)

@@ -113,7 +113,7 @@ def test_ways_that_exclude_each_other_are_told_at_once() -> None:
     [
         ({"com": (0, 0, 0)}, "mass", "is missing"),
         ({"inertia": (1, 1, 1), "points": [{"mass": 1}]}, "mass", "is missing"),
-        ({"mass": 1, "axes": (0, 0, 0)}, "axes", "no inertia"),
+        ({"mass": 1, "axes": (0, 0, 0)}, "axes", "without an inertia"),
         ({"mass": 1, "inertia": (1, 1, 1), "about": "tp"}, "about", "no marker 'tp'"),
         ({"mass": 1, "inertia": (1, 1, 1), "about": 3}, "about", "is not com, origin"),
         ({"mass": 1, "inertia": (1, 1, 1), "about": "tip", "axes": (0, 0, 1)}, "axes", "beside a marker"),

@@ -94,7 +94,7 @@ def test_faults() -> None:
         bad.mechanism()
     told = {(p.path, p.message.split(" (")[0]) for p in caught.value.problems}
     assert ("lagrangian.expression", "unknown name 'z'") in told
-    assert ("lagrangian.expression", "the acceleration 'q_ddot' cannot stand here") in told
+    assert ("lagrangian.expression", "the acceleration 'q_ddot' cannot be used here") in told
     assert ("lagrangian.forces.z", "no coordinate 'z'") in told
     assert any(path == "lagrangian.constraints[0]" and "gamma" in message for path, message in told)
 
@@ -102,7 +102,7 @@ def test_faults() -> None:
 def test_a_clash_of_names() -> None:
     v = sympy.Symbol("q_dot")
     clash = Model.from_lagrangian("p", v**2, ["q"], inputs={"q_dot": 1})
-    with pytest.raises(ModelError, match="'q_dot' is taken"):
+    with pytest.raises(ModelError, match="'q_dot' is already used"):
         clash.mechanism()
     with pytest.raises(ModelError, match="there are no coordinates; name at least one"):
         Model.from_lagrangian("p", v**2, []).mechanism()

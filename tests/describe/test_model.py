@@ -253,7 +253,7 @@ def test_the_other_methods_have_the_keys_of_the_table() -> None:
     assert set(arguments(Model.parameter)) == set(PARAMETER)
     assert set(arguments(Model.input)) == set(INPUT)
     assert set(arguments(Model.output)) == set(OUTPUT_FIELDS)
-    assert set(arguments(Model.body)) == set(BODY) - {"markers"}
+    assert set(arguments(Model.body)) == set(BODY)
     assert {key for key in MODEL if hasattr(Model, key)} >= {"parameters", "bodies", "joints", "initial", "guess"}
 
 
@@ -297,3 +297,44 @@ def test_a_reserved_name_is_told_once(name: str) -> None:
     with pytest.raises(ModelError) as error:
         m.mechanism()
     assert [p.path for p in error.value.problems] == [f"parameters.{name}"]
+
+
+def test_markers_may_be_given_with_the_body() -> None:
+    """As in a model file, and as by marker(): at a position, turned, by a matrix."""
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    places = {"tip": ("l", 0, 0), "side": {"at": (0, 0.2, 0), "rpy": (0, 0, "pi/2")}, "turned": {"matrix": quarter}}
+    m = Model("arm")
+    l = m.parameter("l", 0.5)
+    arm = m.body("arm", mass=1, com=(l / 2, 0, 0), inertia={"zz": 0.1}, markers=places)
+    arm.marker("end", at=(2 * l, 0, 0))  # further ones may follow
+    m.revolute("A", m.ground, arm, coordinate="theta")
+    for name in (*places, "end"):
+        m.output(name, f"y(arm.{name}) + angle(arm.{name})")
+    assert isinstance(places, dict)
+    assert list(places) == ["tip", "side", "turned"]  # the user's own stays as it is
+    mod = m.compile(target="numpy")
+    theta = 0.3
+    expected = {
+        "tip": 0.5 * np.sin(theta) + theta,
+        "side": 0.2 * np.cos(theta) + theta + np.pi / 2,
+        "turned": theta + np.pi / 2,
+        "end": np.sin(theta) + theta,
+    }
+    found = dict(zip(mod.y_names, mod.outputs(0.0, [theta, 0.0]), strict=True))
+    assert found == pytest.approx(expected, abs=1e-14)
+    assert "rpy: [0, 0, pi/2]" in m.to_yaml()
+
+
+@pytest.mark.parametrize(
+    ("markers", "place"),
+    [
+        (["tip"], r"bodies.arm.markers: .*a mapping of marker names"),
+        ({"tip": 3}, r"bodies.arm.markers.tip"),
+        ({"tip": {"att": (0, 0, 0)}}, r"bodies.arm.markers.tip.*did you mean .at."),
+    ],
+)
+def test_markers_that_cannot_be_are_told_with_their_place(markers: object, place: str) -> None:
+    m = Model("arm")
+    m.revolute("A", m.ground, m.body("arm", mass=1, inertia={"zz": 1}, markers=markers))
+    with pytest.raises(ModelError, match=place):
+        m.check()

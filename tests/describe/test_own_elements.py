@@ -6,6 +6,8 @@ derivation and targets.  The rows stand in a test instead of eomgen's own files;
 
 from __future__ import annotations
 
+import importlib
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import ClassVar
@@ -191,3 +193,18 @@ def test_their_faults_are_told_like_eomgens_own() -> None:
         m.hardening_spring("U", m.ground, "block", stifness=1.0)
     with pytest.raises(TypeError, match=r"hardening_spring\(\) missing a required argument: 'stiffness'"):
         m.hardening_spring("U", m.ground, "block")
+
+
+def test_the_page_on_contributing_runs_as_it_stands(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Its force in a file of one's own: F = k s + k3 s^3 of the distance 1.4."""
+    text = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    block = next(part for part in re.findall(r"```python\n(.*?)```", text, re.DOTALL) if "HardeningSpring" in part)
+    (tmp_path / "hardening.py").write_text(f"from __future__ import annotations\n\n{block}")
+    monkeypatch.syspath_prepend(tmp_path)
+    for name, row in importlib.import_module("hardening").TYPES.items():
+        monkeypatch.setitem(FORCES, name, row)
+    m = eg.Model("duffing")
+    m.prismatic("x", m.ground, m.body("mass", mass=2.0), axis="x")
+    m.hardening_spring("k", m.ground.at(-1, 0, 0), "mass", stiffness=3.0, hardening=0.5)
+    mod = m.compile(target="numpy")
+    assert mod.rhs(0.0, [0.4, 0.0])[1] == pytest.approx(-(3.0 * 1.4 + 0.5 * 1.4**3) / 2.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -73,48 +74,48 @@ RIGHT = [
     ("output_N", "m*ax(rod)"), ("output_N", "total_energy/l"), ("output", "n + th"), ("initial", "2*l"),
 ]  # fmt: skip
 WRONG = [
-    ("mass", "l", "l is a length (m), and a mass (kg) belongs here"),
-    ("mass", "rho*l**2", "a mass (kg) belongs here"),
+    ("mass", "l", "l is a length (m), and a mass (kg) is needed here"),
+    ("mass", "rho*l**2", "a mass (kg) is needed here"),
     ("inertia", "m*l/12", "a moment of inertia"),
-    ("com", "m", "m is a mass (kg), and a length (m) belongs here"),
-    ("com", "l**2", "and a length (m) belongs here"),
-    ("torque", "F", "F is a force (N), and a torque or an energy (N*m) belongs here"),
-    ("torque", "tau + F", "puts together"),
-    ("torque", "F*l + l", "puts together"),
-    ("torque", "-k*th", "a torque or an energy (N*m) belongs here"),
+    ("com", "m", "m is a mass (kg), and a length (m) is needed here"),
+    ("com", "l**2", "and a length (m) is needed here"),
+    ("torque", "F", "F is a force (N), and a torque or an energy (N*m) is needed here"),
+    ("torque", "tau + F", "combines"),
+    ("torque", "F*l + l", "combines"),
+    ("torque", "-k*th", "a torque or an energy (N*m) is needed here"),
     ("torque", "tau*sin(l)", "sin(l) is taken of a length (m)"),
     ("torque", "tau*sin(w)", "sin(w) is taken of a rate (1/s)"),
     ("torque", "tau*exp(t*x/l/t*T)", "is taken of a time (s)"),
     ("torque", "tau*exp(T)", "exp(T) is taken of a time (s)"),
     ("torque", "tau*2**l", "is taken of a length (m)"),
-    ("push", "tau", "a force (N) belongs here"),
-    ("push", "l", "l is a length (m), and a force (N) belongs here"),
-    ("push", "-2*k*x**2", "a force (N) belongs here"),
-    ("push", "F - k", "puts together"),
-    ("push", "p", "p is Pa, and a force (N) belongs here"),
-    ("law", "-k*(length - F)", "puts together"),
-    ("law", "-k*rate", "a force (N) belongs here"),
-    ("turning_law", "-k*angle", "a torque or an energy (N*m) belongs here"),
-    ("stiffness", "kt", "and a stiffness (N/m) belongs here"),
-    ("stop", "F", "and a stiffness (N/m) belongs here"),
-    ("stop2", "k", "belongs here"),
-    ("bushing", "k", "belongs here"),
-    ("bushing_force", "kt", "belongs here"),
-    ("driver", "l", "a number or an angle belongs here"),
+    ("push", "tau", "a force (N) is needed here"),
+    ("push", "l", "l is a length (m), and a force (N) is needed here"),
+    ("push", "-2*k*x**2", "a force (N) is needed here"),
+    ("push", "F - k", "combines"),
+    ("push", "p", "p is Pa, and a force (N) is needed here"),
+    ("law", "-k*(length - F)", "combines"),
+    ("law", "-k*rate", "a force (N) is needed here"),
+    ("turning_law", "-k*angle", "a torque or an energy (N*m) is needed here"),
+    ("stiffness", "kt", "and a stiffness (N/m) is needed here"),
+    ("stop", "F", "and a stiffness (N/m) is needed here"),
+    ("stop2", "k", "is needed here"),
+    ("bushing", "k", "is needed here"),
+    ("bushing_force", "kt", "is needed here"),
+    ("driver", "l", "a number or an angle is needed here"),
     ("driver", "w", "w is a rate (1/s)"),
-    ("output", "min(l, T)", "puts together"),
-    ("output", "where(x > th, l, 2*l)", "puts together"),
-    ("output", "l + T", "puts together"),
-    ("output", "atan2(x, T)", "puts together"),
-    ("output", "hypot(l, th)", "puts together"),
-    ("output", "sqrt(l) + l", "puts together"),
-    ("output", "x + x_dot", "puts together"),
-    ("output", "kinetic_energy + F", "puts together"),
-    ("output", "vx(rod) - ax(rod)", "puts together"),
-    ("output_N", "m", "m is a mass (kg), and a force (N) belongs here"),
-    ("output_N", "m*vx(rod)", "a force (N) belongs here"),
+    ("output", "min(l, T)", "combines"),
+    ("output", "where(x > th, l, 2*l)", "combines"),
+    ("output", "l + T", "combines"),
+    ("output", "atan2(x, T)", "combines"),
+    ("output", "hypot(l, th)", "combines"),
+    ("output", "sqrt(l) + l", "combines"),
+    ("output", "x + x_dot", "combines"),
+    ("output", "kinetic_energy + F", "combines"),
+    ("output", "vx(rod) - ax(rod)", "combines"),
+    ("output_N", "m", "m is a mass (kg), and a force (N) is needed here"),
+    ("output_N", "m*vx(rod)", "a force (N) is needed here"),
     ("output", "log(p)", "log(p) is taken of Pa"),
-    ("initial", "a", "a length (m) belongs here"),
+    ("initial", "a", "a length (m) is needed here"),
 ]  # fmt: skip
 
 
@@ -153,6 +154,27 @@ forces:
     assert [(p.path, p.line) for p in caught.value.problems] == [("bodies.b.mass", 6), ("forces.t.value", 13)]
 
 
+@pytest.mark.parametrize(
+    ("mass", "inertia", "size"),  # of l = 0.6, in parts of l^2
+    [
+        (4, "4*l**2/12", 1 / 3), (4, "l**2*4/12", 1 / 3), ("4", "l**2/3", 1 / 3), (1, "l**2/12", 1 / 12),
+        (4, "4*(l**2 + 0.1*l**2)/12", 1.1 / 3), (4, "4*l**2/12 + 4*l**2/4", 4 / 3), (4, "m*l**2/12", 1 / 3),
+        (4, "l**2/12", None), (2.5, "l**2/12", None), (4, "4*l/12", None), ("m", "4*l**2/12", None),
+    ],
+)  # fmt: skip
+def test_a_number_in_an_inertia_may_be_the_mass_of_the_body(mass: object, inertia: str, size: float | None) -> None:
+    m = eg.Model("rod")
+    m.parameter("l", 0.6, unit="m")
+    m.parameter("m", 4.0, unit="kg")
+    m.revolute("A", m.ground, m.body("rod", mass=mass, com=("l/2", 0, 0), inertia={"zz": inertia}))
+    if size is not None:  # about the pin: Steiner's theorem
+        about = m.compile(target="numpy").mass_matrix([0.0])[0, 0]
+        assert about == pytest.approx(size * 0.36 + float(str(mass)) * 0.09, rel=1e-14)
+    else:
+        with pytest.raises(eg.ModelError, match="a moment of inertia .* is needed here"):
+            m.compile(target="numpy")
+
+
 def test_a_model_without_units_is_not_checked() -> None:
     m = eg.Model("free")
     b = m.body("b", mass=1, inertia=(0, 0, 1))
@@ -160,7 +182,7 @@ def test_a_model_without_units_is_not_checked() -> None:
     m.output("y", "th + th_dot")
     m.mechanism()
     m.parameter("l", 1, unit="m")
-    with pytest.raises(eg.ModelError, match="puts together"):
+    with pytest.raises(eg.ModelError, match="combines"):
         m.mechanism()
 
 
@@ -311,7 +333,7 @@ def test_components_keep_their_units(write) -> None:
     assert found["c_m"] == (0.25, "kg")
     with pytest.raises(eg.ModelError) as caught:
         eg.load(write(COMPONENT.replace("l: L/2", "l: L**2"))).mechanism()
-    assert any("a length (m) belongs here" in p.message for p in caught.value.problems)
+    assert any("a length (m) is needed here" in p.message for p in caught.value.problems)
 
 
 def test_an_expression_is_not_scaled_by_its_unit(write) -> None:
@@ -349,3 +371,51 @@ def test_springs_on_a_coordinate_know_its_dimension() -> None:
             with pytest.raises(eg.ModelError) as caught:
                 m.mechanism()
             assert [p.path for p in caught.value.problems] == ["forces.s.stiffness"]
+
+
+def swing() -> eg.Model:
+    m = eg.Model("swing")
+    length = m.parameter("l", 2, unit="m")
+    m.parameter("k", 3)
+    rod, bead = m.body("rod", mass=1, inertia={"zz": 1}), m.body("bead", mass=1, inertia={"zz": 1})
+    rod.marker("tip", at=(length, 0, 0))
+    m.revolute("hinge", m.ground, rod, coordinate="th")
+    m.prismatic("slide", rod, bead, axis="x", coordinate="s")
+    return m
+
+
+@pytest.mark.parametrize(
+    ("expression", "unit"),
+    [
+        ("x(rod.tip)", "m"), ("-vy(bead) + s_dot", "m/s"), ("ax(bead)", "m/s^2"), ("hypot(x(bead), y(bead))", "m"),
+        ("sqrt(x(bead)**2 + y(bead)**2)", "m"), ("s*l", "m^2"), ("x(rod.tip) - 0.15", "m"), ("-th", "rad"),
+        ("th_dot", "rad/s"), ("wz(bead)", "rad/s"), ("total_energy", "J"), ("2*s", ""), ("k*s", ""), ("s/l", ""),
+        ("s_dot/l", ""), ("1000*x(bead)", ""), ("sin(th)", ""),
+    ],
+)  # fmt: skip
+def test_an_output_has_the_unit_that_is_certain(expression: str, unit: str) -> None:
+    m = swing()
+    m.output("y1", expression)
+    assert m.derive().compile(target="numpy").layout.unit("y1") == unit
+
+
+@pytest.mark.parametrize(
+    ("expression", "unit", "told"),
+    [
+        ("th", "mm", "th is a number or an angle, and a length (m) is needed here"),
+        ("x(rod.tip) - s", "deg", "is a length (m), and a number or an angle is needed here"),
+        ("th_dot", "m/s", "th_dot is a rate (1/s), and a speed (m/s) is needed here"),
+    ],
+)
+def test_an_output_of_another_dimension_is_told(expression: str, unit: str, told: str) -> None:
+    m = swing()
+    m.output("y1", expression, unit=unit)
+    with pytest.raises(eg.ModelError, match=re.escape(told)):
+        m.derive()
+
+
+def test_numbers_and_laws_may_hide_a_unit_of_an_output() -> None:
+    m = swing()
+    m.output("force", "-40*s", unit="N")
+    m.output("lift", "sin(th)", unit="mm")
+    assert m.compile(target="numpy").outputs(0.0, [0.5, 0.2, 0.0, 0.0]) == pytest.approx([-8.0, 1e3 * np.sin(0.5)])

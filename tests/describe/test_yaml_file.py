@@ -23,9 +23,9 @@ REFUSED = {
     "deep brackets": ("gravity: " + "[" * 5000, 1, "nested too deeply"),
     "deep braces": ("gravity: " + "{a: " * 5000, 1, "nested too deeply"),
     "deep blocks": ("".join(" " * k + "a:\n" for k in range(DEPTH + 5)), DEPTH + 2, "nested too deeply"),
-    "key that is a list": ("? [a, b]\n: 1\n", 1, "a key that is not a name"),
+    "key that is a list": ("? [a, b]\n: 1\n", 1, "a key is not a name"),
     "merge key": ("name: a\n<<: {doc: b}\n", 2, "unknown key"),
-    "two documents": ("name: a\n---\nname: b\n", 3, "a second document"),
+    "two documents": ("name: a\n---\nname: b\n", 3, "a second YAML document"),
     "empty": ("# nothing\n", 1, "the file is empty"),
     "list": ("- a\n", 1, "is not a mapping"),
     "scalar": ("hello\n", 1, "is not a mapping"),
@@ -79,7 +79,7 @@ def test_load_goes_by_the_suffix(tmp_path: Path, slider_crank_text: str) -> None
     with pytest.raises(FileNotFoundError):
         load(tmp_path / "absent.yaml")
     for name in ("panda.sdf", "model"):
-        with pytest.raises(UsageError, match=r"supported: \.yaml"):
+        with pytest.raises(UsageError, match=r"supported are \.yaml"):
             load(tmp_path / name)
 
 

@@ -131,7 +131,16 @@ def test_the_c_package_builds_its_libraries_and_its_example(packages):
         check=True,
     )
     done = subprocess.run(["./crank_example"], cwd=folder, capture_output=True, text=True, check=True)
-    assert len(done.stdout.split()) == 6
+    x_dot = [float(word) for word in done.stdout.split()]
+    assert len(x_dot) == 6
+    given = re.search(r"const double x\[CRANK_N_X\] = \{ (.*?) \}", (folder / "crank_example.c").read_text()).group(1)
+    x = [float(word) for word in given.split(", ")]
+    np.testing.assert_allclose(x_dot[:3], x[3:], rtol=1e-12)
+    theta, phi = x[:2]  # of crank and rod against ground, r = 0.1 and l = 0.35; the guide is the x axis
+    omega, turning = x[3:5]
+    assert abs(omega) >= 1.0  # it moves
+    assert 0.1 * np.cos(theta) * omega + 0.35 * np.cos(phi) * turning == pytest.approx(0.0, abs=1e-12)
+    assert x[5] == pytest.approx(-0.1 * np.sin(theta) * omega - 0.35 * np.sin(phi) * turning, abs=1e-12)
     assert (folder / "libcrank.so").exists()
 
 

@@ -37,8 +37,8 @@ def test_every_combination(pendulum: object) -> None:
     [
         ({"thta": [1]}, "no parameter, input, coordinate or rate 'thta'; did you mean theta"),
         ({}, "grid has no names"),
-        ([1, 2], "grid must give values by name"),
-        ({"theta_dot": [1]}, "theta_dot stands in initial too"),
+        ([1, 2], "grid must be a mapping of names to values"),
+        ({"theta_dot": [1]}, "theta_dot is given in initial too"),
     ],
 )
 def test_faults(pendulum: object, grid: object, told: str) -> None:

@@ -241,6 +241,15 @@ def test_what_an_ensemble_offers(pendulum: Any, tmp_path: Path) -> None:
     table = ensemble.to_pandas()
     np.testing.assert_array_equal(table["g"], np.linspace(1, 9, 6))
     np.testing.assert_array_equal(table["theta1"], ensemble.x[0])
+    starts = {name: column.tolist() for name, column in table.items() if name.startswith("initial_")}
+    assert starts == {f"initial_{name}": angles(6)[name].tolist() for name in ("theta1", "bend")}
+    rows = ensemble.to_pandas(samples=True)
+    assert len(rows) == 6 * 5
+    np.testing.assert_array_equal(rows[rows["run"] == 4]["t"], times)
+    np.testing.assert_array_equal(rows[rows["run"] == 4]["bend"], ensemble.samples[1, :, 4])
+    np.testing.assert_array_equal(rows[rows["t"] == 0.0]["initial_theta1"], rows[rows["t"] == 0.0]["theta1"])
+    with pytest.raises(eg.UsageError, match="kept no samples"):
+        pendulum.simulate_many(1, angles(6)).to_pandas(samples=True)
     np.testing.assert_allclose(ensemble.trajectory(3).x[:, -1], ensemble.x[:, 3], rtol=0, atol=1e-7)
     with np.load(ensemble.save(tmp_path / "runs")) as data:
         np.testing.assert_array_equal(data["samples"], ensemble.samples)

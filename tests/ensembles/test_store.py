@@ -48,7 +48,7 @@ def test_a_store_of_another_ensemble_is_refused(pendulum: Any, tmp_path: Path) -
         with pytest.raises(eg.UsageError, match="belongs to another ensemble: .* differ"):
             pendulum.simulate_many(**{"span": 1, "initial": angles(4), **changed}, store=tmp_path / "runs")
     (tmp_path / "mine.txt").write_text("precious")
-    with pytest.raises(eg.UsageError, match="not empty and holds no ensemble"):
+    with pytest.raises(eg.UsageError, match="not empty and does not contain an ensemble"):
         pendulum.simulate_many(1, angles(4), store=tmp_path)
     block = next((tmp_path / "runs").glob("block_*"))
     block.write_bytes(block.read_bytes()[:700])
@@ -83,7 +83,7 @@ def test_hostile_stores_are_refused(pendulum: Any, tmp_path: Path) -> None:
     with np.load(block) as data:
         arrays = {name: data[name] for name in data.files}
     for change, words in (
-        ({"runs_t": arrays["runs_t"][:3]}, "another count of runs"), ({"x": arrays["x"][:1]}, "do not fit each other"),
+        ({"runs_t": arrays["runs_t"][:3]}, "another count of runs"), ({"x": arrays["x"][:1]}, "do not belong together"),
         ({"words": np.array("[1, 2]")}, "cannot be read"), ({"words": np.array("[" * 99999)}, "cannot be read"),
     ):  # fmt: skip
         np.savez(block, **(arrays | change))

@@ -81,7 +81,7 @@ def test_check_says_what_is_lost(ratio: float, kept: int) -> None:
     notes = [note for note in model.check().notes if "digits" in note]
     assert len(notes) == 1
     assert f"rounding leaves about {kept} of 16 digits of the accelerations" in notes[0]
-    assert "newton_euler and amalgamated keep all of them" in notes[0]
+    assert "newton_euler and amalgamated keep all digits" in notes[0]
     lost = error(model, "embedding", x)
     assert 10.0 ** -(kept + 3) < lost < 10.0 ** (1 - kept)
     assert error(model, "newton_euler", x) < 1e-14

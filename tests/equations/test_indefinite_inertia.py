@@ -174,7 +174,7 @@ def test_other_calls_work_or_say_what_they_need() -> None:
 
     truth = solve_ivp(rhs, (0, 0.3), [0.4, -0.7, 0, 0], method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
     np.testing.assert_allclose(run.x[:, -1], truth, rtol=1e-7, atol=1e-9)
-    with pytest.raises(eg.SingularMassMatrixError, match="modes: some motion has negative inertia behind it"):
+    with pytest.raises(eg.SingularMassMatrixError, match="modes: a motion has negative inertia behind it"):
         module.modes([-np.pi / 2, 0, 0, 0])
     canonical = model.compile(method="hamilton", target="numpy").canonical
     x = np.array([0.4, -0.7, 1.0, 0.5])

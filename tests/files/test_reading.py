@@ -1,4 +1,4 @@
-"""What is no plain file is refused at once, wherever a file is read; a pipe that nobody writes would block for ever."""
+"""A path that is no plain file is refused at once, wherever a file is read; a pipe without a writer would block."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def other(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_an_open_file_is_plain(other: tuple[str, str]) -> None:
-    with pytest.raises(UsageError, match=f"^odd.yaml is no plain file but {other[1]}"):
+    with pytest.raises(UsageError, match=f"^odd.yaml is not a plain file but {other[1]}"):
         open_plain("odd.yaml")
     with open_plain("model.yaml") as file:
         assert file.read() == EXAMPLE.read_bytes()
@@ -78,19 +78,19 @@ def test_an_open_file_is_plain(other: tuple[str, str]) -> None:
 @pytest.mark.parametrize("suffix", ["yaml", "urdf", "xml"])
 def test_a_model_is_read_from_a_plain_file(suffix: str, other: tuple[str, str],
                                            capfd: pytest.CaptureFixture[str]) -> None:  # fmt: skip
-    with pytest.raises(UsageError, match=f"^odd.{suffix} is no plain file but {other[1]}"):
+    with pytest.raises(UsageError, match=f"^odd.{suffix} is not a plain file but {other[1]}"):
         eg.load(f"odd.{suffix}")
     with pytest.raises(SystemExit, match="2"):
         run_command(["check", f"odd.{suffix}"])
-    assert f"odd.{suffix} is {other[1]}, no plain file" in capfd.readouterr().err
+    assert f"odd.{suffix} is {other[1]}, not a plain file" in capfd.readouterr().err
 
 
 def test_what_a_model_names_is_a_plain_file(other: tuple[str, str]) -> None:
     Path("mesh.yaml").write_text("name: m\nbodies: {b: {solids: [{type: mesh, file: odd.stl, density: 1}]}}\n")
-    with pytest.raises(eg.ModelError, match=r"no plain file|outside the folder"):
+    with pytest.raises(eg.ModelError, match=r"not a plain file|outside the folder"):
         eg.load("mesh.yaml").check()
     Path("native.yaml").write_text("name: n\nfunctions: {f: {type: native, source: odd.c, arguments: 1}}\n")
-    with pytest.raises(eg.ModelError, match="odd.c is no plain file"):
+    with pytest.raises(eg.ModelError, match="odd.c is not a plain file"):
         eg.load("native.yaml", allow_native=True).check()
 
 
@@ -98,10 +98,10 @@ def test_tables_and_results_are_plain_files(other: tuple[str, str], capfd: pytes
     with pytest.raises(SystemExit, match="2"):
         sys.exit(run_command(["ensemble", "model.yaml", "--target", "numpy", "--cases", "odd.csv", "--end", "0.1"]))
     said = capfd.readouterr().err
-    assert f"odd.csv is no plain file but {other[1]}" in said or "'odd.csv' is a directory" in said
-    with pytest.raises(UsageError, match="no plain file"):
+    assert f"odd.csv is not a plain file but {other[1]}" in said or "'odd.csv' is a directory" in said
+    with pytest.raises(UsageError, match="not a plain file"):
         eg.load_trajectory("odd.npz")
-    with pytest.raises(UsageError, match="no plain file"):
+    with pytest.raises(UsageError, match="not a plain file"):
         Checkpoint("odd.npz", 1.0, None).open({})
 
 

@@ -117,7 +117,7 @@ def test_links_are_refused_by_name(tmp_path: Path, kind: str) -> None:
     elif kind != "nothing":
         victim.write_text("precious")
     link.symlink_to(victim)
-    with pytest.raises(UsageError, match=r"link\.npz is a symbolic link to .*victim.*name that place itself"):
+    with pytest.raises(UsageError, match=r"link\.npz is a symbolic link to .*victim.*name that file itself"):
         write_whole(link, "x")
     assert names(tmp_path) == (["link.npz"] if kind == "nothing" else ["link.npz", "victim"])
     assert not victim.is_file() or victim.read_text() == "precious"

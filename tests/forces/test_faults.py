@@ -68,9 +68,9 @@ def test_faults_of_laws_are_told_all_at_once() -> None:
     told = {p.path.removeprefix("forces."): f"{p.message}; {p.remedy}" for p in error.value.problems}
     expected = {
         "f2.smoothing": "is missing", "f3.smoothing": "is -0.1", "f4.stribeck": "is missing",
-        "s1": "has no limit", "s2.stiffness": "is -1", "s2.upper": "is upper - lower", "s2.exponent": "is 0.5",
-        "c1.velocity": "restitution and velocity go together", "c2.restitution": "is 1.5",
-        "c3.formula": "the dissipation is given already", "c4.smoothing": "there is no friction",
+        "s1": "has no limit", "s2.stiffness": "is -1", "s2.upper": "this is upper - lower", "s2.exponent": "is 0.5",
+        "c1.velocity": "give restitution and velocity together", "c2.restitution": "is 1.5",
+        "c3.formula": "dissipation is given too", "c4.smoothing": "is given without friction",
         "c5.radius": "is 0", "c6.radii": "two numbers", "b1.stiffness": "six numbers",
         "b2.stiffness[1][0]": "not symmetric", "g1.center": "lies on 'b' itself", "g2.body": "no body 'c'",
         "m1.activation": "is 2", "m1.fiber_length": "is 0",
@@ -153,7 +153,7 @@ forces:
     with pytest.raises(ModelError) as error:
         eg.load(tmp_path / "m.yaml").mechanism()
     told = [str(p) for p in error.value.problems]
-    assert any("m.yaml:5: forces.rub: has no law" in line for line in told)
+    assert any("m.yaml:5: forces.rub: has no friction law" in line for line in told)
     assert any("m.yaml:6: forces.oil.potential: unknown name 'rate'" in line for line in told)
 
 
@@ -174,12 +174,12 @@ def test_a_force_on_a_joint_is_refused_with_the_remedy(tmp_path: Path) -> None:
     m, _ = slider()
     m.force("push", "s", (1, 0, 0))
     with pytest.raises(
-        ModelError, match=r"forces\.push\.marker: a force acts at a marker, and 's' is not one; .*torque"
+        ModelError, match=r"forces\.push\.marker: a force acts at a marker, and 's' is not a marker; .*torque"
     ):
         m.check()
     m, b = slider()
     handle = m.revolute("r", b, m.body("c", mass=1))
-    with pytest.raises(eg.errors.UsageError, match="'push' acts at a marker.*take torque or actuator"):
+    with pytest.raises(eg.errors.UsageError, match="'push' acts at a marker.*use torque or actuator"):
         m.force("push", handle, (1, 0, 0))
     file = tmp_path / "slider.yaml"
     file.write_text(slider()[0].to_yaml() + "forces: {push: {type: force, joint: s, value: 3}}\n")

@@ -279,4 +279,4 @@ def test_faults_of_paths_are_told_by_place() -> None:
     assert told["forces.k3.via[0].radius"].startswith("is missing")
     assert "a joint's coordinate has no path" in told["forces.a1.via"]
     assert "unknown name 'angle'" in told["forces.e2.law"]
-    assert "'rate' is the parameter at parameters.rate and the element's own too" in told["forces.e3.law"]
+    assert "'rate' is a variable of the element and also the parameter at parameters.rate" in told["forces.e3.law"]

@@ -87,13 +87,13 @@ def test_a_stored_trajectory_is_projected_all_the_same() -> None:
 
 def test_what_baumgarte_cannot_be_is_said() -> None:
     model = models.build("slider_crank")
-    with pytest.raises(UsageError, match="belongs to method 'augmented', not 'embedding'"):
+    with pytest.raises(UsageError, match="works with method 'augmented' only, not 'embedding'"):
         model.derive("embedding", baumgarte=(1, 1))
     with pytest.raises(UsageError, match=r"two numbers \(alpha, beta\) in 1/s, not 5"):
         model.derive("augmented", baumgarte=5)
     with pytest.raises(UsageError, match="not negative"):
         model.derive("augmented", baumgarte=(-1, 2))
-    with pytest.raises(UsageError, match="this model has none"):
+    with pytest.raises(UsageError, match="this model has no constraints"):
         models.build("pendulum").derive("augmented", baumgarte=(1, 1))
 
 

@@ -66,7 +66,7 @@ def test_runs_that_an_event_ends_and_bounces_that_die_away(bouncing: Any) -> Non
         bouncing.dae.solve((0, 20))
     with pytest.raises(eg.ZenoError, match="repeats without an end"):
         ball(reset={"h_dot": "0"}).dae.solve((0, 2))
-    with pytest.raises(eg.UsageError, match="sets eventsfn of IDA itself; events= takes"):
+    with pytest.raises(eg.UsageError, match="sets eventsfn of IDA itself, so it cannot be given; give events="):
         bouncing.dae.solve((0, 1), eventsfn=print)
 
 

@@ -154,9 +154,9 @@ def test_differences_are_as_good_as_documented() -> None:
         ("h(x)", "h\\(\\) takes 2 arguments, not 1"),
         ("g(x)", "unknown function 'g'"),
         ("f", "'f' is a function"),
-        ("f(x).real", "a dot is for markers"),
+        ("f(x).real", "a dot can be used only for markers"),
         ("f(x=1)", "takes no keywords"),
-        ("f(*x)", "'\\*' cannot stand"),
+        ("f(*x)", "'\\*' cannot be used"),
         ("diff(x, 1)", "takes a call of a declared function"),
         ("diff(sin(x), 1)", "takes a call of a declared function"),
         ("diff(h(x, y), 1)", "takes 2 order"),
@@ -201,10 +201,10 @@ def test_names_of_functions_belong_to_the_one_namespace() -> None:
     with pytest.raises(ModelError) as caught:
         m.mechanism()
     text = str(caught.value)
-    assert "functions.f: the name 'f' is taken by the parameter at parameters.f" in text
-    assert "functions.sin: 'sin' is a function" in text
-    assert "functions.vx: 'vx' is the motion of a marker" in text
-    assert "joints.s: the name 's' is taken by the function at functions.s" in text
+    assert "functions.f: the name 'f' is already used by the parameter at parameters.f" in text
+    assert "functions.sin: 'sin' is a built-in function" in text
+    assert "functions.vx: 'vx' is a built-in name for the motion of a marker" in text
+    assert "joints.s: the name 's' is already used by the function at functions.s" in text
     assert len(caught.value.problems) == 4
 
 

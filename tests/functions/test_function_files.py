@@ -86,7 +86,7 @@ BROKEN: list[tuple[str, str, str]] = [
     ("  law: {type: table, x: [0, .nan, 1], y: [1, 2, 3]}", "functions.law.x[1]", "nan is not a number"),
     ("  law: {type: table, x: [0, 1, 2], y: [1, .inf, 3]}", "functions.law.y[1]", "inf is not a number"),
     ("  law: {type: table, x: [0, 1, 2], y: [1, true, 3]}", "functions.law.y[1]", "True is not a number"),
-    ("  law: {type: table, x: [0, 1, 2], y: [1, s, 3]}", "functions.law.y[1]", "the name 's' cannot stand here"),
+    ("  law: {type: table, x: [0, 1, 2], y: [1, s, 3]}", "functions.law.y[1]", "the name 's' cannot be used here"),
     ("  law: {type: table, x: [0, 1, 2], y: [1, null, 3]}", "functions.law.y[1]", "has no value"),
     ("  law: {type: table, x: [0, 1, 2], y: [1, [2], 3]}", "functions.law.y[1]", "[2] is not a number"),
     ("  law: {type: table, x: [0, 1e-300, 1], y: [1, 2, 3]}", "functions.law.x", "too close"),
@@ -94,7 +94,7 @@ BROKEN: list[tuple[str, str, str]] = [
     ("  law: {type: table, kind: cubik, x: [0, 1], y: [1, 2]}", "functions.law.kind", "'cubik' is not known; did you"),
     ("  law: {type: table, extrapolation: no, x: [0, 1], y: [1, 2]}", "functions.law.extrapolation", "'no' is not"),
     ("  law: {type: table, kind: periodic, x: [0, 1, 2], y: [1, 2, 3]}", "functions.law.y", "ends with 3 and begins"),
-    ("  law: {type: table, kind: periodic, x: [0, 1], y: [1, 1]}", "functions.law.x", "at least three points"),
+    ("  law: {type: table, kind: periodic, x: [0, 1], y: [1, 1]}", "functions.law.x", "fewer than three points"),
     ("  law: {type: table, x: [0, 1], y: [0, 1], z: [[1, 2]]}", "functions.law.z", "has 1 rows for 2 points"),
     ("  law: {type: table, x: [0, 1], y: [0, 1], z: [[1, 2], [3]]}", "functions.law.z[1]", "has 1 values for 2"),
     ("  law: {type: table, x: [0, 1], y: [0, 1], z: [[1, 2], 3]}", "functions.law.z[1]", "3 is not a list"),
@@ -103,11 +103,15 @@ BROKEN: list[tuple[str, str, str]] = [
         "functions.law.kind",
         "two",
     ),
-    ("  law: {type: table, x: [0, 1e-9, 1], y: [1e299, -1e299, 0]}", "functions.law", "is too steep for doubles"),
+    (
+        "  law: {type: table, x: [0, 1e-9, 1], y: [1e299, -1e299, 0]}",
+        "functions.law",
+        "is too steep for double precision",
+    ),
     ("  law: {type: table, x: [0, 1e-9], y: [0, 1], z: [[9e299, -9e299], [0, 0]]}", "functions.law", "is too steep"),
     ("  2law: {type: table, x: [0, 1], y: [0, 1]}", "functions.2law", "is not an identifier"),
-    ("  cos: {type: table, x: [0, 1], y: [0, 1]}", "functions.cos", "'cos' is a function"),
-    ("  t: {type: table, x: [0, 1], y: [0, 1]}", "functions.t", "'t' is the time"),
+    ("  cos: {type: table, x: [0, 1], y: [0, 1]}", "functions.cos", "'cos' is a built-in function"),
+    ("  t: {type: table, x: [0, 1], y: [0, 1]}", "functions.t", "'t' is reserved for the time"),
 ]
 
 
@@ -156,7 +160,7 @@ def test_native_code_of_a_file_needs_permission(sources: Path, monkeypatch: pyte
         eg.load(file).mechanism()
     (problem,) = caught.value.problems
     assert (problem.path, problem.line) == ("functions.swing", 3)
-    assert "only where that is allowed" in problem.message
+    assert "native code of model files is not allowed" in problem.message
     assert "--allow-native" in problem.remedy
     assert "allow_native=True" in problem.remedy
     assert any(name.endswith("sample.yaml") for name in opened)
@@ -180,7 +184,7 @@ def test_permission_runs_it(sources: Path, monkeypatch: pytest.MonkeyPatch) -> N
         ("{type: native, source: none.c}", "none.c cannot be read (No such file or directory); paths are relative"),
         ("{type: native, source: laws.c, derivatives: swing}", "functions.swing.derivatives: 'swing' is not a list"),
         ("{type: native, source: laws.c, function: [a]}", "functions.swing.function: ['a'] is not a name"),
-        ("{type: native, source: ., function: a}", "is no plain file but a folder"),
+        ("{type: native, source: ., function: a}", "is not a plain file but a folder"),
         ("{type: native, source: laws.c, python: [a]}", "functions.swing.python: ['a'] is not the path of a file"),
     ],
 )
@@ -216,7 +220,7 @@ def test_the_command_line_asks_for_permission(sources: Path, capfd: pytest.Captu
     assert "swing(s)" in capfd.readouterr().out
     bare = written(sources, "  swing: {type: native, source: laws.c}", "-swing(s)", "s")
     assert command("run", bare, "--allow-native", "--target", "numpy", "--end", "0.1") == 1
-    assert f"{bare}:3: functions.swing: is C code without a Python twin" in capfd.readouterr().err
+    assert f"{bare}:3: functions.swing: is a C function without a Python version" in capfd.readouterr().err
 
 
 def test_the_schema_knows_functions() -> None:

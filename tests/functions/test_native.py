@@ -89,10 +89,10 @@ def test_without_a_twin_only_compiled_code_runs(sources: Path) -> None:
     assert m.derive().force[0].has(sympy_call("swing", m.coordinate("q"), 0).func)
     x = np.array([0.4, 0.0])
     assert m.compile().rhs(0, x)[1] == pytest.approx(-9.81 * math.sin(0.4), rel=1e-15)
-    with pytest.raises(ModelError, match=r"functions\.swing: is C code without a Python twin"):
+    with pytest.raises(ModelError, match=r"functions\.swing: is a C function without a Python version"):
         m.compile(target="numpy")
     m.body("heavy", mass="2 + swing(0)")
-    with pytest.raises(ModelError, match=r"functions\.swing: is C code without a Python twin"):
+    with pytest.raises(ModelError, match=r"functions\.swing: is a C function without a Python version"):
         m.mechanism()
 
 
@@ -127,7 +127,7 @@ def test_a_native_function_in_a_constraint_needs_its_twin(sources: Path) -> None
         m.native("swing", sources / "laws.c", derivatives=["swing_slope"], python=twin)
         m.initial(x=0.7)
         if twin is None:
-            with pytest.raises(ModelError, match="without a Python twin"):
+            with pytest.raises(ModelError, match="without a Python version"):
                 m.compile()
             continue
         run = m.compile().simulate((0, 2), rtol=1e-9, atol=1e-11)
@@ -166,8 +166,8 @@ def test_other_words_of_a_compiler_are_no_fault_of_a_source(sources: Path) -> No
         ("/* double swing(double) */\nstatic const double\nswing(double a,\n double b)\n{}", {},
          r"swing\.arguments: swing in laws\.c:3 takes 2 arguments, not the 1 declared; give arguments: 2"),
         ("double other(double q) { return swing(q); }\ndouble swing(void) { return 1; }", {}, "laws.c:2 takes 0 arg"),
-        ("int swing(int q) { return q; }", {}, "laws.c:1 has 'int', which is no double; write double swing.double."),
-        ("double swing(double *q) { return *q; }", {}, "has 'double .q', which is no double"),
+        ("int swing(int q) { return q; }", {}, "laws.c:1 has 'int', which is not double; write double swing.double."),
+        ("double swing(double *q) { return *q; }", {}, "has 'double .q', which is not double"),
     ],
 )  # fmt: skip
 def test_arguments_are_held_against_the_source(sources: Path, text: str, keys: dict[str, Any], message: str) -> None:
@@ -215,7 +215,7 @@ def test_packages_carry_the_function(sources: Path, tmp_path: Path) -> None:
 
 def test_a_package_cannot_carry_a_callable(sources: Path, tmp_path: Path) -> None:
     m = pendulum("-swing(q)", full(sources, python=math.sin))
-    with pytest.raises(UsageError, match="needs its Python twin as a file"):
+    with pytest.raises(UsageError, match="needs this function in Python too, in a file"):
         generate(m, tmp_path / "numpy", target="numpy")
     with pytest.raises(UsageError, match="cannot be written to a model file"):
         m.to_yaml()
@@ -248,7 +248,7 @@ WRONG = [
     ({"arguments": 0}, "functions.swing.arguments: 0 arguments; allowed: 1 to 16"),
     ({"arguments": 99}, "allowed: 1 to 16"),
     ({"function": "a;b"}, "functions.swing.function: 'a;b' is not an identifier"),
-    ({"function": "sin"}, "'sin' is a function"),
+    ({"function": "sin"}, "'sin' is a built-in function"),
     ({"derivatives": ["swing"]}, "functions.swing: names one C function twice"),
     ({"python": "no.py"}, "functions.swing.python: no.py cannot be read (No such file or directory)"),
     ({"python": 3}, "functions.swing.python: is not a function"),
@@ -269,7 +269,7 @@ def test_twin_files_that_do_not_fit_are_told(sources: Path) -> None:
     for file, message in (("other.py", "other.py has no function swing"), ("broken.py", "ZeroDivisionError")):
         with pytest.raises(ModelError, match=message):
             pendulum("-swing(q)", full(sources, python=sources / file)).mechanism()
-    with pytest.raises(UsageError, match="python_derivatives go with a callable"):
+    with pytest.raises(UsageError, match="python_derivatives need a callable"):
         eg.Model("m").native("f", "f.c", python="f.py", python_derivatives=[math.cos])
     with pytest.raises(UsageError, match="native has no argument 'sorce'"):
         eg.Model("m").native("f", sorce="f.c")  # type: ignore[call-arg]

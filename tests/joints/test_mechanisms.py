@@ -136,7 +136,7 @@ def test_loop_of_guides_alone_cannot_be_cut() -> None:
         ("distance", {"length": 0}, r"joints\.j\.length: is 0.*spherical"),
         ("curve_slider", {"curve": [0, 1]}, r"joints\.j\.curve: \[0, 1\] is not three numbers"),
         ("curve_slider", {"curve": [0, 1, 2]}, r"joints\.j\.curve: does not depend on j"),
-        ("curve_slider", {"curve": ["j", "t", 0]}, r"joints\.j\.curve: the time 't' cannot stand here"),
+        ("curve_slider", {"curve": ["j", "t", 0]}, r"joints\.j\.curve: the time 't' cannot be used here"),
         ("revolute", {"pitch": 1}, r"a revolute joint has no 'pitch'"),
     ],
 )

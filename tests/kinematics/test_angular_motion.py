@@ -100,7 +100,7 @@ def test_rates_are_the_derivatives_of_what_a_run_shows(tmp_path: Path) -> None:
     assert np.abs(speeds[0] - speeds[1]).max() < 1e-12
 
 
-@pytest.mark.parametrize(("text", "message"), [("wx(com)", "does not turn"), ("wx_body(stone.top)", "stone.top")])
+@pytest.mark.parametrize(("text", "message"), [("wx(com)", "has no rotation"), ("wx_body(stone.top)", "stone.top")])
 def test_what_does_not_turn_is_refused(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "tumbling.yaml"
     path.write_text(TUMBLING + f"  spin: {text}\n", encoding="utf-8")

@@ -18,7 +18,7 @@ def body_on(axis: str, inertia: dict[str, float], turned: list[str] | None = Non
 @pytest.mark.parametrize("axis", "xy")
 def test_it_is_told(axis: str) -> None:
     (note,) = body_on(axis, {"zz": 1.0})
-    assert note.startswith("b turns about axes of which no moment of inertia is given")
+    assert note.startswith("b turns about axes without a given moment of inertia")
     assert body_on(axis, {"xx": 1.0, "yy": 1.0, "zz": 1.0}) == []
 
 

@@ -119,7 +119,7 @@ def test_following_a_held_value_stays_on_the_branch(crank):
 def test_a_way_of_too_many_steps_is_given_up(crank, monkeypatch):
     c = crank()
     monkeypatch.setattr("eomgen.numeric.held_path.TRIALS", 20)
-    with pytest.raises(AssemblyError, match=r"too winding: 20 steps cover 73 % of it"):
+    with pytest.raises(AssemblyError, match=r"too many bends: 20 steps cover 73 % of it"):
         follow(system_of(c), c.closed(0.1), {"theta": 9.0})
 
 

@@ -89,7 +89,7 @@ def test_a_thin_rod_that_may_spin_names_its_body_and_axis(along: tuple[int, int,
         return
     axis = ", ".join(f"{x:.3g}" for x in u)
     assert problem.message.endswith(f"has no inertia behind it: it turns 'stick' about ({axis}) in body axes")
-    assert problem.remedy == "give 'stick' an inertia about that axis, or a joint that does not turn it so"
+    assert problem.remedy == "give 'stick' an inertia about that axis, or a joint that does not turn it about that axis"
     rates = [float(x) for x in problem.message.partition("rates ")[2].partition(" has")[0].split(" : ")]
     if rotation == "euler_parameters":  # the angular velocity itself
         w = np.zeros(3)

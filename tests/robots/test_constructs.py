@@ -106,7 +106,7 @@ def test_what_is_not_known_or_given_twice_is_noted(tmp_path: Path) -> None:
             "left out: drives and their reductions (`actuate` gives inputs, `armature` the inertia of a rotor) "
             "(<transmission>)"
         ),
-        "link.b: 2 <inertial>; the first counts",
+        "link.b: 2 <inertial>; only the first is used",
     )
 
 
@@ -177,8 +177,8 @@ CASES = [
     ({"a": 'gravcomp="1"'}, "gravity compensation"),
     ({"b": 'mocap="true"', "free": ""}, "mocap"),
     ({"joint": 'actuatorgravcomp="true"', "a": 'gravcomp="1"'}, "gravity compensation"),
-    ({"joint": 'frictionloss="0.1"'}, "dry friction of joints is data and does not act (j)"),
-    ({"joint": 'range="-1 1" limited="true"'}, "nothing stops at the limits of joints"),
+    ({"joint": 'frictionloss="0.1"'}, "the dry friction of joints does not act (j)"),
+    ({"joint": 'range="-1 1" limited="true"'}, "the limits of joints stop nothing"),
     ({"tail": '<keyframe><key name="home" qpos="0 0"/></keyframe>'}, "left out: stored states (<keyframe>)"),
     (
         {"site": '<site name="s"/>', "tail": '<actuator><motor name="jet" site="s"/></actuator>'},

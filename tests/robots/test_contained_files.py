@@ -343,16 +343,16 @@ def test_limits_of_joints_may_be_as_large_as_others_write_them(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"lock": 5}, "lock=5: names of joints"),
+        ({"lock": 5}, "lock must be names of joints, or a mapping of names to values, not 5"),
         ({"lock": {"j": 1e308}}, "finite number"),
         ({"lock": [None]}, "names of joints"),
-        ({"actuate": 5}, "actuate=5: names of joints, or True"),
+        ({"actuate": 5}, "actuate must be names of joints, or True, not 5"),
         ({"actuate": {"j": 1}}, "names of joints"),
-        ({"snap": "x"}, "snap='x': an angle"),
+        ({"snap": "x"}, "0 or positive, not 'x'"),
         ({"snap": -1.0}, "an angle"),
         ({"assets": 5}, "assets must be the name of a file or folder, as text or Path, not 5"),
-        ({"floating": "yes"}, "floating='yes': allowed: True, False"),
-        ({"mimic": ["coupling"]}, "allowed: coupling, independent"),
+        ({"floating": "yes"}, "floating must be True or False, not 'yes'"),
+        ({"mimic": ["coupling"]}, "mimic must be one of coupling, independent, not"),
     ],
 )
 def test_odd_options_are_named_errors(given: dict[str, Any], said: str, tmp_path: Path) -> None:
@@ -374,13 +374,13 @@ def test_one_name_of_a_joint_actuates_that_joint_alone(tmp_path: Path) -> None:
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 def test_pipes_folders_and_names_that_are_none_end_at_once(suffix: str, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / f"pipe{suffix}")
-    with pytest.raises(eg.UsageError, match="is no plain file but a pipe"):
+    with pytest.raises(eg.UsageError, match="is not a plain file but a pipe"):
         eg.load(tmp_path / f"pipe{suffix}")
     for name in ("a\0", "\udc80\ud800"):
         with pytest.raises(eg.UsageError, match="path must be the name of a file"):
             eg.load(name + suffix)
     (tmp_path / f"folder{suffix}").mkdir()
-    with pytest.raises(eg.UsageError, match="is no plain file but a folder"):
+    with pytest.raises(eg.UsageError, match="is not a plain file but a folder"):
         eg.load(tmp_path / f"folder{suffix}")
 
 
@@ -388,9 +388,9 @@ def test_meshes_of_model_files_with_names_that_are_none_are_faults(tmp_path: Pat
     path = tmp_path / "m.yaml"
     os.mkfifo(tmp_path / "pipe.stl")
     for name, said in {
-        "a\\0.stl": "holds a character that no file name can",
+        "a\\0.stl": "contains a character that file names cannot have",
         "\\ud800.stl": "character|surrogate",
-        "pipe.stl": "is no plain file",
+        "pipe.stl": "is not a plain file",
     }.items():
         path.write_text(f'name: m\nbodies: {{b: {{solids: [{{type: mesh, file: "{name}", density: 1}}]}}}}\n')
         with pytest.raises(eg.ModelError, match=said):

@@ -232,7 +232,7 @@ def test_dry_friction_acts_where_it_is_asked_for() -> None:
 
 @pytest.mark.parametrize("friction", [-1, "much", float("nan")])
 def test_friction_is_a_velocity(friction: Any) -> None:
-    with pytest.raises(eg.UsageError, match="friction="):
+    with pytest.raises(eg.UsageError, match="friction must be True, or the velocity"):
         eg.load(ARM, friction=friction)
 
 

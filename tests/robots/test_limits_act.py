@@ -82,7 +82,7 @@ def test_a_joint_without_range_has_no_stops(tmp_path: Path) -> None:
     path = tmp_path / "swing.urdf"
     path.write_text(PENDULUM.format(more="").replace('lower="-0.5" upper="1.2"', 'lower="0" upper="0"'))
     model = eg.load(path, limits="stop")
-    assert "no stops at pin, whose limits leave it no range" in model.notes
+    assert "pin gets no stops, because its limits leave it no range" in model.notes
     model.check()
 
 

@@ -233,7 +233,7 @@ def test_an_inertia_that_no_body_has_is_refused(tmp_path: Path) -> None:
 def test_it_floats_by_its_own_word(tmp_path: Path) -> None:
     path = tmp_path / "m.xml"
     path.write_text(EVERYTHING)
-    with pytest.raises(eg.UsageError, match="says itself which bodies float"):
+    with pytest.raises(eg.UsageError, match="itself defines which bodies float"):
         eg.load(path, floating=True)
 
 

@@ -205,7 +205,7 @@ def test_a_gripper_does_not_close_faster_than_its_motor_can(tmp_path: Path) -> N
 def test_limits_that_do_not_act_are_noted(tmp_path: Path) -> None:
     model, _ = load(tmp_path, joint='limited="true" range="-1 2" actuatorfrcrange="-1 1"')
     (note,) = model.notes
-    assert note.startswith("nothing stops at the limits of joints (j); a run that passes one says so; limits='stop'")
+    assert note.startswith("the limits of joints stop nothing (j); a run that passes a limit warns; limits='stop'")
     assert load(tmp_path, joint='actuatorfrcrange="-1 1"')[0].notes == ()
     assert eg.load(tmp_path / "pieces.xml", limits="off").notes == ()
 

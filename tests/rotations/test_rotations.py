@@ -239,7 +239,7 @@ def test_symbols_give_textbook_forms() -> None:
 
 
 def test_bad_input() -> None:
-    with pytest.raises(ValueError, match="'xxz' is no sequence"):
+    with pytest.raises(ValueError, match="'xxz' is not a sequence"):
         rot.matrix_from_euler_angles("xxz", [0, 0, 0])
     with pytest.raises(ValueError, match="Euler parameters has 3 entries; 4"):
         rot.matrix_from_euler_parameters([1, 0, 0])

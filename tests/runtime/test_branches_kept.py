@@ -48,7 +48,7 @@ def test_leaving_the_branch_is_told() -> None:
     """A rocker beyond its dead centre: there is a position on another branch, which x0 does not take silently."""
     mod = models.build("four_bar").compile(target="numpy")
     psi = float(mod.x0()[mod.q_names.index("psi")]) - 3.0
-    with pytest.warns(UserWarning, match=r"psi = .* not reached .* without leaving its branch: .* blocked after"):
+    with pytest.warns(UserWarning, match=r"psi = .* cannot be reached .* on the same branch: .* blocked after"):
         x = mod.x0(psi=psi)
     assert np.abs(mod.constraints(x[: mod.n_q], rows="all")).max() < 1e-12
     assert mod.branch(x) == -1
@@ -85,3 +85,58 @@ def test_drivers_that_turn_fast_are_followed_to_a_far_time() -> None:
     mod = m.compile(target="numpy")
     turns = 250.0 * np.pi
     np.testing.assert_allclose(mod.x0(t=1.25)[:3] - mod.x0()[:3], [turns, -turns, 0.0], atol=1e-9)
+
+
+def five_bar(**initial: float) -> eg.Module:
+    """Two cranks of 0.3 on pivots 0.4 apart, rods of 0.5: two degrees of freedom, two branches."""
+    m = eg.Model("five_bar")
+    left, right, first, second = (
+        m.body(name, mass=1, com=(0.1, 0, 0), inertia={"zz": 1}) for name in ("left", "right", "first", "second")
+    )
+    m.revolute("A", m.ground, left, coordinate="a")
+    m.revolute("E", m.ground.at(0.4, 0, 0), right, coordinate="e")
+    m.revolute("B", left.at(0.3, 0, 0), first)
+    m.revolute("D", right.at(0.3, 0, 0), second)
+    m.revolute("C", first.at(0.5, 0, 0), second.at(0.5, 0, 0))
+    m.output("y", first.at(0.5, 0, 0).position[1])
+    m.initial(**initial)
+    return m.compile(target="numpy")
+
+
+@pytest.mark.parametrize("initial", [{}, {"a": 1.8}, {"a": 1.8, "e": 1.0}])
+@pytest.mark.parametrize("given", [{}, {"e": 1.1}])
+def test_branches_hold_what_determines_a_position(initial: dict[str, float], given: dict[str, float]) -> None:
+    """Values that leave freedom would be met by a continuum of positions."""
+    mod = five_bar(**initial)
+    found = mod.branches(given)
+    assert len(found) == 2
+    cranks = np.array([[q[mod.q_names.index(name)] for name in ("a", "e")] for q in found])
+    np.testing.assert_allclose(cranks[1], cranks[0], atol=1e-12)
+    a, e = cranks[0]
+    B, D = (np.array([x + 0.3 * np.cos(turn), 0.3 * np.sin(turn)]) for x, turn in ((0.0, a), (0.4, e)))
+    across = np.sqrt(0.25 - np.sum((D - B) ** 2) / 4) * np.array([-(D - B)[1], (D - B)[0]]) / np.linalg.norm(D - B)
+    expected = sorted([((B + D) / 2 + across)[1], ((B + D) / 2 - across)[1]])
+    heights = sorted(mod.outputs(0.0, np.r_[q, np.zeros(mod.n_x - mod.n_q)])[0] for q in found)
+    np.testing.assert_allclose(heights, expected, atol=1e-9)
+    assert all({"a": a, "e": e}[name] == pytest.approx(value) for name, value in given.items())
+
+
+def test_values_that_say_more_than_a_position_needs_do_not_hide_a_branch() -> None:
+    closed = five_bar(a=1.8, e=1.0)
+    whole = dict(zip(closed.q_names, closed.x0(), strict=False))
+    assert len(five_bar(**whole).branches()) == 2
+
+
+def test_euler_angles_of_one_rotation_are_one_branch() -> None:
+    """An arm and a plate held by balls and a rod: the rod's length is met at two angles of the plate."""
+    m = eg.Model("held", gravity=(0, 0, -9.81))
+    arm, plate = m.body("arm", mass=1, inertia=(1, 1, 1)), m.body("plate", mass=1, inertia=(1, 1, 1))
+    m.revolute("hinge", m.ground, arm, axis="x", coordinate="theta")
+    m.spherical("ball", arm.at(0, 0.4, 0), plate)
+    m.spherical("top", m.ground.at(0, 0.4, 0.3), plate.at(0, 0, 0.3))
+    m.distance("rod", m.ground.at(-0.12, 0, 0.1), plate.at(-0.12, 0, 0.1), length=0.4)
+    mod = m.compile(target="numpy")
+    found = mod.branches()
+    poses = [mod.poses(q) for q in found]
+    assert len(found) >= 2
+    assert all(np.abs(one - other).max() > 1e-3 for k, one in enumerate(poses) for other in poses[:k])

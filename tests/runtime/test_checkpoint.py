@@ -269,7 +269,7 @@ def test_another_run_is_refused_by_name(pendulum: Any, plain: Any, crank: Any, t
 def test_what_no_checkpoint_can_be_kept_of_is_refused(pendulum: Any, plain: Any, tmp_path: Path) -> None:
     file = tmp_path / "run.ckpt"
     for options, words in (
-        ({"method": "LSODA"}, "no checkpoint can be kept with method LSODA"),
+        ({"method": "LSODA"}, "a run with method LSODA cannot keep a checkpoint"),
         ({"method": "BDF", "dense_output": True}, "keeps no continuous solution"),
         ({"checkpoint_every": -1}, "checkpoint_every must be a number of seconds"),
         ({"checkpoint_every": float("nan")}, "checkpoint_every must be finite"),
@@ -284,7 +284,7 @@ def test_what_no_checkpoint_can_be_kept_of_is_refused(pendulum: Any, plain: Any,
         pendulum.simulate(1, resume=True)
     driven = eg.load(EXAMPLES / "driven_slider_crank.yaml").compile(target="numpy")
     if not driven.n_dof:
-        with pytest.raises(eg.UsageError, match="no checkpoint is kept"):
+        with pytest.raises(eg.UsageError, match="cannot keep a checkpoint"):
             driven.simulate(1, checkpoint=file)
     assert not file.exists()
 
@@ -334,7 +334,7 @@ def test_hostile_numbers_are_refused(pendulum: Any, tmp_path: Path, killed: Any)
     bad += [{"block": pivots}]
     for change in bad:
         file.write_bytes(rewritten(file, **change))
-        with pytest.raises(eg.UsageError, match=r"is damaged or none of eomgen's|belongs to another run"):
+        with pytest.raises(eg.UsageError, match=r"is damaged, or is not a checkpoint|belongs to another run"):
             pendulum.simulate(checkpoint=file, **run)
             pytest.fail(f"taken: {change}")
         file.write_bytes(good)

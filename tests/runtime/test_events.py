@@ -199,7 +199,7 @@ def test_events_are_kept_in_files(swing: Any, tmp_path: Path) -> None:
     ("events", "words"),
     [
         ("thteta", "no name in event"),
-        ("__import__('os')", "no place in an expression"),
+        ("__import__('os')", "not allowed in an expression"),
         (3.0, "must be a name, an expression or a function"),
         ({"a": {"expression": "t - 1", "direction": 2}}, "direction must be 1, -1 or 0"),
         ({"a": {"expresion": "t - 1"}}, "did you mean expression"),
@@ -269,8 +269,8 @@ def test_faults_are_told_with_their_lines(tmp_path: Path) -> None:
         eg.load(file).compile()
     text = str(told.value)
     for words in (
-        "events.h: the name 'h' is taken",
-        "the acceleration 'h_ddot' cannot stand in an event",
+        "events.h: the name 'h' is already used",
+        "the acceleration 'h_ddot' cannot be used in an event",
         "events.far.expression: is missing",
         "events.far.direction: 2 is not 1, -1 or 0",
         "events.far.terminal: -1 is not true, false or a whole number",
@@ -337,7 +337,7 @@ def test_an_event_that_is_not_watched_ends_no_run(method: str) -> None:
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_a_single_step_passes_over_no_reset(target: str) -> None:
     mod = ball().compile(target=target)
-    with pytest.raises(eg.UsageError, match="events of ball reset its state, and a single step watches none"):
+    with pytest.raises(eg.UsageError, match="events of ball reset its state, and a single step finds no events"):
         mod.step(0.0, mod.x0(), 0.5)
 
 

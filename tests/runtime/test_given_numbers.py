@@ -80,7 +80,7 @@ def test_degrees_in_expressions() -> None:
     m.prismatic("slide", m.ground, body, axis="x", coordinate="s")
     mod = m.compile(target="numpy")
     np.testing.assert_allclose(mod.outputs(0.0, mod.x0()), [0.5, 0.5], rtol=1e-15)
-    with pytest.raises(eg.ModelError, match="'deg' is a function"):
+    with pytest.raises(eg.ModelError, match="'deg' is a built-in function"):
         wrong = eg.Model("m")
         wrong.parameter("deg", 1.0)
         wrong.mechanism()

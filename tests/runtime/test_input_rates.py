@@ -136,7 +136,7 @@ def test_direct_calls_have_rates_as_inputs(ring: Any) -> None:
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (lambda t, x: 1.0 + t, ["input l", "l_dot", "not known of a function", "give l_dot beside it"]),
+        (lambda t, x: 1.0 + t, ["input l", "l_dot", "rate of a function is not known", "give l_dot too"]),
         (Rated(lambda t: 1.0 + t, lambda t: 1.0), ["input l", "l_ddot", "not known"]),
         (([0.0, 0.5], [1.0, 1.5]), ["l_ddot", "its slope jumps", "linear table at t = 0.5 s", '"cubic"']),
         (eg.Signal([0.0, 0.5], [1.0, 2.0], "zero-order"), ["l_dot", "its value jumps", "t = 0.5 s"]),
@@ -154,7 +154,7 @@ def test_a_rate_that_is_not_known_is_refused(ring: Any, given: Any, words: list[
 
 def test_a_rate_without_its_input_is_refused(ring: Any) -> None:
     for given in (0.5, "t", ([0.0, 1.0], [0.0, 1.0])):
-        with pytest.raises(eg.UsageError, match="input l_dot is the rate of l, which is held; give l as well"):
+        with pytest.raises(eg.UsageError, match="input l_dot is the rate of l, which is constant; give l too"):
             ring.simulate(1.0, START, inputs={"l_dot": given})
     run = ring.simulate(1.0, {"x": 0.6, "x_dot": -0.4}, inputs={"l_dot": 0.0}, **TIGHT)
     assert np.abs(np.hypot(run["x"], run["y"]) - 1.0).max() < 1e-12
@@ -200,7 +200,7 @@ def test_a_jump_of_a_function_is_refused_though_its_rate_is_given() -> None:
 
 def test_a_rate_that_is_bound_of_a_held_input_is_refused() -> None:
     bound = build("winch", "numpy").bind(u={"l": 1.0, "l_dot": 1.0})
-    refused: Any = {"match": "input l_dot is bound to 1, the rate of l, which is held"}
+    refused: Any = {"match": "input l_dot is bound to 1, but it is the rate of l, which is constant"}
     with pytest.raises(eg.UsageError, **refused):
         bound.simulate(1.0, {"th_dot": 1.0})
     with pytest.raises(eg.UsageError, **refused):
@@ -217,7 +217,7 @@ def test_a_rate_that_is_bound_of_a_held_input_is_refused() -> None:
     "pulse", ["where(t > 0.5, 1, 0)*where(t < 0.501, 1, 0)", "max(sign(t - 0.5), 0)*(t < 0.50001)"]
 )
 def test_a_short_pulse_is_a_jump(pulse: str) -> None:
-    with pytest.raises(eg.UsageError, match=r"l_dot, and it jumps at t = 0\.5"):
+    with pytest.raises(eg.UsageError, match=r"l_dot, but it jumps at t = 0\.5"):
         build("winch", "numpy").simulate(1.0, {"th_dot": 1.0}, inputs={"l": f"1 + 0.1*{pulse}"})
 
 
@@ -290,7 +290,7 @@ def test_a_short_pulse_that_the_model_declares_is_a_jump() -> None:
     m.revolute("A", m.ground, m.body("arm", mass=0.0), coordinate="phi")
     m.prismatic("S", m.ground, m.body("bead", mass=1.0), axis="x", coordinate="r")
     m.driver("lead", coordinate="phi", value="u")
-    with pytest.raises(eg.UsageError, match=r"input u: the equations need its rate u_dot, and it jumps at t = 0\.5"):
+    with pytest.raises(eg.UsageError, match=r"input u: the equations need its rate u_dot, but it jumps at t = 0\.5"):
         m.compile(target="numpy").simulate(1.0)
 
 

@@ -200,7 +200,7 @@ def test_kinematics_is_pure(crank):
 
 def test_kinematics_says_when_the_way_is_blocked(crank):
     m = crank(independent=[2], q_reference=[0.7, -0.32768, 0.40673])
-    with pytest.raises((ProjectionError, PartitionError), match=r"way to s = 0\.6 is blocked"):
+    with pytest.raises((ProjectionError, PartitionError), match=r"path to s = 0\.6 is blocked"):
         m.kinematics([0.6])
 
 
@@ -310,7 +310,7 @@ def test_coordinates_called_like_arguments_go_in_a_dict(pendulum, models):
     metadata = json.loads(pendulum.core.metadata)
     metadata |= {"q_names": ["u"], "v_names": ["u_dot"], "x_names": ["u", "u_dot"], "initial": {}}
     m = Module(NumpyCore(metadata, pendulum.core.blocks))
-    with pytest.raises(UsageError, match="the coordinate 'u' goes in a dict: {'u': ...}"):
+    with pytest.raises(UsageError, match="give the coordinate 'u' in a dict: {'u': ...}"):
         m.x0(u=0.4)
     assert m.x0({"u": 0.4})[0] == 0.4
 

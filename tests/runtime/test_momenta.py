@@ -193,7 +193,7 @@ def test_the_models_own_names_come_first() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("angle(com)", "does not turn"),
+        ("angle(com)", "has no rotation"),
         ("x(comm)", "no body 'comm'"),
         ("momentum", "unknown name 'momentum'"),
         ("angular_momentum_x(bob.tip)", "no marker 'tip'"),
@@ -236,7 +236,7 @@ def test_forces_cannot_use_sums() -> None:
 def test_a_negative_mass_is_refused_at_run_time_too() -> None:
     mod = tree()
     for given in ({"m_a": -1.0}, np.array([-1.0])):
-        with pytest.raises(eg.UsageError, match="m_a is the mass of body 'a', which is 0 or positive, not -1"):
+        with pytest.raises(eg.UsageError, match="m_a is the mass of body 'a', which must be 0 or positive, not -1"):
             mod.bind(p=given)
     with pytest.raises(eg.UsageError, match="m_a is the mass"):
         mod.simulate((0, 0.1), parameters={"m_a": -1.0})

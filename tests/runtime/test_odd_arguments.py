@@ -29,11 +29,11 @@ def loop() -> Any:
 WIDE = np.broadcast_to(0.5, 10**9)
 RUNS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "tiny max_step": (lambda m: m.simulate(1.0, max_step=1e-300), "max_step = 1e-300 s is too small .* would not end"),
-    "small max_step": (lambda m: m.simulate(1.0, max_step=1e-9), "would not end"),
+    "small max_step": (lambda m: m.simulate(1.0, max_step=1e-9), "would take too long"),
     "many steps kept": (lambda m: m.simulate(1.0, max_step=2e-8), r"a run of 5e\+07 steps would keep .* GiB"),
     "dense and small": (lambda m: m.simulate(1.0, max_step=1e-7, dense_output=True), "would keep"),
-    "far end": (lambda m: m.simulate(1e300), r"needs \S+ more to t = 1e\+300 s, which would not end"),
-    "far back": (lambda m: m.simulate((0, -1e300)), "would not end"),
+    "far end": (lambda m: m.simulate(1e300), r"needs \S+ more to reach t = 1e\+300 s, which would take too long"),
+    "far back": (lambda m: m.simulate((0, -1e300)), "would take too long"),
     "end nan": (lambda m: m.simulate(np.nan), "span must be"),
     "end inf": (lambda m: m.simulate(np.inf), "span must be"),
     "complex end": (lambda m: m.simulate(1j), "span must be"),
@@ -63,7 +63,7 @@ RUNS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "a guess complex": (lambda m: m.equilibrium({"theta": 1j}), "theta must be a number"),
     "a state of modes": (lambda m: m.modes("ab"), "x must hold real numbers"),
     "no names": (lambda m: m.sensitivities(3, 1.0), "names must be a name or a list of names, not 3"),
-    "slopes": (lambda m: m.sensitivities(["g"], 1.0, max_step=1e-300), "would not end"),
+    "slopes": (lambda m: m.sensitivities(["g"], 1.0, max_step=1e-300), "would take too long"),
 }  # fmt: skip
 
 
@@ -122,9 +122,9 @@ def test_runs_and_calls(swings: dict[str, Any], case: str, target: str) -> None:
 
 
 POSITIONS: dict[str, tuple[Callable[[Any], Any], str]] = {
-    "a far angle": (lambda m: m.kinematics([1e9]), r"the way to theta = 1e\+09 is 1e\+09 rad .* 2000 at most"),
-    "beyond floats": (lambda m: m.kinematics([1e300]), "at most, in small steps"),
-    "minimal": (lambda m: m.minimal.expand([1e9, 0.0]), "at most, in small steps"),
+    "a far angle": (lambda m: m.kinematics([1e9]), r"the path to theta = 1e\+09 is 1e\+09 rad .* at most 2000 are"),
+    "beyond floats": (lambda m: m.kinematics([1e300]), "are allowed, in small steps"),
+    "minimal": (lambda m: m.minimal.expand([1e9, 0.0]), "are allowed, in small steps"),
     "many columns": (lambda m: m.kinematics(np.broadcast_to(0.5, (1, 10**9))), "would keep"),
     "many minimal": (lambda m: m.minimal.expand(np.broadcast_to(0.5, (2, 10**9))), "would keep"),
     "many points": (lambda m: m.kinematic_analysis(WIDE), "a range of 1000000000 points would keep"),
@@ -166,7 +166,7 @@ def test_results_written_beside_and_over_the_state(swings: dict[str, Any], targe
 
 
 def test_steps_of_length_zero_are_named(swings: dict[str, Any]) -> None:
-    with pytest.raises(eg.SimulationError, match="no progress|stopped|would not end"):
+    with pytest.raises(eg.SimulationError, match="no progress|stopped|would take too long"):
         swings["numpy"].simulate(1.0, atol=1e-300, rtol=1e-300, method="LSODA")
 
 

@@ -318,5 +318,5 @@ def test_a_solver_that_ends_early_in_silence_is_named(modules: dict[str, Any]) -
                 self.status = "finished"
             return message
 
-    with pytest.raises(eg.SimulationError, match=r"is at the end, t = 2 s, and is at t = 1\."):
+    with pytest.raises(eg.SimulationError, match=r"reports the end, t = 2 s, but stopped at t = 1\."):
         modules["numpy"].simulate((0, END), method=Lazy)

@@ -53,7 +53,7 @@ def test_here_the_code_is_shared_and_the_values_are_not() -> None:
 def test_rarer_kernels_go_along_once_they_are_made() -> None:
     module = eg.load(EXAMPLES / "slider_crank.yaml").compile(target="numpy")
     q = module.x0()[: module.n_q]
-    with pytest.raises(eg.UsageError, match="came without centroidal.*before pickling"):
+    with pytest.raises(eg.UsageError, match="pickled without centroidal.*before you pickle"):
         pickle.loads(pickle.dumps(module)).center_of_mass(q)
     expected = module.center_of_mass(q)
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(module)).center_of_mass(q), expected)

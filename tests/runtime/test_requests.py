@@ -35,7 +35,7 @@ def ending(times: Any) -> Any:
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        ({"events": ending(-1)}, "event height: terminal must be true, false, or at which time .* not -1"),
+        ({"events": ending(-1)}, "event height: terminal must be true, false, or the number of events .* not -1"),
         ({"events": ending(1.5)}, "not 1.5"),
         ({"events": {"low": {"expression": "theta", "terminal": -2}}}, "event low: terminal .* not -2"),
         ({"events": {"low": {"expression": "theta", "terminal": "once"}}}, "event low: terminal .* not 'once'"),
@@ -68,7 +68,7 @@ def test_times_of_events(swing: Any, times: Any, count: int) -> None:
 @pytest.mark.parametrize("method", ["DOP853", "BDF"])
 def test_an_event_without_a_value_is_told_of(swing: Any, method: str) -> None:
     unknown = {"gap": "log(-1 - theta**2)", "low": "theta"}
-    with pytest.warns(UserWarning, match="event gap: no number") as told:
+    with pytest.warns(UserWarning, match="event gap: the value was not a number") as told:
         run = swing.simulate((0, 1.5), events=unknown, method=method)
     assert told[0].filename == __file__
     assert len(run.t_events["gap"]) == 0

@@ -368,17 +368,17 @@ class Pushing:
 @pytest.mark.parametrize(
     ("function", "said"),
     [
-        (lambda t: t, r"lambda>\(t\) does not take; write it with both, as lambda t, x"),
-        (Pushing().push, r"push\(t\) does not take"),
-        (lambda: 1.0, r"\(\) does not take"),
-        (lambda t, x, gain: gain, r"\(t, x, gain\) does not take; bind its other arguments"),
+        (lambda t: t, r"lambda>\(t\) is not; write it with both, as lambda t, x"),
+        (Pushing().push, r"push\(t\) is not"),
+        (lambda: 1.0, r"\(\) is not"),
+        (lambda t, x, gain: gain, r"\(t, x, gain\) is not; bind its other arguments"),
     ],
 )
 def test_functions_of_other_arguments_are_refused_by_name(crank, function, said):
     m = crank()
-    with pytest.raises(UsageError, match=rf"input tau: its function is called as f\(t, x\), which .*{said}"):
+    with pytest.raises(UsageError, match=rf"input tau: its function must be callable as f\(t, x\), and .*{said}"):
         m.simulate((0, 0.1), inputs={"tau": function})
-    with pytest.raises(UsageError, match=rf"an event is called as f\(t, x\), which .*{said}"):
+    with pytest.raises(UsageError, match=rf"an event must be callable as f\(t, x\), and .*{said}"):
         m.simulate((0, 0.1), events=function)
 
 

@@ -38,7 +38,7 @@ CASES = [
     ({"k": -9.0}, 0.0, [0.0], eg.NonFiniteError, "the loads of law are not"),
     ({"w": 0.0}, 0.0, [0.0], eg.SingularMassMatrixError, "moving theta meets no inertia"),
     ({}, 1e200, [0.0], eg.NonFiniteError, "squares of theta, bend, psi, theta_dot, bend_dot, psi_dot overflow"),
-    ({}, 0.0, [np.nan], eg.NonFiniteError, "look for an input that is no number"),
+    ({}, 0.0, [np.nan], eg.NonFiniteError, "look for an input that is not a number"),
     ({}, np.nan, [0.0], eg.NonFiniteError, "already are not; check the state"),
 ]
 

@@ -58,7 +58,7 @@ def test_what_cannot_be_held_is_refused(crank: Any) -> None:
         crank.x0({"x(rod.tp)": 0.4})
     with pytest.raises(UsageError, match="did you mean pin_x"):
         crank.x0(pinx=0.4)
-    with pytest.raises(UsageError, match="held, not pin_x; give the coordinates"):
+    with pytest.raises(UsageError, match="held coordinates and rates, not pin_x; give the coordinates"):
         crank.sensitivities(["l"], (0, 0.01), initial={"pin_x": 0.42})
 
 
@@ -82,7 +82,7 @@ def test_an_open_arm_reaches_a_point(tmp_path: Path) -> None:
     x = mod.x0(height=0.3)  # the first declared value has room beside it
     np.testing.assert_allclose(x[:2], [0.2, np.arcsin((0.3 - 0.5 * sin(0.2)) / 0.3) - 0.2], atol=1e-10)
     for name in ("energy_like", "pull"):
-        with pytest.raises(UsageError, match=f"the output '{name}' depends on .*cannot be an initial value"):
+        with pytest.raises(UsageError, match=f"the output '{name}' depends on .*cannot be given as an initial value"):
             mod.x0({name: 1.0})
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import importlib.util
+import io
 import json
 import re
 import shutil
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +17,16 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
 from click.testing import CliRunner
+from matplotlib.figure import Figure
 from PIL import Image
 
 import eomgen as eg
 from eomgen.cli.command import eomgen
 from eomgen.errors import MissingDependencyError, UsageError
+from eomgen.show import animate as eomgen_animate
+from eomgen.show.animate import ShownColumn
+from eomgen.show.film_frames import Frames, draw_curves
+from eomgen.show.shown_motion import moving_scene, sample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -56,6 +64,36 @@ def test_a_gif_has_a_frame_for_every_step_of_time(run: Any, tmp_path: Path) -> N
     assert sum(durations) == 2100
 
 
+def test_a_gif_without_a_file_is_shown_by_a_notebook(run: Any, tmp_path: Path) -> None:
+    shown = run.animate(format="gif", fps=4, dpi=30)
+    file = run.animate(tmp_path / "run.gif", fps=4, dpi=30)
+    assert bytes(shown) == shown.data == file.read_bytes()
+    found = re.fullmatch('<img alt="animation" src="data:image/gif;base64,(.*)">', shown._repr_html_())
+    assert found is not None
+    with Image.open(io.BytesIO(base64.b64decode(found[1]))) as image:
+        assert image.n_frames == 13  # 1 s in 3 s, 4 in a second, both ends
+    swing = pendulum_modes().animate(1, format="gif", fps=4, dpi=30)
+    with Image.open(io.BytesIO(bytes(swing))) as image:
+        assert image.n_frames == 8
+    assert "<html" in str(run.animate(format="html", fps=4)).lower()
+
+
+def test_a_format_is_not_a_file(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("gif", ".gif", "mp4"):
+        with pytest.raises(UsageError, match=f"such as 'run.{name[-3:]}', or format='{name[-3:]}' without a file"):
+            run.animate(name)
+    with pytest.raises(UsageError, match="format= is for an animation without a file"):
+        run.animate("run.gif", format="gif")
+    with pytest.raises(UsageError, match="format must be one of 'gif', 'mp4', 'html', not 'png'"):
+        run.animate(format="png")
+    assert list(tmp_path.iterdir()) == []
+
+
+def pendulum_modes() -> Any:
+    return eg.load(EXAMPLES / "pendulum.yaml").compile(target="numpy").modes({"theta": 0.0})
+
+
 def test_ways_are_round_at_any_rate_of_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     """A crank that turns by 2 rad from frame to frame leaves a circle, not a polygon, and only behind itself."""
     from eomgen.show import animate
@@ -90,11 +128,11 @@ def test_a_saved_run_asks_for_its_model(run: Any, module: Any, tmp_path: Path) -
 
 
 def test_bad_files_and_rates_are_refused_before_any_work(run: Any, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"\.gif, \.mp4, \.html"):
+    with pytest.raises(UsageError, match=r"\.gif, \.mp4 or \.html"):
         run.animate(tmp_path / "run.avi")
     with pytest.raises(UsageError, match="fps must be a number greater than 0"):
         run.animate(tmp_path / "run.gif", fps=0)
-    with pytest.raises(UsageError, match="of which an animation has at most"):
+    with pytest.raises(UsageError, match="is the most; give a speed"):
         run.animate(tmp_path / "run.gif", fps=60, speed=0.001)
     with pytest.raises(UsageError, match="trace"):
         run.animate(tmp_path / "run.gif", trace="nowhere")
@@ -161,7 +199,8 @@ def hanging(angle: float = 0.0) -> Any:
 
 def test_arrows_are_the_forces_of_joints() -> None:
     """At rest the hinge holds 2 kg; let go at a right angle it holds nothing at first, and pulls inwards later."""
-    from eomgen.show.shown_motion import moving_scene, sample, with_arrows
+    from eomgen.show.force_arrows import with_arrows
+    from eomgen.show.shown_motion import moving_scene, sample
 
     for angle, force in ((0.0, np.array([0.0, 2 * 9.81])), (np.pi / 2, None)):
         traj = hanging(angle)
@@ -182,8 +221,41 @@ def test_arrows_are_the_forces_of_joints() -> None:
             expected = (inwards * along).T
             longest = np.linalg.norm(expected, axis=1).max()
             assert ways / np.linalg.norm(ways, axis=1).max() == pytest.approx(expected / longest, abs=1e-6)
-    with pytest.raises(UsageError, match="no joint 'hing'"):
+    with pytest.raises(UsageError, match="no joint, spring or damper 'hing' .* there are hinge"):
         with_arrows(scene, module, motion, ("hing",))
+
+
+def test_arrows_are_the_forces_of_springs_and_dampers() -> None:
+    """On each body at an end: -k (s - s0), of the free length 0.4, and -c s', away from the other end."""
+    from eomgen.show.force_arrows import with_arrows
+    from eomgen.show.shown_motion import moving_scene, sample
+
+    m = eg.Model("two", gravity=(0, -9.81, 0))
+    k = m.parameter("k", 80.0)
+    upper, lower = m.body("upper", mass=1.0), m.body("lower", mass=2.0)
+    m.prismatic("A", m.ground, upper, axis="y", coordinate="a")
+    m.prismatic("B", m.ground, lower, axis="y", coordinate="b")
+    m.spring("coil", lower, upper, stiffness=k, length=0.4)
+    m.damper("pot", m.ground.at(0.0, 1.0, 0.0), upper, damping="3 + k/80")
+    m.torque("lift", "B", "k/4*t")
+    traj = m.compile(target="numpy").simulate(0.5, initial={"a": 0.3, "b": -0.3, "a_dot": 0.5}, dense_output=True)
+    module = traj.columns.module
+    motion = sample(traj, lambda t: (traj.at(t).x, None), 20.0, 1.0)
+    x = dict(zip(module.x_names, motion.x, strict=True))
+    scene = with_arrows(moving_scene(module, motion, False, False, ()), module, motion, ["coil", "pot"])
+    found = [(item.name, item.path[:, 1, 1] - item.path[:, 0, 1], item.path[:, 0, 1]) for item in scene.items
+             if item.role == "arrow" and item.path is not None]  # fmt: skip
+    push, drag = -80.0 * (x["a"] - x["b"] - 0.4), -4.0 * x["a_dot"]
+    longest = max(np.abs(push).max(), np.abs(drag).max())
+    assert scene.note == f"longest arrow {longest:.4g} N"
+    scale = max(np.abs(ways).max() for _, ways, _ in found) / longest
+    expected = [("coil", push, x["a"]), ("coil", -push, x["b"]), ("pot", drag, x["a"])]  # ground has no arrow
+    for (name, ways, tails), (element, force, place) in zip(found, expected, strict=True):
+        assert name == element
+        assert ways == pytest.approx(scale * force, abs=1e-6 * scale * longest)
+        assert tails == pytest.approx(place, abs=1e-12)
+    named = with_arrows(moving_scene(module, motion, False, False, ()), module, motion, True)
+    assert {item.name for item in named.items if item.role == "arrow"} == {"A", "B", "coil", "pot"}
 
 
 def test_frames_and_films(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,14 +265,14 @@ def test_frames_and_films(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert [file.name for file in sorted(folder.iterdir())] == [f"frame_{k}.png" for k in range(5)]
     with Image.open(folder / "frame_3.png") as image:
         assert np.ptp(np.asarray(image.convert("L"))) > 100
-    with pytest.raises(UsageError, match="a new or an empty folder"):
+    with pytest.raises(UsageError, match="must be new or empty"):
         run.animate(folder)
     if importlib.util.find_spec("imageio_ffmpeg") or shutil.which("ffmpeg"):
         film = run.animate(tmp_path / "run.mp4", fps=5, dpi=40).read_bytes()
         assert film[4:8] == b"ftyp"
     monkeypatch.setattr(matplotlib.animation.writers, "is_available", lambda name: False)
     monkeypatch.setattr(writers, "import_module", lambda name: (_ for _ in ()).throw(ImportError(name)))
-    with pytest.raises(MissingDependencyError, match=r"needs ffmpeg: pip install imageio-ffmpeg.*\.html need"):
+    with pytest.raises(MissingDependencyError, match=r"needs ffmpeg: pip install imageio-ffmpeg.*\.html do not need"):
         run.animate(tmp_path / "other.mp4")
 
 
@@ -210,3 +282,71 @@ def test_a_range_at_one_time_moves_in_a_page_too(module: Any, tmp_path: Path) ->
     assert '"words": ["theta = 0.000 rad", "theta = 0.250 rad"' in text
     clock = json.loads(re.search(r'"clock": (\[[^]]*\])', text)[1])  # type: ignore[index]
     assert len(set(clock)) == 5
+
+
+@pytest.mark.parametrize("dpi", ["x", 0, True, 1e6, float("nan")])
+def test_dots_are_a_sensible_number(run: Any, tmp_path: Path, dpi: Any) -> None:
+    with pytest.raises(UsageError, match="dpi must be a number from 1 to 1200"):
+        run.animate(tmp_path / "a.gif", dpi=dpi)
+
+
+def test_a_model_in_place_of_a_module_is_told(run: Any, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"model must be a module, as Model.compile\(\) returns"):
+        run.animate(tmp_path / "a.gif", model=eg.load(EXAMPLES / "slider_crank.yaml"))
+
+
+def test_curves_beside_an_animation_are_smooth(module: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Between the few steps of a run they follow the motion, as traj.plot does."""
+    shown: list[Any] = []
+    monkeypatch.setattr(eomgen_animate, "write", lambda file, scene, motion, curves, dpi, format: shown.extend(curves))
+    module.simulate(0.2).animate(tmp_path / "a.gif", plot="pin_x")
+    (curve,) = shown
+    exact = module.simulate(0.2, t_eval=curve.over)["pin_x"]
+    assert len(curve.over) > 500
+    assert curve.values == pytest.approx(exact, abs=1e-5)
+
+
+def test_a_title_fits_a_narrow_picture() -> None:
+    m = eg.Model("a_weight_on_a_very_long_rail", gravity=(0, -9.81, 0))
+    m.prismatic("fall", m.ground, m.body("weight", mass=1), axis="y", coordinate="h")
+    mod = m.compile(target="numpy")
+    motion = sample(mod.simulate(1.0), lambda t: (mod.simulate(1.0, t_eval=t).x, None), 5, 0.25)
+    frames = Frames.of(moving_scene(mod, motion, None, False, ())._replace(note="longest arrow 1.23e+04 N"), motion)
+    box = frames.titles[0].get_window_extent(frames.canvas.get_renderer())
+    assert 0 <= box.x0 < box.x1 <= frames.canvas.get_width_height()[0]
+
+
+def test_curves_over_a_range_name_its_unit(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    turn = module.kinematic_analysis(theta=np.linspace(0, 6, 9))
+    motion = sample(turn, lambda t: (turn.x, None), 25, None)
+    ax = Figure().add_subplot()
+    draw_curves(ax, [ShownColumn("s (m)", motion.over, turn["s"])], motion)
+    assert ax.get_xlabel() == r"$\theta$ (rad)"
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium")
+def test_a_page_fits_a_narrow_window(run: Any, tmp_path: Path) -> None:
+    pytest.importorskip("k3d")
+    file = run.animate(tmp_path / "run.html", names=False)
+    with Browser(tmp_path / "profile", size=(420, 760)) as browser:
+        browser.open(file.as_uri())
+        browser.wait_for("document.getElementById('words') && document.getElementById('words').textContent !== ''")
+        end = time.monotonic() + 30
+        while True:  # until the mechanism is drawn
+            drawn = (browser.picture()[60:600] < 200).any(axis=(0, 2))
+            if drawn.sum() > 50 and not drawn[:3].any() and not drawn[-3:].any():
+                break
+            assert time.monotonic() < end, "the mechanism reaches beyond the window"
+            time.sleep(0.5)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium")
+def test_a_page_says_what_it_lacks(run: Any, tmp_path: Path) -> None:
+    pytest.importorskip("k3d")
+    file = run.animate(tmp_path / "run.html", names=False)
+    with Browser(tmp_path / "profile") as browser:
+        script = "HTMLCanvasElement.prototype.getContext = () => null;"
+        browser.call("Page.addScriptToEvaluateOnNewDocument", source=script)
+        browser.open(file.as_uri())
+        browser.wait_for("document.getElementById('missing') !== null")
+        assert "needs WebGL 2" in browser.evaluate("document.getElementById('missing').textContent")

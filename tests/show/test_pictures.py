@@ -10,12 +10,13 @@ import matplotlib
 import matplotlib.pyplot as pyplot
 import numpy as np
 import pytest
+from matplotlib.path import Path as Line
 
 import eomgen as eg
 from eomgen.errors import MissingDependencyError, UsageError
 from eomgen.show import optional
 from eomgen.show.build_scene import build_scene
-from eomgen.show.flat import outline
+from eomgen.show.label_places import outline
 from eomgen.show.scene import Scene
 
 matplotlib.use("agg")
@@ -79,6 +80,42 @@ def test_a_planar_mechanism_is_true_to_scale_and_a_spatial_one_in_space(module: 
     assert size / size[0] == pytest.approx(box / box[0], rel=1e-9)
 
 
+def test_what_stands_on_given_axes_stays_visible(module: Any) -> None:
+    ax = pyplot.figure().add_subplot()
+    ax.plot([-2.0, 0.1], [0.0, 1.5])
+    ax.set_title("mine")
+    ax.set_xlabel("way (m)")
+    scene = scene_of(module)
+    module.draw(ax=ax)
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    assert left <= -2.0 < 1.5 <= top
+    assert right >= scene.high[0]
+    assert bottom <= scene.low[1]
+    assert (ax.get_aspect(), ax.get_title(), ax.get_xlabel()) == (1.0, "mine", "way (m)")
+    before = module.draw({"theta": 0.3}).get_xlim()
+    assert before == pytest.approx((scene.low[0], scene.high[0]))  # axes of its own fit the mechanism
+    hanging = pyplot.figure().add_subplot()
+    hanging.set_ylim(3.0, 1.0)  # downwards, and set by hand
+    module.draw(ax=hanging)
+    assert hanging.get_ylim()[0] == 3.0
+    assert hanging.get_ylim()[1] <= scene.low[1]
+
+
+def test_what_stands_on_given_axes_in_space_stays_visible() -> None:
+    bicycle = compiled("bicycle.yaml")
+    alone = bicycle.draw()
+    ax = pyplot.figure().add_subplot(projection="3d")
+    ax.plot([5.0, 6.0], [0.0, 0.0], [-3.0, -2.0])
+    bicycle.draw(ax=ax)
+    assert max(ax.get_xlim()) >= 6.0
+    assert min(ax.get_zlim()) <= -3.0
+    assert max(ax.get_zlim()) == pytest.approx(max(alone.get_zlim()))
+    low, high = ax.get_zlim()
+    assert low > high  # z is down, as alone
+    size = np.array([np.ptp(limits) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())])
+    assert size / size[0] == pytest.approx(np.asarray(ax._box_aspect) / ax._box_aspect[0], rel=1e-9)
+
+
 def test_down_is_down() -> None:
     """Gravity along x: x points down the page; against z (z down): the vertical axis is turned round."""
     m = eg.Model("hanging", gravity=(9.81, 0, 0))
@@ -118,6 +155,46 @@ def test_the_names_of_axes_are_not_cut_off(name: str) -> None:
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         box = axis.label.get_window_extent(canvas.get_renderer())
         assert min(box.x0, box.y0, width - box.x1, height - box.y1) >= 0.0
+
+
+def boxes_of_names(ax: Any) -> dict[str, Any]:
+    """Where each name stands on the drawn page, with its light ground."""
+    renderer = ax.figure.canvas.get_renderer()
+    return {text.get_text(): text.get_bbox_patch().get_window_extent(renderer) for text in ax.texts}
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "four_bar", "cart_pendulum", "chebyshev"])
+def test_names_stand_beside_bars_and_hatching(name: str) -> None:
+    module = compiled(f"{name}.yaml")
+    scene = scene_of(module)
+    ax = module.draw()
+    ax.figure.canvas.draw()
+    boxes = boxes_of_names(ax)
+    assert set(boxes) == {label.text for label in scene.labels}
+    for item in scene.items:
+        if item.role not in ("link", "hatch"):
+            continue
+        corners = item.at(scene.frames[0]) @ scene.view[:2].T
+        solid = item.faces is not None
+        pieces = [outline(corners)] if solid else np.split(corners, np.flatnonzero(np.isnan(corners[:, 0])))
+        if solid and item.name == "coupler":
+            continue  # a plate is not a bar; its name may stand on it
+        for piece in pieces:
+            line = Line(ax.transData.transform(piece[np.isfinite(piece[:, 0])]), closed=solid)
+            for text, box in boxes.items():
+                assert not line.intersects_bbox(box, filled=solid), (text, item.role, item.name)
+    for text, box in boxes.items():
+        assert not any(box.overlaps(other) for word, other in boxes.items() if word != text)
+
+
+def test_names_stand_over_solids_in_space() -> None:
+    ax = compiled("furuta_pendulum.yaml").draw()
+    ax.figure.canvas.draw()
+    boxes = boxes_of_names(ax)
+    assert len(boxes) == 4
+    assert min(text.zorder for text in ax.texts) > max(one.zorder for one in ax.collections)
+    for text, box in boxes.items():
+        assert not any(box.overlaps(other) for word, other in boxes.items() if word != text)
 
 
 def test_a_flywheel_is_round() -> None:

@@ -34,20 +34,68 @@ def test_a_rack_touches_its_pinion_where_both_move_alike(radius: float, angle: f
     assert heights.min() < pitch < heights.max()
 
 
-def test_the_curve_of_a_lift_goes_through_the_follower_at_every_angle() -> None:
+def cam_by_lift(turns: bool, swings: bool) -> eg.Model:
+    """A cam that turns or slides, with a follower that swings or slides; what is led is the follower's marker tip."""
     m = eg.Model("lift", gravity=(0, -9.81, 0))
-    cam, follower = m.body("cam", mass=1, inertia={"zz": 0.01}), m.body("follower", mass=0.2)
-    m.revolute("C", m.ground, cam, coordinate="phi")
-    m.prismatic("F", m.ground, follower, axis="y", coordinate="y")
-    m.cam("law", cam="C", follower="F", lift="0.05 + 0.01*(1 - cos(theta)) + 0.004*sin(3*theta)", phase=0.3)
-    mod = m.compile(target="numpy")
-    for phi in (0.0, 0.8, 2.5, 5.0):
-        (curve,) = lines(mod, "wheel", "law", phi=phi)
-        tip = mod.poses(mod.x0(phi=phi)[: mod.n_q])[mod.body_names.index("follower"), :3, 3]
+    cam = m.body("cam", mass=1, inertia={"zz": 0.01})
+    follower = m.body("follower", mass=0.2, com=(0.05, 0, 0) if swings else None, inertia={"zz": 1e-3})
+    follower.marker("tip", at=(0.1, 0, 0) if swings else (0, 0, 0))
+    add = m.revolute if turns else m.prismatic
+    add("C", m.ground, cam, coordinate="c", **({} if turns else {"axis": "x"}))
+    if swings:
+        m.revolute("F", m.ground.at(-0.09, 0.05, 0), follower, coordinate="f")
+    else:
+        m.prismatic("F", m.ground, follower, axis="y", coordinate="f")
+    rise = "0.01*(1 - cos(theta)) + 0.004*sin(3*theta)" if turns else "0.01*sin(30*theta)"
+    m.cam(
+        "law", cam="C", follower="F", lift=f"{'-0.1 + 4*' if swings else '0.05 + '}({rise})", phase=0.3 if turns else 0
+    )
+    return m
+
+
+@pytest.mark.parametrize("swings", [False, True])
+@pytest.mark.parametrize("turns", [True, False])
+def test_the_curve_of_a_lift_goes_through_the_follower_at_every_position_of_the_cam(turns: bool, swings: bool) -> None:
+    mod = cam_by_lift(turns, swings).compile(target="numpy")
+    reach = 0.1 if swings else 0.0
+    for c in (0.0, 0.8, 2.5, 5.0) if turns else (-0.02, 0.0, 0.03):
+        (curve,) = lines(mod, "wheel", "law", c=c)
+        pose = mod.poses(mod.x0(c=c)[: mod.n_q])[mod.body_names.index("follower")]
+        tip = pose[:3, :3] @ [reach, 0, 0] + pose[:3, 3]
         starts, ways = curve[:-1], np.diff(curve, axis=0)
         part = np.clip(((tip - starts) * ways).sum(axis=1) / (ways**2).sum(axis=1), 0.0, 1.0)
         gaps = np.linalg.norm(starts + part[:, None] * ways - tip, axis=1)
         assert gaps.min() < 1e-3 * 0.05  # the sag of a chord of one degree
+
+
+@pytest.mark.parametrize("law", [{"support": "0.04 + 0.008*cos(theta)"}, {"contour": "0.04 + 0.006*cos(theta)"}])
+def test_a_flat_face_lies_on_the_highest_point_of_its_cam(law: dict[str, str]) -> None:
+    m = eg.Model("tappet", gravity=(0, -9.81, 0))
+    cam, follower = m.body("cam", mass=1, inertia={"zz": 0.01}), m.body("follower", mass=0.2)
+    m.revolute("C", m.ground, cam, coordinate="phi")
+    m.prismatic("F", m.ground, follower, axis="y", coordinate="y")
+    m.cam_contact("touch", cam=cam, follower=follower.at(rpy=("-pi/2", 0, 0)), shape="flat_face", **law)
+    mod = m.compile(target="numpy")
+    for phi in (0.0, 0.8, 2.5):
+        scene = build_scene(mod, mod.assemble(phi=phi, y=0.05)[:, None])
+        found = [i.at(scene.frames[0]) for i in scene.items if (i.role, i.name) == ("wheel", "touch")]
+        contour, face = max(found, key=len), min(found, key=len)
+        top = contour[np.argmax(contour[:, 1])]
+        assert face[:, 1] == pytest.approx(top[1], abs=1e-3 * 0.04)
+        assert face[:, 0].min() < top[0] < face[:, 0].max()
+
+
+def test_a_swinging_follower_reaches_to_its_cam() -> None:
+    m = eg.Model("knife", gravity=(0, -9.81, 0))
+    cam = m.body("cam", mass=1, inertia={"zz": 0.01})
+    follower = m.body("follower", mass=0.2, com=(0.05, 0, 0), inertia={"zz": 0.001})
+    m.revolute("C", m.ground, cam, coordinate="phi")
+    m.revolute("F", m.ground.at(-0.1, 0.05, 0), follower, coordinate="psi")
+    m.cam_contact("touch", cam=cam, follower=follower.at(0.1), shape="knife_edge", contour="0.04 + 0.008*cos(theta)")
+    mod = m.compile(target="numpy")
+    scene = build_scene(mod, mod.assemble(phi=0.8)[:, None])
+    (bar,) = [i for i in scene.items if (i.role, i.name) == ("link", "follower")]
+    assert bar.points[:, 0].max() == pytest.approx(0.1, abs=scene.symbol)
 
 
 def test_a_contour_from_a_table_is_that_of_the_expression() -> None:

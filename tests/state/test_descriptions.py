@@ -36,7 +36,7 @@ def test_round_trip_and_named_coordinates() -> None:
         (lambda m: m.torque("t", "f_e1", 1.0), "forces.t.joint.*Euler parameter, which takes no torque.*body"),
         (lambda m: m.friction("t", "f_e1", viscous=1.0), "forces.t.joint.*Euler parameter"),
         (lambda m: m.initial(f_e0_dot=1.0), "initial.f_e0_dot.*f_wx"),
-        (lambda m: m.parameter("f_wx", 1.0), "'f_wx' is taken"),
+        (lambda m: m.parameter("f_wx", 1.0), "'f_wx' is already used"),
         (lambda m: m.independent("f_e0"), "independent.*'f_e0' is an Euler parameter.*f_wx"),
     ],
 )

@@ -55,7 +55,7 @@ def chain(description: Description, random: Any) -> Variant:
             joints.append(DescribedEntry(f"{entry.name}_link_{k}", values, f"joints.{entry.name}_link_{k}"))
             first = frame_on(f"{entry.name}_part_{k}")
     if not gone:
-        raise NotApplicable("there is no joint of several degrees that a chain could stand for")
+        raise NotApplicable("no joint of several degrees can be replaced by a chain of joints")
     made.sections["joints"] = joints
     return Variant(made, joints=gone)
 

@@ -29,7 +29,9 @@ def compare(check: str, original: Original, make: Any, random: Any, reactions: b
         return compare_module(check, original, variant, compiled(variant.description), reactions)
     except EomgenError as error:
         if isinstance(error, ModelError) and all(IDLE in problem.message for problem in error.problems):
-            return Finding.skipped(check, "what holds nothing may be a joint, and is refused as a relation")
+            return Finding.skipped(
+                check, "a constraint without effect is allowed as a joint, but refused as an equation"
+            )
         return refused(check, error)
 
 

@@ -44,7 +44,7 @@ def cut_another(description: Description, random: Any) -> Variant:
     types = {e.name: JOINTS[e.values["type"]] for e in description.sections["joints"]}
     choice = [name for name in loops if types[name].role == "either"]
     if not choice:
-        raise NotApplicable("there is no loop with a joint that can be cut")
+        raise NotApplicable("no loop has another joint that can be cut")
     chosen = choice[int(random.integers(len(choice)))]
     names = coordinates_of(description)
     taken = {name for own in names.values() for name in own} | {
@@ -56,7 +56,7 @@ def cut_another(description: Description, random: Any) -> Variant:
             suffixes = [c.suffix for c in sketch_of(entry.values).coordinates]
             new = {old: entry.name + suffix for old, suffix in zip(names[chosen], suffixes, strict=True)}
     if any(name in taken and name not in new for name in new.values()):
-        raise NotApplicable(f"the default name of {chosen}'s coordinate is taken")
+        raise NotApplicable(f"the default name of {chosen}'s coordinate is already used")
     rates = {old + suffix: name + suffix for old, name in new.items() for suffix in ("", "_dot", "_ddot")}
 
     class Renamed(Visitor):

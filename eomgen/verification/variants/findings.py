@@ -128,7 +128,7 @@ def original_of(model: Builder, seed: int, motion_only: bool = False) -> Origina
     try:
         base = plain(model)
     except EomgenError as error:
-        raise NotApplicable(f"the model has no plain form: {error}") from None
+        raise NotApplicable(f"the model cannot be written in its plain form: {error}") from None
     description, kinds = with_probes(base)
     original = observe(description, kinds, np.random.default_rng([seed, 99]), motion_only=motion_only)
     # variants whose coordinates differ are assembled from the same configuration

@@ -46,7 +46,7 @@ def input_findings(check: str, model: Builder, original: Original, random: Any) 
     if not entries:
         return Finding.skipped(check, "the model has no inputs")
     if any("signal" in entry.values for entry in entries):
-        return Finding.skipped(check, "the inputs have courses of their own")
+        return Finding.skipped(check, "the inputs have signals of their own")
     still = _as_parameters(check, original)
     if not still.ok:
         return still

@@ -44,7 +44,7 @@ def _closed(description: Description, random: Any, table: dict[str, tuple[str, .
     ]
     rods = [e for e in made.sections["joints"] if e.values["type"] == "distance"] if equations else []
     if not candidates and not rods:
-        raise NotApplicable("no joint closes a loop that nothing else refers to")
+        raise NotApplicable("every joint that closes a loop is named by another element")
     gone: dict[str, str] = {}
     for rod in rods:
         _equations(made, rod, rod=True)

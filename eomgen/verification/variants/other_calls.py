@@ -106,7 +106,7 @@ def _minimal(check: str, model: Builder, original: Original, random: Any) -> Fin
     """Accelerations of the independent coordinates by the strictly minimal form."""
     own = original.module
     if not own.n_dof:
-        return Finding.skipped(check, "there is no freedom")
+        return Finding.skipped(check, "there is no degree of freedom")
     if len(own.x_names) != own.n_q + own.n_v:
         return Finding.skipped(check, "the model has states of its own")
     try:

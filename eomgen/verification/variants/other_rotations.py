@@ -38,7 +38,7 @@ def redescribe(description: Description, random: Any) -> Variant:
         chosen.append(entry.name)
         parts.append(_change(made, entry, names[entry.name], place, random))
     if not chosen:
-        raise NotApplicable("there is no spherical or free joint that nothing refers to")
+        raise NotApplicable("there is no spherical or free joint, or other elements name its coordinates")
 
     def state(values: Mapping[str, float]) -> dict[str, float]:
         result = dict(values)

@@ -33,7 +33,7 @@ MULTIPLE = 4  #: of an angle, up to which its sine is written in those of the an
 GROUP = 48  #: terms of a group beyond which only its own terms are joined
 
 
-class Angles:
+class JoinedAngles:
     """Simplifies sines and cosines in polynomials over a table of atoms."""
 
     def __init__(self, atoms: Atoms, work: Work) -> None:

@@ -1,0 +1,145 @@
+"""Stage show, meshes: STL and OBJ files that shapes of bodies name -> as many triangles as a picture needs."""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..files.path_names import as_name, beside
+from ..files.reading import open_plain
+from ..limits.files import MESH
+from ..limits.pictures import NOTHING
+from ..texts import shown, visible
+from .data import Array
+from .solids import Mesh, Triangles
+
+TRIANGLES = 4000  #: of one mesh in a picture, at most; matplotlib draws them one by one
+CELLS = (160, 120, 80, 56, 40, 28, 20, 14, 10)  #: along the longest edge, within which vertices are joined
+PACKAGE = "package://"
+_VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
+
+
+def mesh_of(shape: Mapping[str, Any], body: str, description: Any, quiet: bool = False) -> Mesh | None:
+    """The mesh of a shape in metres, axes of its frame; None, with a warning unless ``quiet``, if it cannot be drawn.
+
+    Parameters
+    ----------
+    shape : mapping
+        With ``file`` and ``sizes``, the scale along each axis.
+    body : str
+    description : Description or None
+        Of the model: a file is looked up from the folder of the model file, and lies in it or below.
+    """
+    try:
+        vertices, faces = read_mesh(_located(as_name("file", shape["file"]), description))
+    except (UsageError, OSError) as error:
+        why = visible(str(error.strerror if isinstance(error, OSError) else error), lines=False)
+        if not quiet:
+            warnings.warn(f"the mesh {shown(shape['file'])} of {body} is not drawn: {why}", stacklevel=2)
+        return None
+    scale = np.asarray(shape["sizes"], dtype=float)
+    return vertices * scale, faces if scale.prod() > 0.0 else faces[:, ::-1]
+
+
+def _located(file: str, description: Any) -> str:
+    if description is None:
+        raise UsageError("the module was not made from a model here, so the folder of the file is not known")
+    model = description.place("")[0]
+    if file.startswith(PACKAGE):  # of a robot: the folder of the package is that of its file
+        file = file.removeprefix(PACKAGE).partition("/")[2]
+    return beside(model, file) if model else file
+
+
+def read_mesh(path: str) -> Mesh:
+    """Vertices (n, 3) and triangles (m, 3) of an STL or OBJ file, in its units and axes, thinned out to TRIANGLES.
+
+    Raises
+    ------
+    UsageError
+        Another kind of file, too large, or one that cannot be read as its ending says.
+    OSError
+        There is no such file.
+    """
+    ending = os.path.splitext(path)[1].lower()
+    if ending not in READERS:
+        raise UsageError(f"{ending or 'no ending'}: STL and OBJ files can be drawn")
+    status = os.stat(path)
+    if status.st_size > MESH:
+        raise UsageError(f"it has {status.st_size:,} bytes; at most {MESH:,}")
+    return _read(os.path.abspath(path), ending, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=64)
+def _read(path: str, ending: str, _changed: int, _size: int) -> Mesh:
+    with open_plain(path) as file:
+        data = file.read(MESH + 1)
+    try:
+        vertices, faces = READERS[ending](data)
+    except (ValueError, IndexError, OverflowError):
+        raise UsageError(f"it cannot be read as a file {ending}") from None
+    if not len(faces) or not np.isfinite(vertices).all():
+        raise UsageError("it holds no triangles, or vertices that are not finite")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise UsageError("its triangles name vertices that it does not have")
+    return thinned(vertices, faces)
+
+
+def _read_stl(data: bytes) -> Mesh:
+    """Binary: 80 bytes, the number of triangles, 50 bytes for each; else as text."""
+    count = int(np.frombuffer(data[80:84], "<u4")[0]) if len(data) >= 84 else 0
+    if count and len(data) == 84 + 50 * count:
+        row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+        corners = np.frombuffer(data, row, count, 84)["corners"].astype(float).reshape(-1, 3)
+    else:
+        corners = np.array([[float(x) for x in found] for found in _VERTEX.findall(data)]).reshape(-1, 3)
+    return corners, np.arange(len(corners) // 3 * 3).reshape(-1, 3)
+
+
+def _read_obj(data: bytes) -> Mesh:
+    """Lines ``v x y z`` and ``f a b c ...``, whose vertices count from 1, or from the last one backwards."""
+    vertices: list[list[float]] = []
+    faces: list[tuple[int, int, int]] = []
+    for line in data.splitlines():
+        word, *rest = line.split() or [b""]
+        if word == b"v":
+            vertices.append([float(x) for x in rest[:3]])
+        elif word == b"f":
+            given = [int(one.partition(b"/")[0]) for one in rest]
+            corners = [k - 1 if k > 0 else len(vertices) + k for k in given]
+            faces += [(corners[0], b, c) for b, c in pairwise(corners[1:])]
+    return np.array(vertices).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
+
+
+def thinned(vertices: Array, faces: Triangles) -> Mesh:
+    """The same surface with at most TRIANGLES where the coarsest cells give so few; vertices of one cell are joined."""
+    vertices, faces = _joined(vertices, faces, vertices)
+    low, size = vertices.min(axis=0), max(float(np.ptp(vertices, axis=0).max()), NOTHING)
+    made = vertices, faces
+    for cells in CELLS:
+        if len(made[1]) <= TRIANGLES:
+            break
+        made = _joined(vertices, faces, np.round((vertices - low) / size * cells))
+    return made
+
+
+def _joined(vertices: Array, faces: Triangles, keys: Array) -> Mesh:
+    """Vertices of one key become their mean; triangles that have lost a corner, or are there twice, go."""
+    _, place, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    place = place.reshape(-1)
+    means = np.zeros((len(counts), 3))
+    np.add.at(means, place, vertices)
+    corners = place[faces]
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    _, first = np.unique(np.sort(corners[whole], axis=1), axis=0, return_index=True)
+    return means / counts[:, None], corners[whole][np.sort(first)]
+
+
+READERS: dict[str, Callable[[bytes], Mesh]] = {".stl": _read_stl, ".obj": _read_obj}

@@ -1,0 +1,185 @@
+"""Forms of expressions: what hand calculation would join and factor, equal values, bounded effort."""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import Any
+
+import pytest
+import sympy
+from sympy.abc import a, b, c, d, k, l, m, x, y
+
+from eomgen.graph.core import Graph
+from eomgen.graph.evaluate import evaluate
+from eomgen.graph.sympy_lower import lower as lower_by
+from eomgen.simplify import WHOLE, simplify
+from eomgen.simplify.atoms import Work
+from eomgen.simplify.form import WORK
+
+A, B, C = sympy.symbols("A B C")
+sin, cos, sqrt = sympy.sin, sympy.cos, sympy.sqrt
+
+
+def lower(graph: Graph, expression: Any) -> Any:
+    return lower_by(graph, expression, lambda x: graph.symbol(x.name) if x.is_Symbol else None)
+
+
+def short(expression: Any, **more: Any) -> Any:
+    """The form of one expression, written out."""
+    form = simplify([lower(Graph(), expression)], sizes=WHOLE, **more)
+    assert form is not None
+    named, (found,) = form.sympy()
+    assert named == []
+    return found
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        (cos(A) * cos(B) - sin(A) * sin(B), "cos(A + B)"),
+        (x * cos(A) * cos(B) + x * sin(A) * sin(B), "x*cos(A - B)"),
+        (sin(A) * cos(B) + cos(A) * sin(B), "sin(A + B)"),
+        (a * sin(A) ** 2 + a * cos(A) ** 2, "a"),
+        (a - a * sin(A) ** 2, "a*cos(A)**2"),
+        (cos(A) * cos(A + B) + sin(A) * sin(A + B), "cos(B)"),
+        (sin(A + B) * cos(B) - cos(A + B) * sin(B), "sin(A)"),
+        (sin(A + B) - sin(A) * cos(B), "sin(B)*cos(A)"),
+        (sin(A) ** 4 + sin(A) ** 2 * cos(A) ** 2, "sin(A)**2"),
+        (cos(A) * (cos(B) * cos(C) - sin(B) * sin(C)) - sin(A) * (sin(B) * cos(C) + cos(B) * sin(C)), "cos(A + B + C)"),
+        (cos(A) + sin(A) ** 2 / cos(A), "1/cos(A)"),
+        (sin(A + sympy.pi / 2) * x, "x*cos(A)"),
+        (cos(A - sympy.pi / 2), "sin(A)"),
+        (sin(-A) + sin(A), "0"),
+        (m * a * x + m * b * x, "m*x*(a + b)"),
+        (a * c + a * d + b * c + b * d, "(a + b)*(c + d)"),
+        (k * (x - y) ** 2 / 2, "k*(x - y)**2/2"),
+        (x**2 + 2 * x * y + y**2, "(x + y)**2"),
+        ((a**2 - b**2) / (a + b), "a - b"),
+        (sqrt(a + b) * sqrt(a + b) - b, "a"),
+        (a / (2 * x + 2 * y) - a / (x + y) / 2, "0"),
+        (m * l**2 / 12 + m * (l / 2) ** 2, "l**2*m/3"),
+    ],
+)
+def test_as_by_hand(given: Any, wanted: str) -> None:
+    assert sympy.sstr(short(given)) == wanted
+
+
+def test_springs_keep_their_extension() -> None:
+    r, l0, g, theta_dot = sympy.symbols("r l0 g theta_dot")
+    assert sympy.sstr(short(m * g * cos(A) + m * r * theta_dot**2 - k * (r - l0), rates=["theta_dot"])) == (
+        "g*m*cos(A) + k*(l0 - r) + m*r*theta_dot**2"
+    )
+
+
+def random_expression(choice: random.Random, depth: int) -> Any:
+    """Sums, products, quotients, powers, roots and turns of five symbols."""
+    if depth == 0:
+        return choice.choice([a, b, x, A, B, sympy.Rational(choice.randint(-7, 7), choice.randint(1, 4)), sympy.pi / 6])
+    one, other = (random_expression(choice, depth - 1) for _ in range(2))
+    return choice.choice(
+        [
+            lambda: one + other,
+            lambda: one - other,
+            lambda: one * other,
+            lambda: one * other,
+            lambda: sin(one) * cos(other),
+            lambda: cos(one),
+            lambda: one / (other**2 + 1),
+            lambda: one / (2 + cos(other)),
+            lambda: sqrt(one**2 + other**2 + 1),
+            lambda: one**2,
+            lambda: sympy.Abs(one),
+            lambda: sympy.atan2(one, 2 + other**2),
+            lambda: sympy.Piecewise((one, other < a), (other, True)),
+        ]
+    )()
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_values_stay(seed: int) -> None:
+    """Of random expressions, whole and with names, at random numbers."""
+    choice = random.Random(seed)
+    given = [random_expression(choice, choice.randint(2, 5)) for _ in range(3)]
+    graph = Graph()
+    lowered = [lower(graph, expression) for expression in given]
+    values = {name: choice.uniform(0.3, 1.7) for name in ("a", "b", "x", "A", "B")}
+    wanted = [float(v) for v in evaluate(lowered, values)]
+    numbers = {sympy.Symbol(name): sympy.Float(value, 30) for name, value in values.items()}
+    for more in ({}, {"sizes": (1,)}, {"sizes": WHOLE}):
+        form = simplify(lowered, **more)
+        assert form is not None
+        named, expressions = form.sympy()
+        known = dict(numbers)
+        for symbol, expression in named:
+            known[symbol] = expression.xreplace(known)
+        for expression, value in zip(expressions, wanted, strict=True):
+            found = float(sympy.N(expression.xreplace(known), 30))
+            assert math.isclose(found, value, rel_tol=1e-9, abs_tol=1e-9)
+
+
+def test_names_are_used_before_they_are_explained_nowhere() -> None:
+    graph = Graph()
+    u = graph.symbol("u")
+    long = lower(graph, sum((sympy.Symbol(f"p{i}") + x) ** 3 * sin(i * A) for i in range(1, 9)))
+    form = simplify([long * u, long * long, graph.apply("sqrt", long * long + u)], [], sizes=(1,))
+    assert form is not None
+    named, expressions = form.sympy()
+    known: set[Any] = set()
+    mine = {symbol for symbol, _ in named}
+    for symbol, expression in named:
+        assert expression.free_symbols & mine <= known
+        known.add(symbol)
+    assert all(expression.free_symbols & mine <= known for expression in expressions)
+
+
+def test_given_names_stay_or_are_put_in() -> None:
+    """A name whose value is long stays; one whose value is short does not."""
+    graph = Graph()
+    ratio, tiny = graph.symbol("ratio"), graph.symbol("tiny")
+    value = lower(graph, (a * sin(A) + b * cos(B) + x) / (a * cos(A) + b * sin(B) + y))
+    uses = [ratio * graph.symbol(f"u{i}") + tiny for i in range(5)]
+    form = simplify(uses, [("ratio", value), ("tiny", lower(graph, 2 * a))])
+    assert form is not None
+    named, expressions = form.sympy()
+    assert [str(symbol) for symbol, _ in named] == ["ratio"]
+    assert all(expression.has(a) for expression in expressions)
+
+
+def test_effort_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A product of thirty sums, which multiplied out has 2^30 terms, stays a product."""
+    spent: list[Work] = []
+    original = Work.__init__
+
+    def kept(self: Work, allowed: float) -> None:
+        original(self, allowed)
+        self.first = allowed  # type: ignore[attr-defined]
+        spent.append(self)
+
+    left: list[float] = []
+    monkeypatch.setattr(Work, "__init__", kept)
+    spend = Work.spend
+    monkeypatch.setattr(Work, "spend", lambda self, n: (left.append(self.left), spend(self, n))[1])
+    product = sympy.Mul(*(sympy.Symbol(f"p{i}") + sympy.Symbol(f"q{i}") for i in range(30)))
+    found = short(product)
+    assert found == product
+    assert len(spent) == 1
+    assert WORK - min(left) < WORK
+
+
+def test_deep_nesting_needs_no_recursion() -> None:
+    """Of calls in calls, as of a table with many intervals."""
+    graph = Graph()
+    found = graph.symbol("x")
+    for i in range(150):
+        found = graph.apply("select", graph.apply("lt", graph.symbol("x"), float(i)), graph.symbol(f"p{i}"), found)
+    form = simplify([found], sizes=WHOLE)
+    assert form is not None
+    (expression,) = form.sympy()[1]
+    for i in reversed(range(150)):
+        (value, condition), (expression, _) = expression.args
+        assert (value, condition) == (sympy.Symbol(f"p{i}"), x < i)
+
+
+def test_nothing_of_nothing() -> None:
+    assert simplify([]) is None
