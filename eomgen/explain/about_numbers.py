@@ -98,6 +98,8 @@ def difference(found: Difference | None, reason: str) -> Section:
     title = "Shown and compiled"
     if found is None:
         return Section(title, (Sentence(f"Not compared: {reason}"),))
+    if not found.each:
+        return Section(title, (Sentence("There is no formula here that the compiled module has too."),))
     rows = tuple((f"`{name}`", f"{value:.1e}") for name, value in found.each.items())
     text = (
         f"Each of these formulas was evaluated through SymPy at {found.states} random consistent states and "

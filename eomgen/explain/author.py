@@ -19,6 +19,7 @@ from .printer import Printer
 WHOLE = 160  #: nodes of a matrix up to which it is shown as a matrix, not entry by entry
 FOLD = 900  #: nodes of a quantity from which a page shows it only on request
 MOST = 9_000  #: nodes of a quantity that is left out
+LINES = 14  #: formulas of one quantity from which a page shows them only on request
 COLUMNS = 6  #: of a matrix that is shown as one
 
 
@@ -61,7 +62,7 @@ class Author:
 
     def variation(self, name: str) -> Any:
         """The SymPy symbol of the variation of a coordinate, printed with a delta."""
-        return self.printer.sign(f"~delta {name}", rf"\delta {self.symbol(name)}")
+        return self.printer.sign(f"delta {name}", rf"\delta {self.symbol(name)}")
 
     # -- quantities ---------------------------------------------------------------------------------------------------
     def quantity(
@@ -104,6 +105,8 @@ class Author:
 
         Large ones are folded or left out.
         """
+        if isinstance(value, sympy.MatrixBase) and len(value) == 1:
+            value = value[0]
         named = needed(named, value)
         size = sum(map(nodes, (x for _, x in named))) + nodes(value)
         if size > MOST:
@@ -122,7 +125,7 @@ class Author:
             if rest:
                 same = ", or stand above the diagonal of a symmetric matrix" if symmetric else ""
                 found.append(Sentence(f"The other {rest} entries of ${left}$ are 0{same}."))
-        if size > FOLD:
+        if size > FOLD or len(found) > LINES:
             return [Folded(f"${left}$: {size} terms and factors", tuple(found))]
         return found
 

@@ -30,6 +30,8 @@ def _pieces(latex: str) -> list[str]:
 
 
 def _piece(latex: str) -> str:
+    if latex == r"\quad":
+        return "<mspace width='1em'/>"
     try:
         return mathml_form(read_latex(latex))
     except NotationError:
@@ -45,7 +47,7 @@ def number_latex(value: float, digits: int = 6) -> str:
 def number_mathml(value: float, digits: int = 6) -> str:
     """A number as elements of MathML."""
     mantissa, _, exponent = f"{value + 0.0:.{digits}g}".partition("e")
-    sign = "<mo>\N{MINUS SIGN}</mo>" if mantissa.startswith("-") else ""
+    sign = "<mo form='prefix'>\N{MINUS SIGN}</mo>" if mantissa.startswith("-") else ""
     found = f"{sign}<mn>{mantissa.lstrip('-')}</mn>"
     if not exponent:
         return found

@@ -10,7 +10,7 @@ from sympy.printing.latex import LatexPrinter
 from sympy.printing.mathml import MathMLPresentationPrinter
 
 from ..notation import Notation
-from .document import PutIn
+from .document import Formula, PutIn
 from .formula_text import number_latex, number_mathml, text_to_mathml
 
 WIDE = 110  #: characters of LaTeX, without commands, after which a sum goes on in the next line
@@ -22,6 +22,16 @@ _BETTER = (
     ("<mo><</mo>", "<mo>&lt;</mo>"),
     ("<mo>></mo>", "<mo>&gt;</mo>"),
 )
+
+
+SHORT = 14  #: nodes of a side that leaves room for another one in its line
+
+
+def is_short(formula: Formula) -> bool:
+    """Whether all sides go into one line."""
+    values = [side.expression if isinstance(side, PutIn) else side for side in formula.sides]
+    kept = [x for x in values if isinstance(x, sympy.Basic | sympy.MatrixBase)]
+    return all(sum(1 for _ in sympy.preorder_traversal(x)) <= SHORT for x in kept)
 
 
 class _Latex(LatexPrinter):  # type: ignore[misc]  # SymPy has no types
@@ -88,7 +98,7 @@ class Printer:
 
     def sign(self, name: str, latex: str) -> Any:
         """A SymPy symbol that is printed as the LaTeX says."""
-        symbol = sympy.Symbol(name)
+        symbol = sympy.Symbol(name, commutative=False)  # which are printed after all other factors
         self._symbols[symbol] = latex, text_to_mathml(latex)
         return symbol
 

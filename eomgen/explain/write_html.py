@@ -8,7 +8,7 @@ from ..files.inline_pictures import image_html
 from ..texts import html_text
 from .document import Folded, Formula, Picture, Piece, Section, Sentence, Table, spans
 from .formula_text import text_to_mathml
-from .printer import Printer
+from .printer import Printer, is_short
 
 _STYLE = """
 body{font:17px/1.5 "Source Serif 4",Georgia,"DejaVu Serif",serif;max-width:52em;margin:2em auto;padding:0 1.2em;
@@ -22,6 +22,7 @@ code{font-size:.88em;background:#f2f2f2;padding:0 .2em;border-radius:2px}
 math{font-family:"STIX Two Math","Cambria Math","Latin Modern Math","Libertinus Math",math,serif}
 .formula math{font-size:1.1em}
 mi[mathvariant=bold]{font-weight:bold;font-style:normal;text-transform:none}
+mover>mo:last-child{padding-bottom:.09em}
 mtd{padding:.18em .45em}
 mtable.matrix{margin:0 .15em;padding:.1em 0;vertical-align:middle;
 background:linear-gradient(currentColor,currentColor) left top/.35em 1px,
@@ -99,8 +100,8 @@ def _formula(formula: Formula, printer: Printer) -> str:
         rows += [_further(line) for line in lines[1:]]
     if len(rows) == 0:
         return left
-    if len(rows) == 1:
-        return f"<mrow>{left}{rows[0]}</mrow>"
+    if len(rows) == 1 or is_short(formula):
+        return f"<mrow>{left}{''.join(rows)}</mrow>"
     cells = [f"<mtr><mtd>{left if k == 0 else ''}</mtd><mtd>{row}</mtd></mtr>" for k, row in enumerate(rows)]
     return f"<mtable class='lines' displaystyle='true'>{''.join(cells)}</mtable>"
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from .document import Folded, Formula, Picture, Piece, Section, Sentence, Table, spans
-from .printer import Printer
+from .printer import Printer, is_short
 
 PICTURE = "mechanism.png"  #: the file that a document with a picture takes it from
 _HEAD = r"""\documentclass[11pt,a4paper]{article}
@@ -48,7 +48,7 @@ def formula_body(formula: Formula, printer: Printer) -> str:
         rows.append(f"= {lines[0]}")
         rows += [rf"\quad {line}" if line.startswith("-") else rf"\quad + {line}" for line in lines[1:]]
     left = printer.latex(first)
-    if len(rows) < 2:
+    if len(rows) < 2 or is_short(formula):
         return " ".join([left, *rows])
     inner = " \\\\\n".join(f"{left if k == 0 else ''} & {row}" for k, row in enumerate(rows))
     return f"\\begin{{aligned}}\n{inner}\n\\end{{aligned}}"
