@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import sympy
 
+from ..limits.rounding import EPS
 from .evaluate import evaluate, random_state, state_values
 
 STATES = 2
-SMALLEST = 1e-12  #: entries that count as 0
+SMALLEST = 4096 * EPS  #: entries that count as 0
 
 
 class Difference(NamedTuple):

@@ -1,7 +1,7 @@
 """Numbers of a published slider-crank found in the line-by-line part.
 
-Parameters of Flores, Leine and Glocker (2010), as in the file's source; accelerations at the outer dead centre.  There a
-book has for the slider x'' = -r omega^2 (1 + r/l) with the crank at rest in theta''; here the weight turns it too.
+Parameters of Flores, Leine and Glocker (2010), as in the file's source; accelerations at the outer dead centre, where
+the slider of every book has x'' = -r omega^2 (1 + r/l), whatever the angular acceleration of the crank.
 """
 
 from __future__ import annotations
