@@ -68,7 +68,9 @@ class WritesQuantities(ABC):
         count = len(expressions) - len(names)
         names = [(known, x) for (known, _), x in zip(names, expressions[count:], strict=True)]
         prefix = prefix or f"{name.replace('.', '_')}_"
-        named, written = write(expressions[:count], self._symbol, prefix, names, self._rates)
+        named, written = write(
+            expressions[:count], self._symbol, prefix, names, self._rates, self.kinematics.parameter_names
+        )
         self._named[name] = named
         return written
 

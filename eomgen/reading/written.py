@@ -42,6 +42,7 @@ def write(
     prefix: str = "z",
     given: Sequence[tuple[str, Expr]] = (),
     rates: Collection[str] = (),
+    parameters: Collection[str] = (),
 ) -> Written:
     """Expressions of one graph in SymPy.
 
@@ -56,10 +57,12 @@ def write(
         Names that stand in the expressions already, and what they stand for, in order.
     rates : collection of str, optional
         Names of velocities and accelerations.
+    parameters : collection of str, optional
+        Names of parameters.
 
     Returns
     -------
     Written
     """
     form = simplify(expressions, given, rates, prefix, *([WHOLE] if not given and is_short(expressions) else []))
-    return Written([], []) if form is None else Written(*form.sympy(symbols))
+    return Written([], []) if form is None else Written(*form.sympy(symbols, parameters, prefix))

@@ -55,10 +55,9 @@ class Expansion:
                 self._of[k] = self._expanded(k)
         return self._of[i]
 
-    def name(self, i: int, name: str) -> int:
-        """Let a name stand for a node from here on; the number of the name's atom."""
-        self._of[i] = self.atoms.poly("name", name)
-        return self.atoms.id("name", name)
+    def put(self, i: int, poly: Poly) -> None:
+        """Let a polynomial, such as a name, stand for a node from here on."""
+        self._of[i] = poly
 
     def _expanded(self, i: int) -> Poly:
         kind, *args = self.graph.nodes[i]
@@ -99,10 +98,11 @@ class Expansion:
         waiting = [a]
         while waiting:
             done: Poly = {}
-            for monomial, x in waiting.pop().items():
+            for given, x in waiting.pop().items():
+                monomial = self._without_squared_signs(given)
                 power = next((f for f in monomial if f[1] >= 1 and self.atoms.table[f[0]].kind == "sum"), None)
                 if power is None:
-                    done[monomial] = x
+                    done[monomial] = done.get(monomial, 0) + x
                     continue
                 below = join(monomial, ((power[0], -1),))
                 base = dict(self.atoms.table[power[0]].what)
@@ -110,6 +110,15 @@ class Expansion:
                 waiting.append(multiply({below: x}, base))
             result = add(result, done) if result else done
         return result
+
+    def _without_squared_signs(self, monomial: Monomial) -> Monomial:
+        """|x|^2 = x^2 of products x."""
+        for atom, n in monomial:
+            kind, what = self.atoms.table[atom]
+            if kind == "abs" and n % 2 == 0 and len(what[0]) == 1 and what[0][0][1] == 1:
+                inner = tuple((a, k * n) for a, k in what[0][0][0])
+                return self._without_squared_signs(join(join(monomial, ((atom, -n),)), inner))
+        return monomial
 
     def _over(self, a: Poly, b: Poly) -> Poly:
         b = self.angles.simplified(b)
@@ -129,6 +138,10 @@ class Expansion:
         a = self.angles.simplified(a)
         if not a or (len(a) == 1 and next(iter(a)) == ONE):
             return self.atoms.poly("sqrt", (freeze(a),))
+        ((monomial, x),) = a.items() if len(a) == 1 else (((), 0),)
+        if x == 1 and all(n % 2 == 0 for _, n in monomial):  # the root of a square
+            base = tuple((atom, n // 2) for atom, n in monomial)
+            return self.atoms.poly("abs", (freeze({base: 1}),))
         return {((self.atoms.id("sum", freeze(a)), Fraction(1, 2)),): 1}
 
 

@@ -17,10 +17,11 @@ from ..graph.core import Expr, Graph
 from ..graph.traverse import LEAVES, common_graph, operands, reachable
 from ..operations import CONDITION, operations_with
 from ..records import dataclass
-from .atoms import Poly, TooLongError, Work
+from .atoms import Frozen, Poly, TooLongError, Work, freeze
 from .expansion import Expansion
 from .factoring import Factoring
-from .inline import EACH, NAME, Named, inlined
+from .good_names import GoodNames
+from .inline import EACH, NAME, Named, inlined, is_plain
 from .literal import Literal
 
 WHOLE = (10**9,)
@@ -28,6 +29,7 @@ SIZES = (1, 6, 16, 40, 120, *WHOLE)
 ALONE = 30  #: operations of what is used once beyond which it gets a name in the first attempt
 WRITTEN = 4_000  #: operations beyond which an attempt is not made
 WORK = 100_000  #: products of terms in all attempts together
+LATER = 10_000  #: products of terms that are left in any case for names that are put in
 SHARED = 1.35  #: how much longer what needs no names may be
 
 
@@ -58,25 +60,45 @@ class Form:
             + sum(map(costs.of_terms, self.polys))
         )
 
-    def sympy(self, symbols: Callable[[str], Any] | None = None) -> tuple[list[tuple[Any, Any]], list[Any]]:
+    def sympy(
+        self, symbols: Callable[[str], Any] | None = None, parameters: Collection[str] = (), prefix: str = "z"
+    ) -> tuple[list[tuple[Any, Any]], list[Any]]:
         """Named intermediates, each a symbol and its expression, and expressions.
 
         Parameters
         ----------
         symbols : callable, optional
             Name -> the SymPy object that stands for it; plain symbols by default.
+        parameters : collection of str, optional
+            Names of what is constant.
+        prefix : str, optional
+            Of the names to which better ones are given where there are better ones.
         """
         import sympy
 
         from .to_sympy import Raising
 
         raising = Raising(self.graph, self.expansion.atoms, self.factoring, symbols or sympy.Symbol)
-        named = []
+        named: list[tuple[Any, Any]] = []
+        good = self._good_names(parameters, prefix)
+        for atom, name in good.turns.items():
+            named.append((sympy.Symbol(name), raising.turn(atom)))
+        raising.turns = {atom: symbol for atom, (symbol, _) in zip(good.turns, named, strict=True)}
         for atom, poly in self.named:
             name = self.expansion.atoms.table[atom].what
-            raising.names[name] = sympy.Symbol(name)
+            raising.names[name] = sympy.Symbol(good.intermediates.get(name, name))
             named.append((raising.names[name], raising.expression(poly)))
         return named, [raising.expression(p) for p in self.polys]
+
+    def _good_names(self, parameters: Collection[str], prefix: str) -> GoodNames:
+        atoms = self.expansion.atoms
+        taken = {node[1] for node in self.graph.nodes if node[0] == "sym"} | {
+            atoms.table[a].what for a, _ in self.named
+        }
+        good = GoodNames(atoms, self.factoring.costs, parameters, taken)
+        if self.named:
+            good.choose(self.named, self.polys, prefix)
+        return good
 
 
 def simplify(
@@ -116,7 +138,7 @@ def simplify(
         form = _Attempt(graph, work, rates).form(exprs, given, cuts, prefix)
         if best is None or form.cost <= best.cost * (1.0 if form.named else SHARED):
             best = form
-        if work.left <= 0:
+        if work.left <= LATER:
             break
     work.left = math.inf  # what stands in sines and denominators is factored as it is written
     return best
@@ -160,14 +182,21 @@ class _Attempt:
         known = {self.graph.symbol(name).id: (x.id, name) for name, x in given}
         taken = {node[1] for node in self.graph.nodes if node[0] == "sym"}
         free = (f"{prefix}{k}" for k in itertools.count() if f"{prefix}{k}" not in taken)
+        same: dict[Frozen, Poly] = {}
         for i in sorted({*cuts, *known}):  # operands have smaller numbers, so do names that stand in them
-            of, name = known[i] if i in known else (i, next(free))
+            of, name = known.get(i, (i, ""))
             poly = self._shortest(of)
-            atom = self.expansion.name(i, name)
-            self.literal.name(i, {((atom, 1),): 1})
-            self.named.append((atom, poly))
+            alike = poly if is_plain(poly, self.expansion.atoms) else same.get(freeze(poly))
+            if alike is None:
+                atom = self.expansion.atoms.id("name", name or next(free))
+                alike = same[freeze(poly)] = {((atom, 1),): 1}
+                self.named.append((atom, poly))
+            self.expansion.put(i, alike)
+            self.literal.put(i, alike)
         polys = [self._shortest(x.id) for x in exprs]
-        named, polys = inlined(self.expansion, self.factoring, self.named, polys)
+        fixed = {self.expansion.atoms.id("name", name) for name, _ in given}
+        self.work.left = max(self.work.left, LATER)
+        named, polys = inlined(self.expansion, self.factoring, self.named, polys, fixed)
         return Form(self.graph, self.expansion, self.factoring, named, polys)
 
     def _shortest(self, i: int) -> Poly:

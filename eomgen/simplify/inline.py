@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from .atoms import Poly, TooLongError, add, join, multiply, ratio
+from collections.abc import Collection
+
+from .atoms import SUMS, Atoms, Frozen, Poly, TooLongError, add, freeze, multiply, ratio
 from .expansion import Expansion
 from .factoring import Factoring
 
@@ -13,31 +15,50 @@ EACH = 40  #: products of terms for one expression, by its length
 Named = list[tuple[int, Poly]]  #: the atom of each name and what it stands for
 
 
-def inlined(expansion: Expansion, factoring: Factoring, named: Named, polys: list[Poly]) -> tuple[Named, list[Poly]]:
-    """Without names that are not worth it."""
+def is_plain(poly: Poly, atoms: Atoms) -> bool:
+    """Whether it reads as well as a name: a number, a power of one quantity, a product of two symbols."""
+    if len(poly) != 1:
+        return not poly
+    (monomial,) = poly
+    return len(monomial) < 2 or (len(monomial) == 2 and all(atoms.table[a].kind == "sym" for a, _ in monomial))
+
+
+def inlined(
+    expansion: Expansion, factoring: Factoring, named: Named, polys: list[Poly], fixed: Collection[int] = ()
+) -> tuple[Named, list[Poly]]:
+    """Without names that are not worth it; the atoms in ``fixed`` keep theirs unless they read as well without."""
     costs = factoring.costs.of_terms
     every = [*named, *((-1, poly) for poly in polys)]
-    kept = []
+    kept: list[int] = []
+    same: dict[Frozen, Poly] = {}
+
+    def keep(k: int, value: Poly) -> None:
+        kept.append(k)
+        same[freeze(value)] = {((every[k][0], 1),): 1}
+
     for k in range(len(named)):
         atom, value = every[k]
+        value = same.get(freeze(value), value)  # of two of one value the second is the first
         users = [n for n in range(k + 1, len(every)) if atom in expansion.atoms.names(every[n][1])]
-        if len(value) == 1 and len(users) > 1:  # named without its symbols and numbers, which may cancel
+        if len(value) == 1 and len(users) > 1 and atom not in fixed:
+            # named without its symbols and numbers, which may cancel
             inner, outer = _parted(expansion, value)
             moved = multiply({((atom, 1),): 1}, outer)
             put = [_put_in(expansion, factoring, every[n][1], atom, moved) for n in users]
             if inner != value and all(p is not None for p in put):
                 for n, p in zip(users, put, strict=True):
                     every[n] = (every[n][0], p or {})
-                every[k] = (atom, value := inner)
+                value = same.get(freeze(inner), inner)
+                every[k] = (atom, inner)
         tried = None
-        if len(value) == 1 or len(users) == 1:
+        if is_plain(value, expansion.atoms) or (atom not in fixed and (len(value) == 1 or len(users) == 1)):
             tried = [_put_in(expansion, factoring, every[n][1], atom, value) for n in users]
         if tried is None or any(p is None for p in tried):
-            kept.append(k)
+            keep(k, value)
             continue
         gain = NAME + costs(value) + sum(costs(every[n][1]) - costs(p) for n, p in zip(users, tried, strict=True) if p)
-        if gain < 0 or (len(users) == 1 and costs(value) > ONCE):
-            kept.append(k)
+        if not is_plain(value, expansion.atoms) and (gain < 0 or (len(users) == 1 and costs(value) > ONCE)):
+            keep(k, value)
             continue
         for n, p in zip(users, tried, strict=True):
             every[n] = (every[n][0], p or {})
@@ -49,14 +70,18 @@ def _parted(expansion: Expansion, value: Poly) -> tuple[Poly, Poly]:
     ((monomial, x),) = value.items()
     plain = tuple(f for f in monomial if expansion.atoms.table[f[0]].kind in ("sym", "pi"))
     rest = tuple(f for f in monomial if f not in plain)
-    return ({rest: 1}, {plain: x}) if rest else (value, {(): 1})
+    if not rest:
+        return value, {(): 1}
+    kind, what = expansion.atoms.table[rest[0][0]]
+    inner = dict(what) if len(rest) == 1 and rest[0][1] == 1 and kind in SUMS else {rest: 1}
+    return inner, {plain: x}
 
 
 def _put_in(expansion: Expansion, factoring: Factoring, poly: Poly, atom: int, value: Poly) -> Poly | None:
     """A polynomial with the value of a name in its place, None where that cannot be told."""
-    if not _can_replace(expansion, poly, atom, value):
+    if not _can_replace(expansion.atoms, poly, atom, value):
         return None
-    replaced = _replaced(poly, atom, value)
+    replaced = _replaced(expansion.atoms, poly, atom, value)
     try:
         with expansion.work.at_most(EACH * len(replaced)):
             return factoring.factored(expansion.angles.simplified(replaced))
@@ -64,32 +89,41 @@ def _put_in(expansion: Expansion, factoring: Factoring, poly: Poly, atom: int, v
         return replaced
 
 
-def _can_replace(expansion: Expansion, poly: Poly, atom: int, value: Poly) -> bool:
+def _can_replace(atoms: Atoms, poly: Poly, atom: int, value: Poly) -> bool:
     for m in poly:
         for a, n in m:
-            if a == atom and (n != int(n) or (n < 0 and len(value) != 1)):
-                return False
-            if a != atom and atom in expansion.atoms.names({((a, 1),): 1}):
-                return False
+            if a == atom:
+                if n != int(n) or (n < 0 and len(value) != 1):
+                    return False
+            elif atom in atoms.names({((a, 1),): 1}):
+                kind, what = atoms.table[a]
+                if kind not in SUMS or not _can_replace(atoms, dict(what), atom, value):
+                    return False
     return True
 
 
-def _replaced(poly: Poly, atom: int, value: Poly) -> Poly:
+def _replaced(atoms: Atoms, poly: Poly, atom: int, value: Poly) -> Poly:
     result: Poly = {}
     for m, x in poly.items():
-        power = next((n for a, n in m if a == atom), 0)
-        if not power:
-            result = add(result, {m: x})
-            continue
-        rest = tuple((a, n) for a, n in m if a != atom)
-        if len(value) == 1:
-            ((monomial, y),) = value.items()
-            n = int(power)
-            factor = y**n if n >= 0 else ratio(1, y**-n)
-            term = {join(rest, tuple((a, k * n) for a, k in monomial)): x * factor}
-        else:
-            term = {rest: x}
-            for _ in range(int(power)):
-                term = multiply(term, value)
+        term: Poly = {(): x}
+        for a, n in m:
+            if a == atom:
+                term = multiply(term, _power(value, int(n)))
+            elif atom in atoms.names({((a, 1),): 1}):
+                kind, what = atoms.table[a]
+                inner = _replaced(atoms, dict(what), atom, value)
+                term = multiply(term, {((atoms.id(kind, freeze(inner)), n),): 1})
+            else:
+                term = multiply(term, {((a, n),): 1})
         result = add(result, term)
+    return result
+
+
+def _power(value: Poly, n: int) -> Poly:
+    if len(value) == 1:
+        ((monomial, x),) = value.items()
+        return {tuple((a, k * n) for a, k in monomial): x**n if n >= 0 else ratio(1, x**-n)}
+    result: Poly = {(): 1}
+    for _ in range(n):
+        result = multiply(result, value)
     return result

@@ -17,8 +17,8 @@ class Literal:
         self.atoms = expansion.atoms
         self._of: dict[int, Poly] = {}
 
-    def name(self, i: int, poly: Poly) -> None:
-        """Let the atom of a name stand for a node from here on."""
+    def put(self, i: int, poly: Poly) -> None:
+        """Let a polynomial, such as a name, stand for a node from here on."""
         self._of[i] = poly
 
     def form(self, i: int) -> Poly:

@@ -10,7 +10,7 @@ import sympy
 
 from ..graph.core import Graph
 from ..graph.sympy_raise import as_number, raise_operation
-from .atoms import SMALL, Atoms, Monomial, Number, Poly
+from .atoms import SMALL, TURNS, Atoms, Monomial, Number, Poly
 from .factoring import Factoring
 
 
@@ -23,6 +23,7 @@ class Raising:
         self.factoring = factoring
         self.symbols = symbols
         self.names: dict[Any, Any] = {}  #: what stands for an intermediate
+        self.turns: dict[int, Any] = {}  #: what stands for a sine or cosine
         self._made: dict[int, Any] = {}
 
     def expression(self, poly: Poly) -> Any:
@@ -37,11 +38,18 @@ class Raising:
         factors = [sympy.Pow(as_number(self._atom(a)), _exponent(n)) for a, n in monomial]
         return sympy.Mul(_number(x), *factors)
 
+    def turn(self, atom: int) -> Any:
+        """A sine or cosine, written out."""
+        kind, angle = self.atoms.table[atom]
+        return getattr(sympy, kind)(self.expression(self.factoring.factored(dict(angle))))
+
     def _atom(self, atom: int) -> Any:
+        if atom in self.turns:
+            return self.turns[atom]
         if atom not in self._made:
             stack, needed = [atom], {atom}
             while stack:  # from the inside out, as calls may be nested deep
-                new = self.atoms.inside(stack.pop()).difference(needed, self._made)
+                new = self.atoms.inside(stack.pop()).difference(needed, self._made, self.turns)
                 needed |= new
                 stack += new
             for a in sorted(needed):
@@ -60,8 +68,8 @@ class Raising:
             return self.expression(dict(what))
         if kind == "sum":
             return self.expression(self.factoring.factored(dict(what)))
-        if kind in ("sin", "cos"):
-            return getattr(sympy, kind)(self.expression(self.factoring.factored(dict(what))))
+        if kind in TURNS:
+            return self.turn(atom)
         return raise_operation(self.graph, kind, [self.expression(self.factoring.factored(dict(p))) for p in what])
 
 
