@@ -7,9 +7,9 @@ from typing import Any
 
 import sympy
 
-from eomgen.explain.evaluate import evaluate as evaluate
-from eomgen.explain.evaluate import random_state as random_state
-from eomgen.explain.evaluate import state_values as state_values
+from eomgen.explain.shown_values import evaluate as evaluate
+from eomgen.explain.shown_values import random_state as random_state
+from eomgen.explain.shown_values import state_values as state_values
 
 
 def number(equations: Any, name: str, values: Mapping[str, float], part: str | None = None) -> Any:

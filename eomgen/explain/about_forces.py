@@ -10,7 +10,7 @@ from ..errors import UnavailableError
 from ..graph.core import Expr
 from ..reading.written import write
 from .author import Author
-from .document import Formula, Piece, Section, Sentence
+from .document import FormulaLine, Piece, Section, Sentence
 
 MANY = 12  #: force elements from which those of one type share one sentence
 
@@ -65,7 +65,7 @@ def _weight(author: Author, name: str) -> list[Piece]:
             "\\mathbf{r}_c$, with "
             "the field of gravity in ground axes"
         ),
-        Formula((r"\mathbf{g}", sympy.Matrix(3, 1, gravity))),
+        FormulaLine((r"\mathbf{g}", sympy.Matrix(3, 1, gravity))),
     ]
 
 
@@ -75,5 +75,5 @@ def _law(author: Author, force: Any) -> list[Piece]:
     for key, value in vars(force).items():
         if isinstance(value, Expr) and not key.startswith("_"):
             (expression,) = write([value]).expressions
-            pieces.append(Formula((rf"\mathrm{{{key.replace('_', '.')}}}", expression)))
+            pieces.append(FormulaLine((rf"\mathrm{{{key.replace('_', '.')}}}", expression)))
     return pieces

@@ -13,13 +13,13 @@ from ..frames import GROUND
 from ..graph.core import Expr
 from ..reading.written import write
 from .author import Author
-from .document import Folded, Formula, Picture, Piece, Section, Sentence, Table
+from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table
 
 MANY = 8  #: bodies from which their masses are folded
 
 
 def mechanism(author: Author, module: Any | None) -> Section:
-    """Picture, topology, joints and loops."""
+    """DrawnPicture, topology, joints and loops."""
     eqs, m = author.equations, author.mechanism
     pieces: list[Piece] = []
     if m.doc:
@@ -60,7 +60,7 @@ def _picture(module: Any | None) -> Piece:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI)
     width = round(SHOWN * figure.get_size_inches()[0] * 1.25)
-    return Picture(buffer.getvalue(), width, "the mechanism in its initial position")
+    return DrawnPicture(buffer.getvalue(), width, "the mechanism in its initial position")
 
 
 def bodies(author: Author) -> Section | None:
@@ -77,11 +77,11 @@ def bodies(author: Author) -> Section | None:
         formulas: list[Piece] = []
         for body in m.bodies:
             mass, *rest = write([body.mass, *body.com, *(x for row in body.inertia for x in row)]).expressions
-            formulas.append(Formula((author.of("m", body.name), mass)))
+            formulas.append(FormulaLine((author.of("m", body.name), mass)))
             if any(x != 0 for x in rest[:3]):
-                formulas.append(Formula((author.of(r"\mathbf{c}", body.name), sympy.Matrix(3, 1, rest[:3]))))
+                formulas.append(FormulaLine((author.of(r"\mathbf{c}", body.name), sympy.Matrix(3, 1, rest[:3]))))
             if any(x != 0 for x in rest[3:]):
-                formulas.append(Formula((author.of(r"\mathbf{J}", body.name), sympy.Matrix(3, 3, rest[3:]))))
+                formulas.append(FormulaLine((author.of(r"\mathbf{J}", body.name), sympy.Matrix(3, 3, rest[3:]))))
         if len(m.bodies) > MANY or not author.full:
             pieces.append(Folded(f"Masses and inertias of {_count(len(m.bodies), 'body', 'bodies')}", tuple(formulas)))
         else:

@@ -14,7 +14,7 @@ from ..graph.differentiate import gradient
 from ..notation import dotted
 from ..reading import Quantities
 from .author import Author, needed
-from .document import Formula, Piece, Section, Sentence
+from .document import FormulaLine, Piece, Section, Sentence
 
 
 def energies(author: Author) -> Section | None:
@@ -52,7 +52,7 @@ def _embedding(author: Author) -> list[Piece]:
         Sentence("Masses and inertias of all bodies form"),
         *author.quantity(r"\mathbf{M}_b", "body_mass_matrix"),
         Sentence("and the mass matrix of the independent accelerations is"),
-        Formula((r"\mathbf{M}", r"\mathbf{B}_b^T \mathbf{M}_b \mathbf{B}_b")),
+        FormulaLine((r"\mathbf{M}", r"\mathbf{B}_b^T \mathbf{M}_b \mathbf{B}_b")),
         Sentence(
             "What the accelerations hold beside $\\mathbf{B}_b \\ddot{\\mathbf{q}}_i$ gives the quadratic "
             "velocity terms "

@@ -8,9 +8,9 @@ from typing import Any
 import sympy
 
 from .author import Author, in_numbers, nodes
-from .compare import Difference
-from .document import Folded, Formula, Piece, Section, Sentence, Table
-from .evaluate import known_values, value_of
+from .document import Folded, FormulaLine, Piece, Section, Sentence, Table
+from .shown_against_module import Difference
+from .shown_values import known_values, value_of
 
 LONG = 60  #: nodes of an expression up to which its numbers are put in
 MOST = 400  #: lines of the calculation
@@ -59,10 +59,10 @@ def calculation(author: Author, state: Mapping[str, float], reason: str) -> Sect
     return Section(title, tuple(pieces))
 
 
-def _line(left: str, expression: Any, here: dict[str, float], known: dict[Any, Any]) -> Formula:
+def _line(left: str, expression: Any, here: dict[str, float], known: dict[Any, Any]) -> FormulaLine:
     value = float(value_of(expression, known))
     if nodes(expression) > LONG:
-        return Formula((left, value))
+        return FormulaLine((left, value))
     return in_numbers(left, expression, here, value)
 
 
@@ -73,7 +73,7 @@ def _accelerations(author: Author, state: Mapping[str, float]) -> list[Piece]:
     if not names:
         return []
     told = Sentence("The equations of motion then give the accelerations")
-    return [told, *(Formula((author.symbol(name), state[name])) for name in names)]
+    return [told, *(FormulaLine((author.symbol(name), state[name])) for name in names)]
 
 
 def _acceleration_names(eqs: Any) -> list[str]:

@@ -13,7 +13,7 @@ from ..kinematics.state import acceleration_name
 from ..notation import with_instance
 from ..reading import Quantities
 from ..reading.written import write
-from .document import Folded, Formula, Piece, PutIn, Sentence
+from .document import Folded, FormulaLine, Piece, PutIn, Sentence
 from .printer import Printer
 
 WHOLE = 160  #: nodes of a matrix up to which it is shown as a matrix, not entry by entry
@@ -114,13 +114,13 @@ class Author:
             return [Sentence(f"${left}$ is left out: it has {size} terms and factors; {where} gives it as SymPy.")]
         entries = list(self._entries(left, value, symmetric))
         self.shown.append(Shown(*key, named, entries))
-        found: list[Piece] = [Formula((self.printer.latex(s), x)) for s, x in named if s not in told]
+        found: list[Piece] = [FormulaLine((self.printer.latex(s), x)) for s, x in named if s not in told]
         if not isinstance(value, sympy.MatrixBase) or (
             size <= WHOLE and value.cols <= COLUMNS and value.rows <= 2 * COLUMNS
         ):
-            found.append(Formula((left, value)))
+            found.append(FormulaLine((left, value)))
         else:
-            found += [Formula(entry) for entry in entries]
+            found += [FormulaLine(entry) for entry in entries]
             rest = len(value) - len(entries)
             if rest:
                 same = ", or stand above the diagonal of a symmetric matrix" if symmetric else ""
@@ -133,7 +133,7 @@ class Author:
         """An equation between two expressions, with the named parts that it uses and that were not shown before."""
         parts = [pair for pair in needed(named, sympy.Matrix([left, right])) if pair not in self._told]
         self._told += parts
-        return [*(Formula((self.printer.latex(s), x)) for s, x in parts), Formula((left, right))]
+        return [*(FormulaLine((self.printer.latex(s), x)) for s, x in parts), FormulaLine((left, right))]
 
     def form(self, choose: Callable[[Quantities], Sequence[Expr]], prefix: str) -> tuple[list[Any], list[Any]]:
         """Expressions that no attribute has, formed in a copy of the graph: named parts, SymPy expressions."""
@@ -171,8 +171,8 @@ def needed(named: Sequence[tuple[Any, Any]], value: Any) -> list[tuple[Any, Any]
     return found[::-1]
 
 
-def in_numbers(left: str, expression: Any, numbers: dict[str, float], value: float) -> Formula:
+def in_numbers(left: str, expression: Any, numbers: dict[str, float], value: float) -> FormulaLine:
     """The line of a calculation by hand: left side = expression with its numbers = value."""
     if not expression.free_symbols or not expression.args:
-        return Formula((left, value))
-    return Formula((left, PutIn(expression, numbers), value))
+        return FormulaLine((left, value))
+    return FormulaLine((left, PutIn(expression, numbers), value))

@@ -47,7 +47,7 @@ class Sentence:
 
 
 @dataclass(frozen=True)
-class Formula:
+class FormulaLine:
     """Sides with signs of equality between them, each LaTeX, a SymPy expression or matrix, a number, or PutIn."""
 
     sides: tuple[Any, ...]
@@ -62,7 +62,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Picture:
+class DrawnPicture:
     """A picture in the bytes of a PNG file, ``width`` in dots of a page."""
 
     png: bytes
@@ -78,7 +78,7 @@ class Folded:
     pieces: tuple[Piece, ...]
 
 
-Piece = Sentence | Formula | Table | Picture | Folded
+Piece = Sentence | FormulaLine | Table | DrawnPicture | Folded
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..errors import EomgenError, MissingDependencyError, UsageError
 from ..files.writing import write_whole
-from .document import Folded, Picture, Piece, Section
+from .document import DrawnPicture, Folded, Piece, Section
 from .printer import Printer
 from .write_html import write_html
 from .write_markdown import write_markdown
@@ -130,16 +130,16 @@ def _pictures(sections: Sequence[Section]) -> Any:
     for piece in pending:
         if isinstance(piece, Folded):
             pending += piece.pieces
-        if isinstance(piece, Picture):
+        if isinstance(piece, DrawnPicture):
             yield piece
 
 
 def explain(equations: Any, level: str = "full") -> Explanation:
-    """See :meth:`eomgen.derivation.Derivation.explain`."""
+    """See :meth:`eomgen.api.equations.Equations.explain`."""
     from . import about_forces, about_mechanism, about_methods, about_motion, about_numbers
     from .author import Author
-    from .compare import compare
-    from .evaluate import state_values
+    from .shown_against_module import compare
+    from .shown_values import state_values
 
     if level not in LEVELS:
         raise UsageError(f"no level {level!r}; there are {', '.join(LEVELS)}")

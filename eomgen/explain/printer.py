@@ -10,7 +10,7 @@ from sympy.printing.latex import LatexPrinter
 from sympy.printing.mathml import MathMLPresentationPrinter
 
 from ..notation import Notation
-from .document import Formula, PutIn
+from .document import FormulaLine, PutIn
 from .formula_text import number_latex, number_mathml, text_to_mathml
 
 WIDE = 110  #: characters of LaTeX, without commands, after which a sum goes on in the next line
@@ -27,7 +27,7 @@ _BETTER = (
 SHORT = 14  #: nodes of a side that leaves room for another one in its line
 
 
-def is_short(formula: Formula) -> bool:
+def is_short(formula: FormulaLine) -> bool:
     """Whether all sides go into one line."""
     values = [side.expression if isinstance(side, PutIn) else side for side in formula.sides]
     kept = [x for x in values if isinstance(x, sympy.Basic | sympy.MatrixBase)]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..files.inline_pictures import image_html
 from ..texts import html_text
-from .document import Folded, Formula, Picture, Piece, Section, Sentence, Table, spans
+from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table, spans
 from .formula_text import text_to_mathml
 from .printer import Printer, is_short
 
@@ -76,20 +76,20 @@ def _piece(piece: Piece, printer: Printer) -> str:
     match piece:
         case Sentence():
             return f"<p>{_text(piece.text)}</p>"
-        case Formula():
+        case FormulaLine():
             return f"<div class='formula'><math displaystyle='true'>{_formula(piece, printer)}</math></div>"
         case Table():
             head = "".join(f"<th>{_text(cell)}</th>" for cell in piece.head)
             rows = "".join("<tr>" + "".join(f"<td>{_text(cell)}</td>" for cell in row) + "</tr>" for row in piece.rows)
             return f"<div class='scroll'><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
-        case Picture():
+        case DrawnPicture():
             return f"<p>{image_html(piece.png, 'png', piece.width, piece.words)}</p>"
         case Folded():
             inner = "\n".join(_piece(part, printer) for part in piece.pieces)
             return f"<details><summary>{_text(piece.title)}</summary>\n{inner}\n</details>"
 
 
-def _formula(formula: Formula, printer: Printer) -> str:
+def _formula(formula: FormulaLine, printer: Printer) -> str:
     """One row of sides, or several lines where a side is a long sum or a third one follows."""
     first, *others = formula.sides
     left = f"<mrow>{printer.mathml(first)}</mrow>"

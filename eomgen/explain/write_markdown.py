@@ -7,7 +7,7 @@ from base64 import b64encode
 from collections.abc import Sequence
 
 from ..texts import html_text
-from .document import Folded, Formula, Picture, Piece, Section, Sentence, Table, spans
+from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table, spans
 from .printer import Printer
 from .write_tex import formula_body
 
@@ -37,12 +37,12 @@ def _piece(piece: Piece, printer: Printer) -> str:
     match piece:
         case Sentence():
             return _text(piece.text)
-        case Formula():
+        case FormulaLine():
             return f"$$\n{formula_body(piece, printer)}\n$$"
         case Table():
             rows = [piece.head, tuple("---" for _ in piece.head), *piece.rows]
             return "\n".join("| " + " | ".join(map(_cell, row)) + " |" for row in rows)
-        case Picture():
+        case DrawnPicture():
             data = b64encode(piece.png).decode()
             return f"![{piece.words}](data:image/png;base64,{data})"
         case Folded():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from .document import Folded, Formula, Picture, Piece, Section, Sentence, Table, spans
+from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table, spans
 from .printer import Printer, is_short
 
 PICTURE = "mechanism.png"  #: the file that a document with a picture takes it from
@@ -39,7 +39,7 @@ def write_tex(title: str, sections: Sequence[Section], printer: Printer, picture
     return "\n".join([*found, r"\end{document}", ""])
 
 
-def formula_body(formula: Formula, printer: Printer) -> str:
+def formula_body(formula: FormulaLine, printer: Printer) -> str:
     """LaTeX of a formula, in lines where a side is a long sum or a third one follows."""
     first, *others = formula.sides
     rows: list[str] = []
@@ -74,14 +74,14 @@ def _piece(piece: Piece, printer: Printer, picture: str | None) -> str:
     match piece:
         case Sentence():
             return _text(piece.text) + "\n"
-        case Formula():
+        case FormulaLine():
             return rf"\fitted{{{formula_body(piece, printer)}}}"
         case Table():
             columns = " ".join(["l"] * (len(piece.head) - 1) + [r">{\raggedright\arraybackslash}p{0.45\linewidth}"])
             rows = [" & ".join(map(_text, row)) + r" \\" for row in piece.rows]
             head = " & ".join(map(_text, piece.head)) + r" \\ \hline"
             return "\n".join([rf"\begin{{longtable}}{{{columns}}}", head, *rows, r"\end{longtable}"])
-        case Picture():
+        case DrawnPicture():
             if picture is None:
                 return ""
             width = min(1.0, piece.width / 640)

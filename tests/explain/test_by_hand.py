@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import eomgen as eg
-from eomgen.explain.document import Folded, Formula
+from eomgen.explain.document import Folded, FormulaLine
 
 FILE = Path(__file__).parents[1] / "reference" / "planar_slider_crank_dynamics.json"
 
@@ -34,7 +34,7 @@ def test_accelerations_of_a_published_slider_crank() -> None:
     document = m.derive(independent=["theta"]).explain()
     (section,) = [s for s in document.sections if s.title.startswith("Numbers")]
     pieces = [x for piece in section.pieces for x in (piece.pieces if isinstance(piece, Folded) else [piece])]
-    lines = {piece.sides[0]: piece.sides[-1] for piece in pieces if isinstance(piece, Formula)}
+    lines = {piece.sides[0]: piece.sides[-1] for piece in pieces if isinstance(piece, FormulaLine)}
     crank_turn, rod_turn, along = map(float, known["reference"]["omega150"]["initial_acc"])
     assert lines[r"\ddot{\theta}"] == pytest.approx(crank_turn, rel=1e-9)
     assert lines[r"\ddot{s}"] == pytest.approx(along, rel=1e-9)

@@ -15,7 +15,7 @@ import pytest
 import eomgen as eg
 from eomgen.equations import METHODS
 from eomgen.errors import MissingDependencyError, UsageError
-from eomgen.explain.document import Folded, Formula, Sentence, Table
+from eomgen.explain.document import Folded, FormulaLine, Sentence, Table
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.yaml"))
@@ -83,7 +83,7 @@ def _says_something(piece: Any) -> bool:
             return piece.text.strip() != ""
         case Table():
             return len(piece.rows) > 0
-        case Formula():
+        case FormulaLine():
             return len(piece.sides) >= 1
         case Folded():
             return len(piece.pieces) > 0 and all(map(_says_something, piece.pieces))

@@ -9,7 +9,7 @@ import numpy as np
 import sympy
 
 from ..limits.rounding import EPS
-from .evaluate import evaluate, random_state, state_values
+from .shown_values import evaluate, random_state, state_values
 
 STATES = 2
 SMALLEST = 4096 * EPS  #: entries that count as 0
@@ -33,7 +33,7 @@ class Difference(NamedTuple):
         return max(self.each.values(), default=0.0)
 
 
-class State(NamedTuple):
+class StateNumbers(NamedTuple):
     """A consistent state of a module, and the numbers of all names there."""
 
     module: Any
@@ -61,7 +61,7 @@ def compare(equations: Any, module: Any, shown: set[tuple[str, str | None]]) -> 
     for seed in range(STATES):
         x = random_state(module, seed + 1)
         free = list(module.layout.metadata["independent"])
-        state = State(module, x, state_values(module, x, 0.0), free)
+        state = StateNumbers(module, x, state_values(module, x, 0.0), free)
         for name, of_module in COMPARED.items():
             if name in wanted and (equations.mobility.n_dof or name in ("T", "V")):
                 _note(found, name, _number(equations, name, None, state.values), *of_module(state))
@@ -79,31 +79,31 @@ def compare(equations: Any, module: Any, shown: set[tuple[str, str | None]]) -> 
 Wanted = tuple[Any, float]
 
 
-def _energy(k: int) -> Callable[[State], Wanted]:
-    def wanted(s: State) -> Wanted:
+def _energy(k: int) -> Callable[[StateNumbers], Wanted]:
+    def wanted(s: StateNumbers) -> Wanted:
         energies = s.module.energy(s.x)
         return np.array([energies[k]]), float(np.abs(energies).sum())
 
     return wanted
 
 
-def _force(s: State) -> Wanted:
+def _force(s: StateNumbers) -> Wanted:
     terms = s.module.embedded_mass_matrix(s.q) * s.a[s.free]
     return terms.sum(axis=1), float(np.abs(terms).max(initial=0.0))
 
 
-def _gamma(s: State) -> Wanted:
+def _gamma(s: StateNumbers) -> Wanted:
     terms = s.module.constraint_jacobian(s.q) * s.a
     return -terms.sum(axis=1), float(np.abs(terms).max(initial=0.0))
 
 
-def _velocity_constraints(s: State) -> Wanted:
+def _velocity_constraints(s: StateNumbers) -> Wanted:
     terms = s.module.constraint_jacobian(s.q) * s.v
     return s.module.velocity_constraints(s.x), float(np.abs(terms).max(initial=0.0))
 
 
 #: Quantity -> what the module has for it at a state, flat, and the size of the terms that it is a sum of.
-COMPARED: dict[str, Callable[[State], Wanted]] = {
+COMPARED: dict[str, Callable[[StateNumbers], Wanted]] = {
     "T": _energy(0),
     "V": _energy(1),
     "mass_matrix": lambda s: (s.module.embedded_mass_matrix(s.q).ravel(), 0.0),
@@ -126,7 +126,7 @@ def _note(found: dict[str, float], name: str, shown: Any, wanted: Any, size: flo
     found[name] = max(found.get(name, 0.0), float(np.abs(shown - wanted).max(initial=0.0)) / largest)
 
 
-def _compare_forces(found: dict[str, float], equations: Any, s: State) -> None:
+def _compare_forces(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
     """The forces of all elements and the quadratic velocity terms together are M v'."""
     named, total = equations.written("generalized_forces")
     Q_v = _number(equations, "quadratic_velocity", None, s.values)
@@ -136,7 +136,7 @@ def _compare_forces(found: dict[str, float], equations: Any, s: State) -> None:
     _note(found, "generalized_forces", sum(parts, Q_v), wanted, largest)
 
 
-def _compare_transformation(found: dict[str, float], equations: Any, s: State) -> None:
+def _compare_transformation(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
     """B v_i + b is v."""
     B = _number(equations, "velocity_transformation", None, s.values).reshape(len(s.v), -1)
     b = _number(equations, "velocity_offset", None, s.values)
