@@ -14,6 +14,7 @@ from .module import Module
 
 if TYPE_CHECKING:
     from ..describe.builder import Builder
+    from ..explain import Explanation
 
 
 DRAWN = 30  #: bodies of a mechanism that is drawn whenever a notebook shows its equations
@@ -50,6 +51,39 @@ class Equations(Derivation):
 
         def __getattr__(self, name: str) -> Any:
             return find_lacking(self, "Equations", name)
+
+    def explain(self, level: str = "full") -> Explanation:
+        """The worked solution: every step from the mechanism to the equations of motion, then the numbers of one state.
+
+        Parameters
+        ----------
+        level : {'full', 'short'}
+            ``short``: topology, coordinates, the equations of motion and counts.
+
+        Returns
+        -------
+        Explanation
+            ``.html``, ``.markdown``, ``.latex``, ``.save("solution.html")``, and ``.difference``, the largest one
+            between the shown formulas and the compiled module.
+
+        Raises
+        ------
+        UsageError
+            An unknown level.
+
+        Examples
+        --------
+        >>> import eomgen as eg
+        >>> m = eg.Model("pendulum", gravity=(0, "-g", 0))
+        >>> g, l = m.parameter("g", 9.81), m.parameter("l", 0.5)
+        >>> hinge = m.revolute("hinge", m.ground, m.body("bob", mass=2, com=(0, -l, 0)), coordinate="theta")
+        >>> solution = m.derive().explain()
+        >>> solution.difference < 1e-10
+        True
+        """
+        from ..explain import explain
+
+        return explain(self, level)
 
     def compile(self, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any) -> Module:
         """Generate code, compile it and load it.

@@ -23,6 +23,7 @@ VERBS = {
     "kinematics": "Analyse the motion over a range, without forces.",
     "check": "Report a model's topology, mobility and faults.",
     "derive": "Derive the equations of motion and count their operations.",
+    "explain": "Write the worked solution: every step to the equations, then numbers.",
     "linearize": "Linearize a model: A, B, C, D, eigenvalues.",
     "modes": "Find natural frequencies, mode shapes and damping ratios.",
     "equilibrium": "Find a static equilibrium, and parameters for which it is one.",

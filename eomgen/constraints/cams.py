@@ -37,6 +37,8 @@ def _polar(cam: Marker, contour: Profile, follower: Marker, face: bool = False) 
 class CamLift(Constraint):
     """The follower's coordinate is a given function of the cam's: s = lift(theta - phase)."""
 
+    sentence: ClassVar[str] = "The coordinate of the follower is a given function of the angle of the cam."
+    formula: ClassVar[str] = r"s = f(\theta - \theta_0)"
     type_name: ClassVar[str] = "cam"
     written: ClassVar[bool] = True
     cam: Expr
@@ -56,6 +58,8 @@ class CamLift(Constraint):
 class KnifeContact(Constraint):
     """The follower marker's origin lies on the contour: |p| = r(theta of p), p in the cam's axes."""
 
+    sentence: ClassVar[str] = "The tip of the follower lies on the contour of the cam."
+    formula: ClassVar[str] = r"|\mathbf{p}| = r(\theta)"
     type_name: ClassVar[str] = "cam_knife_edge"
     cam: Marker
     follower: Marker
@@ -77,6 +81,8 @@ class FlatSupport(Constraint):
     axis to the tangent whose outward normal points to theta (for a convex cam h + h'' > 0 is its radius of curvature).
     """
 
+    sentence: ClassVar[str] = r"A flat face with the normal $\mathbf{n}$ touches the cam."
+    formula: ClassVar[str] = r"\mathbf{n}^T \mathbf{p} = h(\theta)"
     type_name: ClassVar[str] = "cam_support"
     cam: Marker
     follower: Marker
@@ -103,6 +109,8 @@ class _Contact(Constraint):
     ``point`` is fixed to a body without mass that turns about the cam's axis by that angle.
     """
 
+    sentence: ClassVar[str] = "The follower touches the contour of the cam at the polar angle $\theta$."
+    formula: ClassVar[str] = r"\mathbf{p} = r(\theta) \mathbf{e}_r"
     cam: Marker
     follower: Marker
     contour: Profile

@@ -53,8 +53,13 @@ class Condition(NamedTuple):
 
 @dataclass(frozen=True)
 class Constraint(ABC):
-    """A constraint element.  ``name`` is the user's; a subclass adds its coordinates, markers and dimensions."""
+    """A constraint element.  ``name`` is the user's; a subclass adds its coordinates, markers and dimensions.
 
+    ``sentence`` and ``formula`` (LaTeX) say its condition, for readers.
+    """
+
+    sentence: ClassVar[str] = "A condition between coordinates, or between motions of markers."
+    formula: ClassVar[str] = r"C(q,t) = 0"
     type_name: ClassVar[str]
     written: ClassVar[bool] = False  #: whether factors in the equations are the user's, and may have any size
     name: str

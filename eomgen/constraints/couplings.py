@@ -18,6 +18,8 @@ from .constraint import POSITION, VELOCITY, Condition, Constraint, ConstraintVie
 class Linear(Constraint):
     """A linear relation: sum of factor times coordinate = offset (Shabana, Computational Dynamics, sec. 3.2)."""
 
+    sentence: ClassVar[str] = "A linear relation between coordinates."
+    formula: ClassVar[str] = r"\Sigma_k c_k q_k = c_0"
     type_name: ClassVar[str] = "linear"
     written: ClassVar[bool] = True
     terms: tuple[tuple[Expr, Expr], ...]  #: (coordinate, factor)
@@ -35,6 +37,8 @@ class Linear(Constraint):
 class Equation(Constraint):
     """Any expression held at zero; nonholonomic (``level`` 'velocity') if it is linear in velocities."""
 
+    sentence: ClassVar[str] = "An equation that the model gives."
+    formula: ClassVar[str] = r"C = 0"
     type_name: ClassVar[str] = "equation"
     written: ClassVar[bool] = True
     expression: Expr

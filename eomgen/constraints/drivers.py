@@ -31,6 +31,8 @@ ROUGH = ("monotone",)
 class Driver(Constraint):
     """A measure that follows ``value``, an expression of t and parameters; its row is called ``<name>.motion``."""
 
+    sentence: ClassVar[str] = "A measure $s$ of the motion follows a given function of time."
+    formula: ClassVar[str] = r"s - f(t) = 0"
     value: Expr
 
     @abstractmethod

@@ -18,6 +18,8 @@ from .constraint import Condition, Constraint, ConstraintView
 class Pair(Constraint):
     """Two angles, measured from the part that carries the two axes, in a fixed ratio: a + ratio b = phase."""
 
+    sentence: ClassVar[str] = "Two angles, measured from the part that carries both axes, keep a fixed ratio $i$."
+    formula: ClassVar[str] = r"a + i b = \varphi_0"
     written: ClassVar[bool] = True
     a: Expr
     b: Expr
@@ -59,6 +61,8 @@ class Belt(Pair):
 class Rack(Constraint):
     """A pinion that rolls on a rack: s = r a + offset (Norton, Design of Machinery, sec. 9.3)."""
 
+    sentence: ClassVar[str] = "A pinion of radius $r$ rolls on a rack."
+    formula: ClassVar[str] = r"s = r a + s_0"
     type_name: ClassVar[str] = "rack"
     written: ClassVar[bool] = True
     pinion: Expr

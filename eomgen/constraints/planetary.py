@@ -31,6 +31,8 @@ class Planetary(Constraint):
     the angle 0; one whose radius is None is not there.
     """
 
+    sentence: ClassVar[str] = "The angles of sun, ring and carrier of a planetary set with the radii $r_s$ and $r_r$."
+    formula: ClassVar[str] = r"r_s \varphi_s + r_r \varphi_r = (r_s + r_r) \varphi_c"
     type_name: ClassVar[str] = "planetary"
     written: ClassVar[bool] = True
     sun: Expr

@@ -29,6 +29,8 @@ LYING = "the disc lies flat (axle along the plane's normal)"
 class _Rolling(Constraint):
     """A body that rolls on the x-y plane of marker ``plane``, on the side to which its z axis points."""
 
+    sentence: ClassVar[str] = "The body touches the plane, and the point of contact does not slide."
+    formula: ClassVar[str] = r"\mathbf{v} + \mathbf{\omega} \times \mathbf{d} = \mathbf{0}"
     wheel: Marker  #: centre; its z axis is that of the wheel
     plane: Marker
     radius: Expr
@@ -123,6 +125,8 @@ class KnifeEdge(Constraint):
     The velocity is taken relative to the body of ``on`` (Chaplygin's sleigh; Neimark and Fufaev, ch. II).
     """
 
+    sentence: ClassVar[str] = r"The marker does not move along one of its axes $\mathbf{n}$."
+    formula: ClassVar[str] = r"\mathbf{n}^T \mathbf{v} = 0"
     type_name: ClassVar[str] = "knife_edge"
     marker: Marker
     axis: Vec3  #: unit vector, marker axes

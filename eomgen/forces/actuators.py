@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from ..elements.dimensions import FORCE, PUSH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
@@ -21,6 +23,8 @@ from .routes import VIA, read_joint_or_path
 class Actuator(Force):
     """A given generalized force along the path: positive pushes markers apart or drives the coordinate (N or N m)."""
 
+    sentence: ClassVar[str] = "A given force or torque $F$ (`value`) along its path of length or angle $s$."
+    formula: ClassVar[str] = r"\delta W = F \delta s"
     path: Path
     value: Expr
 
@@ -40,6 +44,8 @@ def _in_ground_axes(view: View, marker: Marker, value: Vec3, axes: str) -> Vec3:
 class PointForce(Force):
     """A force at a marker's origin, given in ground axes or in the marker's own (``axes="body"``) (N)."""
 
+    sentence: ClassVar[str] = r"A given force $\mathbf{F}$ at the origin of a marker."
+    formula: ClassVar[str] = r"\delta W = \mathbf{F}^T \delta \mathbf{r}"
     marker: Marker
     value: Vec3
     axes: str = "ground"
@@ -53,6 +59,8 @@ class PointForce(Force):
 class BodyTorque(Force):
     """A torque on a body, given in ground axes or in the marker's own (``axes="body"``) (N m)."""
 
+    sentence: ClassVar[str] = r"A given torque $\mathbf{M}$ on a body."
+    formula: ClassVar[str] = r"\delta W = \mathbf{M}^T \delta \mathbf{\varphi}"
     marker: Marker
     value: Vec3
     axes: str = "ground"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from ..elements.dimensions import Dimension
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
@@ -32,6 +34,8 @@ class PointGravity(Force):
     The opposite wrench acts on the body of the centre; two bodies attract each other if mu = G times the mass there.
     """
 
+    sentence: ClassVar[str] = r"A body is attracted by a point at the distance $r$, with the parameter $\mu$ (`mu`)."
+    formula: ClassVar[str] = r"V = -\mu \frac{m}{r}"
     center: Marker
     body: Marker  #: at the centre of mass, in the body's axes
     mu: Expr

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import cast
+from typing import ClassVar, cast
 
 from ..elements.dimensions import ENERGY, TIME
 from ..elements.element_type import ElementType, table
@@ -33,6 +33,11 @@ class Bushing(Force):
     its opposite at the same point on the first body.  K is symmetric; V = y^T K y / 2.
     """
 
+    sentence: ClassVar[str] = (
+        r"A bushing: forces and torques proportional to the six displacements $\mathbf{y}$ and their "
+        "rates."
+    )
+    formula: ClassVar[str] = r"\mathbf{Q} = -\mathbf{K} \mathbf{y} - \mathbf{D} \dot{\mathbf{y}}"
     first: Marker
     second: Marker
     stiffness: Mat6

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from typing import ClassVar
 
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
@@ -31,6 +32,11 @@ class Contact(Force):
     on the first body at the same point.
     """
 
+    sentence: ClassVar[str] = (
+        "Contact at one point: a force along the normal from the penetration $d$ and its rate, and friction "
+        "against the sliding."
+    )
+    formula: ClassVar[str] = r"F_n = k d^n (1 + \lambda \dot{d}), \quad d > 0"
     first: Marker
     second: Marker
     normal_law: HuntCrossley

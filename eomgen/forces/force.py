@@ -53,8 +53,13 @@ Load = MarkerLoad | CoordinateLoad
 
 @dataclass(frozen=True)
 class Force(ABC):
-    """A force element.  ``name`` is the user's; a subclass adds its markers and laws."""
+    """A force element.  ``name`` is the user's; a subclass adds its markers and laws.
 
+    ``sentence`` and ``formula`` (LaTeX) say its law, for readers.
+    """
+
+    sentence: ClassVar[str] = "A force element of the model."
+    formula: ClassVar[str] = ""
     uses_value: ClassVar[bool] = False  #: whether its law looks at the value of its path, not at the rate alone
     name: str
 

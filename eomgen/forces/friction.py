@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from ..elements.dimensions import DAMPING, NONE, PUSH, RATE
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
@@ -57,6 +59,10 @@ class JointFriction(Force):
     depend on the joint's reactions, unless the coefficients are given so.
     """
 
+    sentence: ClassVar[str] = (
+        "Friction in a joint: it opposes the rate $v$ of the coordinate; $v_s$ smooths its change of sign."
+    )
+    formula: ClassVar[str] = r"F = -c(v) \mathrm{tanh}(v/v_s) - b v"
     path: Path
     law: Friction
 

@@ -26,6 +26,10 @@ class GeneralElement(Force):
     law for the path's.  Only the potential V(value) counts as energy; the law is taken as it is, conservative or not.
     """
 
+    sentence: ClassVar[str] = (
+        "A law of the model gives the force along the path from its length or angle $s$ and the rate."
+    )
+    formula: ClassVar[str] = r"F = f(s,\dot{s})"
     uses_value: ClassVar[bool] = True
     path: Path
     value: Expr

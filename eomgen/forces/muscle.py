@@ -60,6 +60,11 @@ class Muscle(Force):
     outside.  The thickness of the muscle, l_opt sin alpha_opt, stays.
     """
 
+    sentence: ClassVar[str] = (
+        "A muscle with a rigid tendon pulls the ends of its path together; $a$ is the activation, $l$ and "
+        r"$\dot{l}$ the length of its fibres and its rate, normalised."
+    )
+    formula: ClassVar[str] = r"F = F_0 [a f_l(l) f_v(\dot{l}) + f_p(l)] \mathrm{cos}(\alpha)"
     uses_value: ClassVar[bool] = True
     path: Path
     activation: Expr

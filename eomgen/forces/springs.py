@@ -25,6 +25,11 @@ class Spring(Force):
     The law is conservative while k and s0 depend on parameters only, which the description checks.
     """
 
+    sentence: ClassVar[str] = (
+        "A linear spring: its force along its path of length or angle $s$ is proportional to the stretch "
+        "from $s_0$ (`rest`), with the stiffness $k$."
+    )
+    formula: ClassVar[str] = r"F = -k (s - s_0), \quad V = \frac{1}{2} k (s - s_0)^2"
     uses_value: ClassVar[bool] = True
     path: Path
     stiffness: Expr
@@ -58,6 +63,11 @@ class Spring(Force):
 class Damper(Force):
     """Viscous damper: generalized force -c s' along the path (c in N s/m or N m s/rad)."""
 
+    sentence: ClassVar[str] = (
+        "A viscous damper: its force along its path is proportional to the rate of the length or angle $s$, "
+        "with the factor $c$ (`damping`)."
+    )
+    formula: ClassVar[str] = r"F = -c \dot{s}"
     path: Path
     damping: Expr
 

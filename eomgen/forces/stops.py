@@ -22,6 +22,10 @@ class JointStop(Force):
     Penetrations are q - upper and lower - q.  A stop never pulls.
     """
 
+    sentence: ClassVar[str] = (
+        "Stops of a joint: beyond its limits a force from the penetration $d$ pushes the coordinate back."
+    )
+    formula: ClassVar[str] = r"F = k d^n (1 + \lambda \dot{d}), \quad d > 0"
     uses_value: ClassVar[bool] = True
     path: Path
     lower: Expr | None

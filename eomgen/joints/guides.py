@@ -99,6 +99,10 @@ class TurningGuide(Guide):
 class CurveSlider(Guide):
     """The origin of S slides along a curve of P, without turning: a bead on a wire.  Allows 1, removes 5."""
 
+    sentence: ClassVar[str] = (
+        "The origin of S slides along a curve of P without turning; the coordinate is the parameter of the curve."
+    )
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q)"
     type_name: ClassVar[str] = "curve_slider"
     options: ClassVar[Fields] = {"curve": CURVE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
@@ -113,6 +117,10 @@ class CurveSlider(Guide):
 class SurfaceSlider(Guide):
     """The origin of S slides on a surface of P, without turning: a particle in a bowl.  Allows 2, removes 4."""
 
+    sentence: ClassVar[str] = (
+        "The origin of S slides on a surface of P without turning; the coordinates are the parameters of the surface."
+    )
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q_1,q_2)"
     type_name: ClassVar[str] = "surface_slider"
     options: ClassVar[Fields] = {"surface": SURFACE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = ON_SURFACE
@@ -130,6 +138,8 @@ class PointOnCurve(TurningGuide):
     A point on a curve (Shabana, sec. 3.2, point follower): of the curve's point r(s) only s is free.
     """
 
+    sentence: ClassVar[str] = "The origin of S slides along a curve of P, and S turns freely."
+    formula: ClassVar[str] = r"\mathbf{u} = \mathbf{r}(q_1)"
     type_name: ClassVar[str] = "point_on_curve"
     options: ClassVar[Fields] = {"curve": CURVE, "sequence": SEQUENCE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (*ALONG_CURVE, *ANGLES)
@@ -145,6 +155,8 @@ class PointOnCurve(TurningGuide):
 class PointOnSurface(TurningGuide):
     """The origin of S slides on a surface of P; S turns freely, in Euler angles.  Allows 5, removes 1."""
 
+    sentence: ClassVar[str] = "The origin of S slides on a surface of P, and S turns freely."
+    formula: ClassVar[str] = r"\mathbf{u} = \mathbf{r}(q_1,q_2)"
     type_name: ClassVar[str] = "point_on_surface"
     options: ClassVar[Fields] = {"surface": SURFACE, "sequence": SEQUENCE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (*ON_SURFACE, *ANGLES)

@@ -91,9 +91,12 @@ class Joint(ABC):
     counts_turns : whether :meth:`measure` tells its one angle beyond half a turn
     quaternion_slots : where four of the coordinates are Euler parameters
     look : its symbol in pictures
+    sentence, formula : what it allows, for readers; P and S are its markers
     """
 
     type_name: ClassVar[str]
+    sentence: ClassVar[str] = "S moves against P as the joint's coordinates say."
+    formula: ClassVar[str] = r"\mathbf{r}_S = \mathbf{r}_P + \mathbf{R}_P \mathbf{u}(q)"
     has_axis: ClassVar[bool] = True
     has_axes: ClassVar[bool] = False
     role: ClassVar[str] = "either"

@@ -19,6 +19,8 @@ from .rotation_coordinates import about, unit
 class Cylindrical(Joint):
     """S slides along the common z axis and turns about it.  Allows 2, removes 4."""
 
+    sentence: ClassVar[str] = "S slides along the common z axis and turns about it."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_z(q_2), \quad \mathbf{u} = q_1 \mathbf{e}_z"
     type_name: ClassVar[str] = "cylindrical"
     look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (1.0, 3.2)),), slides=True)
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("_z", "length"), Coordinate("_3", "angle"))
@@ -43,6 +45,10 @@ class Cylindrical(Joint):
 class Planar(Joint):
     """S moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
 
+    sentence: ClassVar[str] = "S moves in the x-y plane of P and turns about its z axis."
+    formula: ClassVar[str] = (
+        r"\mathbf{R}_{PS} = \mathbf{R}_z(q_3), \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y"
+    )
     type_name: ClassVar[str] = "planar"
     look: ClassVar[JointLook] = JointLook((SymbolPart("box", (3.0, 3.0, 0.8)),))
     coordinates: ClassVar[tuple[Coordinate, ...]] = (
@@ -73,6 +79,10 @@ class Planar(Joint):
 class Translational(Joint):
     """S slides along x, y and z of P without turning.  Allows 3, removes 3."""
 
+    sentence: ClassVar[str] = "S slides along the three axes of P without turning."
+    formula: ClassVar[str] = (
+        r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y + q_3 \mathbf{e}_z"
+    )
     type_name: ClassVar[str] = "translational"
     look: ClassVar[JointLook] = JointLook((SymbolPart("box", (1.6, 1.6, 1.6)),))
     has_axis: ClassVar[bool] = False
@@ -98,6 +108,8 @@ class Translational(Joint):
 class Weld(Joint):
     """S is fixed to P.  Allows 0, removes 6."""
 
+    sentence: ClassVar[str] = "S is fixed to P."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{0}"
     type_name: ClassVar[str] = "weld"
     look: ClassVar[JointLook] = JointLook((SymbolPart("box", (0.9, 0.9, 0.9)),))
     has_axis: ClassVar[bool] = False

@@ -48,6 +48,10 @@ def apart(length: Expr, position: Vec3) -> Closure:
 class Distance(RodJoint):
     """A massless rod with a ball joint at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
 
+    sentence: ClassVar[str] = (
+        "The origins of P and S stay at the distance $l$, as by a massless rod with a ball at each end."
+    )
+    formula: ClassVar[str] = r"\mathbf{u}^T \mathbf{u} - l^2 = 0"
     type_name: ClassVar[str] = "distance"
     look: ClassVar[JointLook] = JointLook(
         (SymbolPart("sphere", (0.7,), on="P"), SymbolPart("sphere", (0.7,))), bar=True
@@ -65,6 +69,8 @@ class Distance(RodJoint):
 class RevoluteSpherical(RodJoint):
     """A massless rod of ``length`` turns about z of P, across it, with a ball joint at S.  Allows 4, removes 2."""
 
+    sentence: ClassVar[str] = "A massless rod of length $l$ turns about z of P and holds S by a ball."
+    formula: ClassVar[str] = r"u_z = 0, \quad u_x^2 + u_y^2 - l^2 = 0"
     type_name: ClassVar[str] = "revolute_spherical"
     look: ClassVar[JointLook] = JointLook(
         (SymbolPart("cylinder", (0.75, 2.2), on="P"), SymbolPart("sphere", (0.8,))), bar=True
@@ -81,6 +87,8 @@ class RevoluteSpherical(RodJoint):
 class Inline(RodJoint):
     """The origin of S stays on the z axis of P.  Allows 4, removes 2."""
 
+    sentence: ClassVar[str] = "The origin of S stays on the z axis of P."
+    formula: ClassVar[str] = r"u_x = 0, \quad u_y = 0"
     type_name: ClassVar[str] = "inline"
     look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (0.8,)),), slides=True)
     removes: ClassVar[int] = 2
@@ -93,6 +101,8 @@ class Inline(RodJoint):
 class Inplane(RodJoint):
     """The origin of S stays in the x-y plane of P.  Allows 5, removes 1."""
 
+    sentence: ClassVar[str] = "The origin of S stays in the x-y plane of P."
+    formula: ClassVar[str] = r"u_z = 0"
     type_name: ClassVar[str] = "inplane"
     look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (0.8,)),))
     removes: ClassVar[int] = 1
@@ -105,6 +115,8 @@ class Inplane(RodJoint):
 class Parallel(RodJoint):
     """The z axes stay parallel.  Allows 4, removes 2."""
 
+    sentence: ClassVar[str] = "The z axes of P and S stay parallel."
+    formula: ClassVar[str] = r"\mathbf{x}_P \cdot \mathbf{z}_S = 0, \quad \mathbf{y}_P \cdot \mathbf{z}_S = 0"
     type_name: ClassVar[str] = "parallel"
     removes: ClassVar[int] = 2
 
@@ -119,6 +131,8 @@ class Parallel(RodJoint):
 class Perpendicular(RodJoint):
     """The z axes stay perpendicular: turn one marker by ``rpy``, as ``axis`` turns both.  Allows 5, removes 1."""
 
+    sentence: ClassVar[str] = "The z axes of P and S stay perpendicular."
+    formula: ClassVar[str] = r"\mathbf{z}_P \cdot \mathbf{z}_S = 0"
     type_name: ClassVar[str] = "perpendicular"
     removes: ClassVar[int] = 1
 
@@ -130,6 +144,8 @@ class Perpendicular(RodJoint):
 class Orientation(RodJoint):
     """S does not turn against P: all axes stay parallel, and the origins move freely.  Allows 3, removes 3."""
 
+    sentence: ClassVar[str] = "The axes of S stay parallel to those of P; the origins are free."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}"
     type_name: ClassVar[str] = "orientation"
     has_axis: ClassVar[bool] = False
     removes: ClassVar[int] = 3

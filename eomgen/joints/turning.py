@@ -73,6 +73,8 @@ class RotatingJoint(Joint):
 class Spherical(RotatingJoint):
     """S turns freely about the common origin.  Allows 3, removes 3."""
 
+    sentence: ClassVar[str] = "S turns about its origin, which stays at the origin of P."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}(q_1,q_2,q_3), \quad \mathbf{u} = \mathbf{0}"
     type_name: ClassVar[str] = "spherical"
     look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)),))
     coordinates: ClassVar[tuple[Coordinate, ...]] = ANGLES
@@ -94,6 +96,10 @@ class Spherical(RotatingJoint):
 class Free(RotatingJoint):
     """S moves freely: three coordinates of its position in P axes, then its rotation.  Allows 6, removes 0."""
 
+    sentence: ClassVar[str] = "S moves without hindrance: three displacements in the axes of P, then three rotations."
+    formula: ClassVar[str] = (
+        r"\mathbf{R}_{PS} = \mathbf{R}(q), \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y + q_3 \mathbf{e}_z"
+    )
     type_name: ClassVar[str] = "free"
     place: ClassVar[tuple[Coordinate, ...]] = PLACE
     coordinates: ClassVar[tuple[Coordinate, ...]] = PLACE + ANGLES

@@ -24,6 +24,8 @@ class Universal(Joint):
     R = R_x(q1) R_y(q2); the shafts are the z axes, in line at zero (Shabana, sec. 7.7, universal joint).
     """
 
+    sentence: ClassVar[str] = "A cross turns about x of P and y of S, which stay perpendicular."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_x(q_1) \mathbf{R}_y(q_2), \quad \mathbf{u} = \mathbf{0}"
     type_name: ClassVar[str] = "universal"
     look: ClassVar[JointLook] = JointLook(
         (SymbolPart("cylinder", (0.4, 2.6), "x", "P"), SymbolPart("cylinder", (0.4, 2.6), "y"))
@@ -54,6 +56,8 @@ class ConstantVelocity(Joint):
     1978, sec. 13.2: constant-velocity connections).  The shafts are the z axes; a bend of half a turn is singular.
     """
 
+    sentence: ClassVar[str] = "The shaft bends about any axis across it and passes its turning on evenly."
+    formula: ClassVar[str] = r"\omega_S \cdot \mathbf{z}_S = \omega_P \cdot \mathbf{z}_P"
     type_name: ClassVar[str] = "constant_velocity"
     look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)), SymbolPart("cylinder", (0.4, 3.0), "x")))
     coordinates: ClassVar[tuple[Coordinate, ...]] = TWO_ANGLES

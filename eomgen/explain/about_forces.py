@@ -1,0 +1,79 @@
+"""Stage explain, sections: the law, the virtual work and the generalized forces of each force element."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy
+
+from ..errors import UnavailableError
+from ..graph.core import Expr
+from ..reading.written import write
+from .author import Author
+from .document import FormulaLine, Piece, Section, Sentence
+
+MANY = 12  #: force elements from which those of one type share one sentence
+
+
+def forces(author: Author) -> list[Section]:
+    """A section of all forces and one of each element."""
+    eqs, m = author.equations, author.mechanism
+    if m.bare:
+        return []
+    try:
+        named, total = eqs.written("generalized_forces")
+    except UnavailableError:
+        return []
+    parts = total.parts
+    if not eqs.mobility.n_dof or not parts:
+        text = "There are no degrees of freedom for forces to act on." if parts else "No forces act."
+        return [Section("Forces", (Sentence(text),))]
+    text = (
+        "The virtual work of an element is $\\delta W = \\mathbf{Q}^T \\delta \\mathbf{q}_i$; the factors of "
+        "the variations of "
+        "the independent coordinates are its generalized forces."
+    )
+    found = [Section("Forces and their virtual work", (Sentence(text),))]
+    elements = {force.name: force for force in m.forces}
+    for name, column in parts.items():
+        pieces = _law(author, elements[name]) if name in elements else _weight(author, name)
+        if not any(x != 0 for x in column):
+            pieces.append(Sentence("Its virtual work vanishes: it does not act along the independent coordinates."))
+        else:
+            left = author.of(r"\delta W", name)
+            pieces += author.formulas(left, _work(author, column), named, ("generalized_forces", name))
+        found.append(Section(f"`{name}`", tuple(pieces), level=2))
+    return found
+
+
+def _work(author: Author, column: Any) -> Any:
+    """Q^T delta q_i as a sum."""
+    total = zip(column, author.equations.independent, strict=True)
+    return sympy.Add(
+        *(sympy.Mul(x, author.variation(name), evaluate=False) for x, name in total if x != 0), evaluate=False
+    )
+
+
+def _weight(author: Author, name: str) -> list[Piece]:
+    """Gravity, and other parts that are no elements."""
+    if name != "gravity":
+        return [Sentence(f"`{name}` of the model.")]
+    gravity = write(list(author.mechanism.gravity)).expressions
+    return [
+        Sentence(
+            "The weight of each body acts at its centre of mass, $\\delta W = m \\mathbf{g}^T \\delta "
+            "\\mathbf{r}_c$, with "
+            "the field of gravity in ground axes"
+        ),
+        FormulaLine((r"\mathbf{g}", sympy.Matrix(3, 1, gravity))),
+    ]
+
+
+def _law(author: Author, force: Any) -> list[Piece]:
+    """The sentence and the formula of an element's type, and what its letters are."""
+    pieces: list[Piece] = [Sentence(f"{force.sentence} ${force.formula}$" if force.formula else force.sentence)]
+    for key, value in vars(force).items():
+        if isinstance(value, Expr) and not key.startswith("_"):
+            (expression,) = write([value]).expressions
+            pieces.append(FormulaLine((rf"\mathrm{{{key.replace('_', '.')}}}", expression)))
+    return pieces

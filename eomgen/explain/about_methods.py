@@ -1,0 +1,265 @@
+"""Stage explain, sections: the steps of each method of derivation, from the motion to the equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import sympy
+
+from ..errors import UnavailableError
+from ..graph.core import Expr
+from ..graph.differentiate import gradient
+from ..notation import dotted
+from ..reading import Quantities
+from .author import Author, needed
+from .document import FormulaLine, Piece, Section, Sentence
+
+
+def energies(author: Author) -> Section | None:
+    """T and V, of every method."""
+    if author.mechanism.given is not None:
+        return None
+    pieces = [
+        Sentence("Kinetic energy $T$ and potential energy $V$ of gravity and springs (J):"),
+        *author.quantity("T", "T"),
+        *author.quantity("V", "V"),
+    ]
+    return Section("Energies", tuple(pieces))
+
+
+def steps(author: Author) -> Section | None:
+    """The section of the method by which the equations were derived."""
+    method = author.equations.method
+    if author.mechanism.lagrangian is not None and method not in ("hamilton", "augmented"):
+        method = "lagrange"
+    if method not in STEPS or not author.equations.mobility.n_dof:
+        return None
+    title, tell = STEPS[method]
+    return Section(title, tuple(tell(author)))
+
+
+def _embedding(author: Author) -> list[Piece]:
+    return [
+        Sentence(
+            "The velocities of all bodies, of each $\\mathbf{v}$ of the centre of mass in ground axes and "
+            "$\\mathbf{\\omega}$ in its own axes, are $\\mathbf{v}_b = \\mathbf{B}_b \\dot{\\mathbf{q}}_i + "
+            "\\mathbf{b}_b$ with "
+            "the velocity transformation"
+        ),
+        *author.quantity(r"\mathbf{B}_b", "body_velocity_transformation"),
+        Sentence("Masses and inertias of all bodies form"),
+        *author.quantity(r"\mathbf{M}_b", "body_mass_matrix"),
+        Sentence("and the mass matrix of the independent accelerations is"),
+        FormulaLine((r"\mathbf{M}", r"\mathbf{B}_b^T \mathbf{M}_b \mathbf{B}_b")),
+        Sentence(
+            "What the accelerations hold beside $\\mathbf{B}_b \\ddot{\\mathbf{q}}_i$ gives the quadratic "
+            "velocity terms "
+            "$\\mathbf{Q}_v$; the generalized forces of all elements together are $\\mathbf{Q}$:"
+        ),
+        *_right_side(author),
+    ]
+
+
+def _right_side(author: Author) -> list[Piece]:
+    return [
+        *author.quantity(r"\mathbf{Q}_v", "quadratic_velocity"),
+        *author.quantity(r"\mathbf{Q}", "generalized_forces", pick=lambda total: sympy.Matrix(list(total))),
+        Sentence("The right side of the equations of motion is $\\mathbf{Q} + \\mathbf{Q}_v$."),
+    ]
+
+
+def _lagrange(author: Author) -> list[Piece]:
+    k = author.equations.kinematics
+    pieces: list[Piece] = [
+        Sentence(
+            "Lagrange's equations, one for each coordinate $q$ of the tree: $\\frac{d}{d\\,t} "
+            "\\frac{\\partial T}{\\partial\\dot{q}} - \\frac{\\partial T}{\\partial q} + \\frac{\\partial "
+            "V}{\\partial q} = "
+            "Q_q$, where $Q_q$ holds the forces without a potential"
+            + (" and those of the constraints." if author.equations.constraint_names else ".")
+        )
+    ]
+    if k.mechanism.lagrangian is not None:
+        pieces += author.quantity("L", "lagrangian")
+    for j, name in enumerate(k.names):
+        if k.velocity_names[j : j + 1] != (f"{name}_dot",):
+            pieces.append(Sentence("Coordinates that are no angles or lengths follow from their angular velocities."))
+            break
+        q = author.symbol(name)
+        for left, choose in _derivatives(q, j):
+            named, (value,) = author.form(choose, "d_")
+            pieces += author.formulas(left, value, named)
+    if k.velocity_names and author.equations.constraint_names:
+        pieces.append(Sentence("Multiplied by $\\mathbf{B}^T$, these equations lose the forces of the constraints:"))
+        pieces += author.quantity(r"\mathbf{B}", "velocity_transformation")
+    return pieces
+
+
+def _derivatives(q: str, j: int) -> list[tuple[str, Callable[[Quantities], Sequence[Expr]]]]:
+    """Left sides and values of the derivatives of the energies by coordinate j."""
+    partial_rate = rf"\frac{{\partial T}}{{\partial{dotted(q, 1)}}}"
+    return [
+        (partial_rate, lambda s: [s.momenta[j]]),
+        (rf"\frac{{d}}{{d\,t}} {partial_rate}", lambda s: s.kinematics.total_derivative([s.momenta[j]])),
+        (rf"\frac{{\partial T}}{{\partial {q}}}", lambda s: gradient(s.kinetic_energy, [s.kinematics.q[j]])),
+        (rf"\frac{{\partial V}}{{\partial {q}}}", lambda s: gradient(s.potential_energy, [s.kinematics.q[j]])),
+    ]
+
+
+def _newton_euler(author: Author) -> list[Piece]:
+    eqs = author.equations
+    pieces: list[Piece] = [
+        Sentence(
+            "Each body is set free. In ground axes, its mass times the acceleration of its centre of mass is "
+            "the sum of "
+            "all forces on it, and the rate of its angular momentum is the sum of their moments about the "
+            "centre of mass. "
+            "$F$ and $M$ with the name of a joint are the force and the moment of this joint on the body that "
+            "it carries."
+        )
+    ]
+    for name in eqs.free_bodies:
+        named, body = eqs.written("free_bodies", name)
+        pieces.append(Sentence(f"`{name}`:"))
+        pieces += _equations(author, [*body.force, *body.moment], named)
+    pieces.append(
+        Sentence("Along the directions in which a joint is free, its reaction is what drives and forces give:")
+    )
+    for name in eqs.joint_forces:
+        named, pairs = eqs.written("joint_forces", name)
+        pieces += _equations(author, pairs, named)
+    return [*pieces, *_block(author)]
+
+
+def _equations(author: Author, pairs: list[Any], named: list[tuple[Any, Any]]) -> list[Piece]:
+    pieces: list[Piece] = []
+    for pair in pairs:
+        if pair.lhs != pair.rhs:
+            pieces += author.balance(pair.lhs, pair.rhs, named)
+    return pieces
+
+
+def _block(author: Author) -> list[Piece]:
+    """The linear system of a method that keeps reactions as unknowns."""
+    named, system = author.equations.written("block_system")
+    unknowns = ", ".join(f"${author.symbol(str(x))}$" for x in system.unknowns)
+    return [
+        Sentence(
+            f"Together they are one linear system $\\mathbf{{K}} \\mathbf{{x}} = \\mathbf{{k}}$ for the "
+            f"{len(system.unknowns)} unknowns {unknowns}:"
+        ),
+        *author.formulas(r"\mathbf{K}", system.matrix, named, ("block_system", "matrix")),
+        *author.formulas(r"\mathbf{k}", system.right, named, ("block_system", "right")),
+    ]
+
+
+def _augmented(author: Author) -> list[Piece]:
+    return [
+        Sentence(
+            "The accelerations of the tree and the multipliers $\\mathbf{\\lambda}$ of the constraints are the "
+            "unknowns: "
+            "$\\mathbf{M}_t \\ddot{\\mathbf{q}} + \\mathbf{C}_q^T \\mathbf{\\lambda} = \\mathbf{Q} + "
+            "\\mathbf{Q}_v$ and "
+            "$\\mathbf{C}_q \\ddot{\\mathbf{q}} = -\\mathbf{\\gamma}$."
+        ),
+        *_block(author),
+    ]
+
+
+def _gibbs_appell(author: Author) -> list[Piece]:
+    return [
+        Sentence(
+            "The Gibbs function $S$ is half the sum of mass times the square of acceleration over all bodies; what is "
+            "free of accelerations is left out, because only derivatives by accelerations are needed:"
+        ),
+        *author.quantity("S", "gibbs_function"),
+        Sentence(
+            "Its derivatives by the accelerations are the generalized forces: $\\frac{\\partial "
+            "S}{\\partial\\ddot{q}} = Q_q$."
+        ),
+        *_right_side(author),
+    ]
+
+
+def _hamilton(author: Author) -> list[Piece]:
+    eqs = author.equations
+    symbols = ", ".join(f"${author.symbol(str(p))}$" for p in eqs.momentum_symbols)
+    return [
+        Sentence(f"The momenta {symbols} are the derivatives of $T$ by the velocities:"),
+        *author.quantity(r"\mathbf{p}", "momenta"),
+        Sentence("The Hamiltonian is $H = \\mathbf{p}^T \\dot{\\mathbf{q}} - L$, in coordinates and momenta:"),
+        *author.quantity("H", "hamiltonian"),
+        Sentence(
+            "The rates of the momenta are $\\dot{p} = -\\frac{\\partial H}{\\partial q} + Q_q$; written in velocities:"
+        ),
+        *author.quantity(r"\dot{\mathbf{p}}", "momentum_rates"),
+    ]
+
+
+def _recursive(author: Author) -> list[Piece]:
+    k = author.equations.kinematics
+    pieces: list[Piece] = [
+        Sentence(
+            "From ground outwards, the velocity of each link is that of the link that carries it plus that of "
+            "its joint, "
+            "$\\mathbf{v}_j = \\mathbf{X}_j \\mathbf{v}_p + \\mathbf{S}_j \\dot{q}_j$, each in the axes of the "
+            "link; its wrench is "
+            "$\\mathbf{f}_j = \\mathbf{I}_j \\mathbf{a}_j + \\mathbf{v}_j^{\\ast} \\mathbf{I}_j \\mathbf{v}_j$. "
+            "From the last link "
+            "inwards, wrenches and inertias of the links that a link carries are added to its own."
+        )
+    ]
+    for place, branch in enumerate(k.topology.branches):
+        body, joint = k.mechanism.bodies[branch.body].name, k.mechanism.joints[branch.joint]
+        below = "ground" if branch.parent < 0 else f"`{k.mechanism.bodies[branch.parent].name}`"
+        pieces.append(Sentence(f"Link {place + 1} is `{body}`, carried by {below} through joint `{joint.name}`:"))
+        named, flat = author.form(partial(_twist, place), "w_")
+        pieces += author.formulas(author.of(r"\mathbf{v}", body), sympy.Matrix(6, 1, flat), named)
+    if author.equations.constraint_names:
+        pieces.append(Sentence("The equations of the tree are then multiplied by $\\mathbf{B}^T$ of the constraints:"))
+        pieces += author.quantity(r"\mathbf{B}", "velocity_transformation")
+    return [*pieces, *_right_side(author)]
+
+
+def _twist(place: int, quantities: Quantities) -> list[Expr]:
+    """Angular velocity and velocity of the origin of a link, in its axes."""
+    return [x for part in quantities.kinematics.twists[place] for x in part]
+
+
+#: Method -> title of its section, and what tells it.
+STEPS: dict[str, tuple[str, Callable[[Author], list[Piece]]]] = {
+    "embedding": ("Embedding technique", _embedding),
+    "lagrange": ("Lagrange's equations", _lagrange),
+    "newton_euler": ("Newton's and Euler's equations of the free bodies", _newton_euler),
+    "amalgamated": ("Equations of the free bodies in one system", _newton_euler),
+    "gibbs_appell": ("Equations of Gibbs and Appell", _gibbs_appell),
+    "hamilton": ("Hamilton's equations", _hamilton),
+    "augmented": ("Augmented system with multipliers", _augmented),
+    "recursive": ("Recursion along the links", _recursive),
+}
+
+
+def final(author: Author) -> Section:
+    """The equations of motion."""
+    eqs = author.equations
+    rates = ", ".join(f"${author.symbol(name)}$" for name in eqs.acceleration_names)
+    if not eqs.acceleration_names:
+        return Section("Equations of motion", (Sentence("The motion is prescribed: no acceleration is unknown."),))
+    try:
+        named, mass = eqs.written("mass_matrix")
+        force = eqs.force
+    except UnavailableError as error:
+        return Section("Equations of motion", (Sentence(str(error).partition("\n")[0]),))
+    pieces: list[Piece] = [
+        Sentence(f"$\\mathbf{{M}} \\ddot{{\\mathbf{{q}}}}_i = \\mathbf{{f}}$ for the accelerations {rates}, with")
+    ]
+    if len(mass) == 1:
+        pieces = [Sentence(f"$M {author.symbol(eqs.acceleration_names[0])} = f$ with")]
+    one = len(mass) == 1
+    left, right = ("M", "f") if one else (r"\mathbf{M}", r"\mathbf{f}")
+    pieces += author.formulas(left, mass[0] if one else mass, named, ("mass_matrix", None), True)
+    known = {symbol for symbol, _ in needed(named, mass)}
+    pieces += author.formulas(right, force[0] if one else force, named, ("force", None), told=known)
+    return Section("Equations of motion", tuple(pieces))

@@ -1,0 +1,178 @@
+"""Stage explain, the author: equations and a level -> formulas in their notation, with a record of what was shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import sympy
+
+from ..errors import UnavailableError
+from ..graph.core import Expr
+from ..kinematics.state import acceleration_name
+from ..notation import with_instance
+from ..reading import Quantities
+from ..reading.written import write
+from .document import Folded, FormulaLine, Piece, PutIn, Sentence
+from .printer import Printer
+
+WHOLE = 160  #: nodes of a matrix up to which it is shown as a matrix, not entry by entry
+FOLD = 900  #: nodes of a quantity from which a page shows it only on request
+MOST = 9_000  #: nodes of a quantity that is left out
+LINES = 14  #: formulas of one quantity from which a page shows them only on request
+COLUMNS = 6  #: of a matrix that is shown as one
+
+
+class Shown(NamedTuple):
+    """A quantity that stands in the document: its name and part for readers, and its entries with their left sides."""
+
+    name: str
+    part: str | None
+    named: Sequence[tuple[Any, Any]]
+    entries: Sequence[tuple[str, Any]]
+
+
+class Author:
+    """Writes the quantities of equations as pieces of a document.
+
+    Parameters
+    ----------
+    equations : Derivation
+    full : bool
+        Whether every quantity is shown, or only the equations of motion.
+    """
+
+    def __init__(self, equations: Any, full: bool) -> None:
+        self.equations, self.full = equations, full
+        self.mechanism = equations.kinematics.mechanism
+        self.printer = Printer(equations.notation)
+        self.shown: list[Shown] = []
+        self._told: list[tuple[Any, Any]] = []
+        names = equations.kinematics.velocity_names
+        self._rates = frozenset((*names, *map(acceleration_name, names)))
+
+    # -- names --------------------------------------------------------------------------------------------------------
+    def of(self, letter: str, name: str) -> str:
+        r"""LaTeX of a letter that belongs to something of the model: ``m_{\mathrm{rod}}``."""
+        return with_instance(letter, name)
+
+    def symbol(self, name: str) -> str:
+        """LaTeX of a name of the model."""
+        return str(self.equations.notation.latex(name))
+
+    def variation(self, name: str) -> Any:
+        """The SymPy symbol of the variation of a coordinate, printed with a delta."""
+        return self.printer.sign(f"delta {name}", rf"\delta {self.symbol(name)}")
+
+    # -- quantities ---------------------------------------------------------------------------------------------------
+    def quantity(
+        self,
+        left: str,
+        name: str,
+        part: str | None = None,
+        pick: Callable[[Any], Any] | None = None,
+        symmetric: bool = False,
+    ) -> list[Piece]:
+        """A quantity that equations have, and its formula; a sentence where the method does not have it.
+
+        Parameters
+        ----------
+        left : str
+            LaTeX of the left side.
+        name, part : str
+            What :meth:`~eomgen.reading.Readable.written` takes.
+        pick : callable, optional
+            What of the value is shown.
+        symmetric : bool
+            Whether entries below the diagonal are left out where a matrix is shown entry by entry.
+        """
+        try:
+            named, value = self.equations.written(name, part)
+        except UnavailableError as error:
+            return [Sentence(f"Not shown: {str(error).partition(chr(10))[0]}.")]
+        return self.formulas(left, value if pick is None else pick(value), named, (name, part), symmetric)
+
+    def formulas(
+        self,
+        left: str,
+        value: Any,
+        named: Sequence[tuple[Any, Any]] = (),
+        key: tuple[str, str | None] = ("", None),
+        symmetric: bool = False,
+        told: Collection[Any] = (),
+    ) -> list[Piece]:
+        """Named parts, save those in ``told``, and the formula of an expression or matrix.
+
+        Large ones are folded or left out.
+        """
+        if isinstance(value, sympy.MatrixBase) and len(value) == 1:
+            value = value[0]
+        named = needed(named, value)
+        size = sum(map(nodes, (x for _, x in named))) + nodes(value)
+        if size > MOST:
+            where = f"`eqs.{key[0]}`" if key[0] else "the attributes of the equations"
+            return [Sentence(f"${left}$ is left out: it has {size} terms and factors; {where} gives it as SymPy.")]
+        entries = list(self._entries(left, value, symmetric))
+        self.shown.append(Shown(*key, named, entries))
+        found: list[Piece] = [FormulaLine((self.printer.latex(s), x)) for s, x in named if s not in told]
+        if not isinstance(value, sympy.MatrixBase) or (
+            size <= WHOLE and value.cols <= COLUMNS and value.rows <= 2 * COLUMNS
+        ):
+            found.append(FormulaLine((left, value)))
+        else:
+            found += [FormulaLine(entry) for entry in entries]
+            rest = len(value) - len(entries)
+            if rest:
+                same = ", or stand above the diagonal of a symmetric matrix" if symmetric else ""
+                found.append(Sentence(f"The other {rest} entries of ${left}$ are 0{same}."))
+        if size > FOLD or len(found) > LINES:
+            return [Folded(f"${left}$: {size} terms and factors", tuple(found))]
+        return found
+
+    def balance(self, left: Any, right: Any, named: Sequence[tuple[Any, Any]]) -> list[Piece]:
+        """An equation between two expressions, with the named parts that it uses and that were not shown before."""
+        parts = [pair for pair in needed(named, sympy.Matrix([left, right])) if pair not in self._told]
+        self._told += parts
+        return [*(FormulaLine((self.printer.latex(s), x)) for s, x in parts), FormulaLine((left, right))]
+
+    def form(self, choose: Callable[[Quantities], Sequence[Expr]], prefix: str) -> tuple[list[Any], list[Any]]:
+        """Expressions that no attribute has, formed in a copy of the graph: named parts, SymPy expressions."""
+        written = write(list(choose(Quantities(*self.equations.fresh()))), prefix=prefix, rates=self._rates)
+        return written.intermediates, written.expressions
+
+    def _entries(self, left: str, value: Any, symmetric: bool) -> Iterator[tuple[str, Any]]:
+        """Left sides and values of the entries that do not vanish."""
+        if not isinstance(value, sympy.MatrixBase):
+            yield left, value
+            return
+        column = value.cols == 1
+        for i in range(value.rows):
+            for j in range(i + 1 if symmetric else value.cols):
+                if value[i, j] != 0:
+                    place = str(i + 1) if column else f"{i + 1},{j + 1}"
+                    whole = rf"({left})" if "_" in left else left
+                    yield rf"{whole}_{{{place}}}" if value.rows * value.cols > 1 else left, value[i, j]
+
+
+def nodes(value: Any) -> int:
+    """Terms, factors and symbols of an expression or matrix."""
+    flat = list(value) if isinstance(value, sympy.MatrixBase) else [value]
+    return sum(1 for x in flat for _ in sympy.preorder_traversal(x))
+
+
+def needed(named: Sequence[tuple[Any, Any]], value: Any) -> list[tuple[Any, Any]]:
+    """The named parts that a value uses, and those that these use."""
+    wanted = set(value.free_symbols)
+    found = []
+    for symbol, expression in reversed(list(named)):
+        if symbol in wanted:
+            found.append((symbol, expression))
+            wanted |= expression.free_symbols
+    return found[::-1]
+
+
+def in_numbers(left: str, expression: Any, numbers: dict[str, float], value: float) -> FormulaLine:
+    """The line of a calculation by hand: left side = expression with its numbers = value."""
+    if not expression.free_symbols or not expression.args:
+        return FormulaLine((left, value))
+    return FormulaLine((left, PutIn(expression, numbers), value))

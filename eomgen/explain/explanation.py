@@ -1,0 +1,178 @@
+"""Stage explain, the whole: equations -> the worked solution, in sections, and its HTML, Markdown and LaTeX."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..errors import EomgenError, MissingDependencyError, UsageError
+from ..files.writing import write_whole
+from .document import DrawnPicture, Folded, Piece, Section
+from .printer import Printer
+from .write_html import write_html
+from .write_markdown import write_markdown
+from .write_tex import write_tex
+
+SUFFIXES = (".html", ".md", ".tex", ".pdf")
+LEVELS = ("full", "short")
+
+
+class Explanation:
+    """A worked solution: how the equations of motion follow from the mechanism, with numbers.
+
+    Attributes
+    ----------
+    html : str
+        A page that stands alone and needs no network; formulas are MathML.
+    markdown : str
+        Text with formulas between dollars.
+    latex : str
+        A document for pdflatex.
+    difference : float or None
+        Largest difference between the shown formulas, evaluated through SymPy at random consistent states, and the
+        compiled module, as a share of the largest entry or term; None where parameters have no values.
+    sections : tuple of Section
+    """
+
+    def __init__(self, title: str, sections: Sequence[Section], printer: Printer, difference: float | None) -> None:
+        self.title, self.sections, self.difference = title, tuple(sections), difference
+        self._printer = printer
+
+    @cached_property
+    def html(self) -> str:
+        """A page that stands alone."""
+        return write_html(self.title, self.sections, self._printer)
+
+    @cached_property
+    def markdown(self) -> str:
+        """Text with formulas between dollars."""
+        return write_markdown(self.title, self.sections, self._printer)
+
+    @cached_property
+    def latex(self) -> str:
+        """A document for pdflatex; the picture is the file that :meth:`save` writes beside it."""
+        return write_tex(self.title, self.sections, self._printer)
+
+    def save(self, file: str | Path) -> Path:
+        """Write the document; the ending of the name says in which form.
+
+        Parameters
+        ----------
+        file : str or Path
+            ``.html``, ``.md``, ``.tex`` or ``.pdf``.  Beside a ``.tex`` file its picture is written too, under the
+            same name with ``.png``.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        UsageError
+            Another ending.
+        MissingDependencyError
+            A ``.pdf`` without pdflatex, or one that fails.
+        """
+        path = Path(file)
+        if path.suffix == ".html":
+            write_whole(path, self.html)
+        elif path.suffix == ".md":
+            write_whole(path, self.markdown)
+        elif path.suffix == ".tex":
+            self._save_tex(path)
+        elif path.suffix == ".pdf":
+            self._save_pdf(path)
+        else:
+            raise UsageError(f"{path.name!r} must end in one of {', '.join(SUFFIXES)}")
+        return path
+
+    def _save_tex(self, path: Path) -> None:
+        picture = next(_pictures(self.sections), None)
+        name = f"{path.stem}.png"
+        text = write_tex(self.title, self.sections, self._printer, None if picture is None else name)
+        if picture is not None:
+            write_whole(path.with_name(name), picture.png)
+        write_whole(path, text)
+
+    def _save_pdf(self, path: Path) -> None:
+        program = shutil.which("pdflatex")
+        if program is None:
+            raise MissingDependencyError(
+                "a .pdf needs pdflatex: install TeX Live (Debian: apt install texlive-latex-extra), or save "
+                ".html and print it"
+            )
+        with tempfile.TemporaryDirectory() as folder:
+            self._save_tex(Path(folder) / "document.tex")
+            words = [program, "-interaction=nonstopmode", "-halt-on-error", "-no-shell-escape", "document.tex"]
+            done = subprocess.run(words, cwd=folder, capture_output=True, check=False, errors="replace", text=True)
+            made = Path(folder) / "document.pdf"
+            if done.returncode or not made.is_file():
+                wrong = next((line for line in done.stdout.splitlines() if line.startswith("!")), "no reason given")
+                raise MissingDependencyError(f"pdflatex failed: {wrong}; save .tex and compile it to see more")
+            write_whole(path, made.read_bytes())
+
+    def _repr_html_(self) -> str:
+        return self.html
+
+    def __repr__(self) -> str:
+        told = "not compared" if self.difference is None else f"difference {self.difference:.1e}"
+        return f"<{self.title}: {len(self.sections)} sections, {told}>"
+
+
+def _pictures(sections: Sequence[Section]) -> Any:
+    """All pictures of a document."""
+    pending: list[Piece] = [piece for section in sections for piece in section.pieces]
+    for piece in pending:
+        if isinstance(piece, Folded):
+            pending += piece.pieces
+        if isinstance(piece, DrawnPicture):
+            yield piece
+
+
+def explain(equations: Any, level: str = "full") -> Explanation:
+    """See :meth:`eomgen.api.equations.Equations.explain`."""
+    from . import about_forces, about_mechanism, about_methods, about_motion, about_numbers
+    from .author import Author
+    from .shown_against_module import compare
+    from .shown_values import state_values
+
+    if level not in LEVELS:
+        raise UsageError(f"no level {level!r}; there are {', '.join(LEVELS)}")
+    full = level == "full"
+    author = Author(equations, full)
+    module, reason = _module(equations)
+    sections: list[Section | None] = [about_mechanism.mechanism(author, module)]
+    sections += [about_mechanism.bodies(author), about_mechanism.coordinates(author)]
+    if full:
+        sections += about_motion.motion(author)
+        sections.append(about_motion.constraints(author))
+        sections += about_forces.forces(author)
+        sections += [about_methods.energies(author), about_methods.steps(author)]
+    sections += [about_methods.final(author), about_numbers.counts(author)]
+    if full:
+        state = {} if module is None else state_values(module, module.x0(), 0.0)
+        sections.append(about_numbers.calculation(author, state, reason))
+    shown = {(s.name, s.part) for s in author.shown}
+    found = None if module is None else compare(equations, module, shown)
+    sections.append(about_numbers.difference(found, reason))
+    title = f"Equations of motion of `{equations.name}`, method `{equations.method}`"
+    kept = [section for section in sections if section is not None]
+    return Explanation(title, kept, author.printer, None if found is None else found.largest)
+
+
+def _module(equations: Any) -> tuple[Any, str]:
+    """The module of the equations on NumPy at its declared state, or None and why."""
+    from ..pipeline import compile_core
+    from ..runtime.bound_model import BoundModel
+
+    try:
+        module = BoundModel(compile_core(equations, "numpy"))
+        module.x0()
+    except EomgenError as error:
+        return None, str(error)
+    return module, ""
