@@ -16,6 +16,7 @@ Frozen = tuple[tuple[Monomial, Number], ...]  #: a Poly as a key, by rising mono
 ONE: Monomial = ()
 TURNS = ("sin", "cos")
 SUMS = ("sum", "factor")  #: kinds of atoms that are one polynomial
+DIGITS = 12  #: characters up to which a decimal is taken as it is written
 SMALL = 1000  #: denominators up to which a number is written as a fraction
 
 
@@ -77,11 +78,14 @@ class Atoms:
 def number(value: float) -> tuple[Number, bool]:
     """A double as it was probably meant, and whether it is that many times pi.
 
-    The fraction with a denominator up to 1000, or the multiple of pi, whose double this is; else the double itself.
+    The fraction with a denominator up to 1000, the decimal of few digits, or the multiple of pi, whose double this is;
+    else the double itself.
     """
     near = Fraction(value).limit_denominator(SMALL)
     if abs(near.numerator) < 10**15 and near.numerator / near.denominator == value:
         return ratio(near, 1), False
+    if len(repr(value).partition("e")[0]) <= DIGITS:
+        return ratio(Fraction(repr(value)), 1), False
     turns = Fraction(value / math.pi).limit_denominator(360)
     if 0 < abs(turns.numerator) <= SMALL and turns.numerator / turns.denominator * math.pi == value:
         return ratio(turns, 1), True

@@ -10,6 +10,7 @@ from .factoring import Factoring
 
 NAME = 20.0  #: what a name costs a reader, beyond its definition
 ONCE = 60.0  #: length up to which a definition that is used once is put in its place
+FEW = 6  #: terms of a sum in a product that is multiplied out when a name in it is replaced
 EACH = 40  #: products of terms for one expression, by its length
 
 Named = list[tuple[int, Poly]]  #: the atom of each name and what it stands for
@@ -83,7 +84,7 @@ def _put_in(expansion: Expansion, factoring: Factoring, poly: Poly, atom: int, v
         return None
     replaced = _replaced(expansion.atoms, poly, atom, value)
     try:
-        with expansion.work.at_most(EACH * len(replaced)):
+        with expansion.work.at_most(EACH * factoring.costs.of_terms(replaced)):
             return factoring.factored(expansion.angles.simplified(replaced))
     except TooLongError:
         return replaced
@@ -112,7 +113,10 @@ def _replaced(atoms: Atoms, poly: Poly, atom: int, value: Poly) -> Poly:
             elif atom in atoms.names({((a, 1),): 1}):
                 kind, what = atoms.table[a]
                 inner = _replaced(atoms, dict(what), atom, value)
-                term = multiply(term, {((atoms.id(kind, freeze(inner)), n),): 1})
+                if kind == "factor" and n == 1 and len(inner) <= FEW:  # so that its terms may join
+                    term = multiply(term, inner)
+                else:
+                    term = multiply(term, {((atoms.id(kind, freeze(inner)), n),): 1})
             else:
                 term = multiply(term, {((a, n),): 1})
         result = add(result, term)
