@@ -132,6 +132,7 @@ def mathml_form(node: Node, style: str = "") -> str:
         case Accent():
             over = f"<mo>{html_text(OVER[node.accent])}</mo>"
             tag = "munder" if node.accent == "underline" else "mover accent='true'"
+            tag = "mover" if node.accent in DOTS else tag  # as accents, browsers set dots on high letters
             return f"<{tag}>{mathml_form(node.body, style)}{over}</{tag.partition(' ')[0]}>"
         case Fraction():
             return f"<mfrac>{mathml_form(node.above, style)}{mathml_form(node.below, style)}</mfrac>"
