@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from eomgen.cli.verb_derive import FORMATS
+from eomgen.reading import formats
+
 from .conftest import EXAMPLES, Call
 
 FILE = EXAMPLES / "slider_crank.yaml"
@@ -43,3 +48,38 @@ def test_what_does_not_fit_is_refused(call: Call) -> None:
         refused = call("derive", FILE, *words)
         assert refused.code == 2
         assert fault in refused.err
+
+
+def test_derive_writes_the_equations_for_other_programs(call: Call, tmp_path: Path) -> None:
+    assert FORMATS == formats.FORMATS
+    for form in FORMATS:
+        said = call("derive", EXAMPLES / "double_pendulum.yaml", "--format", form)
+        assert said.code == 0
+        assert "bend" in said.out
+    file = tmp_path / "equations.m"
+    said = call("derive", FILE, "--format", "matlab", "--out", file)
+    assert (said.code, said.out) == (0, f"{file}\n")
+    assert file.read_text(encoding="utf-8").count("function [M, f]") == 1
+
+
+def test_formats_that_do_not_fit_are_refused(call: Call, tmp_path: Path) -> None:
+    for words, fault in (
+        (["--format", "fortran"], "is not one of 'latex', 'text', 'sympy'"),
+        (["--out", tmp_path / "x.m"], "--out needs --format"),
+        (["--format", "c", "--json"], "--json and --format exclude each other"),
+        (["--format", "c", "--out", tmp_path / "none" / "x.c"], "none"),
+    ):
+        refused = call("derive", FILE, *words)
+        assert refused.code == 2
+        assert fault in refused.err
+
+
+def test_explain_writes_the_worked_solution(call: Call, tmp_path: Path) -> None:
+    for ending, begins in ((".html", "<!doctype html>"), (".md", "# "), (".tex", r"\documentclass")):
+        file = tmp_path / f"solution{ending}"
+        said = call("explain", EXAMPLES / "pendulum.yaml", "--out", file, "--level", "short")
+        assert said.code == 0
+        assert file.read_text(encoding="utf-8").lower().startswith(begins)
+    refused = call("explain", FILE, "--out", tmp_path / "solution.docx")
+    assert refused.code == 2
+    assert ".html" in refused.err
