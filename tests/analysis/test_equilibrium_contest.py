@@ -15,7 +15,7 @@ import eomgen as eg
 from benchmarks.equilibria import PEERS, Balance, judge
 from benchmarks.rest_models import FAMILIES
 from eomgen.analysis import balance_search
-from eomgen.cli.example_files import example_files
+from eomgen.shipped import example_files
 
 
 def elastic_pendulum() -> Any:

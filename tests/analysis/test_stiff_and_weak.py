@@ -64,5 +64,5 @@ def test_weak_gravity_is_gravity(g: float) -> None:
     np.testing.assert_allclose(np.abs(rest.eigenvalues), np.sqrt(g), rtol=1e-9)
     assert (rest.stability, mod.linearize(mod.x0(th=np.pi)).stability) == ("marginal", "unstable")
     assert not mod.linearize(mod.x0(th=0.3)).is_equilibrium
-    with pytest.raises(UsageError, match="about an equilibrium"):
+    with pytest.raises(UsageError, match="needs an equilibrium"):
         mod.modes(mod.x0(th=0.3))

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import eomgen as eg
-from eomgen.cli.example_files import example_files
+from eomgen.shipped import example_files
 from eomgen.cli.verb_view import view
 from eomgen.show.data import read_picture
 

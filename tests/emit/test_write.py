@@ -31,7 +31,7 @@ def test_a_file_of_the_user_is_never_overwritten(tmp_path):
     folder = tmp_path / "m"
     write_package({"model.json": MODEL}, folder)
     (folder / "Makefile").write_text("mine")
-    with pytest.raises(EomgenError, match="Makefile is in the way"):
+    with pytest.raises(EomgenError, match="Makefile exists and was not written by eomgen"):
         write_package({"model.json": MODEL, "Makefile": "ours"}, folder)
     assert (folder / "Makefile").read_text() == "mine"
 

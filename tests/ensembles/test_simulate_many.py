@@ -255,7 +255,7 @@ def test_what_an_ensemble_offers(pendulum: Any, tmp_path: Path) -> None:
         np.testing.assert_array_equal(data["samples"], ensemble.samples)
     axes = ensemble.plot("theta2")
     assert len(axes.lines) == 6
-    assert axes.get_ylabel() == r"$\theta_{2}$"
+    assert axes.get_ylabel() == r"$\theta_{2}$ (rad)"
     assert ensemble.plot("bend").get_ylabel() == "bend (rad)"
     with pytest.raises(KeyError, match="theta2"):
         ensemble["theta3"]

@@ -29,7 +29,7 @@ def loop() -> Any:
 WIDE = np.broadcast_to(0.5, 10**9)
 RUNS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "tiny max_step": (lambda m: m.simulate(1.0, max_step=1e-300), "max_step = 1e-300 s is too small .* would not end"),
-    "small max_step": (lambda m: m.simulate(1.0, max_step=1e-9), "would take too long"),
+    "small max_step": (lambda m: m.simulate(1.0, max_step=1e-9), "would not end"),
     "many steps kept": (lambda m: m.simulate(1.0, max_step=2e-8), r"a run of 5e\+07 steps would keep .* GiB"),
     "dense and small": (lambda m: m.simulate(1.0, max_step=1e-7, dense_output=True), "would keep"),
     "far end": (lambda m: m.simulate(1e300), r"needs \S+ more to reach t = 1e\+300 s, which would take too long"),
@@ -63,7 +63,7 @@ RUNS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "a guess complex": (lambda m: m.equilibrium({"theta": 1j}), "theta must be a number"),
     "a state of modes": (lambda m: m.modes("ab"), "x must hold real numbers"),
     "no names": (lambda m: m.sensitivities(3, 1.0), "names must be a name or a list of names, not 3"),
-    "slopes": (lambda m: m.sensitivities(["g"], 1.0, max_step=1e-300), "would take too long"),
+    "slopes": (lambda m: m.sensitivities(["g"], 1.0, max_step=1e-300), "would not end"),
 }  # fmt: skip
 
 

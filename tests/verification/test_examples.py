@@ -76,7 +76,7 @@ def test_a_function_in_c_is_left_out_with_a_reason(tmp_path: Path) -> None:
     )
     found = eg.load(tmp_path / "m.yaml", allow_native=True).compile().verify(states=2)
     assert found.ok
-    assert "without a Python twin" in found.findings[-1].note
+    assert "without a Python version" in found.findings[-1].note
 
 
 def test_the_table() -> None:
