@@ -24,7 +24,8 @@ math{font-family:"STIX Two Math","Cambria Math","Latin Modern Math","Libertinus 
 mi[mathvariant=bold]{font-weight:bold;font-style:normal;text-transform:none}
 mover>mo:last-child{padding-bottom:.09em}
 mtd{padding:.18em .45em}
-mtable.matrix{margin:0 .15em;padding:.1em 0;vertical-align:middle;
+.matrix>mo{display:none}
+.matrix>mtable{margin:0 .15em;padding:.1em 0;vertical-align:middle;
 background:linear-gradient(currentColor,currentColor) left top/.35em 1px,
 linear-gradient(currentColor,currentColor) left bottom/.35em 1px,
 linear-gradient(currentColor,currentColor) right top/.35em 1px,

@@ -25,7 +25,7 @@ _FUNCTIONS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "delta": "δ
 _RELATIONS = {"<=": "≤", ">=": "≥", "and": "\u2227", "or": "\u2228"}
 MINUS_SIGN = "\u2212"
 MINUS = f"<mo>{MINUS_SIGN}</mo>"
-_THIN = "<mspace width='0.17em'></mspace>"
+_THIN = "<mspace width='0.17em'/>"
 
 
 def mathml(formula: Formula, names: Notation) -> str:
@@ -92,7 +92,8 @@ class _MathML:
                 ]  # fmt: skip
                 return row("<mo>{</mo>", table(rows, "text-align:left"))
             case MatrixOf():
-                return fenced(table([list(map(self.element, one)) for one in formula.rows]), "[", "]")
+                body = table([list(map(self.element, one)) for one in formula.rows])
+                return f"<mrow class='matrix'><mo>[</mo>{body}<mo>]</mo></mrow>"
 
     def _sum(self, formula: SumOf) -> str:
         parts = []

@@ -72,6 +72,8 @@ class Formulas:
         kind = type(x).__name__
         if kind in _SIGNS or kind in _LOGIC:
             return Relation(_SIGNS.get(kind) or _LOGIC[kind], tuple(map(self, x.args)))
+        if kind == "delta":  # the variation of a name, which no number stands for
+            return CallOf(kind, (Name(x.args[0].name),))
         if isinstance(x, sympy.Function | sympy.Max | sympy.Min) and x.args:
             return CallOf(_NAMES.get(kind, kind), tuple(map(self, x.args)))
         if x == sympy.pi:
