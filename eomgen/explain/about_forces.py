@@ -49,9 +49,7 @@ def forces(author: Author) -> list[Section]:
 def _work(author: Author, column: Any) -> Any:
     """Q^T delta q_i as a sum."""
     total = zip(column, author.equations.independent, strict=True)
-    return sympy.Add(
-        *(sympy.Mul(x, author.variation(name), evaluate=False) for x, name in total if x != 0), evaluate=False
-    )
+    return sympy.Add(*(x * author.variation(name) for x, name in total))
 
 
 def _weight(author: Author, name: str) -> list[Piece]:

@@ -45,7 +45,7 @@ class Author:
     def __init__(self, equations: Any, full: bool) -> None:
         self.equations, self.full = equations, full
         self.mechanism = equations.kinematics.mechanism
-        self.printer = Printer(equations.notation)
+        self.printer = Printer(equations)
         self.shown: list[Shown] = []
         self._told: list[tuple[Any, Any]] = []
         names = equations.kinematics.velocity_names
@@ -61,8 +61,8 @@ class Author:
         return str(self.equations.notation.latex(name))
 
     def variation(self, name: str) -> Any:
-        """The SymPy symbol of the variation of a coordinate, printed with a delta."""
-        return self.printer.sign(f"delta {name}", rf"\delta {self.symbol(name)}")
+        """The variation of a coordinate in SymPy, printed with a delta."""
+        return sympy.Function("delta")(sympy.Symbol(name))
 
     # -- quantities ---------------------------------------------------------------------------------------------------
     def quantity(

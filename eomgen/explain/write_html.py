@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..files.inline_pictures import image_html
+from ..printing import given_mathml
 from ..texts import html_text
 from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table, spans
-from .formula_text import text_to_mathml
-from .printer import Printer, is_short
+from .printer import Printer
 
 _STYLE = """
 body{font:17px/1.5 "Source Serif 4",Georgia,"DejaVu Serif",serif;max-width:52em;margin:2em auto;padding:0 1.2em;
@@ -24,7 +24,8 @@ math{font-family:"STIX Two Math","Cambria Math","Latin Modern Math","Libertinus 
 mi[mathvariant=bold]{font-weight:bold;font-style:normal;text-transform:none}
 mover>mo:last-child{padding-bottom:.09em}
 mtd{padding:.18em .45em}
-mtable.matrix{margin:0 .15em;padding:.1em 0;vertical-align:middle;
+.matrix>mo{display:none}
+.matrix>mtable{margin:0 .15em;padding:.1em 0;vertical-align:middle;
 background:linear-gradient(currentColor,currentColor) left top/.35em 1px,
 linear-gradient(currentColor,currentColor) left bottom/.35em 1px,
 linear-gradient(currentColor,currentColor) right top/.35em 1px,
@@ -66,7 +67,7 @@ def _text(text: str) -> str:
     found = []
     for kind, part in spans(text):
         if kind == "math":
-            found.append(f"<math>{text_to_mathml(part)}</math>")
+            found.append(f"<math>{given_mathml(part)}</math>")
         else:
             found.append(f"<code>{html_text(part)}</code>" if kind == "name" else html_text(part))
     return "".join(found)
@@ -95,20 +96,12 @@ def _formula(formula: FormulaLine, printer: Printer) -> str:
     left = f"<mrow>{printer.mathml(first)}</mrow>"
     rows: list[str] = []
     for side in others:
-        lines = [printer.mathml(part) for part in printer.lines(side)]
+        lines = printer.mathml_lines(side)
         rows.append(f"<mo>=</mo><mrow>{lines[0]}</mrow>")
-        rows += [_further(line) for line in lines[1:]]
+        rows += [f"<mspace width='1.2em'/><mrow>{line}</mrow>" for line in lines[1:]]
     if len(rows) == 0:
         return left
-    if len(rows) == 1 or is_short(formula):
+    if len(rows) == 1 or printer.is_short(formula):
         return f"<mrow>{left}{''.join(rows)}</mrow>"
     cells = [f"<mtr><mtd>{left if k == 0 else ''}</mtd><mtd>{row}</mtd></mtr>" for k, row in enumerate(rows)]
     return f"<mtable class='lines' displaystyle='true'>{''.join(cells)}</mtable>"
-
-
-def _further(line: str) -> str:
-    """A line that continues a sum, with its sign in front."""
-    for start in ("<mo>\N{MINUS SIGN}</mo>", "<mrow><mo>\N{MINUS SIGN}</mo>", "<mrow><mrow><mo>\N{MINUS SIGN}</mo>"):
-        if line.startswith(start):
-            return f"<mspace width='1.2em'/><mrow>{line}</mrow>"
-    return f"<mspace width='1.2em'/><mo form='infix'>+</mo><mrow>{line}</mrow>"

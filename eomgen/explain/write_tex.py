@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table, spans
-from .printer import Printer, is_short
+from .printer import Printer
 
 PICTURE = "mechanism.png"  #: the file that a document with a picture takes it from
 _HEAD = r"""\documentclass[11pt,a4paper]{article}
@@ -44,11 +44,10 @@ def formula_body(formula: FormulaLine, printer: Printer) -> str:
     first, *others = formula.sides
     rows: list[str] = []
     for side in others:
-        lines = [printer.latex(part) for part in printer.lines(side)]
-        rows.append(f"= {lines[0]}")
-        rows += [rf"\quad {line}" if line.startswith("-") else rf"\quad + {line}" for line in lines[1:]]
+        lines = printer.latex_lines(side)
+        rows += [f"= {lines[0]}", *(rf"\quad {line}" for line in lines[1:])]
     left = printer.latex(first)
-    if len(rows) < 2 or is_short(formula):
+    if len(rows) < 2 or printer.is_short(formula):
         return " ".join([left, *rows])
     inner = " \\\\\n".join(f"{left if k == 0 else ''} & {row}" for k, row in enumerate(rows))
     return f"\\begin{{aligned}}\n{inner}\n\\end{{aligned}}"

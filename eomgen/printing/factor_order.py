@@ -1,6 +1,7 @@
 """Printing, order: in what order textbooks print factors and terms.
 
-Factors: number, masses and inertias, gravity, other parameters, coordinates and rates, sums, functions:
+Factors: number, masses and inertias, gravity, other parameters, coordinates and rates, sums, functions,
+variations:
 ``m_1 l_1^2``, ``(m_1 + m_2) g l_1 sin(theta_1)``.  Terms: inputs, squares of rates, what has no rates, rates.
 """
 
@@ -12,7 +13,7 @@ from typing import Any
 import sympy
 
 NUMBER, MASS, INERTIA, INERTIAL_SUM, INPUT, GRAVITY, PARAMETER, SUM_OF_PARAMETERS = range(8)
-NAMED, COORDINATE, RATE, SUM, FUNCTION = range(8, 13)
+NAMED, COORDINATE, RATE, SUM, FUNCTION, VARIATION = range(8, 14)
 Key = tuple[Any, ...]
 
 
@@ -47,6 +48,8 @@ class Order:
         if factor.is_Pow and factor.base.is_Symbol and factor.exp.is_Number:
             return self.of_factor(factor.base)
         names = sorted(self.of_name(str(symbol)) for symbol in factor.free_symbols)
+        if type(factor).__name__ == "delta":
+            return (VARIATION, *names)
         if factor.atoms(sympy.Function) or not names:
             return (FUNCTION, len(names), *names)
         if names[-1][0] <= PARAMETER:
@@ -72,7 +75,7 @@ class Order:
         given = any(key[0] == INPUT for key in keys)
         family = 0 if given else (2, 3, 1)[min(rates, 2)]
         heavy = not keys or keys[0][0] > INERTIAL_SUM
-        function = bool(keys) and keys[-1][0] == FUNCTION
+        function = bool(keys) and keys[-1][0] >= FUNCTION
         return (family, heavy, function, degree, _flat(keys))
 
     def _is_rate(self, symbol: Any) -> bool:

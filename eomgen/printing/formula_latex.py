@@ -8,6 +8,7 @@ from .formula_tree import (
     CallOf,
     CasesOf,
     Formula,
+    MatrixOf,
     Name,
     NumberPart,
     Power,
@@ -23,6 +24,7 @@ from .formula_tree import (
 _FUNCTIONS = {
     "sin": r"\sin", "cos": r"\cos", "tan": r"\tan", "asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan",
     "sinh": r"\sinh", "cosh": r"\cosh", "tanh": r"\tanh", "exp": r"\exp", "ln": r"\ln", "min": r"\min", "max": r"\max",
+    "delta": r"\delta",
 }  # fmt: skip
 _RELATIONS = {"<=": r"\le", ">=": r"\ge", "and": r"\wedge", "or": r"\vee"}
 
@@ -77,6 +79,9 @@ class _Latex:
                 ]  # fmt: skip
                 body = r" \\ ".join(rows)
                 return rf"\begin{{cases}}{body}\end{{cases}}"
+            case MatrixOf():
+                body = r" \\ ".join(" & ".join(map(self.line, row)) for row in formula.rows)
+                return rf"\begin{{bmatrix}}{body}\end{{bmatrix}}"
 
     def _sum(self, formula: SumOf) -> str:
         found = ""
@@ -89,8 +94,7 @@ class _Latex:
         found = ""
         for factor in formula.factors:
             shown = self._factor(factor)
-            ends_in_number = isinstance(factor, NumberPart) and found
-            found += (r" \cdot " if ends_in_number else " " if found else "") + shown
+            found += (r" \cdot " if found and shown[0].isdigit() else " " if found else "") + shown
         return found
 
     def _factor(self, formula: Formula) -> str:

@@ -8,6 +8,7 @@ from .formula_tree import (
     CallOf,
     CasesOf,
     Formula,
+    MatrixOf,
     Name,
     NumberPart,
     Power,
@@ -20,10 +21,11 @@ from .formula_tree import (
     is_simple,
 )
 
-_FUNCTIONS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan"}
+_FUNCTIONS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "delta": "δ"}
 _RELATIONS = {"<=": "≤", ">=": "≥", "and": "\u2227", "or": "\u2228"}
-MINUS = "<mo>\u2212</mo>"
-_THIN = "<mspace width='0.17em'></mspace>"
+MINUS_SIGN = "\u2212"
+MINUS = f"<mo>{MINUS_SIGN}</mo>"
+_THIN = "<mspace width='0.17em'/>"
 
 
 def mathml(formula: Formula, names: Notation) -> str:
@@ -62,7 +64,7 @@ class _MathML:
         match formula:
             case NumberPart():
                 if formula.power:
-                    ten = f"<msup><mn>10</mn><mn>{formula.power}</mn></msup>"
+                    ten = f"<msup><mn>10</mn><mn>{formula.power.replace('-', MINUS_SIGN)}</mn></msup>"
                     return row(f"<mn>{formula.digits}</mn><mo>·</mo>", ten)
                 return f"<mn>{formula.digits}</mn>"
             case Name():
@@ -72,7 +74,7 @@ class _MathML:
             case SumOf():
                 return self._sum(formula)
             case Product():
-                return row(_THIN.join(map(self._factor, formula.factors)))
+                return self._product(formula)
             case Quotient():
                 return f"<mfrac>{row(self.element(formula.above))}{row(self.element(formula.below))}</mfrac>"
             case Power():
@@ -89,6 +91,9 @@ class _MathML:
                     for value, when in formula.branches
                 ]  # fmt: skip
                 return row("<mo>{</mo>", table(rows, "text-align:left"))
+            case MatrixOf():
+                body = table([list(map(self.element, one)) for one in formula.rows])
+                return f"<mrow class='matrix'><mo>[</mo>{body}<mo>]</mo></mrow>"
 
     def _sum(self, formula: SumOf) -> str:
         parts = []
@@ -96,6 +101,14 @@ class _MathML:
             sign = MINUS if subtracted else "<mo>+</mo>"
             parts += [sign] * (subtracted or k > 0) + [self._factor(term)]
         return row(*parts)
+
+    def _product(self, formula: Product) -> str:
+        """Factors side by side; a point before one that begins with a digit."""
+        found: list[str] = []
+        for shown in map(self._factor, formula.factors):
+            begins = shown.removeprefix("<mrow>").removeprefix("<msup>").startswith("<mn>")
+            found += [("<mo>·</mo>" if begins else _THIN) if found else "", shown]
+        return row(*found)
 
     def _factor(self, formula: Formula) -> str:
         shown = self.element(formula)

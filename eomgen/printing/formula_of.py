@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import sympy
 from sympy.core.function import AppliedUndef
 
 from .factor_order import Order, is_subtracted
-from .formula_tree import CallOf, CasesOf, Formula, Name, NumberPart, Power, Product, Quotient, Relation, SumOf, Words
+from .formula_tree import (
+    CallOf,
+    CasesOf,
+    Formula,
+    MatrixOf,
+    Name,
+    NumberPart,
+    Power,
+    Product,
+    Quotient,
+    Relation,
+    SumOf,
+    Words,
+)
 
 _SIGNS = {"StrictLessThan": "<", "StrictGreaterThan": ">", "LessThan": "<=", "GreaterThan": ">=", "Equality": "="}
 _LOGIC = {"And": "and", "Or": "or"}
@@ -21,14 +35,18 @@ class Formulas:
     Parameters
     ----------
     order : Order
+    numbers : mapping of str to float, optional
+        Numbers that stand in the places of names.
     """
 
-    def __init__(self, order: Order) -> None:
+    def __init__(self, order: Order, numbers: Mapping[str, float] | None = None) -> None:
         self.order = order
-        self._made: dict[Any, Formula] = {}
+        self._made: dict[Any, Formula] = {sympy.Symbol(name): number(x) for name, x in (numbers or {}).items()}
 
     def __call__(self, expression: Any) -> Formula:
-        """The tree of an expression."""
+        """The tree of an expression or a matrix."""
+        if isinstance(expression, sympy.MatrixBase):
+            return MatrixOf(tuple(tuple(map(self, row)) for row in expression.tolist()))
         found = self._made.get(expression)
         if found is None:
             found = self._made[expression] = self._formula(expression)
@@ -54,6 +72,8 @@ class Formulas:
         kind = type(x).__name__
         if kind in _SIGNS or kind in _LOGIC:
             return Relation(_SIGNS.get(kind) or _LOGIC[kind], tuple(map(self, x.args)))
+        if kind == "delta":  # the variation of a name, which no number stands for
+            return CallOf(kind, (Name(x.args[0].name),))
         if isinstance(x, sympy.Function | sympy.Max | sympy.Min) and x.args:
             return CallOf(_NAMES.get(kind, kind), tuple(map(self, x.args)))
         if x == sympy.pi:
@@ -105,5 +125,17 @@ def _product(factors: tuple[Formula, ...]) -> Formula:
 def _decimal(x: Any) -> Formula:
     if not x.is_Float or not x.is_finite:
         return Words(str(x), sympy.latex(x))
-    digits, _, power = repr(float(x)).partition("e")
-    return NumberPart(digits.removesuffix(".0"), str(int(power)) if power else "")
+    return number(float(x), 15)
+
+
+def number(value: float, digits: int = 6) -> Formula:
+    """A number of at most so many digits; one below 0 is a sum that subtracts it.
+
+    Parameters
+    ----------
+    value : float
+    digits : int
+    """
+    shown, _, power = f"{abs(value):.{digits}g}".partition("e")
+    part = NumberPart(shown, str(int(power)) if power else "")
+    return SumOf(((True, part),)) if value < 0 else part

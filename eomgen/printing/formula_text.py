@@ -8,6 +8,7 @@ from .formula_tree import (
     CallOf,
     CasesOf,
     Formula,
+    MatrixOf,
     Name,
     NumberPart,
     Power,
@@ -22,6 +23,7 @@ from .formula_tree import (
 #: Between factors: lines are broken between terms before they are broken between factors.
 TIGHT = "\u00a0"
 MINUS = "-"
+LONGEST_LINE = 90  #: characters after which a sum goes on in the next line
 _RELATIONS = {"<=": "≤", ">=": "≥"}
 
 
@@ -34,6 +36,22 @@ def text(formula: Formula, names: Notation) -> str:
     names : Notation
     """
     return _TextOf(names).line(formula)
+
+
+def sums_in_lines(formula: Formula, names: Notation, room: int = LONGEST_LINE) -> list[Formula]:
+    """A sum as sums that are at most about ``room`` characters long; anything else alone."""
+    if not isinstance(formula, SumOf):
+        return [formula]
+    lines: list[list[tuple[bool, Formula]]] = [[]]
+    used = 0
+    for subtracted, term in formula.terms:
+        size = len(text(term, names)) + 3
+        if used and used + size > room:
+            lines.append([])
+            used = 0
+        lines[-1].append((subtracted, term))
+        used += size
+    return [SumOf(tuple(line)) for line in lines]
 
 
 class _TextOf:
@@ -67,6 +85,8 @@ class _TextOf:
                     for value, when in formula.branches
                 ]
                 return f"{{{'; '.join(parts)}}}"
+            case MatrixOf():
+                return f"[{'; '.join(', '.join(map(self.line, row)) for row in formula.rows)}]"
 
     def _call(self, function: str, arguments: tuple[Formula, ...]) -> str:
         inside = ", ".join(map(self.line, arguments))

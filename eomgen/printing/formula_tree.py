@@ -64,6 +64,12 @@ class CasesOf(NamedTuple):
     branches: tuple[tuple[Formula, Formula | None], ...]
 
 
+class MatrixOf(NamedTuple):
+    """Formulas in rows."""
+
+    rows: tuple[tuple[Formula, ...], ...]
+
+
 class Words(NamedTuple):
     """What no other part is for, as SymPy writes it: in text and in LaTeX."""
 
@@ -71,7 +77,7 @@ class Words(NamedTuple):
     latex: str
 
 
-Formula = NumberPart | Name | SumOf | Product | Quotient | Power | CallOf | Relation | CasesOf | Words
+Formula = NumberPart | Name | SumOf | Product | Quotient | Power | CallOf | Relation | CasesOf | MatrixOf | Words
 
 
 def is_group(formula: Formula) -> bool:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..printing import mathml
-from ..printing.formula_mathml import fenced, row, table
-from ..printing.formula_tree import Formula, Name, SumOf, is_group
+from ..printing import mathml, sums_in_lines
+from ..printing.formula_mathml import fenced, row
+from ..printing.formula_tree import Formula, MatrixOf, Name, SumOf, is_group
 from ..texts import html_text
-from .equations_latex import LONGEST_LINE, WIDE, sums_in_lines
+from .equations_latex import WIDE
 from .printed_equations import PrintedEntry, PrintedEquations
 from .readable import Readable
 
@@ -65,10 +65,6 @@ def _block(inside: str) -> str:
     return f"<div style='{_STYLE}'><math displaystyle='true' style='{_FONT}'>{inside}</math></div>"
 
 
-def _bracketed(rows: list[list[str]]) -> str:
-    return fenced(table(rows), "[", "]")
-
-
 def _motion(printed: PrintedEquations) -> Iterator[str]:
     def shown(formula: Formula) -> str:
         return mathml(formula, printed.names)
@@ -81,8 +77,8 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
         factor = "" if printed.text(M[0][0]) == "1" else fenced(shown(M[0][0])) if is_group(M[0][0]) else shown(M[0][0])
         yield _block(row(factor, "<mspace width='0.17em'></mspace>", rates[0], equals, shown(f[0])))
         return
-    v, right = _bracketed([[x] for x in rates]), _bracketed([[shown(x)] for x in f])
-    left = _bracketed([[shown(x) for x in one] for one in M])
+    v = shown(MatrixOf(tuple((Name(name),) for name in printed.equations.acceleration_names)))
+    right, left = shown(MatrixOf(tuple((x,) for x in f))), shown(MatrixOf(tuple(map(tuple, M))))
     if len(rates) > 1 and of_mass + of_force <= WIDE:
         yield _block(row(left, v, equals, right))
         return
@@ -114,7 +110,7 @@ def _label(entry: PrintedEntry, n: int) -> str:
 def _line(printed: PrintedEquations, label: str, formula: Formula) -> str:
     """A formula; a long sum in lines of its terms, below each other."""
     lines = []
-    for k, part in enumerate(sums_in_lines(printed, formula, LONGEST_LINE)):
+    for k, part in enumerate(sums_in_lines(formula, printed.names)):
         sign = ""
         if k and isinstance(part, SumOf) and not part.terms[0][0]:
             sign = "<mo form='infix'>+</mo>"

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..printing import latex
-from ..printing.formula_tree import Formula, is_group
+from ..printing import latex, sums_in_lines
+from ..printing.formula_tree import Formula, MatrixOf, Name, is_group
 from .printed_equations import PrintedEquations
 from .readable import Readable
 
 WIDE = 150  #: characters of text up to which a matrix equation stands in one line
-LONGEST_LINE = 90  #: characters of text after which a sum goes on in the next line
 
 
 def latex_lines(equations: Readable) -> list[str]:
@@ -45,8 +44,9 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
         factor = rf"\left({shown(M)}\right)" if is_group(M) else shown(M)
         yield f"{'' if shown(M) == '1' else factor + ' '}{rates[0]} = {shown(f)}"
         return
-    left = _matrix([[shown(x) for x in row] for row in printed.mass_matrix])
-    right, v = _matrix([[shown(x)] for x in printed.force]), _matrix([[x] for x in rates])
+    left = shown(MatrixOf(tuple(map(tuple, printed.mass_matrix))))
+    right = shown(MatrixOf(tuple((x,) for x in printed.force)))
+    v = shown(MatrixOf(tuple((Name(name),) for name in printed.equations.acceleration_names)))
     if len(rates) > 1 and of_mass + of_force <= WIDE:
         yield f"{left} {v} = {right}"
         return
@@ -61,35 +61,12 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
             yield _broken(printed, label, entry.formula)
 
 
-def _matrix(rows: list[list[str]]) -> str:
-    body = r" \\ ".join(" & ".join(row) for row in rows)
-    return rf"\begin{{bmatrix}}{body}\end{{bmatrix}}"
-
-
 def _broken(printed: PrintedEquations, label: str, formula: Formula) -> str:
     """A formula; a long sum in lines of its terms."""
-    lines = sums_in_lines(printed, formula, LONGEST_LINE)
+    lines = sums_in_lines(formula, printed.names)
     shown = [latex(line, printed.names) for line in lines]
     if len(shown) == 1:
         return f"{label} = {shown[0]}"
     others = (line if line.startswith("-") else f"+ {line}" for line in shown[1:])
     body = r" \\ & \quad ".join([shown[0], *others])
     return rf"\begin{{aligned}}{label} & = {body}\end{{aligned}}"
-
-
-def sums_in_lines(printed: PrintedEquations, formula: Formula, room: int) -> list[Formula]:
-    """A sum as sums that are at most about ``room`` characters long; anything else alone."""
-    from ..printing.formula_tree import SumOf
-
-    if not isinstance(formula, SumOf):
-        return [formula]
-    lines: list[list[tuple[bool, Formula]]] = [[]]
-    used = 0
-    for subtracted, term in formula.terms:
-        size = len(printed.text(term)) + 3
-        if used and used + size > room:
-            lines.append([])
-            used = 0
-        lines[-1].append((subtracted, term))
-        used += size
-    return [SumOf(tuple(line)) for line in lines]
