@@ -167,6 +167,9 @@ def explain(equations: Any, level: str = "full") -> Explanation:
 
 def _module(equations: Any) -> tuple[Any, str]:
     """The module of the equations on NumPy at its declared state, or None and why."""
+    functions = sorted(equations.kinematics.graph.functions)
+    if functions:
+        return None, f"The formulas hold tables or functions, which SymPy cannot evaluate: {', '.join(functions)}."
     from ..pipeline import compile_core
     from ..runtime.bound_model import BoundModel
 

@@ -11,8 +11,11 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import sympy
+from sympy.core.function import AppliedUndef
 from sympy.printing.c import reserved_words as c_words
+from sympy.printing.mathematica import MCodePrinter
 
+from ..errors import UnavailableError
 from .equations_latex import latex_lines
 from .equations_text import COLUMNS, equations_text
 from .readable import Readable
@@ -25,6 +28,17 @@ _JULIA_WORDS = (
 _JULIA_WORDS += (
     "if import let local macro module quote return struct true try using while pi im M f sin cos tan exp log"
 )
+
+
+class _Mathematica(MCodePrinter):  # type: ignore[misc]  # SymPy has no types
+    """SymPy's printer, with what it lacks."""
+
+    def _print_Piecewise(self, expr: Any) -> str:
+        pairs = (f"{{{self._print(x)}, {self._print(c)}}}" for x, c in expr.args)
+        return f"Piecewise[{{{', '.join(pairs)}}}]"
+
+    def _print_BooleanTrue(self, expr: Any) -> str:
+        return "True"
 
 
 class Language(NamedTuple):
@@ -41,7 +55,7 @@ LANGUAGES = {
     "octave": Language(sympy.octave_code, "%", frozenset([*_MATLAB_WORDS.split(), "endfunction", "endif", "do"])),
     "julia": Language(sympy.julia_code, "#", frozenset(_JULIA_WORDS.split())),
     "mathematica": Language(
-        sympy.mathematica_code, "", frozenset(["C", "D", "E", "I", "K", "N", "O", "Pi", "Sin", "Cos", "M", "f"])
+        _Mathematica().doprint, "", frozenset(["C", "D", "E", "I", "K", "N", "O", "Pi", "Sin", "Cos", "M", "f"])
     ),
     "c": Language(sympy.ccode, "//", frozenset([*c_words, "M", "f", "double", "restrict", "inline", "y0", "y1", "jn"])),
 }
@@ -76,6 +90,12 @@ class _Code:
         self.language, self.form, self.model = language, form, equations.kinematics.mechanism.name
         named = equations.intermediates
         whole = [*(x for _, x in named), *equations.mass_matrix, *equations.force]
+        unknown = {str(f.func) for x in whole for f in x.atoms(AppliedUndef)}
+        if unknown:
+            raise UnavailableError(
+                f"format {form!r} cannot hold the tables or functions of this model: {', '.join(sorted(unknown))}; "
+                "latex and text show them by name, and eomgen generate writes code for them"
+            )
         symbols = set().union(*(x.free_symbols for x in whole), {symbol for symbol, _ in named})
         self.renamed = _renamed((str(s) for s in symbols), language.reserved, form)
         put = {s: sympy.Symbol(self.renamed[str(s)]) for s in symbols}

@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 
 import eomgen as eg
-from eomgen.shipped import example_files
 from eomgen.cli.verb_view import view
+from eomgen.shipped import example_files
 from eomgen.show.data import read_picture
 
 ROOT = Path(__file__).parents[2]

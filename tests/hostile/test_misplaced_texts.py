@@ -138,7 +138,7 @@ def test_half_of_a_pair_is_refused_where_it_stands_and_a_pair_is_a_character() -
     for place in filter(None, PLACES.values()):
         at = tuple(int(part) if part.isdigit() else part for part in re.findall(r"\w+", place))
         for text in LONE.values():
-            with pytest.raises(ModelError, match=r"contains U\+D[0-9A-F]{3}, which is half of a character pair") as caught:
+            with pytest.raises(ModelError, match=r"contains U\+D[0-9A-F]{3}, which is half of a") as caught:
                 model_of(changed(described(""), at, text, False)).mechanism()
             assert caught.value.problems[0].path == place
     model = model_of(described(PAIR))

@@ -92,3 +92,24 @@ def test_words_of_a_language_are_changed_with_a_note() -> None:
     assert "% end_ is end of the model" in write_format(equations, "matlab")
     assert "// M_ is M of the model" in write_format(equations, "c")
     assert "end_" not in write_format(equations, "c")
+
+
+def test_tables_are_named_where_a_format_cannot_hold_them() -> None:
+    m = eg.Model("tabular")
+    m.prismatic("rail", m.ground, m.body("block", mass=1.0), axis="x", coordinate="s")
+    m.table("push", [0, 1, 2, 3], [1, 2, 4, 3])
+    m.actuator("motor", "rail", "push(s)")
+    eqs = m.derive()
+    with pytest.raises(eg.EomgenError, match="format 'c' cannot hold the tables or functions of this model: push"):
+        write_format(eqs, "c")
+    assert "push" in write_format(eqs, "text")
+    solution = eqs.explain("short")
+    assert solution.difference is None
+    assert "push" in solution.markdown
+
+
+def test_conditions_in_mathematica() -> None:
+    m = eg.Model("stop")
+    m.prismatic("rail", m.ground, m.body("block", mass=1.0), axis="x", coordinate="s")
+    m.actuator("wall", "rail", sympy.Piecewise((-100 * sympy.Symbol("s"), sympy.Symbol("s") > 0), (0, True)))
+    assert "f = {Piecewise[{{-100*s, s > 0}, {0, True}}]};" in write_format(m.derive(), "mathematica")
