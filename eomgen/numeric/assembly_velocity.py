@@ -36,7 +36,6 @@ def assemble_velocity(
     C_q: Array,
     C_t: Array,
     scales: Scales,
-    *,
     guess: Array | None = None,
     held: Sequence[int] | Indices = (),
     equations: VelocityEquations | None = None,

@@ -261,10 +261,8 @@ class Initial:
         if others:
             y_q, y_t, scales = map(np.array, zip(*(self.rate_equation(q, name) for name in others), strict=True))
             equations = VelocityEquations(y_q, y_t, np.array([held[name] for name in others]), scales, others)
-        return assemble_velocity(
-            self._C_q(q, t=self.t), self.rate(q), self.scales, guess=v, held=indices, equations=equations,
-            names=layout.v, labels=layout.constraint_labels,
-        )  # fmt: skip
+        C_q, labels = self._C_q(q, t=self.t), layout.constraint_labels
+        return assemble_velocity(C_q, self.rate(q), self.scales, v, indices, equations, layout.v, labels)
 
     def rate_equation(self, q: Array, name: str) -> tuple[Array, float, float]:
         """y_q (n,), y_t and the typical size of a rate y' = y_q v + y_t that is no velocity of the tree."""
