@@ -13,6 +13,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from . import __version__
 from .derivation import Derivation
@@ -21,7 +22,6 @@ from .equations.digits_kept import note_lost_digits
 from .equations.positive import require_inertia
 from .errors import AssemblyError, ToolchainError, UsageError
 from .kinematics import Kinematics, analyse
-from .kinematics.loads import drives_cut_joint
 from .kinematics.mobility import Mobility, find_mobility
 from .kinematics.report import MechanismReport, report
 from .targets import TARGETS, find_target
@@ -44,12 +44,16 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
 
 
 @contextmanager
-def _without_collection() -> Iterator[None]:
-    """Pause the garbage collector, which would walk the many small objects of a graph again and again."""
+def _alone() -> Iterator[None]:
+    """Pause the garbage collector, which would walk the many small objects of a graph again and again, and keep linear
+    algebra to one thread: matrices are small, and on a busy machine threads that wait for each other take 20 times as
+    long (singular values of 320 x 320: 6 ms in one thread, 110 ms in two).
+    """
     was_on = gc.isenabled()
     gc.disable()
     try:
-        yield
+        with threadpool_limits(1, "blas"):
+            yield
     finally:
         if was_on:
             gc.enable()
@@ -86,8 +90,8 @@ def derive(
     ----------
     model : Model
     method : str
-        One of ``equations.METHODS``, or ``auto``: of a tree, embedding or recursive, whichever has the right-hand side
-        of fewer operations; embedding where there are loops; lagrange of a bare Lagrangian.
+        One of ``equations.METHODS``, or ``auto``: embedding or recursive, whichever has the right-hand side of fewer
+        operations; lagrange of a bare Lagrangian.
     independent : names of coordinates, optional
         The independent ones of a mechanism with loops; the model's own by default, else the best conditioned.
     baumgarte : (alpha, beta), optional
@@ -109,21 +113,19 @@ def derive(
     with _timed(seconds, "describe"):
         mechanism = model.mechanism()
     chosen = choose_method(mechanism, method)
-    with _without_collection(), _timed(seconds, "kinematics"):
+    with _alone(), _timed(seconds, "kinematics"):
         kinematics = analyse(mechanism, independent or ())
         mobility = _mobility(kinematics, independent or ())
     if baumgarte is not None:
         kinematics = _stabilised(kinematics, chosen, baumgarte)
-    with _without_collection(), _timed(seconds, "equations"):
+    with _alone(), _timed(seconds, "equations"):
         choice: Choice | None = None
         if chosen == GIVEN:
             tree = take_given(kinematics)
         elif chosen != "auto":
             tree = METHODS[chosen](kinematics)
-        elif kinematics.constraints.labels or drives_cut_joint(kinematics):
-            tree = METHODS["embedding"](kinematics)
         else:
-            tree, choice = choose(kinematics)
+            tree, choice = choose(kinematics, mobility)
     return Derivation(kinematics, mobility, tree, seconds, choice)
 
 
@@ -200,7 +202,8 @@ def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] 
         metadata["indefinite"] = True
     if strange:
         limits = Limits(unrolled=0, unrolled_loops=0)  # drivers that look before they divide
-    return build_program(collect_terms(kinematics, mobility, tree), metadata, kernels=kernels, limits=limits)
+    terms = collect_terms(kinematics, mobility, tree, in_c=not row.arrays and not strange)
+    return build_program(terms, metadata, kernels=kernels, limits=limits)
 
 
 @np.errstate(all="ignore")

@@ -13,6 +13,8 @@ DERIVE = ("correct_change", "jacobian_projection", "jacobian")
 #: from states on both sides of a change point
 PASSING = ("passing_curve", "passing_points", "passing", "passing_search")
 
+FORMED = {"terms", "gamma"}  #: blocks of M, h, C_q, gamma
+
 LOOPS: dict[str, tuple[str, ...]] = {
     "project": (*CLOSE, "is_closed", "project_drive"),
     "embedded_mass_matrix": ("scaled", *PIVOT, "embed", "mass"),
@@ -28,14 +30,14 @@ TREES: dict[str, tuple[str, ...]] = {
 
 COLUMNS: dict[str, tuple[str, ...]] = {
     "jacobian": ("columns_jacobian",),
-    "mass_matrix": ("columns_mass", "columns_mass_drive"),
-    "embedded_mass_matrix": ("columns_mass", "columns_mass_embedded"),
+    "mass_matrix": ("mass_by_columns", "columns_mass_drive"),
+    "embedded_mass_matrix": ("mass_by_columns", "columns_mass_embedded"),
 }
 
 
 def shift_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
     """The files of a derivative by inputs or parameters."""
-    if program.by_columns:
+    if program.tree_by_columns:
         return ("shift_columns", name)
     if not program.has_loops:
         return ("tree", "shift_tree", name)
@@ -59,7 +61,11 @@ def rhs_files(program: Program) -> tuple[str, ...]:
 def driver_files(program: Program) -> list[str]:
     """Names of the files in templates/c/drivers that hold this program's drivers, callees first."""
     direct = "residuals_along" if "residual_tangent" in program.block_names else "residuals_direct"
-    files: dict[str, None] = {"terms": None} if program.composes_terms else {}
+    files: dict[str, None] = {}
+    if "mass_times" in program.block_names:
+        files["mass_by_columns"] = None
+    if program.composes_terms:
+        files |= {"terms": None, "terms_loops" if program.has_loops else "terms_tree": None}
     if program.drivers:
         space = ("space_quaternions", "space_quaternions_more") if program.has_loops else ("space_quaternions",)
         if program.given_rates:
@@ -74,7 +80,7 @@ def driver_files(program: Program) -> list[str]:
             needed = _passing_files(program, driver.name, direct)
         elif "system" in driver.blocks:
             needed = _system_files(program, driver.name, direct)
-        elif program.by_columns and "terms" not in driver.blocks:
+        elif driver.name == "mass_matrix" or (program.tree_by_columns and "terms" not in driver.blocks):
             needed = COLUMNS[driver.name]
         elif not program.has_loops and driver.name == "jacobian":
             along = (direct, "tree_jacobian_along") if direct == "residuals_along" else ("tree_jacobian",)
@@ -85,7 +91,7 @@ def driver_files(program: Program) -> list[str]:
             needed = (*rhs_files(program), "rhs")
         elif driver.name == "jacobian":
             needed = (*rhs_files(program), "multipliers", direct, *DERIVE, "jacobian_plain")
-        elif driver.name == "outputs" and "terms" in driver.blocks:
+        elif driver.name == "outputs" and FORMED.intersection(driver.blocks):
             needed = (*ACCELERATE, "outputs_accelerated")
         else:
             needed = LOOPS[driver.name]
@@ -95,7 +101,7 @@ def driver_files(program: Program) -> list[str]:
 
 def _passing_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
     """Files of a driver of :func:`passes`."""
-    accelerates = {"system", "terms"} & {block for d in program.drivers if d.name == name for block in d.blocks}
+    accelerates = {"system", *FORMED} & {block for d in program.drivers if d.name == name for block in d.blocks}
     if name == "jacobian":
         return (*rhs_files(program), *ACCELERATE, "multipliers", direct, *DERIVE, "jacobian_passing")
     if name == "project":
@@ -171,8 +177,10 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
         ("RATES", n_q),
         ("SHIFT", h + n + 2 * m if shifted else 0),  # C, r1, r2, r3 along du or dp
     ]
-    if program.composes_terms:
+    if program.composes_terms or "mass_times" in names:
         lengths.append(("FULL", n * n))
+    if "mass_times" in names:
+        lengths.append(("UNIT", n_q + 2 * n))  # q, a, M a
     if program.has_loops:
         lengths += [
             ("POSITION", h + m * n),  # C, C_q

@@ -65,6 +65,7 @@ def add_armature(kinematics: Kinematics, tree: TreeEquations) -> TreeEquations:
         system=tree.system,
         canonical=tree.canonical,
         turned=tree.turned,
+        constrained=tree.constrained,
     )
 
 

@@ -81,8 +81,9 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
     n, r = len(names), mobility.rank
     if n == r:
         return []
-    if tree.pivots:
-        moved = compile_evaluator(list(tree.pivots), (*kinematics.names, *numbers, "t"))
+    found = tree.pivots or (tree.constrained().pivots if tree.constrained is not None and functions.m else ())
+    if found:
+        moved = compile_evaluator(list(found), (*kinematics.names, *numbers, "t"))
         for sample in mobility.samples:
             pivots = np.array(moved([*sample, *numbers.values(), 0.0]), dtype=float) * functions.scales.q**2
             sizes = np.array(pivots)

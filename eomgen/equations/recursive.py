@@ -1,8 +1,7 @@
 """Stage equations: Kinematics -> TreeEquations by the articulated-body method, linear in the number of bodies.
 
-Featherstone, Rigid Body Dynamics Algorithms (2008), ch. 7, in link axes, with two changes.  Linear accelerations are
-those of the links' origins, gravity subtracted, so that linear velocities never appear.  A joint of several degrees of
-freedom is released one column of its motion subspace at a time, which eliminates its block as L^T D L would.
+Featherstone, Rigid Body Dynamics Algorithms (2008), ch. 5 and 7, in link axes.  Linear accelerations are those of the
+links' origins, gravity subtracted, so that linear velocities never appear.
 """
 
 from __future__ import annotations
@@ -16,88 +15,17 @@ from ..graph.core import Expr
 from ..graph.count import count
 from ..graph.differentiate import jacobian
 from ..graph.spatial import Twist, Wrench, add, dot, scaled
-from ..graph.tensors import add_matrices, rotate, rotate_symmetric, skew, symmetric
-from ..graph.vectors import Mat3
-from ..kinematics import Kinematics, Link
+from ..kinematics import Kinematics
 from ..kinematics.energies import kinetic_energy, potential_energy
 from ..kinematics.joint_rates import JointRates, joint_rates
 from ..kinematics.link_axes import SlidingTriple, falling, turn_back, turn_forces, turn_links
 from ..kinematics.link_inertia import SpatialInertia
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias, drives_cut_joint
 from ..kinematics.regroup import regroup
-from ..records import dataclass
+from .articulated import ArticulatedBodies, ConstraintRow, TreeMotion
 from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
-
-
-@dataclass(frozen=True)
-class Articulated:
-    """[moment; force] = [[inertia, coupling], [coupling^T, mass]] [angular; linear acceleration] + a wrench."""
-
-    inertia: Mat3
-    coupling: Mat3
-    mass: Mat3
-
-    def times(self, motion: Twist) -> Wrench:
-        """The wrench of an acceleration."""
-        angular, linear = motion
-        turn = vec.add(vec.times(self.inertia, angular), vec.times(self.coupling, linear))
-        return turn, vec.add(vec.transpose_times(self.coupling, angular), vec.times(self.mass, linear))
-
-    def plus(self, other: Articulated) -> Articulated:
-        """Both on one link."""
-        return Articulated(
-            symmetric(add_matrices(self.inertia, other.inertia)),
-            add_matrices(self.coupling, other.coupling),
-            symmetric(add_matrices(self.mass, other.mass)),
-        )
-
-    def released(self, column: Twist, wrench: Wrench, reciprocal: Expr, driven: bool) -> Articulated:
-        """What is felt when the column moves freely: I - U U^T / D (Featherstone, RBDA, eq. 7.43).
-
-        ``driven`` tells that D holds the inertia of a drive, which resists along the column.
-        """
-        turn, push = wrench
-        turn_d, push_d = vec.scale(reciprocal, turn), vec.scale(reciprocal, push)
-        inertia = [[self.inertia[i][j] - turn[i] * turn_d[j] for j in range(3)] for i in range(3)]
-        coupling = [[self.coupling[i][j] - turn[i] * push_d[j] for j in range(3)] for i in range(3)]
-        mass = [[self.mass[i][j] - push[i] * push_d[j] for j in range(3)] for i in range(3)]
-        zero = reciprocal.graph.zero
-        entries = [*column[0], *column[1]]
-        if sum(not x.is_zero for x in entries) == 1 and not driven:  # no force along a free unit column: exactly so
-            k = next(i for i, x in enumerate(entries) if not x.is_zero)
-            for m in range(3):
-                if k < 3:
-                    inertia[k][m] = inertia[m][k] = coupling[k][m] = zero
-                else:
-                    mass[k - 3][m] = mass[m][k - 3] = coupling[m][k - 3] = zero
-        return Articulated(symmetric(_matrix(inertia)), _matrix(coupling), symmetric(_matrix(mass)))
-
-    def lifted(self, link: Link) -> Articulated:
-        """In parent link axes about the parent's origin (Featherstone, RBDA, sec. 7.2)."""
-        inertia, coupling, mass = self.inertia, self.coupling, self.mass
-        for turn in (link.joint_rotation, link.turn):
-            inertia, coupling = rotate_symmetric(turn, inertia), rotate(turn, coupling)
-            mass = rotate_symmetric(turn, mass)
-        arm = skew(link.position)
-        moved = add_matrices(coupling, vec.product(arm, mass))
-        ahead = vec.product(coupling, arm)
-        behind = vec.product(arm, vec.transpose(moved))
-        rows = [[inertia[i][j] - (ahead[i][j] - behind[i][j]) for j in range(3)] for i in range(3)]
-        return Articulated(symmetric(_matrix(rows)), moved, mass)
-
-
-@dataclass(frozen=True)
-class Release:
-    """One released column: U = I s, D = s . U, and the force left to accelerate it."""
-
-    index: int
-    column: Twist
-    wrench: Wrench
-    pivot: Expr
-    reciprocal: Expr
-    force: Expr
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
@@ -113,8 +41,8 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     if count(shorter).total <= count(inverse).total:  # grouping symbols is work too
         inertias, loads, inverse = grouped, lighter, shorter
     rest = tuple(kinematics.graph.zero for _ in a)
-    tree = not kinematics.constraints.labels and not drives_cut_joint(kinematics)
-    accelerations, pivots = _articulated(*turn_links(kinematics), inertias, products, loads) if tree else (None, ())
+    solve = None if drives_cut_joint(kinematics) else partial(solve_tree, kinematics, inertias, products, loads)
+    tree = solve() if solve is not None and not kinematics.constraints.labels else None
     return TreeEquations(
         method="recursive",
         mass_matrix=partial(_mass_matrix, kinematics, inverse),
@@ -122,13 +50,10 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         inverse_dynamics=inverse,
         kinetic_energy=kinetic_energy(kinematics),
         potential_energy=potential_energy(kinematics),
-        accelerations=accelerations,
-        pivots=pivots,
+        accelerations=tree.accelerations if tree else None,
+        pivots=tree.pivots if tree else (),
+        constrained=solve,
     )
-
-
-def _matrix(rows: Sequence[Sequence[Expr]]) -> Mat3:
-    return tuple(tuple(row) for row in rows)  # type: ignore[return-value]
 
 
 def _velocity_products(kinematics: Kinematics, rates: list[JointRates]) -> list[Twist]:
@@ -188,55 +113,44 @@ def _newton_euler(
     return tuple(result)
 
 
-def _articulated(
+def solve_tree(
     kinematics: Kinematics,
-    blocks: Sequence[SlidingTriple],
     inertias: list[SpatialInertia],
     products: list[Twist],
     loads: list[Wrench],
-) -> tuple[tuple[Expr, ...], tuple[Expr, ...]]:
-    """v' and the pivots D (Featherstone, RBDA, table 7.1), found in velocities of which some are turned."""
-    graph, links = kinematics.graph, kinematics.links
-    still = vec.zero(graph)
-    bodies = [Articulated(i.inertia, skew(i.moment), _uniform(i.mass)) for i in inertias]
-    wrenches = list(loads)
-    forces = turn_forces(blocks, coordinate_forces(kinematics))
-    afloat = falling(blocks)
-    drives = drive_inertias(kinematics)
-    releases: list[list[Release]] = [[] for _ in links]
-    for k in reversed(range(len(links))):
-        link, body, wrench = links[k], bodies[k], wrenches[k]
-        for c in reversed(range(len(link.columns))):
-            column, index = link.columns[c], link.first + c
-            felt = body.times(column)
-            pivot = dot(column, felt) + drives.get(index, graph.zero)
-            release = Release(index, column, felt, pivot, 1.0 / pivot, forces[index] - dot(column, wrench))
-            releases[k].append(release)
-            if link.parent != GROUND or c > 0:
-                body = body.released(column, felt, release.reciprocal, index in drives)
-                wrench = add(wrench, scaled(release.force * release.reciprocal, felt))
-        if link.parent != GROUND:
-            bodies[link.parent] = bodies[link.parent].plus(body.lifted(link))
-            wrench = add(wrench, body.times(products[k]))
-            wrenches[link.parent] = add(wrenches[link.parent], link.lift(wrench))
-    motions: list[Twist] = []
-    accelerations = [graph.zero] * len(kinematics.v)
-    pivots = [graph.zero] * len(kinematics.v)
-    for k, link in enumerate(links):
-        lifted = still if k in afloat else _base(kinematics)[1]
-        above = motions[link.parent] if link.parent != GROUND else (still, lifted)
-        motion = add(link.down_twist(above), products[k])
-        for release in reversed(releases[k]):
-            rate = (release.force - dot(release.wrench, motion)) * release.reciprocal
-            accelerations[release.index], pivots[release.index] = rate, release.pivot
-            motion = add(motion, scaled(rate, release.column))
-        motions.append(motion)
-    return tuple(turn_back(blocks, accelerations)), tuple(pivots)
+    rows: Sequence[ConstraintRow] = (),
+    term: float = 0.0,
+) -> TreeMotion:
+    """v' of the tree, on which constraints may act; found in velocities of which some are turned."""
+    turned, blocks = turn_links(kinematics)
+    afloat, still = falling(blocks), vec.zero(kinematics.graph)
+    bodies = ArticulatedBodies(
+        turned.graph,
+        turned.links,
+        inertias,
+        products,
+        loads,
+        turn_forces(blocks, coordinate_forces(kinematics)),
+        drive_inertias(kinematics),
+        [(still, still) if k in afloat else _base(kinematics) for k in range(len(turned.links))],
+        [_turn_row(blocks, row) for row in rows],
+        term,
+    )
+    found = bodies.solve()
+    return found._replace(accelerations=tuple(turn_back(blocks, found.accelerations)))
 
 
-def _uniform(mass: Expr) -> Mat3:
-    o = mass.graph.zero
-    return ((mass, o, o), (o, mass, o), (o, o, mass))
+def _turn_row(blocks: Sequence[SlidingTriple], row: ConstraintRow) -> ConstraintRow:
+    """A constraint on v' -> the same on w', which leaves out the gravity of what falls."""
+    entries, rest = dict(row.entries), row.rest
+    for b in blocks:
+        zero = rest.graph.zero
+        along = [entries.pop(b.first + i, zero) for i in range(3)]
+        x, y, z = vec.transpose_times(b.rotation, (along[0], along[1], along[2]))
+        entries |= {b.first + i: entry for i, entry in enumerate((x, y, z)) if not entry.is_zero}
+        if b.gravity is not None:
+            rest = rest + vec.dot((along[0], along[1], along[2]), b.gravity)
+    return ConstraintRow(entries, rest)
 
 
 def _mass_matrix(kinematics: Kinematics, inverse: tuple[Expr, ...]) -> Rows:

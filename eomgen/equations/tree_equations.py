@@ -12,6 +12,7 @@ from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.link_axes import Turned
 from ..records import dataclass
+from .articulated import TreeMotion
 
 Rows = tuple[tuple[Expr, ...], ...]
 
@@ -82,6 +83,7 @@ class TreeEquations:
     system : the linear system that the method solves for its accelerations; None where M and h are enough
     canonical : (2 n_v,) of a method in canonical variables: p = dT/dv, then -dH/dq + Q; else empty
     turned : the same system in velocities in which it is shorter, where there are free joints; else None
+    constrained : (rows, term) -> what the constraints' multipliers leave of the accelerations, of a method that has it
     """
 
     def __init__(
@@ -97,8 +99,9 @@ class TreeEquations:
         system: LinearSystem | None = None,
         canonical: tuple[Expr, ...] = (),
         turned: Turned | None = None,
+        constrained: Callable[..., TreeMotion] | None = None,
     ) -> None:
-        if isinstance(mass_matrix, FunctionType):
+        if isinstance(mass_matrix, FunctionType) or isinstance(constrained, FunctionType):
             raise TypeError("a function that holds expressions is not copied with them: give a functools.partial")
         self.method = method
         self._mass_matrix = mass_matrix
@@ -111,6 +114,7 @@ class TreeEquations:
         self.system = system
         self.canonical = canonical
         self.turned = turned
+        self.constrained = constrained
 
     def without_accelerations(self) -> TreeEquations:
         """The same equations, to be solved with M."""

@@ -52,11 +52,10 @@ def _spread(
     graph = common_graph(outputs)
     if graph is None:
         return np.empty(0), np.empty(0)
-    order = reachable(graph, (y.id for y in outputs))
-    names = list(values)
+    order, nodes = reachable(graph, (y.id for y in outputs)), graph.nodes
+    names = [nodes[i][1] for i in order if nodes[i][0] == "sym" and nodes[i][1] in values]  # of many, few are used
     found = dict(zip(order, Evaluator([Expr(graph, i) for i in order], names)([values[n] for n in names]), strict=True))
     bounds: dict[int, float] = {}
-    nodes = graph.nodes
     with np.errstate(all="ignore"):
         for i in order:
             operation, *operands = nodes[i]

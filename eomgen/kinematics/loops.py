@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from ..describe.mechanism import JointSpec, Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
+from ..graph.evaluate import evaluate
 from ..graph.rounding_bounds import vanishing
 from ..graph.substitute import substitute, symbols_of
+from ..graph.vectors import Vec3
 from ..limits.rounding import ROUNDED
 from ..records import dataclass
 from .angle_sums import sum_of_turns
@@ -90,6 +94,8 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
     else:
         rows = spec.joint.closure(graph, rotation, position)
     if {r.label for r in rows} >= {"r_x", "r_y", "r_z"}:  # all three vanish: any axes do, common ones are simplest
+        if turns is not None:
+            gap = _in_plane(gap, (outer.rotation[0][2], outer.rotation[1][2], outer.rotation[2][2]))
         free = dict(zip(("r_x", "r_y", "r_z"), gap, strict=True))
         rows = [r._replace(expression=free.get(r.label, r.expression)) for r in rows]
     measured = spec.joint.measure(graph, rotation, position)
@@ -98,6 +104,24 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
     labelled = [Row(f"{spec.name}.{r.label}", r.expression, r.kind) for r in rows]
     wrapping = [] if turns is not None or spec.joint.counts_turns else [spec.coordinates[k] for k in angles]
     return ClosedLoop(labelled, measured, spec.joint.aligned(rotation), wrapping)
+
+
+def _in_plane(gap: Vec3, axis: Vec3) -> Vec3:
+    """A gap in axes of which the third is across the plane of its loop, so that nothing is left along it.
+
+    Axes in which a component vanishes already are kept, and so is a gap that is in no plane.
+    """
+    graph = gap[0].graph
+    if any(vanishing(gap)):
+        return gap
+    names = sorted(symbols_of(axis))
+    values = dict(zip(names, np.random.default_rng(5).uniform(0.2, 1.4, len(names)).tolist(), strict=True))
+    across = np.array(evaluate(list(axis), values), dtype=float)
+    first = np.cross(across, np.eye(3)[int(np.argmin(np.abs(across)))])
+    first /= np.linalg.norm(first)
+    rows = [[graph.constant(x) for x in row.tolist()] for row in (first, np.cross(across, first), across)]
+    turned = [vec.dot((x, y, z), gap) for x, y, z in rows]
+    return (turned[0], turned[1], turned[2]) if vanishing(turned[2:])[0] else gap
 
 
 def differentiate_constraints(

@@ -95,27 +95,47 @@ def _walk(n: int, joints: Sequence[JointSpec], tree: Collection[int]) -> list[Br
     return branches
 
 
-def _cycle(joints: Sequence[JointSpec], branches: Sequence[Branch], cut: int) -> list[int]:
-    """Tree joints on the loop that joint ``cut`` closes."""
-    above = {b.body: b for b in branches}
+class _Depths:
+    """How far the bodies of a tree are from ground, and what another cut of a loop would change in the sum of that."""
 
-    def chain(body: int) -> list[int]:
-        result = []
-        while body != GROUND:
-            result.append(above[body].joint)
-            body = above[body].parent
-        return result
+    def __init__(self, joints: Sequence[JointSpec], branches: Sequence[Branch]) -> None:
+        self.joints = joints
+        self.above = {b.body: b for b in branches}
+        self.depth = {GROUND: 0}
+        for b in branches:
+            self.depth[b.body] = self.depth[b.parent] + 1
+        self.carried = dict.fromkeys(self.above, 1)  #: bodies that hang on each, itself included
+        for b in reversed(branches):
+            if b.parent != GROUND:
+                self.carried[b.parent] += self.carried[b.body]
 
-    a, b = (chain(end) for end in _ends(joints[cut]))
-    return sorted(set(a) ^ set(b))
+    def _down_to(self, body: int, top: int) -> list[int]:
+        """Bodies on the way from below ``top`` to ``body``."""
+        found = []
+        while body != top:
+            found.append(body)
+            body = self.above[body].parent
+        return found[::-1]
 
-
-def _length(branches: Sequence[Branch]) -> int:
-    """Sum over bodies of the number of joints to ground."""
-    depth = {GROUND: 0}
-    for b in branches:
-        depth[b.body] = depth[b.parent] + 1
-    return sum(depth.values())
+    def changes(self, cut: int) -> dict[int, int]:
+        """By each tree joint on the loop that joint ``cut`` closes: how much longer all is if it is cut instead."""
+        a, b = _ends(self.joints[cut])
+        top, other = a, b
+        while top != other:
+            if self.depth[top] < self.depth[other]:
+                top, other = other, top
+            top = self.above[top].parent
+        found: dict[int, int] = {}
+        for here, there in ((a, b), (b, a)):
+            side, far = self._down_to(here, top), self.depth[there]
+            alone = [self.carried[x] for x in side]
+            for k in range(len(side) - 1):
+                alone[k] -= self.carried[side[k + 1]]
+            change = 0
+            for k in reversed(range(len(side))):  # what is below the joint of this body hangs on the other side then
+                change += alone[k] * (far + len(side) - k - self.depth[side[k]])
+                found[self.above[side[k]].joint] = change
+        return found
 
 
 def _check_tree(mechanism: Mechanism, tree: Collection[int], branches: Sequence[Branch]) -> None:
@@ -158,21 +178,18 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
     tree = {k for k in order if joints[k].joint.role != "loop" and forest.join(*_ends(joints[k]))}
     branches = _walk(n, joints, tree)
     _check_tree(mechanism, tree, branches)
+    depths = _Depths(joints, branches)
     improved = True
     while improved:
         improved = False
         for cut in sorted(set(range(len(joints))) - tree):
-            best = (_length(branches), -cut)
-            swap = None
-            for other in _cycle(joints, branches, cut):
-                if rank[other] != rank[cut]:
-                    continue
-                candidate = _walk(n, joints, tree - {other} | {cut})
-                score = (_length(candidate), -other)
-                if score < best:
-                    best, swap = score, other
+            best, swap = (0, -cut), None
+            for other, longer in sorted(depths.changes(cut).items()):
+                if rank[other] == rank[cut] and (longer, -other) < best:
+                    best, swap = (longer, -other), other
             if swap is not None:
                 tree = tree - {swap} | {cut}
                 branches = _walk(n, joints, tree)
+                depths = _Depths(joints, branches)
                 improved = True
     return Topology(tuple(branches), tuple(sorted(set(range(len(joints))) - tree)))

@@ -61,6 +61,9 @@ PASSED = 1e-4
 #: Least square of the sine between a column of pivots and those before it, in straight-line code that may fall back to
 #: pivoting: an angle of 3e-3, beyond which accelerations keep eight digits; and where it must not, of rounding alone.
 LOST, VANISHED = 1e-5, 1e-20
+#: Least part of an inertia, or of what a constraint's multiplier moves, that elimination may leave of it in code that
+#: may fall back to pivoting: accelerations keep eleven digits.
+KEPT = 1e-5
 
 # -- the same --------------------------------------------------------------------------------------------------------
 ALIKE = 1e-13  #: relative difference of two inputs that count as one: 500 eps

@@ -14,7 +14,8 @@ from ..limits.constraints import STRUCTURE as TOLERANCE
 from . import algebra
 from .scales import Array, Indices
 
-ENUMERATED = 500  #: at most so many sets of coordinates are compared one by one
+#: At most so many sets of coordinates are compared one by one, where that takes at most so many singular values.
+ENUMERATED, DECOMPOSED = 500, 20_000
 
 
 class Rank(NamedTuple):
@@ -67,10 +68,11 @@ def redundant_rows(J: Array, rank: int, labels: Sequence[str]) -> list[str]:
     return [label for row, label in enumerate(labels) if row not in kept]
 
 
-def conditioning(J: Array, independent: Sequence[int] | Indices) -> float:
+def conditioning(J: Array, independent: Sequence[int] | Indices, size: float | None = None) -> float:
     """How well a set of independent coordinates moves the mechanism: 1 is perfect, 0 not at all.
 
-    The smallest singular value of J_d divided by the largest of J, where d are the other columns.
+    The smallest singular value of J_d divided by the largest of J, where d are the other columns; ``size`` is that
+    largest one, where it is known already.
     """
     n = J.shape[1]
     dependent = np.delete(np.arange(n), np.asarray(independent, dtype=np.intp))
@@ -79,7 +81,7 @@ def conditioning(J: Array, independent: Sequence[int] | Indices) -> float:
     values = algebra.singular_values(J[:, dependent])
     if len(values) < len(dependent):
         return 0.0
-    size = algebra.norm2(J)
+    size = algebra.norm2(J) if size is None else size
     return float(values[len(dependent) - 1] / size) if size else 0.0
 
 
@@ -104,13 +106,15 @@ def choose_independent(jacobians: Sequence[Array], rank: int, prefer: Sequence[i
     size = n - rank
     order = list(dict.fromkeys([*prefer, *range(n)]))  # earlier wins among equals
 
-    def worst(columns: Sequence[int]) -> float:
-        return min(conditioning(J, columns) for J in jacobians)
+    largest = [algebra.norm2(J) for J in jacobians]
 
-    if comb(n, size) <= ENUMERATED:
+    def worst(columns: Sequence[int]) -> float:
+        return min(conditioning(J, columns, most) for J, most in zip(jacobians, largest, strict=True))
+
+    if comb(n, size) <= min(ENUMERATED, DECOMPOSED // n):
         sets: list[tuple[int, ...]] = list(combinations(order, size))
     else:
-        sets = [_eliminate(J, rank, order) for J in jacobians]
+        sets = list(dict.fromkeys(_eliminate(J, rank, order) for J in jacobians))
         if len(prefer) >= size:
             sets.append(tuple(order[:size]))
     scores = [worst(columns) for columns in sets]
@@ -126,15 +130,30 @@ def choose_independent(jacobians: Sequence[Array], rank: int, prefer: Sequence[i
 
 
 def _eliminate(J: Array, rank: int, order: Sequence[int]) -> tuple[int, ...]:
-    """Independent columns by column pivoting from the back of `order`, so that its front stays independent."""
-    work = np.array(J)
-    dependent: list[int] = []
-    backwards = list(reversed(order))
-    for _ in range(rank):
+    """Independent columns by pivoting, so that the front of `order` stays independent.
+
+    Few dependent columns are found from the back of `order` by elimination in J; few independent ones from its front,
+    by elimination in the motions that J allows.
+    """
+    if len(order) - rank < rank:
+        motions = algebra.svd(J)[2][rank:]
+        found = _pivots(motions, len(order) - rank, list(order))
+        return tuple(c for c in order if c in found)
+    dependent = _pivots(J, rank, list(reversed(order)))
+    return tuple(c for c in order if c not in dependent)
+
+
+def _pivots(rows: Array, count: int, order: Sequence[int]) -> set[int]:
+    """Columns that span the column space: each the first in `order` that is not much nearer to the span than others."""
+    work, chosen = np.array(rows), set[int]()
+    places = np.array(order, dtype=np.intp)
+    for _ in range(count):
         length = np.linalg.norm(work, axis=0)
-        length[dependent] = 0.0
-        column = next(c for c in backwards if length[c] >= 0.3 * length.max() and c not in dependent)
-        dependent.append(column)
+        length[list(chosen)] = 0.0
+        column = int(places[np.flatnonzero(length[places] >= 0.3 * length.max())[0]])
+        if column in chosen:  # nothing is left to choose by
+            column = next(c for c in order if c not in chosen)
+        chosen.add(column)
         direction = work[:, column] / (length[column] or 1.0)
         work -= np.outer(direction, direction @ work)
-    return tuple(c for c in order if c not in dependent)
+    return chosen

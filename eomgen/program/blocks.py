@@ -14,10 +14,11 @@ from ..kernel_table import DAE, NAMED, Sizes
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
 from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
 from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
-from .loop_blocks import LoopBlocks
+from .loop_blocks import LoopBlocks, estimate
 from .program import Block, Limits, Port
 from .terms import Row, SystemTerms
 
+COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h, C_q and gamma are put together from
 RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
 
 #: Kernels that are derivatives by something other than the state -> what.
@@ -54,12 +55,15 @@ class BlockMaker:
     def _loops(self) -> LoopBlocks | None:
         """The straight-line form of a right-hand side with loops, if it is not too long."""
         terms = self.terms
-        if not self.has_loops or not self.sizes.n_dof or not terms.mass_matrix:
+        if not self.has_loops or not self.sizes.n_dof or not (terms.mass_matrix or terms.by_columns):
             return None
-        if terms.given_rates or terms.system is not None or not terms.projects:
+        if terms.given_rates or terms.system is not None or not terms.projects or not self.limits.unrolled_loops:
             return None
         loops = LoopBlocks(terms)
-        return loops if loops.determined and loops.estimate() <= self.limits.unrolled_loops else None
+        if loops.by_bodies is not None or terms.by_columns:
+            return loops if loops.by_bodies is not None else None
+        short = estimate(terms.constraint_jacobian, terms.n_dof) <= self.limits.unrolled_loops
+        return loops if short and loops.determined else None
 
     @cached_property
     def outputs_need_accelerations(self) -> bool:
@@ -266,13 +270,14 @@ class BlockMaker:
             return ("dae_tangent",)
         residual = "residual_tangent" if self.by_direction else "residual_jacobian"
         shift = SHIFTS.get(name)
-        if shift and self.terms.by_columns:
+        if shift and self.terms.by_columns and not self.has_loops:
             return (f"{shift}_acceleration",)
         if shift and not self.has_loops:
             return ("mass_matrix", "bias", "scales", f"{shift}_shift")
+        formed = COMPOSED if self.terms.by_columns else ("terms",)
         if shift:
-            return ("scales", "position", "rate", "terms", residual, f"{shift}_shift")
-        if self.terms.by_columns:
+            return ("scales", "position", "rate", *formed, residual, f"{shift}_shift")
+        if self.terms.by_columns and (not self.has_loops or name == "mass_matrix"):
             if name != "jacobian":
                 return ("mass_times",)
             return ("acceleration_tangent",) if self.by_direction else ("terms", "scales", "residual_jacobian")
@@ -286,15 +291,16 @@ class BlockMaker:
                 "outputs": (*terms, "accelerated_outputs"),
             }[name]
         project = ("scales", "position", "rate")
-        accelerate = ("terms",) if self.outputs_need_accelerations else ()
+        accelerate = formed if self.outputs_need_accelerations else ()
+        mass = "mass_times" if self.terms.by_columns else "mass_matrix"
         direct = ("closing", "dynamics") if self._loops is not None else ()
         return {
-            "rhs": (*project, "terms", *direct),
-            "jacobian": (*project, "terms", residual),
-            "embedded_mass_matrix": ("scales", "position", "mass_matrix"),
+            "rhs": (*project, *formed, *direct),
+            "jacobian": (*project, *formed, residual),
+            "embedded_mass_matrix": ("scales", "position", mass),
             "project": project,
             "outputs": (*project, *accelerate, "accelerated_outputs"),
-            "kinematics": (*project, "terms"),
+            "kinematics": (*project, *formed),
         }[name]
 
     def _system_needs(self, name: str, residual: str) -> tuple[str, ...]:
@@ -324,6 +330,8 @@ class BlockMaker:
                 assert self._loops is not None
                 outputs, checks = self._loops.dynamics()
                 return self._internal(name, "q v", outputs, [*self._turned, *checks])
+            case "gamma":
+                return self._internal(name, "q v", terms.gamma)
             case "rate":  # C_t
                 return self._internal(name, "q", terms.constraint_rate)
             case "system":  # entries of K, then r, then sizes of equations and of unknowns

@@ -1,4 +1,4 @@
-"""Stage program: Kinematics of a tree -> the method whose right-hand side takes fewer operations, and both counts."""
+"""Stage program: Kinematics -> the method whose right-hand side takes fewer operations, and both counts."""
 
 from __future__ import annotations
 
@@ -6,9 +6,14 @@ from collections.abc import Mapping
 
 from ..equations import METHODS, TreeEquations
 from ..graph.count import count
+from ..graph.evaluate import compile_evaluator
 from ..kinematics import Kinematics
+from ..kinematics.loads import drives_cut_joint
+from ..kinematics.mobility import Mobility
 from ..records import dataclass
+from .collect import collect_terms
 from .factor import factoring_operations, factorize, is_unrolled, solve
+from .loop_blocks import LoopBlocks, estimate
 from .program import Limits
 
 
@@ -32,8 +37,58 @@ class Choice:
         return f"{self.method} chosen; operations of the right-hand side: {counts}"
 
 
-def choose(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
-    """Derive a tree without loops by ``embedding`` and by ``recursive``; keep the one that takes fewer operations.
+def choose(kinematics: Kinematics, mobility: Mobility) -> tuple[TreeEquations, Choice | None]:
+    """Derive by ``embedding`` and by ``recursive``; keep the one whose right-hand side takes fewer operations."""
+    if drives_cut_joint(kinematics):  # its inertia couples branches: what recursion cannot have
+        return METHODS["embedding"](kinematics), None
+    if kinematics.constraints.labels:
+        return _choose_with_constraints(kinematics, mobility)
+    return _choose_of_tree(kinematics)
+
+
+def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tuple[TreeEquations, Choice | None]:
+    """By the operations once the state is on the constraints, which takes the same in both.
+
+    An embedded system that is too large to be written out is not derived.  Joints that move (almost) no mass by
+    themselves, as those of light rods may, are for embedding.
+    """
+    operations: dict[str, int] = {}
+    factors = estimate(kinematics.constraints.jacobian, mobility.n_dof)
+    embedding = None
+    if not mobility.n_dof or factors <= Limits().unrolled_loops:
+        embedding = METHODS["embedding"](kinematics)
+        embedded = LoopBlocks(collect_terms(kinematics, mobility, embedding))
+        if not mobility.n_dof or not embedded.determined:
+            return embedding, None
+        operations["embedding"] = _count(embedded)
+    recursive = METHODS["recursive"](kinematics)
+    bodies = LoopBlocks(collect_terms(kinematics, mobility, recursive))
+    if bodies.by_bodies is None or not _is_sound(kinematics, mobility, bodies):
+        return embedding or METHODS["embedding"](kinematics), None
+    operations["recursive"] = _count(bodies)
+    if embedding is not None and operations["embedding"] <= operations["recursive"]:
+        return embedding, Choice("embedding", operations)
+    return recursive, Choice("recursive", operations)
+
+
+def _count(blocks: LoopBlocks) -> int:
+    outputs, checks = blocks.dynamics()
+    return count([*outputs, *checks]).total
+
+
+def _is_sound(kinematics: Kinematics, mobility: Mobility, bodies: LoopBlocks) -> bool:
+    """Whether articulated bodies can be used at the reference and at most other configurations of the mechanism."""
+    m = kinematics.mechanism
+    numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
+    known = (*kinematics.names, *kinematics.velocity_names, *numbers, "t")
+    evaluate = compile_evaluator([bodies.is_sound], known)
+    rest = [0.0] * len(kinematics.velocity_names)
+    found = [bool(evaluate([*sample, *rest, *numbers.values(), 0.0])[0] == 1.0) for sample in mobility.samples]
+    return found[0] and 2 * sum(found) > len(found)
+
+
+def _choose_of_tree(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
+    """Without constraints.
 
     The mass matrix of a large tree is not even formed where factoring it would take more than the recursive method does
     in all.

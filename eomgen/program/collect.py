@@ -24,6 +24,7 @@ from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
 from .drawn import describe_picture
+from .factor import path
 from .given_multipliers import multiplier_values
 from .program import Limits
 from .rolling_discs import describe_discs
@@ -31,12 +32,20 @@ from .soundness import flag_forces
 from .terms import SystemTerms
 
 
-def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEquations) -> SystemTerms:
-    """Put together every expression that functions are generated from."""
+def collect_terms(
+    kinematics: Kinematics, mobility: Mobility, equations: TreeEquations, *, in_c: bool = True
+) -> SystemTerms:
+    """Put together every expression that functions are generated from.
+
+    In C the mass matrix of a large system with loops is made column by column, as that of a large tree always is.
+    """
     c, loop = kinematics.constraints, kinematics.loop_coordinates
     names = kinematics.names
     length = kinematics.length_scale
     by_columns = equations.accelerations is not None and len(kinematics.v) > Limits().unrolled
+    if c.labels and equations.constrained is not None and in_c:
+        entries = sum(len(path(kinematics.parent, k)) for k in range(len(kinematics.v)))
+        by_columns = entries > Limits().unrolled * len(kinematics.v)
     scale = {"length": length, "angle": kinematics.graph.one}
     return SystemTerms(
         graph=kinematics.graph,
@@ -79,6 +88,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         wrenches=find_wrenches(kinematics),
         system=equations.system,
         turned=equations.turned,
+        constrained=equations.constrained if c.labels else None,
         events=tuple(resolved([e.expression for e in kinematics.mechanism.events], kinematics, equations)),
         resets=tuple(resolved([x for _, _, x in _resets(kinematics)], kinematics, equations)),
         input_rates=tuple(_rate_pairs(kinematics)),

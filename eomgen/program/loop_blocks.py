@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
+from ..equations.articulated import ConstraintRow, TreeMotion
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..limits.constraints import GENTLE, LEFT, LOST, TIKHONOV, UNMOVED, VANISHED
+from ..limits.constraints import GENTLE, KEPT, LEFT, LOST, TIKHONOV, UNMOVED, VANISHED
 from ..limits.crossings import NEAR_SQUARE
 from ..limits.inertia import STILL
 from ..limits.rounding import ROW
-from .factor import exceeding
+from .factor import exceeding, outward
 from .sparse import Row, SparseFactor, dot, factorize, fill, gram, rows_of, times, transpose
 from .terms import SystemTerms
 from .triangular import DiagonalBlock, diagonal_blocks
@@ -25,6 +26,7 @@ from .triangular import DiagonalBlock, diagonal_blocks
 #: Linear corrections with GENTLE of velocities, whose errors gamma squares, and of accelerations; where weak rows keep
 #: something, drivers take more.
 PASSES = 5, 4
+FEWER = 3, 1  #: where articulated bodies find the accelerations: what is left is looked at
 NOTHING = 1e-100  #: what is this small need not be told from 0
 LARGE = 8  #: velocities above which configurations of lost rank are passed here too, pivoting being slow
 SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast as independent ones (scaled)
@@ -62,6 +64,18 @@ def summands(x: Expr) -> list[Expr]:
     return found
 
 
+def estimate(jacobian: Sequence[Sequence[Expr]], n_dof: int) -> int:
+    """About how many multiplications the linear algebra of the embedded system takes, by the pattern of C_q (m, n)."""
+    touching: dict[int, set[int]] = {}
+    held = [[k for k, x in enumerate(row) if not x.is_zero] for row in jacobian]
+    for i, row in enumerate(held):
+        for k in row:
+            touching.setdefault(k, set()).add(i)
+    n = len(jacobian[0]) if jacobian else 0
+    pattern = [dict.fromkeys(sorted({j for k in row for j in touching[k]})) for row in held]
+    return 2 * fill(pattern) + n * n_dof * n_dof + n_dof**3 // 6
+
+
 class LoopBlocks:
     """The expressions of both blocks.
 
@@ -88,23 +102,26 @@ class LoopBlocks:
         #: squares of a column of the dependent coordinates, and of its part across those before it
         self._angles: dict[tuple[Expr, Expr], None] = {}
 
+    @cached_property
+    def by_bodies(self) -> TreeMotion | None:
+        """The accelerations by articulated bodies, at the given velocities; None where some joint moves no mass."""
+        terms = self.terms
+        if terms.constrained is None:
+            return None
+        rows = [ConstraintRow(row, x * i) for row, x, i in zip(self.rows, terms.gamma, self.inverse, strict=True)]
+        solved = terms.constrained(rows, TIKHONOV if self.redundant else 0.0)
+        return None if any(d.is_zero for d in solved.pivots) else solved
+
+    @property
+    def redundant(self) -> bool:
+        """Whether there are more rows than their rank."""
+        return len(self.J) > self.terms.n_v - self.terms.n_dof
+
     @property
     def determined(self) -> bool:
         """Whether some row holds each dependent coordinate; else the preferred partition is never sound."""
         held = {k for row in self.J for k in row}
         return held.issuperset(k for k in range(self.terms.n_v) if k not in self.terms.preferred)
-
-    def estimate(self) -> int:
-        """About how many multiplications the linear algebra takes."""
-        n, f = self.terms.n_v, self.terms.n_dof
-        pattern: list[dict[int, object]] = [{} for _ in self.J]
-        touching: dict[int, set[int]] = {}
-        for i, row in enumerate(self.J):
-            for k in row:
-                touching.setdefault(k, set()).add(i)
-        for i, row in enumerate(self.J):
-            pattern[i] = dict.fromkeys(sorted({j for k in row for j in touching[k]}))
-        return 2 * fill(pattern) + n * f * f + f**3 // 6
 
     def _regularised(self, rows: Sequence[Row], relative: Expr | float) -> tuple[SparseFactor, Expr]:
         """The factor of J J^T + relative max(diag) I, and what was added."""
@@ -146,10 +163,8 @@ class LoopBlocks:
     def _factor(self) -> tuple[SparseFactor, tuple[int, int]]:
         """The factor of J J^T, and how many passes of both corrections by it leave no trace of its regularisation."""
         if self.gentle:
-            factor, term = self._regularised(self.J, GENTLE)
-            self._rows_size = term * (1.0 / GENTLE)
-            return factor, PASSES
-        if len(self.J) > self.terms.n_v - self.terms.n_dof:  # redundant rows
+            return self._regularised(self.J, GENTLE)[0], PASSES if self.by_bodies is None else FEWER
+        if self.redundant:
             return self._regularised(self.J, TIKHONOV)[0], (2, 2)
         return factorize(gram(self.J)), (1, 1)
 
@@ -180,6 +195,8 @@ class LoopBlocks:
         rate = [x * i for x, i in zip(terms.constraint_rate, self.inverse, strict=True)]
         conditions: list[Expr] = []
         moved = self._corrected(v, rate, conditions)
+        if self.by_bodies is not None:
+            return self._by_bodies(self.by_bodies, moved, conditions)
         here = substitute([*terms.bias, *terms.gamma], dict(zip(v, moved, strict=True)))
         gamma = [x * i for x, i in zip(here[terms.n_v :], self.inverse, strict=True)]
         if self.gentle:
@@ -209,21 +226,64 @@ class LoopBlocks:
                 checks.append(graph.apply("lt", reach * STILL, factor.pivots[0]))
         return [*moved, *a, sound, self._far()], checks
 
+    def _by_bodies(
+        self, solved: TreeMotion, moved: list[Expr], conditions: list[Expr]
+    ) -> tuple[list[Expr], list[Expr]]:
+        """The same, accelerations by articulated bodies that carry the multipliers: no partition, no mass matrix."""
+        terms, graph = self.terms, self.terms.graph
+        conditions += self._kept(solved)
+        gamma = [x * i for x, i in zip(terms.gamma, self.inverse, strict=True)]
+        v = [graph.symbol(name) for name in terms.v]
+        here = substitute([*solved.accelerations, *gamma], dict(zip(v, moved, strict=True)))
+        a, gamma = here[: terms.n_v], here[terms.n_v :]
+        left = [x + y for x, y in zip(gamma, times(self.rows, a), strict=True)]
+        size = total_magnitude([x * (1.0 / s) for x, s in zip(a, self.s, strict=True)])
+        conditions.append(graph.apply("lt", total_magnitude(left) * self.unit, size * LEFT + NOTHING))
+        dz = times(transpose(self.J, terms.n_v), self._factor[0].solve(left))
+        a = [x - s * d for x, s, d in zip(a, self.s, dz, strict=True)]
+        return [*moved, *a, self._all(conditions), self._far()], []
+
+    def _kept(self, solved: TreeMotion) -> list[Expr]:
+        """Conditions: elimination leaves enough of each inertia, and of what each multiplier moves."""
+        pivots = [d * s * s for d, s in zip(solved.pivots, self.s, strict=True)]
+        kept = list(zip(outward(pivots, self.terms.parent), pivots, strict=True))
+        if not self.redundant:
+            kept += zip(solved.row_sizes, solved.row_pivots, strict=True)
+        return [self.terms.graph.apply("lt", size * KEPT, pivot) for size, pivot in kept]
+
+    @property
+    def is_sound(self) -> Expr:
+        """Whether articulated bodies can be used at a position."""
+        return self._all(self._kept(self.by_bodies)) if self.by_bodies else self.terms.graph.zero
+
+    def _all(self, conditions: Sequence[Expr]) -> Expr:
+        """Whether all conditions hold."""
+        sound = self.terms.graph.one
+        for condition in conditions:
+            sound = condition if sound == self.terms.graph.one else self.terms.graph.apply("and", sound, condition)
+        return sound
+
     def _far(self) -> Expr:
         """1 where no change point can be near: by the columns of the dependent coordinates, which a dead centre of the
-        independent ones makes nearly parallel too, or by the rows of all, which tell only without redundant ones.
+        independent ones makes nearly parallel too, or by the rows of all; of redundant ones some keep nothing.
         """
-        graph, far = self.terms.graph, self.terms.graph.one
-        for size, part in self._angles:
-            condition = graph.apply("lt", size * NEAR_SQUARE, part)
-            far = condition if far == graph.one else graph.apply("and", far, condition)
-        if self.gentle and far != graph.one and len(self.J) == self.terms.n_v - self.terms.n_dof:
-            pivots = self._factor[0].pivots
-            least = pivots[0]
-            for pivot in pivots[1:]:
-                least = graph.apply("min", least, pivot)
-            far = graph.apply("or", far, graph.apply("lt", self._rows_size * NEAR_SQUARE, least))
+        graph = self.terms.graph
+        far = self._all([graph.apply("lt", size * NEAR_SQUARE, part) for size, part in self._angles])
+        by_rows = self.by_bodies is not None
+        if by_rows or (self.gentle and far != graph.one and not self.redundant):
+            separate = self._separate_rows()
+            far = separate if by_rows else graph.apply("or", far, separate)
         return far
+
+    def _separate_rows(self) -> Expr:
+        """Whether as many rows as the rank are neither short beside the longest nor near to those before them."""
+        graph, pivots = self.terms.graph, self._factor[0].pivots
+        squares = [graph.zero if (x := dot(row, row)) is None else x for row in self.J]
+        held, limit = graph.zero, largest(squares) * NEAR_SQUARE
+        for pivot, square in zip(pivots, squares, strict=True):
+            separate = graph.apply("lt", square * NEAR_SQUARE, pivot)
+            held = held + graph.apply("and", separate, graph.apply("lt", limit, square))
+        return graph.apply("lt", self.terms.n_v - self.terms.n_dof - 0.5, held)
 
     # -- partition ------------------------------------------------------------------------------------------------
     def _partition(self, y: list[Expr] | None, conditions: list[Expr]) -> tuple[list[Row], list[Expr], Expr]:
@@ -258,10 +318,7 @@ class LoopBlocks:
                     B[i][j] = value
                     sizes.setdefault(SPREAD * self.s[i] / self.s[k], []).append(graph.apply("abs", value))
         conditions += [graph.apply("lt", largest(values), most) for most, values in sizes.items()]
-        sound = graph.one
-        for condition in conditions:
-            sound = condition if sound == graph.one else graph.apply("and", sound, condition)
-        return B, x, sound
+        return B, x, self._all(conditions)
 
     def _substitute(
         self, rows: list[Row], blocks: list[DiagonalBlock], right: Sequence[Expr], conditions: list[Expr]

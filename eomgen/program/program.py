@@ -165,12 +165,17 @@ class Program:
     @property
     def composes_terms(self) -> bool:
         """Whether drivers put ``terms`` together from ``mass_matrix`` and ``bias``."""
-        return not self.has_loops and not self.by_columns and any("bias" in d.blocks for d in self.drivers)
+        return not self.tree_by_columns and any("bias" in d.blocks for d in self.drivers)
 
     @property
     def by_columns(self) -> bool:
-        """Whether drivers make the mass matrix and the Jacobian of a tree column by column."""
+        """Whether drivers make the mass matrix, and the Jacobian of a tree, column by column."""
         return not self.block_names.isdisjoint(BY_COLUMNS)
+
+    @property
+    def tree_by_columns(self) -> bool:
+        """Whether that is a tree, whose drivers need nothing else."""
+        return self.by_columns and not self.has_loops
 
     @property
     def kernels(self) -> tuple[Block | KernelDriver, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ..equations.articulated import TreeMotion
 from ..equations.tree_equations import LinearSystem
 from ..equations.tree_slopes import ForceSlopes
 from ..errors import UsageError
@@ -76,6 +77,7 @@ class SystemTerms:
     slopes: Callable[[], ForceSlopes] | None = None  #: derivatives of the inverse dynamics by recursion
     canonical: Row = ()  #: (2n,) of (q, v), by method hamilton: momenta and their rates
     turned: Turned | None = None  #: the tree's system in other velocities, in which it is solved; else None
+    constrained: Callable[..., TreeMotion] | None = None  #: constraint rows -> a, by articulated bodies; else None
     events: Row = ()  #: of (q, v): their zeros are the events of the model
     resets: Row = ()  #: of (q, v): new values of states after events
     input_rates: tuple[tuple[str, str], ...] = ()  #: inputs with the input that is their rate
@@ -118,8 +120,8 @@ class SystemTerms:
 
     @property
     def by_columns(self) -> bool:
-        """Whether the mass matrix is not written out: entries would be many, and nothing but itself needs them."""
-        return self.accelerations is not None and self.n_v > 0 and not self.mass_matrix
+        """Whether the mass matrix is not written out: entries would be many, and little needs them."""
+        return (self.accelerations or self.constrained) is not None and self.n_v > 0 and not self.mass_matrix
 
     def check_shapes(self) -> None:
         """Refuse terms whose sizes contradict each other.

@@ -26,6 +26,7 @@ def test_methods_import_only_what_they_may_share() -> None:
         "newton_euler": {"free_bodies", "free_body_system"},
         "amalgamated": {"free_bodies", "free_body_system"},
         "augmented": {"", "armature"},
+        "recursive": {"articulated"},
     }
     for name in METHODS:
         allowed = common | families.get(name, set())

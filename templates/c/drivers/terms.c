@@ -1,6 +1,6 @@
-/* M packed row by row, lower triangle, and h of a tree. */
-static int terms_block(double t, const double *restrict x, const double *restrict u, const double *restrict c,
-                       double *restrict out, double *restrict w)
+/* M packed row by row, lower triangle, and h. */
+static int tree_terms(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                      double *restrict out, double *restrict w)
 {
     const double *const full = w + AT_FULL;
     (void)mass_matrix_block(t, x, u, c, w + AT_FULL, w);

@@ -1,0 +1,1 @@
+#define terms_block tree_terms
