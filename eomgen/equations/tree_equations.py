@@ -122,6 +122,10 @@ class TreeEquations:
         same.accelerations, same.pivots = None, ()
         return same
 
+    def take_mass_matrix(self, other: TreeEquations) -> None:
+        """Have the mass matrix of the same system by another method."""
+        self._mass_matrix = other._mass_matrix
+
     @property
     def mass_matrix(self) -> Rows:
         """M, row by row."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 
 from ..equations import METHODS, TreeEquations
 from ..graph.count import count
@@ -12,7 +13,7 @@ from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
 from ..records import dataclass
 from .collect import collect_terms
-from .factor import factoring_operations, factorize, is_unrolled, solve
+from .factor import factoring_operations, factorize, has_long_paths, is_unrolled, solve
 from .loop_blocks import LoopBlocks, estimate
 from .program import Limits
 
@@ -62,13 +63,27 @@ def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tupl
             return embedding, None
         operations["embedding"] = _count(embedded)
     recursive = METHODS["recursive"](kinematics)
+    if not has_long_paths(kinematics.parent):
+        embedding = embedding or METHODS["embedding"](kinematics)
+        recursive = _with_shorter(recursive, embedding)
     bodies = LoopBlocks(collect_terms(kinematics, mobility, recursive))
     if bodies.by_bodies is None or not _is_sound(kinematics, mobility, bodies):
         return embedding or METHODS["embedding"](kinematics), None
     operations["recursive"] = _count(bodies)
-    if embedding is not None and operations["embedding"] <= operations["recursive"]:
+    if embedding is not None and operations.get("embedding", operations["recursive"] + 1) <= operations["recursive"]:
         return embedding, Choice("embedding", operations)
     return recursive, Choice("recursive", operations)
+
+
+def _with_shorter(recursive: TreeEquations, embedding: TreeEquations) -> TreeEquations:
+    """The recursive form with the mass matrix, forces and inverse dynamics of the other where these are shorter."""
+    found = copy(recursive)
+    found.take_mass_matrix(embedding)
+    if count(list(embedding.bias)).total < count(list(recursive.bias)).total:
+        found.bias = embedding.bias
+    if count(list(embedding.inverse_dynamics)).total < count(list(recursive.inverse_dynamics)).total:
+        found.inverse_dynamics = embedding.inverse_dynamics
+    return found
 
 
 def _count(blocks: LoopBlocks) -> int:
@@ -98,7 +113,7 @@ def _choose_of_tree(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
     operations = {"recursive": count(list(recursive.accelerations)).total}
     factoring = factoring_operations(kinematics.parent)
     large = not is_unrolled(kinematics.parent, Limits().unrolled)
-    if large and factoring >= operations["recursive"]:
+    if factoring >= operations["recursive"] and has_long_paths(kinematics.parent):
         return recursive, Choice("recursive", {"embedding": factoring, **operations})
     embedding = METHODS["embedding"](kinematics)
     if large:
@@ -110,5 +125,5 @@ def _choose_of_tree(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
         solution = solve(factorize(mass, kinematics.parent), [-h for h in bias])
         total = count(turned.accelerations(solution) if turned else solution).total
     operations = {"embedding": total, **operations}
-    chosen = recursive if operations["recursive"] < total else embedding
+    chosen = _with_shorter(recursive, embedding) if operations["recursive"] < total else embedding
     return chosen, Choice(chosen.method, operations)

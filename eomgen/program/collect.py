@@ -24,9 +24,8 @@ from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
 from .drawn import describe_picture
-from .factor import path
+from .factor import has_long_paths
 from .given_multipliers import multiplier_values
-from .program import Limits
 from .rolling_discs import describe_discs
 from .soundness import flag_forces
 from .terms import SystemTerms
@@ -37,15 +36,13 @@ def collect_terms(
 ) -> SystemTerms:
     """Put together every expression that functions are generated from.
 
-    In C the mass matrix of a large system with loops is made column by column, as that of a large tree always is.
+    Where paths to ground are long the mass matrix of a recursive form is made column by column; with loops only in C.
     """
     c, loop = kinematics.constraints, kinematics.loop_coordinates
     names = kinematics.names
     length = kinematics.length_scale
-    by_columns = equations.accelerations is not None and len(kinematics.v) > Limits().unrolled
-    if c.labels and equations.constrained is not None and in_c:
-        entries = sum(len(path(kinematics.parent, k)) for k in range(len(kinematics.v)))
-        by_columns = entries > Limits().unrolled * len(kinematics.v)
+    recursive = equations.accelerations is not None or (c.labels and equations.constrained is not None and in_c)
+    by_columns = bool(recursive) and has_long_paths(kinematics.parent)
     scale = {"length": length, "angle": kinematics.graph.one}
     return SystemTerms(
         graph=kinematics.graph,

@@ -13,6 +13,8 @@ from ..graph.core import Expr
 from ..limits.inertia import NOTHING, SINGULAR
 from ..records import dataclass
 
+LONG = 24  #: velocities on the way to ground, on average, with which a mass matrix is written out
+
 
 @dataclass(frozen=True)
 class Factor:
@@ -128,6 +130,14 @@ def factoring_operations(parent: Sequence[int]) -> int:
         total += depth + depth * (depth + 1)  # ratios; products and differences
         total += 4 * depth + 1  # two substitutions, division by the pivot
     return total
+
+
+def has_long_paths(parent: Sequence[int]) -> bool:
+    """Whether the mass matrix has too many entries to be written out: more than :data:`LONG` for each velocity."""
+    depths: list[int] = []
+    for above in parent:
+        depths.append(depths[above] + 1 if above >= 0 else 1)
+    return sum(depths) > LONG * len(depths)
 
 
 def is_unrolled(parent: Sequence[int], limit: int) -> bool:

@@ -89,6 +89,14 @@ const eomgen_model *eomgen_model_table(void);
 #endif
 #endif
 
+/* ROWS: a function whose inner loops go along rows of numbers, several at a time where the processor can; no sum is taken
+   in another order, and nothing is contracted, so that the bits stay the same. */
+#if defined(__gnu_linux__) && defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define EOMGEN_ROWS __attribute__((optimize("O3"), target_clones("avx2", "default")))
+#else
+#define EOMGEN_ROWS
+#endif
+
 /* APART keeps pieces of very long code apart, so that compile time stays proportional to its length;
    PIECE marks a piece that lies in another file of the same library; SHARED a helper that not every model uses. */
 #if defined(__GNUC__)

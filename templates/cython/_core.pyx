@@ -18,7 +18,7 @@ from cpython.object cimport PyObject
 from cpython.pycapsule cimport PyCapsule_New
 from libc.math cimport NAN, isfinite
 from libc.stdint cimport int64_t, uintptr_t
-from libc.string cimport memcmp, memcpy
+from libc.string cimport memcmp, memcpy, memset
 
 import json
 import os
@@ -109,16 +109,6 @@ cdef cnp.ndarray copy(const double *data, cnp.npy_intp n):
     cdef cnp.ndarray array = cnp.PyArray_EMPTY(1, &n, cnp.NPY_DOUBLE, 0)
     memcpy(cnp.PyArray_DATA(array), data, n * sizeof(double))
     return array
-
-
-cdef cnp.ndarray compute_constants(cnp.ndarray p, object error):
-    """The constants (n_const,) that follow from the parameters (n_p,)."""
-    cdef cnp.npy_intp n = MODEL.n_const
-    cdef cnp.ndarray constants = cnp.PyArray_ZEROS(1, &n, cnp.NPY_DOUBLE, 0)
-    cdef int status = MODEL.precompute(<double *>cnp.PyArray_DATA(p), <double *>cnp.PyArray_DATA(constants))
-    if status != 0:
-        raise error(f"the constants that follow from the parameters cannot be computed (status {status}); p = {p}")
-    return constants
 
 
 cdef class Context:
@@ -234,17 +224,18 @@ cdef class Kernel:
         return data >= x + self.n_in or x >= data + self.n_out
 
     cdef object evaluate(self, object t, object x, object p, object u, object out):
-        """The fast way for one contiguous float64 state and the context's values; all else goes the general way."""
+        """The fast way for contiguous float64 vectors, one state; all else goes the general way."""
         cdef double[STACK] stack
         cdef double *w = stack
         cdef double *data
         cdef const double *state
+        cdef const double *inputs = self.u
+        cdef const double *constants = self.c
         cdef double now
         cdef cnp.npy_intp n_work = MODEL.n_work
         cdef int status, i
-        if (p is not None or u is not None or not cnp.PyArray_CheckExact(x)
-                or cnp.PyArray_TYPE(<cnp.ndarray>x) != cnp.NPY_DOUBLE or cnp.PyArray_NDIM(<cnp.ndarray>x) != 1
-                or cnp.PyArray_DIM(<cnp.ndarray>x, 0) != self.n_in or not cnp.PyArray_ISCARRAY_RO(<cnp.ndarray>x)):
+        if not (is_vector(x, self.n_in) and (u is None or is_vector(u, MODEL.n_u))
+                and (p is None or is_vector(p, MODEL.n_p))):
             return self.general(t, [("x", self.n_in, x)], p, u, out)
         now = moment(t, "t", self.error, self.name)
         state = <const double *>cnp.PyArray_DATA(<cnp.ndarray>x)
@@ -253,21 +244,32 @@ cdef class Kernel:
         elif not self.is_target(out, state):
             return self.general(t, [("x", self.n_in, x)], p, u, out)
         data = <double *>cnp.PyArray_DATA(<cnp.ndarray>out)
+        if u is not None:
+            inputs = <const double *>cnp.PyArray_DATA(<cnp.ndarray>u)
+            if data < inputs + MODEL.n_u and inputs < data + self.n_out:
+                return self.general(t, [("x", self.n_in, x)], p, u, out)
+        if p is not None:
+            n_work += MODEL.n_const
         if n_work > STACK:
             heap = cnp.PyArray_EMPTY(1, &n_work, cnp.NPY_DOUBLE, 0)
             w = <double *>cnp.PyArray_DATA(<cnp.ndarray>heap)
+        if p is not None:
+            fill_constants(<cnp.ndarray>p, w, self.error)
+            constants = w
+            w += MODEL.n_const
         if self.tolerant:
             for i in range(self.n_out):
                 data[i] = NAN
         if self.long:
             with nogil:
-                status = self.call(now, state, self.u, self.c, data, w)
+                status = self.call(now, state, inputs, constants, data, w)
         else:
-            status = self.call(now, state, self.u, self.c, data, w)
+            status = self.call(now, state, inputs, constants, data, w)
         if status != 0:
             for i in range(self.n_out):
                 data[i] = entry(data[i], status)
-            self.report(status, now, copy(state, self.n_in), ())
+            given = () if p is None and u is None else (p, copy(inputs, MODEL.n_u))
+            self.report(status, now, copy(state, self.n_in), given)
         return out
 
     cdef int report(self, int status, double t, cnp.ndarray x, tuple given) except -1:

@@ -124,3 +124,27 @@ cdef cnp.ndarray vector(object value, int n, str label, object error):
     if array.ndim != 1 or cnp.PyArray_DIM(array, 0) != n:
         raise error(f"{label} must have shape ({n},), not {(<object>array).shape}")
     return array
+
+
+cdef cnp.ndarray compute_constants(cnp.ndarray p, object error):
+    """The constants (n_const,) that follow from the parameters (n_p,)."""
+    cdef cnp.npy_intp n = MODEL.n_const
+    cdef cnp.ndarray constants = cnp.PyArray_EMPTY(1, &n, cnp.NPY_DOUBLE, 0)
+    fill_constants(p, <double *>cnp.PyArray_DATA(constants), error)
+    return constants
+
+
+cdef int fill_constants(cnp.ndarray p, double *constants, object error) except -1:
+    """The same into a place for them."""
+    memset(constants, 0, MODEL.n_const * sizeof(double))
+    cdef int status = MODEL.precompute(<double *>cnp.PyArray_DATA(p), constants)
+    if status != 0:
+        raise error(f"the constants that follow from the parameters cannot be computed (status {status}); p = {p}")
+    return 0
+
+
+cdef inline bint is_vector(object given, cnp.npy_intp n) noexcept:
+    """Whether C can read so many doubles in a row from it."""
+    return (cnp.PyArray_CheckExact(given) and cnp.PyArray_TYPE(<cnp.ndarray>given) == cnp.NPY_DOUBLE
+            and cnp.PyArray_NDIM(<cnp.ndarray>given) == 1 and cnp.PyArray_DIM(<cnp.ndarray>given, 0) == n
+            and cnp.PyArray_ISCARRAY_RO(<cnp.ndarray>given))

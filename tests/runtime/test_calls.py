@@ -51,6 +51,26 @@ def test_every_way_to_name_the_arguments_gives_the_same(arm: Any) -> None:
     )
 
 
+def test_results_may_overwrite_what_they_are_made_from(arm: Any) -> None:
+    """x, u or p in the memory of ``out``: read whole before it is written; lists and strided arrays mean the same."""
+    x, p, u = np.array([0.3, -0.4, 1.0, 2.0]), arm.p * 1.1, np.array([0.5, -0.2])
+    expected = arm.bind(p=p, u=u).rhs(0.5, x)
+    for start in range(5):
+        room = np.zeros(12)
+        inner = room[start : start + 2]
+        inner[:] = u
+        out = room[2:6]
+        np.testing.assert_array_equal(arm.rhs(0.5, x, p=p, u=inner, out=out), expected)
+        np.testing.assert_array_equal(out, expected)
+    room = np.concatenate([p, np.zeros(8)])
+    np.testing.assert_array_equal(arm.rhs(0.5, x, p=room[: len(p)], u=u, out=room[1:5]), expected)
+    strided = np.zeros((2, 3))
+    strided[:, 1] = u
+    for given in (u.tolist(), strided[:, 1], u.astype(np.float64)[::1], u.astype(">f8")):
+        np.testing.assert_array_equal(arm.rhs(0.5, x, p=p.tolist(), u=given), expected)
+        np.testing.assert_array_equal(arm.rhs(0.5, x, p=p, u=given), expected)
+
+
 def test_wrong_arguments_are_told_as_ever(arm: Any) -> None:
     x = np.zeros(4)
     positional: list[tuple[Any, ...]] = [
