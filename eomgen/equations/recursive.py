@@ -7,6 +7,7 @@ links' origins, gravity subtracted, so that linear velocities never appear.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 from ..frames import GROUND
@@ -120,19 +121,29 @@ def solve_tree(
     loads: list[Wrench],
     rows: Sequence[ConstraintRow] = (),
     term: float = 0.0,
+    loaded: bool = True,
 ) -> TreeMotion:
-    """v' of the tree, on which constraints may act; found in velocities of which some are turned."""
+    """v' of the tree, on which constraints may act; found in velocities of which some are turned.
+
+    Without ``loaded`` there are no forces, gravity and velocities: what the constraints alone make of their rests.
+    """
     turned, blocks = turn_links(kinematics)
-    afloat, still = falling(blocks), vec.zero(kinematics.graph)
+    still = vec.zero(kinematics.graph)
+    forces = coordinate_forces(kinematics)
+    if not loaded:
+        blocks = tuple(replace(b, gravity=None) for b in blocks)
+        products = loads = [(still, still)] * len(loads)
+        forces = [kinematics.graph.zero] * len(forces)
+    afloat = falling(blocks)
     bodies = ArticulatedBodies(
         turned.graph,
         turned.links,
         inertias,
         products,
         loads,
-        turn_forces(blocks, coordinate_forces(kinematics)),
+        turn_forces(blocks, forces),
         drive_inertias(kinematics),
-        [(still, still) if k in afloat else _base(kinematics) for k in range(len(turned.links))],
+        [(still, still) if k in afloat or not loaded else _base(kinematics) for k in range(len(turned.links))],
         [_turn_row(blocks, row) for row in rows],
         term,
     )

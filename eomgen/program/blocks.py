@@ -11,7 +11,9 @@ from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from ..kernel_table import DAE, NAMED, Sizes
+from .body_loops import BodyLoops
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
+from .embedded_loops import EmbeddedLoops
 from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
 from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .loop_blocks import LoopBlocks, estimate
@@ -59,11 +61,13 @@ class BlockMaker:
             return None
         if terms.given_rates or terms.system is not None or not terms.projects or not self.limits.unrolled_loops:
             return None
-        loops = LoopBlocks(terms)
-        if loops.by_bodies is not None or terms.by_columns:
-            return loops if loops.by_bodies is not None else None
-        short = estimate(terms.constraint_jacobian, terms.n_dof) <= self.limits.unrolled_loops
-        return loops if short and loops.determined else None
+        bodies = BodyLoops(terms)
+        if bodies.motion is not None or terms.by_columns:
+            return bodies if bodies.motion is not None else None
+        if estimate(terms.constraint_jacobian, terms.n_dof) > self.limits.unrolled_loops:
+            return None
+        loops = EmbeddedLoops(terms)
+        return loops if loops.determined else None
 
     @cached_property
     def outputs_need_accelerations(self) -> bool:

@@ -12,7 +12,9 @@ from ..kinematics import Kinematics
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
 from ..records import dataclass
+from .body_loops import BodyLoops
 from .collect import collect_terms
+from .embedded_loops import EmbeddedLoops
 from .factor import factoring_operations, factorize, has_long_paths, is_unrolled, solve
 from .loop_blocks import LoopBlocks, estimate
 from .program import Limits
@@ -58,7 +60,7 @@ def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tupl
     embedding = None
     if not mobility.n_dof or factors <= Limits().unrolled_loops:
         embedding = METHODS["embedding"](kinematics)
-        embedded = LoopBlocks(collect_terms(kinematics, mobility, embedding))
+        embedded = EmbeddedLoops(collect_terms(kinematics, mobility, embedding))
         if not mobility.n_dof or not embedded.determined:
             return embedding, None
         operations["embedding"] = _count(embedded)
@@ -66,8 +68,8 @@ def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tupl
     if not has_long_paths(kinematics.parent):
         embedding = embedding or METHODS["embedding"](kinematics)
         recursive = _with_shorter(recursive, embedding)
-    bodies = LoopBlocks(collect_terms(kinematics, mobility, recursive))
-    if bodies.by_bodies is None or not _is_sound(kinematics, mobility, bodies):
+    bodies = BodyLoops(collect_terms(kinematics, mobility, recursive))
+    if bodies.motion is None or not _is_sound(kinematics, mobility, bodies):
         return embedding or METHODS["embedding"](kinematics), None
     operations["recursive"] = _count(bodies)
     if embedding is not None and operations.get("embedding", operations["recursive"] + 1) <= operations["recursive"]:
@@ -91,10 +93,12 @@ def _count(blocks: LoopBlocks) -> int:
     return count([*outputs, *checks]).total
 
 
-def _is_sound(kinematics: Kinematics, mobility: Mobility, bodies: LoopBlocks) -> bool:
+def _is_sound(kinematics: Kinematics, mobility: Mobility, bodies: BodyLoops) -> bool:
     """Whether articulated bodies can be used at the reference and at most other configurations of the mechanism."""
     m = kinematics.mechanism
-    numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
+    numbers = {p.name: 1.0 if p.value is None else float(p.value) for p in m.parameters} | {
+        u.name: u.value for u in m.inputs
+    }
     known = (*kinematics.names, *kinematics.velocity_names, *numbers, "t")
     evaluate = compile_evaluator([bodies.is_sound], known)
     rest = [0.0] * len(kinematics.velocity_names)

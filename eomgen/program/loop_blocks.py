@@ -1,35 +1,26 @@
-"""Stage program: SystemTerms with loops -> the straight-line blocks of their right-hand side.
+"""Stage program: SystemTerms with loops -> what the straight-line blocks of their right-hand side have in common.
 
 ``closing`` is one Newton step onto the constraints, ``dynamics`` everything at the closed position: velocities brought
-onto the constraints, the preferred partition, the embedded system and the accelerations (the algorithms of
-:mod:`eomgen.numeric`, with every zero known).  Where ``dynamics`` says that the preferred partition is not well
-conditioned, drivers take another one.
+onto the constraints, then the accelerations, by the embedded system (:mod:`.embedded_loops`) or by articulated bodies
+(:mod:`.body_loops`), with every zero known.  Where ``dynamics`` says that it is not sound, drivers take the algorithms
+of :mod:`eomgen.numeric`, which pivot.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
 
-from ..equations.articulated import ConstraintRow, TreeMotion
 from ..graph.core import Expr
-from ..graph.substitute import substitute
-from ..limits.constraints import GENTLE, KEPT, LEFT, LOST, TIKHONOV, UNMOVED, VANISHED
+from ..limits.constraints import GENTLE, LEFT, TIKHONOV, UNMOVED
 from ..limits.crossings import NEAR_SQUARE
-from ..limits.inertia import STILL
 from ..limits.rounding import ROW
-from .factor import exceeding, outward
 from .sparse import Row, SparseFactor, dot, factorize, fill, gram, rows_of, times, transpose
 from .terms import SystemTerms
-from .triangular import DiagonalBlock, diagonal_blocks
 
-#: Linear corrections with GENTLE of velocities, whose errors gamma squares, and of accelerations; where weak rows keep
-#: something, drivers take more.
-PASSES = 5, 4
-FEWER = 3, 1  #: where articulated bodies find the accelerations: what is left is looked at
 NOTHING = 1e-100  #: what is this small need not be told from 0
 LARGE = 8  #: velocities above which configurations of lost rank are passed here too, pivoting being slow
-SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast as independent ones (scaled)
 
 
 def largest(values: Sequence[Expr]) -> Expr:
@@ -76,7 +67,13 @@ def estimate(jacobian: Sequence[Sequence[Expr]], n_dof: int) -> int:
     return 2 * fill(pattern) + n * n_dof * n_dof + n_dof**3 // 6
 
 
-class LoopBlocks:
+def apart(p: Expr, q: Expr, r: Expr, t: Expr) -> tuple[Expr, Expr, Expr]:
+    """Of two columns (p, r) and (q, t) the product of their squares, that times the sine's square, the determinant."""
+    determinant = p * t - q * r
+    return (p * p + r * r) * (q * q + t * t), determinant * determinant, determinant
+
+
+class LoopBlocks(ABC):
     """The expressions of both blocks.
 
     Parameters
@@ -84,6 +81,9 @@ class LoopBlocks:
     terms : SystemTerms
         With constraint rows and at least one degree of freedom.
     """
+
+    #: Linear corrections with GENTLE of velocities, whose errors gamma squares, and of accelerations.
+    passes: tuple[int, int]
 
     def __init__(self, terms: SystemTerms) -> None:
         self.terms = terms
@@ -98,30 +98,8 @@ class LoopBlocks:
         self.J = [{k: x * self.s[k] for k, x in row.items()} for row in self.rows]
         self.h = len(terms.constraints)
         self.gentle = terms.n_v > LARGE
-        self.lost = VANISHED if self.gentle else LOST
-        #: squares of a column of the dependent coordinates, and of its part across those before it
-        self._angles: dict[tuple[Expr, Expr], None] = {}
-
-    @cached_property
-    def by_bodies(self) -> TreeMotion | None:
-        """The accelerations by articulated bodies, at the given velocities; None where some joint moves no mass."""
-        terms = self.terms
-        if terms.constrained is None:
-            return None
-        rows = [ConstraintRow(row, x * i) for row, x, i in zip(self.rows, terms.gamma, self.inverse, strict=True)]
-        solved = terms.constrained(rows, TIKHONOV if self.redundant else 0.0)
-        return None if any(d.is_zero for d in solved.pivots) else solved
-
-    @property
-    def redundant(self) -> bool:
-        """Whether there are more rows than their rank."""
-        return len(self.J) > self.terms.n_v - self.terms.n_dof
-
-    @property
-    def determined(self) -> bool:
-        """Whether some row holds each dependent coordinate; else the preferred partition is never sound."""
-        held = {k for row in self.J for k in row}
-        return held.issuperset(k for k in range(self.terms.n_v) if k not in self.terms.preferred)
+        #: whether there are more rows than their rank
+        self.redundant = len(self.J) > terms.n_v - terms.n_dof
 
     def _regularised(self, rows: Sequence[Row], relative: Expr | float) -> tuple[SparseFactor, Expr]:
         """The factor of J J^T + relative max(diag) I, and what was added."""
@@ -163,7 +141,7 @@ class LoopBlocks:
     def _factor(self) -> tuple[SparseFactor, tuple[int, int]]:
         """The factor of J J^T, and how many passes of both corrections by it leave no trace of its regularisation."""
         if self.gentle:
-            return self._regularised(self.J, GENTLE)[0], PASSES if self.by_bodies is None else FEWER
+            return self._regularised(self.J, GENTLE)[0], self.passes
         if self.redundant:
             return self._regularised(self.J, TIKHONOV)[0], (2, 2)
         return factorize(gram(self.J)), (1, 1)
@@ -187,74 +165,23 @@ class LoopBlocks:
         return x
 
     def dynamics(self) -> tuple[list[Expr], list[Expr]]:
-        """Projected velocities (n,), accelerations (n,), 1 if the partition is sound, 1 if no change point can be near;
-        and checks of the inertia.
+        """Projected velocities (n,), accelerations (n,), 1 if these are sound, 1 if no change point can be near; and
+        checks of the inertia.
         """
-        terms, graph, f = self.terms, self.terms.graph, range(self.terms.n_dof)
-        v = [graph.symbol(name) for name in terms.v]
-        rate = [x * i for x, i in zip(terms.constraint_rate, self.inverse, strict=True)]
+        v = [self.terms.graph.symbol(name) for name in self.terms.v]
+        rate = [x * i for x, i in zip(self.terms.constraint_rate, self.inverse, strict=True)]
         conditions: list[Expr] = []
         moved = self._corrected(v, rate, conditions)
-        if self.by_bodies is not None:
-            return self._by_bodies(self.by_bodies, moved, conditions)
-        here = substitute([*terms.bias, *terms.gamma], dict(zip(v, moved, strict=True)))
-        gamma = [x * i for x, i in zip(here[terms.n_v :], self.inverse, strict=True)]
-        if self.gentle:
-            a = self._corrected([graph.zero] * terms.n_v, gamma, conditions, 2)
-            B, _, sound = self._partition(None, conditions)
-        else:
-            B, a, sound = self._partition([-x for x in gamma], conditions)
-        M = rows_of(terms.mass_matrix)
-        force = [x + y for x, y in zip(here[: terms.n_v], times(M, a), strict=True)]
-        columns = transpose(B, terms.n_dof)
-        MB = [{k: x for k, b in enumerate(columns) if (x := dot(row, b)) is not None} for row in M]
-        across = transpose(MB, terms.n_dof)
-        embedded = {(i, k): dot(columns[i], across[k]) for i in f for k in f if k <= i}
-        entries = {key: graph.zero if x is None else x for key, x in embedded.items()}
-        factor = factorize([{k: entries[max(i, k), min(i, k)] for k in f} for i in f])
-        y = factor.solve([-x for x in times(columns, force)])
-        a = [x + d for x, d in zip(a, times(B, y), strict=True)]
-        diagonal = {i: row.get(i, graph.zero) for i, row in enumerate(M)}
-        squares = [dot({i: x * x for i, x in column.items()}, diagonal) for column in columns]
-        units = [self.s[k] * self.s[k] if terms.n_dof > 1 else graph.one for k in terms.preferred]
-        sizes = [graph.zero if x is None else x * k for x, k in zip(squares, units, strict=True)]
-        checks = exceeding([d * k for d, k in zip(factor.pivots, units, strict=True)], sizes)
-        if terms.n_dof == 1:  # there is no other motion whose inertia tells what nothing is
-            moving = {k: self.s[k] / self.s[terms.preferred[0]] for k, row in enumerate(B) if row}
-            reach = dot({k: ratio * ratio for k, ratio in moving.items()}, diagonal)
-            if reach is not None:
-                checks.append(graph.apply("lt", reach * STILL, factor.pivots[0]))
-        return [*moved, *a, sound, self._far()], checks
+        a, checks = self._accelerate(dict(zip(v, moved, strict=True)), conditions)
+        return [*moved, *a, self._all(conditions), self._far()], checks
 
-    def _by_bodies(
-        self, solved: TreeMotion, moved: list[Expr], conditions: list[Expr]
-    ) -> tuple[list[Expr], list[Expr]]:
-        """The same, accelerations by articulated bodies that carry the multipliers: no partition, no mass matrix."""
-        terms, graph = self.terms, self.terms.graph
-        conditions += self._kept(solved)
-        gamma = [x * i for x, i in zip(terms.gamma, self.inverse, strict=True)]
-        v = [graph.symbol(name) for name in terms.v]
-        here = substitute([*solved.accelerations, *gamma], dict(zip(v, moved, strict=True)))
-        a, gamma = here[: terms.n_v], here[terms.n_v :]
-        left = [x + y for x, y in zip(gamma, times(self.rows, a), strict=True)]
-        size = total_magnitude([x * (1.0 / s) for x, s in zip(a, self.s, strict=True)])
-        conditions.append(graph.apply("lt", total_magnitude(left) * self.unit, size * LEFT + NOTHING))
-        dz = times(transpose(self.J, terms.n_v), self._factor[0].solve(left))
-        a = [x - s * d for x, s, d in zip(a, self.s, dz, strict=True)]
-        return [*moved, *a, self._all(conditions), self._far()], []
+    @abstractmethod
+    def _accelerate(self, moved: dict[Expr, Expr], conditions: list[Expr]) -> tuple[list[Expr], list[Expr]]:
+        """Accelerations (n,) and checks of the inertia, with velocities -> projected ones; conditions are added."""
 
-    def _kept(self, solved: TreeMotion) -> list[Expr]:
-        """Conditions: elimination leaves enough of each inertia, and of what each multiplier moves."""
-        pivots = [d * s * s for d, s in zip(solved.pivots, self.s, strict=True)]
-        kept = list(zip(outward(pivots, self.terms.parent), pivots, strict=True))
-        if not self.redundant:
-            kept += zip(solved.row_sizes, solved.row_pivots, strict=True)
-        return [self.terms.graph.apply("lt", size * KEPT, pivot) for size, pivot in kept]
-
-    @property
-    def is_sound(self) -> Expr:
-        """Whether articulated bodies can be used at a position."""
-        return self._all(self._kept(self.by_bodies)) if self.by_bodies else self.terms.graph.zero
+    @abstractmethod
+    def _far(self) -> Expr:
+        """1 where no change point can be near."""
 
     def _all(self, conditions: Sequence[Expr]) -> Expr:
         """Whether all conditions hold."""
@@ -262,18 +189,6 @@ class LoopBlocks:
         for condition in conditions:
             sound = condition if sound == self.terms.graph.one else self.terms.graph.apply("and", sound, condition)
         return sound
-
-    def _far(self) -> Expr:
-        """1 where no change point can be near: by the columns of the dependent coordinates, which a dead centre of the
-        independent ones makes nearly parallel too, or by the rows of all; of redundant ones some keep nothing.
-        """
-        graph = self.terms.graph
-        far = self._all([graph.apply("lt", size * NEAR_SQUARE, part) for size, part in self._angles])
-        by_rows = self.by_bodies is not None
-        if by_rows or (self.gentle and far != graph.one and not self.redundant):
-            separate = self._separate_rows()
-            far = separate if by_rows else graph.apply("or", far, separate)
-        return far
 
     def _separate_rows(self) -> Expr:
         """Whether as many rows as the rank are neither short beside the longest nor near to those before them."""
@@ -284,85 +199,3 @@ class LoopBlocks:
             separate = graph.apply("lt", square * NEAR_SQUARE, pivot)
             held = held + graph.apply("and", separate, graph.apply("lt", limit, square))
         return graph.apply("lt", self.terms.n_v - self.terms.n_dof - 0.5, held)
-
-    # -- partition ------------------------------------------------------------------------------------------------
-    def _partition(self, y: list[Expr] | None, conditions: list[Expr]) -> tuple[list[Row], list[Expr], Expr]:
-        """B (n rows of f) with C_q B = 0, the x (n,) with C_q x = y and no independent part, whether all is sound.
-
-        No y counts as zero.  Conditions of soundness may be given, and are added to.
-        """
-        terms, graph = self.terms, self.terms.graph
-        dependent = [k for k in range(terms.n_v) if k not in terms.preferred]
-        place = {k: j for j, k in enumerate(dependent)}
-        left = [{place[k]: x for k, x in row.items() if k in place} for row in self.rows]
-        right = [
-            y or [graph.zero] * len(left),
-            *([-row.get(k, graph.zero) for row in self.rows] for k in terms.preferred),
-        ]
-        blocks = diagonal_blocks(left) if len(left) == len(dependent) else None
-        first: list[Expr] = []
-        found: list[list[Expr]] = [[] for _ in terms.preferred]
-        if dependent and (blocks is None or any(len(b.rows) > 2 for b in blocks)):
-            first, *found = self._least_squares(left, right, conditions)
-        elif blocks is not None:  # else rows that hold nothing: parameters alone decide whether they are closed
-            first, *found = (self._substitute(left, blocks, r, [] if j else conditions) for j, r in enumerate(right))
-        x = [graph.zero] * terms.n_v
-        for i, value in zip(dependent, first, strict=True):
-            x[i] = value
-        B: list[Row] = [{} for _ in range(terms.n_v)]
-        sizes: dict[Expr, list[Expr]] = {}  # by the most that is allowed
-        for j, k in enumerate(terms.preferred):
-            B[k][j] = graph.one
-            for i, value in zip(dependent, found[j], strict=True):
-                if not value.is_zero:
-                    B[i][j] = value
-                    sizes.setdefault(SPREAD * self.s[i] / self.s[k], []).append(graph.apply("abs", value))
-        conditions += [graph.apply("lt", largest(values), most) for most, values in sizes.items()]
-        return B, x, self._all(conditions)
-
-    def _substitute(
-        self, rows: list[Row], blocks: list[DiagonalBlock], right: Sequence[Expr], conditions: list[Expr]
-    ) -> list[Expr]:
-        """Solve block after block, each of one or two rows."""
-        graph = self.terms.graph
-        x: list[Expr] = [graph.zero] * len(rows)
-        for block in blocks:
-            b = []
-            for i in block.rows:
-                total = right[i]
-                for k, entry in rows[i].items():
-                    if k not in block.columns and not x[k].is_zero:
-                        total = total - entry * x[k]
-                b.append(total)
-            if len(b) == 1:
-                x[block.columns[0]] = b[0] / rows[block.rows[0]][block.columns[0]] if not b[0].is_zero else b[0]
-                continue
-            (i, j), (k, l) = block.rows, block.columns
-            p, q, r, t = (rows[m].get(c, graph.zero) for m in (i, j) for c in (k, l))
-            determinant = p * t - q * r
-            sizes, across = (p * p + r * r) * (q * q + t * t), determinant * determinant
-            conditions.append(graph.apply("lt", sizes * self.lost, across))
-            self._angles[sizes, across] = None
-            inverse = 1.0 / determinant
-            x[k] = (t * b[0] - q * b[1]) * inverse
-            x[l] = (p * b[1] - r * b[0]) * inverse
-        return x
-
-    def _least_squares(
-        self, rows: list[Row], right: Sequence[Sequence[Expr]], conditions: list[Expr]
-    ) -> list[list[Expr]]:
-        """Solve by normal equations, refined once: redundant rows need no choice, and nothing is pivoted."""
-        graph = self.terms.graph
-        columns = transpose(rows, self.terms.n_v - self.terms.n_dof)
-        E = gram(columns)
-        factor = factorize(E)
-        for i, pivot in enumerate(factor.pivots):
-            if not (pivot - E[i][i]).is_zero:
-                conditions.append(graph.apply("lt", E[i][i] * self.lost, pivot))
-                self._angles[E[i][i], pivot] = None
-        found = []
-        for b in right:
-            x = factor.solve(times(columns, b))
-            rest = [p - q for p, q in zip(b, times(rows, x), strict=True)]
-            found.append([p + q for p, q in zip(x, factor.solve(times(columns, rest)), strict=True)])
-        return found

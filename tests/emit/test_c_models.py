@@ -128,7 +128,7 @@ def make(libraries: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[[
             limits = Limits(**few, jacobian_nodes=nodes, jacobian_recursive=nodes)
             limits = Limits() if straight else limits
             with pytest.MonkeyPatch.context() as patch:
-                patch.setattr("eomgen.program.collect.Limits", lambda: Limits(unrolled=4))  # as if long
+                patch.setattr("eomgen.program.factor.LONG", 1)
                 terms = collect_terms(kinematics, mobility, tree)
             sources = emit_c(build_program(terms, metadata, kernels=kernels, limits=limits))
             path = libraries.compile_library(sources, tmp_path_factory.mktemp(name))

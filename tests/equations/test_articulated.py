@@ -183,3 +183,16 @@ def test_large_loops_are_left_to_articulated_bodies() -> None:
     assert equations.choice is not None
     assert set(equations.choice.operations) == {"recursive"}
     assert eg.load_example("slider_crank").derive().method == "embedding"
+
+
+@pytest.mark.slow
+def test_flat_positions_are_passed() -> None:
+    """Ten parallelograms in a row lie flat about every half second, and have ten more freedoms there (IFToMM, A02)."""
+    from benchmarks.linkages import n_four_bar
+    from benchmarks.loops import tip
+
+    equations = n_four_bar(10).derive(independent=["theta0"])
+    assert equations.method == "recursive"
+    run = equations.compile().simulate((0, 4))
+    assert np.abs(np.array([run["x"], run["y"]]) - tip(10, run.t)).max() < 1e-3
+    assert np.ptp(run["y"]) > 1.9  # from one side to the other
