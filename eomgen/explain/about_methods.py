@@ -13,7 +13,8 @@ from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..notation import dotted
 from ..reading import Quantities
-from .author import Author, needed
+from ..reading.written import needed
+from .author import Author
 from .document import FormulaLine, Piece, Section, Sentence
 
 

@@ -12,7 +12,7 @@ from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
 from ..notation import with_instance
 from ..reading import Quantities
-from ..reading.written import write
+from ..reading.written import needed, write
 from .document import Folded, FormulaLine, Piece, PutIn, Sentence
 from .printer import Printer
 
@@ -158,17 +158,6 @@ def nodes(value: Any) -> int:
     """Terms, factors and symbols of an expression or matrix."""
     flat = list(value) if isinstance(value, sympy.MatrixBase) else [value]
     return sum(1 for x in flat for _ in sympy.preorder_traversal(x))
-
-
-def needed(named: Sequence[tuple[Any, Any]], value: Any) -> list[tuple[Any, Any]]:
-    """The named parts that a value uses, and those that these use."""
-    wanted = set(value.free_symbols)
-    found = []
-    for symbol, expression in reversed(list(named)):
-        if symbol in wanted:
-            found.append((symbol, expression))
-            wanted |= expression.free_symbols
-    return found[::-1]
 
 
 def in_numbers(left: str, expression: Any, numbers: dict[str, float], value: float) -> FormulaLine:

@@ -20,7 +20,7 @@ from .formula_tree import (
     is_group,
 )
 
-#: Between factors: lines are broken between terms before they are broken between factors.
+#: Between factors and within arguments of functions: lines are broken between terms before they are broken there.
 TIGHT = "\u00a0"
 MINUS = "-"
 LONGEST_LINE = 90  #: characters after which a sum goes on in the next line
@@ -28,7 +28,7 @@ _RELATIONS = {"<=": "≤", ">=": "≥"}
 
 
 def text(formula: Formula, names: Notation) -> str:
-    """One line of text; factors are ``TIGHT`` apart.
+    """One line of text; factors, and whatever stands in arguments of functions, are ``TIGHT`` apart.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class _TextOf:
                 return f"[{'; '.join(', '.join(map(self.line, row)) for row in formula.rows)}]"
 
     def _call(self, function: str, arguments: tuple[Formula, ...]) -> str:
-        inside = ", ".join(map(self.line, arguments))
+        inside = ", ".join(map(self.line, arguments)).replace(" ", TIGHT)
         if function == "abs":
             return f"|{inside}|"
         return f"√{inside}" if function == "sqrt" and isinstance(arguments[0], Name) else f"{function}({inside})"
@@ -114,7 +114,7 @@ class _TextOf:
         high = exponent.translate(SUPERSCRIPTS) if exponent.isdecimal() else ""
         base = formula.base
         if high and isinstance(base, CallOf) and base.function not in ("abs", "sqrt"):
-            return f"{base.function}{high}({', '.join(map(self.line, base.arguments))})"
+            return f"{base.function}{high}({', '.join(map(self.line, base.arguments))})".replace(" ", TIGHT)
         shown = self.line(base)
         plain = isinstance(base, Name | Words) or (isinstance(base, CallOf) and shown.startswith("|"))
         shown = shown if plain and not any(c in shown for c in "^*") else f"({shown})"

@@ -37,7 +37,19 @@ def facts_html(equations: Readable) -> str:
     name = html_text(equations.kinematics.mechanism.name)
     head = f"<p style='margin:0 0 0.6em 0'><b>{name}</b>: equations of motion, {html_text(printed.title)}</p>"
     attributes = ", ".join(f"<code>eqs.{name}</code>" for name in printed.attributes)
-    return f"{head}{_coordinates(printed)}<details><summary>read next</summary><p {LEFT}>{attributes}</p></details>"
+    further = f"<details><summary>read next</summary><p {LEFT}>{attributes}</p></details>"
+    return f"{head}{_values(printed)}{_coordinates(printed)}{further}"
+
+
+def _values(printed: PrintedEquations) -> str:
+    """What was put in."""
+    shown = [_math(mathml(x, printed.names)) for x in printed.values]
+    whole = f"with {', '.join(shown)}"
+    if not shown:
+        return ""
+    if len(shown) <= FOLDED:
+        return f"<p {LEFT}>{whole}</p>"
+    return f"<details><summary>with {len(shown)} values</summary><p {LEFT}>{whole}</p></details>"
 
 
 def _coordinates(printed: PrintedEquations) -> str:
@@ -69,20 +81,20 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
     def shown(formula: Formula) -> str:
         return mathml(formula, printed.names)
 
-    rates = [printed.names.mathml(name) for name in printed.equations.acceleration_names]
+    rates = [shown(x) for x in printed.accelerations]
     of_mass, of_force = printed.size
     M, f = printed.mass_matrix, printed.force
     equals = "<mo>=</mo>"
-    if len(rates) == 1 and of_mass + of_force <= WIDE:
+    if printed.is_one_equation and of_mass + of_force <= WIDE:
         factor = "" if printed.text(M[0][0]) == "1" else fenced(shown(M[0][0])) if is_group(M[0][0]) else shown(M[0][0])
         yield _block(row(factor, "<mspace width='0.17em'></mspace>", rates[0], equals, shown(f[0])))
         return
-    v = shown(MatrixOf(tuple((Name(name),) for name in printed.equations.acceleration_names)))
+    v = shown(MatrixOf(tuple((x,) for x in printed.accelerations)))
     right, left = shown(MatrixOf(tuple((x,) for x in f))), shown(MatrixOf(tuple(map(tuple, M))))
     if len(rates) > 1 and of_mass + of_force <= WIDE:
         yield _block(row(left, v, equals, right))
         return
-    yield _block(row("<mi>M</mi>", v if len(rates) > 1 else rates[0], equals, "<mi>f</mi>"))
+    yield _block(row("<mi>M</mi>", rates[0] if printed.is_one_equation else v, equals, "<mi>f</mi>"))
     whole = len(rates) > 1 and of_mass <= WIDE
     if whole:
         yield _block(row("<mi>M</mi>", equals, left))

@@ -9,10 +9,10 @@ from typing import NamedTuple
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
 from ..notation.notation import Notation
-from ..printing import Formulas, Order, text
+from ..printing import Formulas, Order, number, text
 from ..printing.factor_order import COORDINATE, GRAVITY, INERTIA, INPUT, MASS, PARAMETER, RATE
 from ..printing.formula_text import TIGHT
-from ..printing.formula_tree import Formula, NumberPart
+from ..printing.formula_tree import Formula, Name, NumberPart, Relation
 from .readable import Readable
 
 UNITS = {"angle": "rad", "turn": "rad", "length": "m", "parameter": ""}
@@ -21,6 +21,8 @@ ATTRIBUTES = (
     "q", "v", "parameters", "T", "V", "lagrangian", "mass_matrix", "force", "quadratic_velocity", "generalized_forces",
     "poses", "velocities", "accelerations", "momenta", "linearize", "operations", "report",
 )  # fmt: skip
+OF_BODIES = ("poses", "velocities", "accelerations")
+OF_FORCES = ("T", "V", "lagrangian", "momenta", "quadratic_velocity", "generalized_forces")
 OF_LOOPS = ("constraints", "constraint_jacobian", "gamma", "velocity_transformation")
 
 
@@ -58,6 +60,7 @@ def order_of(equations: Readable) -> Order:
             kinds[p.name] = INERTIA
         else:
             kinds[p.name] = GRAVITY if p.name in gravity else PARAMETER
+    kinds |= dict.fromkeys(equations.names_put_in, PARAMETER)
     kinds |= dict.fromkeys(equations.kinematics.input_names, INPUT)
     kinds |= dict.fromkeys([*k.names, *k.loop_coordinates.names, "t"], COORDINATE)
     return Order(kinds | dict.fromkeys([*k.velocity_names, *equations.acceleration_names], RATE))
@@ -82,7 +85,8 @@ class PrintedEquations:
     """
 
     def __init__(self, equations: Readable) -> None:
-        self.equations = equations
+        self.equations = equations.in_plain_symbols()
+        self.of_time = self.equations is not equations
         self.names: Notation = equations.notation
         self.formula = Formulas(order_of(equations))
 
@@ -100,6 +104,25 @@ class PrintedEquations:
     def intermediates(self) -> list[tuple[str, Formula]]:
         """Names that stand in M and f, with what they stand for."""
         return [(str(name), self.formula(x)) for name, x in self.equations.intermediates]
+
+    @cached_property
+    def accelerations(self) -> list[Formula]:
+        """v' of M v' = f."""
+        return [self.formula(x) for x in self.equations.symbols_put_in(self.equations.acceleration_names)]
+
+    @property
+    def values(self) -> list[Formula]:
+        """Equations of what was put in, ``l = 0.5``; a second time for a name with what came later."""
+        return [
+            Relation("=", (Name(name), number(float(x), 15) if isinstance(x, float | int) else self.formula(x)))
+            for given in self.equations.values_put_in()
+            for name, x in given
+        ]
+
+    @property
+    def is_one_equation(self) -> bool:
+        """Whether there is one acceleration, for which nothing was put in."""
+        return len(self.accelerations) == 1 and isinstance(self.accelerations[0], Name)
 
     def entries(self) -> Iterator[PrintedEntry]:
         """Entries of M on and below its diagonal that do not vanish, then those of f."""
@@ -146,14 +169,16 @@ class PrintedEquations:
     def title(self) -> str:
         """What these equations are, in one line."""
         n = self.equations.mobility.n_dof
-        method = getattr(self.equations, "method", "").replace("_", "-")
-        return f"method {method}, {n} degree{'s' * (n != 1)} of freedom"
+        method = self.equations.method.replace("_", "-")
+        return f"method {method}, {n} degree{'s' * (n != 1)} of freedom{', functions of time' * self.of_time}"
 
     @property
     def attributes(self) -> tuple[str, ...]:
         """Attributes to read next."""
         loops = OF_LOOPS if self.equations.constraint_names else ()
-        return (*ATTRIBUTES, *loops)
+        mechanism, there = self.equations.kinematics.mechanism, type(self.equations)
+        lacking = {*(OF_BODIES if mechanism.bare else ()), *(OF_FORCES if mechanism.given is not None else ())}
+        return tuple(name for name in (*ATTRIBUTES, *loops) if hasattr(there, name) and name not in lacking)
 
 
 def plain(line: str) -> str:

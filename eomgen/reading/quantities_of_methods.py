@@ -18,7 +18,6 @@ from .of_methods import (
     momentum_names,
     momentum_rates,
 )
-from .put_in import read_values
 from .quantities import Quantities
 from .writes_quantities import WritesQuantities
 
@@ -131,10 +130,8 @@ class QuantitiesOfMethods(WritesQuantities):
         Reactions of the joints of the tree are ``A_F_x``, ..., ``A_M_x``, ... on the body that the joint carries, at
         the joint, in ground axes; those of joints that close loops are written with their multipliers ``lambda_1``, ...
         """
-        from .named_parts import ByName
-
         BodiesApart(Quantities(*self.fresh()))  # refuses other methods now
-        return ByName("body", [body.name for body in self.kinematics.mechanism.bodies], self._free_body)
+        return self._by_name("body", [body.name for body in self.kinematics.mechanism.bodies], self._free_body)
 
     def _free_body(self, name: str) -> FreeBody:
         written = self._write(f"free_bodies.{name}", lambda s: [x for p in BodiesApart(s).balance(name) for x in p])
@@ -148,10 +145,8 @@ class QuantitiesOfMethods(WritesQuantities):
         The left side is the component of the reaction in ``free_bodies``; the right side what force elements and
         constraint elements exert along the coordinate, 0 if there are none.
         """
-        from .named_parts import ByName
-
         joints = BodiesApart(Quantities(*self.fresh())).joints  # refuses other methods
-        return ByName("joint of the tree", joints, self._joint_force)
+        return self._by_name("joint of the tree", joints, self._joint_force)
 
     def _joint_force(self, name: str) -> list[Any]:
         written = self._write(
@@ -209,7 +204,7 @@ class QuantitiesOfMethods(WritesQuantities):
         """
         import sympy
 
-        values = read_values(at or {}, self._known, "symbol")
+        values = self._read(at or {})
         states: list[tuple[str, ...]] = []
 
         def choose(quantities: Quantities) -> Sequence[Expr]:
