@@ -166,11 +166,6 @@ class ReadingView(Displayed):
     def _picture_and_facts(self, facts: str) -> str:
         return facts if self._values else self.source._picture_and_facts(facts)
 
-    @property
-    def _told(self) -> str:
-        """Values that were put in, for messages."""
-        return ", then ".join(", ".join(f"{name} = {value}" for name, value in one.items()) for one in self._values)
-
     def in_plain_symbols(self) -> Readable:
         plain = self.source._symbol
         return self if self._symbols is plain else ReadingView(self.source, plain, self._values)

@@ -19,6 +19,7 @@ from .of_methods import (
     momentum_rates,
 )
 from .quantities import Quantities
+from .regular_state import told
 from .writes_quantities import WritesQuantities
 
 if TYPE_CHECKING:
@@ -188,6 +189,12 @@ class QuantitiesOfMethods(WritesQuantities):
         ------
         UnavailableError
             Constraints depend on inputs, or rates of coordinates are given as functions of velocities.
+        SingularMassMatrixError
+            The mass matrix has no inverse at the state.
+        PartitionError
+            The state is a dead centre: the velocities of ``independent`` do not tell the others.
+        NonFiniteError
+            An entry of A or B has no value at the state, such as for a spring of length 0.
         UsageError
             An unknown name, or a value that is no expression.
 
@@ -213,6 +220,7 @@ class QuantitiesOfMethods(WritesQuantities):
             return [x for matrix in (found.A, found.B) for row in matrix for x in row]
 
         written = self._write("linearize", choose, "A_")
+        self._require_finite("linearize", [*written, *(x for _, x in self._named["linearize"])], told(values))
         (names,), inputs = states, self.kinematics.input_names
         n = len(names)
         A, B = sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, len(inputs), written[n * n :])

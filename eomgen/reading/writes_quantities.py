@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..describe.dotted_names import Undotted
 from ..equations import TreeEquations
-from ..errors import UsageError
+from ..errors import NonFiniteError, UsageError
 from ..graph.core import Expr, Graph
 from ..graph.substitute import symbols_of
 from ..kinematics import Kinematics
@@ -87,8 +87,25 @@ class WritesQuantities(ABC):
         named, written = write(
             expressions[:count], self._symbol, prefix, names, self._rates, self.kinematics.parameter_names
         )
+        if self._put_in:
+            self._require_finite(name, [*written, *(x for _, x in named)], f"with {self._told}")
         self._named[name] = named
         return written
+
+    @property
+    def _told(self) -> str:
+        """Values that were put in, for messages."""
+        return ", then ".join(", ".join(f"{name} = {value}" for name, value in one.items()) for one in self._put_in)
+
+    def _require_finite(self, name: str, written: Sequence[Any], where: str) -> None:
+        """Refuse a quantity that divides by zero."""
+        import sympy
+
+        if any(x.has(sympy.zoo, sympy.nan, sympy.oo) for x in written):
+            raise NonFiniteError(
+                f"{name} has no finite value {where}: it divides by zero there, as at a dead centre or where a "
+                "rotation is singular; put in other values, or leave one as a symbol"
+            )
 
     @cached_property
     def _rates(self) -> frozenset[str]:
