@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..printing import mathml, sums_in_lines
+from ..printing import given_mathml, mathml, sums_in_lines
 from ..printing.formula_mathml import fenced, row
 from ..printing.formula_tree import Formula, MatrixOf, Name, SumOf, is_group
 from ..texts import html_text
@@ -94,17 +94,20 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
     if len(rates) > 1 and of_mass + of_force <= WIDE:
         yield _block(row(left, v, equals, right))
         return
-    yield _block(row("<mi>M</mi>", rates[0] if printed.is_one_equation else v, equals, "<mi>f</mi>"))
+    mass, _, force = map(given_mathml, printed.letters)
+    yield _block(row(mass, rates[0] if printed.is_one_equation else v, equals, force))
+    if told := ", ".join(f"{_math(given_mathml(letter))} is {what}" for letter, what in printed.letters_told):
+        yield f"<p {LEFT}>{told}; the usual letters are names of the model.</p>"
     whole = len(rates) > 1 and of_mass <= WIDE
     if whole:
-        yield _block(row("<mi>M</mi>", equals, left))
+        yield _block(row(mass, equals, left))
     elif len(rates) > 1:
         zeros = "; entries that are not shown are 0" if printed.vanishing else ""
         yield f"<p {LEFT}>The mass matrix is symmetric{zeros}.</p>"
     entries = [
         _line(printed, _label(entry, len(rates)), entry.formula)
         for entry in printed.entries()
-        if not (whole and entry.letter == "M")
+        if not (whole and entry.letter == printed.letters.mass)
     ]
     if len(entries) <= FOLDED:
         yield from entries
@@ -114,9 +117,9 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
 
 def _label(entry: PrintedEntry, n: int) -> str:
     if n == 1:
-        return f"<mi>{entry.letter}</mi>"
+        return given_mathml(entry.letter)
     comma = "," if n > 9 else ""
-    return f"<msub><mi>{entry.letter}</mi><mn>{comma.join(map(str, entry.place))}</mn></msub>"
+    return f"<msub>{given_mathml(entry.letter)}<mn>{comma.join(map(str, entry.place))}</mn></msub>"
 
 
 def _line(printed: PrintedEquations, label: str, formula: Formula) -> str:

@@ -48,12 +48,13 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
     if len(rates) > 1 and of_mass + of_force <= WIDE:
         yield f"{left} {v} = {right}"
         return
-    yield rf"M\, {rates[0] if printed.is_one_equation else v} = f"
+    mass, _, right = printed.letters
+    yield rf"{mass}\, {rates[0] if printed.is_one_equation else v} = {right}"
     whole = len(rates) > 1 and of_mass <= WIDE
     if whole:
-        yield f"M = {left}"
+        yield f"{mass} = {left}"
     for entry in printed.entries():
-        if not (whole and entry.letter == "M"):
+        if not (whole and entry.letter == mass):
             comma = "," if len(rates) > 9 else ""
             label = f"{entry.letter}_{{{comma.join(map(str, entry.place))}}}" if len(rates) > 1 else entry.letter
             yield _broken(printed, label, entry.formula)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ..files.terminal import fold
+from ..notation import read_latex
+from ..notation.printing import text_form
 from ..printing.formula_text import TIGHT
 from ..printing.formula_tree import times
 from ..texts import visible
@@ -83,27 +85,37 @@ def _equations(printed: PrintedEquations, columns: int) -> Iterator[str]:
         yield from map(plain, whole_rows)
         yield from _where(printed, columns)
         return
-    listed = f"M v' = f with v' = ({', '.join(rates)})"
-    yield f"M {rates[0]} = f" if printed.is_one_equation else listed if len(listed) <= columns else "M v' = f"
+    mass, v, right = (letter_text(letter) for letter in printed.letters)
+    short = f"{mass} {rates[0]} = {right}" if printed.is_one_equation else f"{mass} {v} = {right}"
+    listed = f"{short} with {v} = ({', '.join(rates)})"
+    yield short if printed.is_one_equation or len(listed) > columns else listed
+    if told := ", ".join(f"{letter_text(letter)} is {what}" for letter, what in printed.letters_told):
+        yield from fold(f"{told}; the usual letters are names of the model", columns, "  ", "  ")
     yield ""
-    rows = [*_matrix(M, "M = ")]
+    rows = [*_matrix(M, f"{mass} = ")]
     small = len(rates) > 1 and max(map(len, rows)) <= columns
     if small:
         yield from map(plain, rows)
         yield ""
     for entry in printed.entries():
-        if not (small and entry.letter == "M"):
+        if not (small and entry.letter == printed.letters.mass):
             yield from _wrapped(f"{_label(entry, len(rates))} = ", printed.text(entry.formula), columns)
     if not small and len(rates) > 1:
-        yield f"M is symmetric{'; its other entries are 0' if printed.vanishing else ''}"
+        yield f"{mass} is symmetric{'; its other entries are 0' if printed.vanishing else ''}"
     yield from _where(printed, columns)
 
 
+def letter_text(latex: str) -> str:
+    """A letter of a display in text."""
+    return text_form(read_latex(latex))
+
+
 def _label(entry: PrintedEntry, n: int) -> str:
+    letter = letter_text(entry.letter)
     if n == 1:
-        return entry.letter
+        return letter
     comma = "," if n > 9 else ""
-    return f"{entry.letter}_{comma.join(map(str, entry.place))}"
+    return f"{letter}_{comma.join(map(str, entry.place))}"
 
 
 def _where(printed: PrintedEquations, columns: int) -> Iterator[str]:

@@ -35,8 +35,21 @@ class PrintedCoordinate(NamedTuple):
     role: str
 
 
+class Letters(NamedTuple):
+    """LaTeX of the letters of M v' = f."""
+
+    mass: str
+    accelerations: str
+    force: str
+
+
+#: The usual letters, and those that take their places.
+USUAL = Letters("M", r"\dot{v}", "f")
+OTHERS = Letters("AK", "aw", "br")
+
+
 class PrintedEntry(NamedTuple):
-    """An entry of M or f: ``M_12`` with its formula; places count from 1."""
+    """An entry of M or f: its letter in LaTeX, its place, counted from 1, and its formula."""
 
     letter: str
     place: tuple[int, ...]
@@ -87,8 +100,21 @@ class PrintedEquations:
     def __init__(self, equations: Readable) -> None:
         self.equations = equations.in_plain_symbols()
         self.of_time = self.equations is not equations
-        self.names: Notation = equations.notation
+        self.names: Notation = equations.notation.with_names(str(name) for name, _ in equations.intermediates)
         self.formula = Formulas(order_of(equations))
+
+    @cached_property
+    def letters(self) -> Letters:
+        """The letters of M v' = f; others where names of the model are printed so."""
+        M, f = (self.names.letter(USUAL[k], *OTHERS[k], with_numbers=True) for k in (0, 2))
+        rates = (USUAL.accelerations,) if self.names.is_free("v") else ()
+        return Letters(M, self.names.letter(*rates, *OTHERS.accelerations), f)
+
+    @property
+    def letters_told(self) -> list[tuple[str, str]]:
+        """Letters that are not the usual ones, in LaTeX, and what they stand for."""
+        told = [(self.letters.mass, USUAL.mass, "the mass matrix"), (self.letters.force, USUAL.force, "the right side")]
+        return [(letter, what) for letter, usual, what in told if letter != usual]
 
     @cached_property
     def mass_matrix(self) -> list[list[Formula]]:
@@ -129,9 +155,9 @@ class PrintedEquations:
         for i, row in enumerate(self.mass_matrix):
             for j, x in enumerate(row[: i + 1]):
                 if x != NumberPart("0"):
-                    yield PrintedEntry("M", (j + 1, i + 1), x)
+                    yield PrintedEntry(self.letters.mass, (j + 1, i + 1), x)
         for i, x in enumerate(self.force):
-            yield PrintedEntry("f", (i + 1,), x)
+            yield PrintedEntry(self.letters.force, (i + 1,), x)
 
     @property
     def vanishing(self) -> bool:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..graph.core import Expr
 from .bodies_apart import BodiesApart
+from .names_of_unknowns import momentum_names
 from .near_state import linearize
 from .of_methods import (
     block_system,
@@ -15,7 +16,6 @@ from .of_methods import (
     body_velocities,
     gibbs_function,
     hamiltonian,
-    momentum_names,
     momentum_rates,
 )
 from .quantities import Quantities

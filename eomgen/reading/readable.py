@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
 from ..notation.notation import Notation
+from .names_of_unknowns import model_notation
 from .quantities import PointMotion, Quantities
 from .quantities_of_methods import QuantitiesOfMethods
 
@@ -57,12 +58,7 @@ class Readable(QuantitiesOfMethods):
     @cached_property
     def notation(self) -> Notation:
         """How names are printed: ``.latex("theta1_dot")``, ``.text(name)``, ``.html(name)``, ``.mathtext(name)``."""
-        k = self.kinematics
-        outputs = [output.name for output in k.mechanism.outputs]
-        rates = [*k.velocity_names, *map(acceleration_name, k.velocity_names)]
-        names = [*k.names, *k.loop_coordinates.names, *k.parameter_names, *k.input_names, *outputs, *rates]
-        names += self.names_put_in
-        return Notation(names, k.mechanism.latex, k.mechanism.instances)
+        return model_notation(self.kinematics, self.names_put_in)
 
     # -- symbols ------------------------------------------------------------------------------------------------------
     @property

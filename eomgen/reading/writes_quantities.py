@@ -17,6 +17,7 @@ from ..kinematics.mobility import Mobility
 from ..kinematics.state import acceleration_name
 from ..runtime.near_names import UnknownNameError
 from ..suggestions import hint
+from .names_of_unknowns import momentum_names
 from .put_in import put_in, read_value, read_values
 from .quantities import Quantities
 from .written import needed, write
@@ -200,7 +201,7 @@ class WritesQuantities(ABC):
     @property
     def _known(self) -> tuple[str, ...]:
         """Names for which values can be put in."""
-        return (*self._own, *(f"p_{label}" for label in self.kinematics.velocity_labels), *self.names_put_in)
+        return (*self._own, *momentum_names(self.kinematics), *self.names_put_in)
 
     @property
     def names_put_in(self) -> tuple[str, ...]:
