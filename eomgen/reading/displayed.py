@@ -127,7 +127,8 @@ class ReadingView(Displayed):
     if not TYPE_CHECKING:  # type checkers know all attributes
 
         def __getattr__(self, name: str) -> Any:
-            if not name.startswith("_") and hasattr(type(self.source), name):
+            lacks = not name.startswith("_") and not hasattr(type(self), name)
+            if lacks and hasattr(type(self.source), name):
                 raise AttributeError(
                     f"a view of equations has no {name!r}: values are put into what is read, not into what is "
                     f"compiled and counted; take it of the equations themselves, which are .source of the view",

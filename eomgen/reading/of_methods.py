@@ -16,7 +16,7 @@ from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute
 from ..graph.symmetric import solve_symmetric
 from .names_of_unknowns import momentum_names, multiplier_names, twist_rate_names, wrench_names
-from .quantities import Quantities, Row, Rows
+from .quantities import Quantities, Row, Rows, require_bodies
 
 BLOCKS = ("augmented", "newton_euler", "amalgamated")  #: methods that solve one system for more than accelerations
 
@@ -131,7 +131,7 @@ def body_velocities(quantities: Quantities) -> Rows:
 
     The six velocities of a body are that of its centre of mass in ground axes, then its angular velocity in body axes.
     """
-    _require_bodies(quantities)
+    require_bodies(quantities.kinematics)
     motion, v = quantities.kinematics.motion, list(quantities.kinematics.v)
     velocities: list[Expr] = []
     for body in quantities.kinematics.mechanism.bodies:
@@ -145,7 +145,7 @@ def body_velocities(quantities: Quantities) -> Rows:
 
 def body_mass_matrix(quantities: Quantities) -> Rows:
     """M_b (6 n_b, 6 n_b), mass and inertia body by body."""
-    _require_bodies(quantities)
+    require_bodies(quantities.kinematics)
     bodies = quantities.kinematics.mechanism.bodies
     mass = [[quantities.graph.zero] * (6 * len(bodies)) for _ in range(6 * len(bodies))]
     for k, body in enumerate(bodies):
@@ -153,8 +153,3 @@ def body_mass_matrix(quantities: Quantities) -> Rows:
             mass[6 * k + i][6 * k + i] = body.mass
             mass[6 * k + 3 + i][6 * k + 3 : 6 * k + 6] = body.inertia[i]
     return tuple(map(tuple, mass))
-
-
-def _require_bodies(quantities: Quantities) -> None:
-    if quantities.kinematics.mechanism.bare:
-        raise UnavailableError("there are no bodies: the model is a Lagrangian or given equations")

@@ -22,7 +22,7 @@ ATTRIBUTES = (
     "poses", "velocities", "accelerations", "momenta", "linearize", "operations", "report",
 )  # fmt: skip
 OF_BODIES = ("poses", "velocities", "accelerations")
-OF_FORCES = ("T", "V", "lagrangian", "momenta", "quadratic_velocity", "generalized_forces")
+OF_PARTS = ("T", "V", "lagrangian", "momenta", "quadratic_velocity", "generalized_forces")
 OF_LOOPS = ("constraints", "constraint_jacobian", "gamma", "velocity_transformation")
 
 
@@ -203,7 +203,7 @@ class PrintedEquations:
         """Attributes to read next."""
         loops = OF_LOOPS if self.equations.constraint_names else ()
         mechanism, there = self.equations.kinematics.mechanism, type(self.equations)
-        lacking = {*(OF_BODIES if mechanism.bare else ()), *(OF_FORCES if mechanism.given is not None else ())}
+        lacking = {*(OF_BODIES if mechanism.bare else ()), *(OF_PARTS if mechanism.given is not None else ())}
         return tuple(name for name in (*ATTRIBUTES, *loops) if hasattr(there, name) and name not in lacking)
 
 

@@ -15,7 +15,7 @@ from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
 from ..notation.notation import Notation
 from .names_of_unknowns import model_notation
-from .quantities import PointMotion, Quantities
+from .quantities import PointMotion, Quantities, require_bodies
 from .quantities_of_methods import QuantitiesOfMethods
 
 if TYPE_CHECKING:
@@ -186,15 +186,16 @@ class Readable(QuantitiesOfMethods):
         return self._column("acceleration_offset", lambda s: s.transformation.acceleration_offset)
 
     # -- motion of bodies and markers ---------------------------------------------------------------------------------
-    @cached_property
     def _places(self) -> tuple[str, ...]:
+        """Names of bodies and of named markers."""
+        require_bodies(self.kinematics)
         mechanism = self.kinematics.mechanism
         return (*(b.name for b in mechanism.bodies), *(marker.label for marker in mechanism.named_markers))
 
     @cached_property
     def poses(self) -> ByName[Any]:
         """Pose (4, 4) of each body and named marker in ground axes: ``poses["rod"]``, ``poses["rod.tip"]``."""
-        return self._by_name("body or marker", self._places, self._pose)
+        return self._by_name("body or marker", self._places(), self._pose)
 
     def _pose(self, name: str) -> Any:
         return self._matrix(f"poses.{name}", lambda s: s.pose(name), 4)
@@ -202,13 +203,15 @@ class Readable(QuantitiesOfMethods):
     @cached_property
     def velocities(self) -> ByName[SpatialMotion]:
         """Velocity of each body and named marker, ground axes: ``velocities["rod"].angular``, ``.linear`` ..."""
-        return self._by_name("body or marker", self._places, partial(self._spatial, "velocities", Quantities.velocity))
+        return self._by_name(
+            "body or marker", self._places(), partial(self._spatial, "velocities", Quantities.velocity)
+        )
 
     @cached_property
     def accelerations(self) -> ByName[SpatialMotion]:
         """Acceleration of each body and named marker, ground axes: ``accelerations["rod"].angular``, ``.linear`` ..."""
         return self._by_name(
-            "body or marker", self._places, partial(self._spatial, "accelerations", Quantities.acceleration)
+            "body or marker", self._places(), partial(self._spatial, "accelerations", Quantities.acceleration)
         )
 
     def _spatial(self, what: str, of: Callable[[Quantities, str], PointMotion], name: str) -> SpatialMotion:
