@@ -98,6 +98,11 @@ def is_group(formula: Formula) -> bool:
     return isinstance(formula, SumOf | Relation)
 
 
+def is_number(formula: Formula) -> bool:
+    """Whether a formula is a number without a sign."""
+    return isinstance(formula, NumberPart)
+
+
 def is_simple(formula: Formula) -> bool:
     """Whether a formula is one symbol."""
     return isinstance(formula, Name) or (isinstance(formula, NumberPart) and not formula.power)

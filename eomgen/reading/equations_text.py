@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from ..files.terminal import fold
 from ..notation import read_latex
 from ..notation.printing import text_form
+from ..notation.signs import SUPERSCRIPTS
 from ..printing.formula_text import TIGHT
 from ..printing.formula_tree import times
 from ..texts import visible
@@ -14,9 +15,11 @@ from .printed_equations import PrintedEntry, PrintedEquations, plain
 from .readable import Readable
 
 COLUMNS = 80
+HIGH = "".join(map(chr, SUPERSCRIPTS.values()))  #: digits of a power between a function and its argument
 LINES = 60  #: of formulas; how to get the others is said
-#: Where lines end, the best first: between terms, between factors, within parentheses, within arguments of functions.
-BREAKS = ((" ", True), (TIGHT, True), (" ", False), (TIGHT, False))
+#: Where lines end, the best first: at spaces of one kind outside of some parentheses.  These are between terms, then
+#: between terms within parentheses, between factors, and within arguments of functions at last.
+BREAKS = ((" ", "call group"), (" ", "call"), (TIGHT, "call"), (TIGHT, ""))
 
 
 def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LINES) -> str:
@@ -150,10 +153,10 @@ def _matrix_equation(M: list[list[str]], rates: list[str], f: list[str]) -> Iter
 
 
 def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
-    """A formula in lines that end between terms; see :func:`_fitting` for terms that are too long."""
+    """A formula in lines that end where ``BREAKS`` says."""
     margin = " " * min(len(label) + 2, 12)
     line = f"  {label}"
-    for part in _fitting(shown, columns - len(margin)):
+    for part in _fitting(shown, columns - len(margin), BREAKS):
         if len(line) + len(part) > columns and line.strip():
             yield plain(line.rstrip())
             line = margin
@@ -161,7 +164,7 @@ def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
     yield plain(line.rstrip())
 
 
-def _fitting(shown: str, room: int, ways: Sequence[tuple[str, bool]] = BREAKS) -> Iterator[str]:
+def _fitting(shown: str, room: int, ways: Sequence[tuple[str, str]]) -> Iterator[str]:
     """Parts between which a line may end, each cut no further than it has to be to fit."""
     if not ways:
         yield from (shown[k : k + room] for k in range(0, len(shown), room))
@@ -173,13 +176,20 @@ def _fitting(shown: str, room: int, ways: Sequence[tuple[str, bool]] = BREAKS) -
             yield from _fitting(part, room, ways[1:])
 
 
-def _parts(shown: str, space: str, outside: bool) -> Iterator[str]:
-    """The parts between spaces of one kind, a sign with what comes after it; outside of parentheses alone if asked."""
-    piece, depth = "", 0
+def _parts(shown: str, space: str, outside: str) -> Iterator[str]:
+    """The parts between spaces of one kind outside of some parentheses, a sign with what comes after it."""
+    piece = ""
+    before, opened = "", [""]
     for word in shown.split(space):
+        for letter in word:
+            if letter in "({":
+                opened.append("call" if before.isalnum() or before in HIGH else "group")
+            elif letter in ")}" and len(opened) > 1:
+                opened.pop()
+            before = letter
+        before = space
         piece += word
-        depth += sum(map(word.count, "({")) - sum(map(word.count, ")}"))
-        if word in ("+", "-", "if", "otherwise") or (outside and depth):
+        if word in ("+", "-", "if", "otherwise") or any(kind and kind in outside for kind in opened):
             piece += TIGHT if word in ("+", "-", "if") else space
         else:
             yield piece
