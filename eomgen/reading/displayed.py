@@ -139,7 +139,7 @@ class ReadingView(Displayed):
     def __init__(self, source: Displayed, symbols: Callable[[str], Any], values: tuple[Mapping[str, Any], ...]) -> None:
         self.source: Displayed = source.source if isinstance(source, ReadingView) else source
         self.kinematics, self.mobility = source.kinematics, source.mobility
-        self._symbols, self._values = symbols, values
+        self._symbols, self._values = symbols, tuple(given for given in values if given)
 
     def fresh(self) -> Derived:
         return self.source.fresh()

@@ -17,9 +17,10 @@ from .readable import Readable
 COLUMNS = 80
 HIGH = "".join(map(chr, SUPERSCRIPTS.values()))  #: digits of a power between a function and its argument
 LINES = 60  #: of formulas; how to get the others is said
-#: Where lines end, the best first: at spaces of one kind outside of some parentheses.  These are between terms, then
-#: between terms within parentheses, between factors, and within arguments of functions at last.
-BREAKS = ((" ", "call group"), (" ", "call"), (TIGHT, "call"), (TIGHT, ""))
+DEEP = 9  #: parentheses in parentheses
+#: Where lines end, the best first: the kind of space, and within how many parentheses, and of arguments among them.
+#: Between terms, between terms within parentheses, the outer ones first, between factors, and within arguments at last.
+BREAKS = (*((" ", deep, 0) for deep in range(DEEP)), (TIGHT, DEEP, 0), (TIGHT, DEEP, DEEP))
 
 
 def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LINES) -> str:
@@ -164,7 +165,7 @@ def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
     yield plain(line.rstrip())
 
 
-def _fitting(shown: str, room: int, ways: Sequence[tuple[str, str]]) -> Iterator[str]:
+def _fitting(shown: str, room: int, ways: Sequence[tuple[str, int, int]]) -> Iterator[str]:
     """Parts between which a line may end, each cut no further than it has to be to fit."""
     if not ways:
         yield from (shown[k : k + room] for k in range(0, len(shown), room))
@@ -176,20 +177,22 @@ def _fitting(shown: str, room: int, ways: Sequence[tuple[str, str]]) -> Iterator
             yield from _fitting(part, room, ways[1:])
 
 
-def _parts(shown: str, space: str, outside: str) -> Iterator[str]:
-    """The parts between spaces of one kind outside of some parentheses, a sign with what comes after it."""
-    piece = ""
-    before, opened = "", [""]
+def _parts(shown: str, space: str, deep: int, in_calls: int) -> Iterator[str]:
+    """The parts between spaces of one kind, a sign with what comes after it.
+
+    Spaces count within at most ``deep`` parentheses, ``in_calls`` of which are those of arguments.
+    """
+    piece, before, opened = "", "", [False]  # of each open parenthesis whether it is one of arguments
     for word in shown.split(space):
         for letter in word:
             if letter in "({":
-                opened.append("call" if before.isalnum() or before in HIGH else "group")
+                opened.append(before.isalnum() or (before != "" and before in HIGH))
             elif letter in ")}" and len(opened) > 1:
                 opened.pop()
             before = letter
         before = space
         piece += word
-        if word in ("+", "-", "if", "otherwise") or any(kind and kind in outside for kind in opened):
+        if word in ("+", "-", "if", "otherwise") or len(opened) - 1 > deep or sum(opened) > in_calls:
             piece += TIGHT if word in ("+", "-", "if") else space
         else:
             yield piece

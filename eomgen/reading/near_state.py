@@ -65,7 +65,7 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     slopes = jacobian(residual, [graph.symbol(name) for name in inputs])
     changes += [[slopes.get((i, k), graph.zero) for i in range(len(free))] for k in range(len(inputs))]
     flat = put_in([x for row in quantities.mass_matrix for x in row], at)
-    mass = [flat[k : k + len(free)] for k in range(0, len(flat), len(free))]
+    mass = [flat[k * len(free) : (k + 1) * len(free)] for k in range(len(free))]
     require_inertia(quantities, mass, named)
     rates = [graph.zero] * len(free) if equilibrium else solve_symmetric(mass, put_in(quantities.force, at))
     still = dict(zip(a, rates, strict=True))

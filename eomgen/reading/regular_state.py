@@ -31,6 +31,8 @@ def require_inertia(quantities: Quantities, mass: Sequence[Sequence[Expr]], at: 
         It has no inverse.
     """
     n, mobility = len(mass), quantities.mobility
+    if n == 0:
+        return
     samples = [np.reshape(x, (n, n)) for x in _samples(quantities, [x for row in mass for x in row])]
     finite = [M for M in samples if np.abs(M).max(initial=0.0) * SINGULAR < 1.0]  # 1/0 is large by rounding
     if samples and not finite:

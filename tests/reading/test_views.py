@@ -232,6 +232,7 @@ def test_a_view_goes_through_pickle_and_copy_with_its_display() -> None:
 def test_explain_of_a_view() -> None:
     equations = derived()
     assert equations.with_dynamicsymbols().explain("short").difference < 1e-10
+    assert equations.subs({}).with_parameters().explain("short").difference < 1e-10
     view = equations.with_parameters({"left.l": 0.5}).subs({"s": 0})
     with pytest.raises(UnavailableError, match=re.escape("no view with left_l = 0.5, then s = 0")) as raised:
         view.explain()
