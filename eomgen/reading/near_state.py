@@ -22,7 +22,7 @@ from ..graph.symmetric import solve_symmetric
 from ..numeric.partitions import partition
 from .put_in import put_in
 from .quantities import Quantities, Row, Rows
-from .regular_state import require_finite, require_inertia
+from .regular_state import require_finite, require_inverse
 
 
 class StateEquations(NamedTuple):
@@ -66,7 +66,7 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     changes += [[slopes.get((i, k), graph.zero) for i in range(len(free))] for k in range(len(inputs))]
     flat = put_in([x for row in quantities.mass_matrix for x in row], at)
     mass = [flat[k * len(free) : (k + 1) * len(free)] for k in range(len(free))]
-    require_inertia(quantities, mass, named)
+    require_inverse(quantities, mass, named)
     rates = [graph.zero] * len(free) if equilibrium else solve_symmetric(mass, put_in(quantities.force, at))
     still = dict(zip(a, rates, strict=True))
     columns = [solve_symmetric(mass, substitute(put_in(change, at), still)) for change in changes]

@@ -20,7 +20,7 @@ from ..numeric.definite import correlated
 from .quantities import Quantities
 
 
-def require_inertia(quantities: Quantities, mass: Sequence[Sequence[Expr]], at: Mapping[str, Any]) -> None:
+def require_inverse(quantities: Quantities, mass: Sequence[Sequence[Expr]], at: Mapping[str, Any]) -> None:
     """Refuse a state at which no acceleration of the independent coordinates follows.
 
     Raises

@@ -73,6 +73,14 @@ def test_names_of_instances_are_taken_with_dots_everywhere(method: str) -> None:
         assert equations.joint_forces["x.hinge"] == equations.joint_forces["x_hinge"]
 
 
+def test_independent_coordinates_are_named_with_dots() -> None:
+    named = two_arms().derive(independent=["s", "left.hinge", "x.hinge"])
+    assert named.independent == ("s", "left_hinge", "x_hinge")
+    assert named.mass_matrix == derived().mass_matrix
+    with pytest.raises(eg.ModelError, match="no coordinate 'left_hnge'"):
+        two_arms().derive(independent=["left.hnge"])
+
+
 @pytest.mark.parametrize(
     ("ask", "word"),
     [
