@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 from shown_numbers import evaluate, random_state, state_values
 
 import eomgen as eg
 from eomgen.notation import Notation
-from eomgen.printing import text
+from eomgen.printing import Formulas, Order, latex, mathml, text
 from eomgen.printing.formula_text import TIGHT
 from eomgen.printing.formula_tree import CallOf, Name, NumberPart, Product, Quotient, SumOf, times
 from eomgen.reading.equations_text import _wrapped
@@ -174,3 +175,25 @@ def test_parentheses_are_broken_before_arguments() -> None:
     lines = lines_of(f"m{TIGHT}({argument} + {argument} + {argument} + {argument})", 34)
     assert all("sin(" not in line or "sin(a + b)" in line for line in lines)
     assert all(line.count("sin(") == line.count("sin(a + b)") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("number", "shown"),
+    [
+        ("981/100", "9.81"),
+        ("-1/250", "-0.004"),
+        ("3/4", "3/4"),
+        ("7/20", "7/20"),
+        ("1/25", "0.04"),
+        ("1/3", "1/3"),
+        ("1/75", "1/75"),
+        ("123456789012345678/25", "123456789012345678/25"),
+    ],
+)
+def test_fractions_of_decimals_are_decimals(number: str, shown: str) -> None:
+    x = sympy.Rational(number)
+    tree = Formulas(Order({}))(x)
+    assert text(tree, Notation()) == shown
+    assert "nan" not in latex(tree, Notation()) + mathml(tree, Notation())
+    if "." in shown:
+        assert sympy.Rational(shown) == x
