@@ -160,12 +160,12 @@ def lines_of(shown: str, columns: int) -> list[str]:
 def test_lines_end_outside_of_arguments() -> None:
     names = Notation()
     angle = SumOf(tuple((False, Name(f"{word}_angle")) for word in ("first", "second", "third")))
-    factors = (Name("long_mass"), Name("gravity"), CallOf("sin", (angle,)), CallOf("cos", (angle,)))
+    factors = (Name("long_mass"), Name("gravity"), CallOf("sin", (angle,)), CallOf("abs", (angle,)))
     shown = text(SumOf(((False, Product(factors)), (False, Product(factors)))), names)
     for columns in range(52, 100):
         lines = lines_of(shown, columns)
         assert max(map(len, lines)) <= columns
-        assert all(line.count("(") == line.count(")") for line in lines), lines
+        assert all(line.count("(") == line.count(")") and line.count("|") % 2 == 0 for line in lines), lines
         assert " ".join(" ".join(lines).split()) == f"f = {plain(shown)}"
     assert any(line.count("(") != line.count(")") for line in lines_of(shown, 30))  # the argument alone is longer
 
