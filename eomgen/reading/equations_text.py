@@ -182,17 +182,24 @@ def _parts(shown: str, space: str, deep: int, in_calls: int) -> Iterator[str]:
 
     Spaces count within at most ``deep`` parentheses, ``in_calls`` of which are those of arguments.
     """
-    piece, before, opened = "", "", [False]  # of each open parenthesis whether it is one of arguments
+    piece, before = "", ""
+    opened: list[str] = []  # what each open parenthesis is
     for word in shown.split(space):
         for letter in word:
-            if letter in "({":
-                opened.append(before.isalnum() or (before != "" and before in HIGH))
-            elif letter in ")}" and len(opened) > 1:
-                opened.pop()
+            if letter == "|":
+                opened = opened[:-1] if opened[-1:] == ["bar"] else [*opened, "bar"]
+            elif letter in "({":
+                opened.append("call" if before.isalnum() or (before != "" and before in HIGH) else "group")
+            elif letter in ")}":
+                opened = opened[:-1]
             before = letter
         before = space
         piece += word
-        if word in ("+", "-", "if", "otherwise") or len(opened) - 1 > deep or sum(opened) > in_calls:
+        if (
+            word in ("+", "-", "if", "otherwise")
+            or len(opened) > deep
+            or len(opened) - opened.count("group") > in_calls
+        ):
             piece += TIGHT if word in ("+", "-", "if") else space
         else:
             yield piece
