@@ -15,7 +15,7 @@ from .graph.count import Operations, count
 from .kinematics import Kinematics
 from .kinematics.mobility import Mobility
 from .kinematics.report import MechanismReport, report
-from .reading import Readable
+from .reading import Displayed
 from .records import dataclass
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Derivation(Readable):
+class Derivation(Displayed):
     """What a derivation gives; :class:`~.api.equations.Equations` says what its attributes are."""
 
     kinematics: Kinematics = field(repr=False)
@@ -42,11 +42,6 @@ class Derivation(Readable):
         and statements.  What is built from such a copy depends on the model alone.
         """
         return deepcopy(cast("tuple[Kinematics, Mobility, TreeEquations]", vars(self)["_derived"]))
-
-    @property
-    def name(self) -> str:
-        """Name of the model."""
-        return self.kinematics.mechanism.name
 
     @property
     def method(self) -> str:
@@ -86,10 +81,7 @@ class Derivation(Readable):
         return None if system is None else (len(system.unknowns), len(system.places))
 
     # -- display
-    def __str__(self) -> str:
-        return self._shown_text
-
-    __repr__ = __str__
+    __repr__ = Displayed.__repr__
 
     @cached_property
     def _shown_text(self) -> str:
@@ -104,27 +96,3 @@ class Derivation(Readable):
         if self.choice is not None:
             lines += fold(str(self.choice), 80, "", "  ")
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return f"{self._picture_and_facts(self._facts_html)}{self._equations_html}"
-
-    def _picture_and_facts(self, facts: str) -> str:
-        """What stands above the formulas; equations that can be compiled add a picture."""
-        return facts
-
-    @cached_property
-    def _facts_html(self) -> str:
-        from .reading.equations_html import facts_html
-
-        return facts_html(self)
-
-    @cached_property
-    def _equations_html(self) -> str:
-        from .reading.equations_html import equations_html
-
-        return equations_html(self)
-
-    def _repr_latex_(self) -> str:
-        from .reading.equations_latex import equations_latex
-
-        return equations_latex(self)

@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from . import __version__
 from .derivation import Derivation
+from .describe.dotted_names import Undotted
 from .equations import GIVEN, METHODS, take_given
 from .equations.digits_kept import note_lost_digits
 from .equations.positive import require_inertia
@@ -114,8 +115,10 @@ def derive(
         mechanism = model.mechanism()
     chosen = choose_method(mechanism, method)
     with _alone(), _timed(seconds, "kinematics"):
-        kinematics = analyse(mechanism, independent or ())
-        mobility = _mobility(kinematics, independent or ())
+        plain = Undotted(mechanism.instances).coordinate  # leg.hip of an instance is leg_hip
+        wanted = tuple(plain(name) if isinstance(name, str) else name for name in independent or ())
+        kinematics = analyse(mechanism, wanted)
+        mobility = _mobility(kinematics, wanted)
     if baumgarte is not None:
         kinematics = _stabilised(kinematics, chosen, baumgarte)
     with _alone(), _timed(seconds, "equations"):

@@ -43,7 +43,7 @@ def closest(name: object, known: Iterable[str], most: int = 1) -> list[str]:
     from difflib import get_close_matches  # only needed once something is wrong
 
     word, options = str(name), list(dict.fromkeys(known))
-    meant = [other for other in _MEANT.get(word.lower(), ()) if other in options]
+    meant = [other for other in _MEANT.get(word, _MEANT.get(word.lower(), ())) if other in options]
     if meant or len(options) > MOST:
         return meant[:most]
     folded = {option.lower(): option for option in options}

@@ -14,6 +14,10 @@ from .errors import UsageError
 Files = dict[str, str]
 
 
+#: What ``eomgen derive --format`` writes equations in; all but the first two are languages of other programs.
+FORMATS = ("latex", "text", "sympy", "matlab", "octave", "julia", "mathematica", "c")
+
+
 class Target(NamedTuple):
     """One target.
 

@@ -311,6 +311,18 @@ def require_folder(option: str, file: Path | None) -> None:
         raise UsageError(f"{option} {file}: the folder {folder} cannot be written")
 
 
+def require_document_folder(option: str, file: Path | None) -> None:
+    """Fail before the work if a text cannot be written where it is asked for: its folder has to be there.
+
+    Raises
+    ------
+    UsageError
+    """
+    require_folder(option, file)
+    if file is not None and not file.absolute().parent.is_dir():
+        raise UsageError(f"{option} {file}: there is no folder {file.absolute().parent}; make it, or name another one")
+
+
 def parse_settings(settings: tuple[str, ...], option: str = "--set", example: str = "r=0.12") -> dict[str, float]:
     """``name=value`` words as numbers; a value may be an expression of numbers such as ``pi/3``.
 

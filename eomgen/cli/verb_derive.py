@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..files.writing import write_whole
+from ..targets import FORMATS
 from .failures import reports_failures
 from .screen import print_heading, print_json, print_table, say, stage
 from .sections import verb_command
@@ -19,15 +21,12 @@ from .shared_options import (
     method_option,
     model_argument,
     native_option,
+    require_document_folder,
     robot_options,
 )
 
 if TYPE_CHECKING:
     from ..api.equations import Equations
-
-
-#: Of :mod:`eomgen.reading.formats`, which loads SymPy.
-FORMATS = ("latex", "text", "sympy", "matlab", "octave", "julia", "mathematica", "c")
 
 
 @verb_command()
@@ -68,6 +67,7 @@ def derive(
         raise click.UsageError("--out needs --format")
     if form is not None and as_json:
         raise click.UsageError("--json and --format exclude each other")
+    require_document_folder("--out", out)
     with blaming_option(independent), stage("derive") as parts:
         derived = load_model(model, allow_native, robot).derive(method, independent or None, baumgarte)
         parts |= derived.seconds
@@ -91,7 +91,7 @@ def write_or_print(derived: Equations, form: str, out: Path | None) -> None:
     if out is None:
         say(text.rstrip("\n"))
     else:
-        out.write_text(text, encoding="utf-8")
+        write_whole(out, text)
         say(str(out))
 
 

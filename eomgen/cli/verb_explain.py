@@ -11,6 +11,7 @@ from .failures import reports_failures
 from .screen import print_json, say, stage
 from .sections import verb_command
 from .shared_options import (
+    baumgarte_option,
     blaming_option,
     independent_option,
     json_option,
@@ -18,6 +19,7 @@ from .shared_options import (
     method_option,
     model_argument,
     native_option,
+    require_document_folder,
     robot_options,
 )
 
@@ -40,6 +42,7 @@ from .shared_options import (
     help="short: topology, coordinates, final equations and counts.",
 )
 @method_option
+@baumgarte_option
 @independent_option
 @json_option
 @robot_options
@@ -50,6 +53,7 @@ def explain(
     out: Path,
     level: str,
     method: str,
+    baumgarte: tuple[float, float] | None,
     independent: tuple[str, ...],
     as_json: bool,
     robot: dict[str, Any],
@@ -59,8 +63,9 @@ def explain(
     Mechanism, motion of each body, constraints, forces, the steps of the method, the equations, and one state with
     numbers, line by line.  At the end stands the largest difference between shown formulas and the compiled module.
     """
+    require_document_folder("--out", out)
     with blaming_option(independent), stage("derive") as parts:
-        derived = load_model(model, allow_native, robot).derive(method, independent or None)
+        derived = load_model(model, allow_native, robot).derive(method, independent or None, baumgarte)
         parts |= derived.seconds
     with stage("explain"):
         document = derived.explain(level)
@@ -69,6 +74,6 @@ def explain(
         told = {"file": str(out), "name": derived.name, "method": derived.method, "level": level}
         print_json({**told, "sections": [s.title for s in document.sections], "difference": document.difference})
         return
-    say(f"wrote {out}")
+    say(str(out))
     if document.difference is not None:
         say(f"largest difference between shown formulas and the compiled module: {document.difference:.1e}")

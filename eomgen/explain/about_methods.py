@@ -13,7 +13,8 @@ from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..notation import dotted
 from ..reading import Quantities
-from .author import Author, needed
+from ..reading.written import needed
+from .author import Author
 from .document import FormulaLine, Piece, Section, Sentence
 
 
@@ -21,10 +22,11 @@ def energies(author: Author) -> Section | None:
     """T and V, of every method."""
     if author.mechanism.given is not None:
         return None
+    T, V = author.letter("T"), author.letter("V")
     pieces = [
-        Sentence("Kinetic energy $T$ and potential energy $V$ of gravity and springs (J):"),
-        *author.quantity("T", "T"),
-        *author.quantity("V", "V"),
+        Sentence(f"Kinetic energy ${T}$ and potential energy ${V}$ of gravity and springs (J):"),
+        *author.quantity(T, "T"),
+        *author.quantity(V, "V"),
     ]
     return Section("Energies", tuple(pieces))
 
@@ -72,23 +74,24 @@ def _right_side(author: Author) -> list[Piece]:
 
 def _lagrange(author: Author) -> list[Piece]:
     k = author.equations.kinematics
+    T, V = author.letter("T"), author.letter("V")
     pieces: list[Piece] = [
         Sentence(
             "Lagrange's equations, one for each coordinate $q$ of the tree: $\\frac{d}{d\\,t} "
-            "\\frac{\\partial T}{\\partial\\dot{q}} - \\frac{\\partial T}{\\partial q} + \\frac{\\partial "
-            "V}{\\partial q} = "
+            f"\\frac{{\\partial {T}}}{{\\partial\\dot{{q}}}} - \\frac{{\\partial {T}}}{{\\partial q}} + "
+            f"\\frac{{\\partial {V}}}{{\\partial q}} = "
             "Q_q$, where $Q_q$ holds the forces without a potential"
             + (" and those of the constraints." if author.equations.constraint_names else ".")
         )
     ]
     if k.mechanism.lagrangian is not None:
-        pieces += author.quantity("L", "lagrangian")
+        pieces += author.quantity(author.letter("L"), "lagrangian")
     for j, name in enumerate(k.names):
         if k.velocity_names[j : j + 1] != (f"{name}_dot",):
             pieces.append(Sentence("Coordinates that are no angles or lengths follow from their angular velocities."))
             break
         q = author.symbol(name)
-        for left, choose in _derivatives(q, j):
+        for left, choose in _derivatives(q, j, T, V):
             named, (value,) = author.form(choose, "d_")
             pieces += author.formulas(left, value, named)
     if k.velocity_names and author.equations.constraint_names:
@@ -97,14 +100,14 @@ def _lagrange(author: Author) -> list[Piece]:
     return pieces
 
 
-def _derivatives(q: str, j: int) -> list[tuple[str, Callable[[Quantities], Sequence[Expr]]]]:
+def _derivatives(q: str, j: int, T: str, V: str) -> list[tuple[str, Callable[[Quantities], Sequence[Expr]]]]:
     """Left sides and values of the derivatives of the energies by coordinate j."""
-    partial_rate = rf"\frac{{\partial T}}{{\partial{dotted(q, 1)}}}"
+    partial_rate = rf"\frac{{\partial {T}}}{{\partial{dotted(q, 1)}}}"
     return [
         (partial_rate, lambda s: [s.momenta[j]]),
         (rf"\frac{{d}}{{d\,t}} {partial_rate}", lambda s: s.kinematics.total_derivative([s.momenta[j]])),
-        (rf"\frac{{\partial T}}{{\partial {q}}}", lambda s: gradient(s.kinetic_energy, [s.kinematics.q[j]])),
-        (rf"\frac{{\partial V}}{{\partial {q}}}", lambda s: gradient(s.potential_energy, [s.kinematics.q[j]])),
+        (rf"\frac{{\partial {T}}}{{\partial {q}}}", lambda s: gradient(s.kinetic_energy, [s.kinematics.q[j]])),
+        (rf"\frac{{\partial {V}}}{{\partial {q}}}", lambda s: gradient(s.potential_energy, [s.kinematics.q[j]])),
     ]
 
 
@@ -116,7 +119,7 @@ def _newton_euler(author: Author) -> list[Piece]:
             "the sum of "
             "all forces on it, and the rate of its angular momentum is the sum of their moments about the "
             "centre of mass. "
-            "$F$ and $M$ with the name of a joint are the force and the moment of this joint on the body that "
+            "Symbols with the name of a joint are the components of its force and its moment on the body that "
             "it carries."
         )
     ]
@@ -169,15 +172,16 @@ def _augmented(author: Author) -> list[Piece]:
 
 
 def _gibbs_appell(author: Author) -> list[Piece]:
+    S = author.letter("S")
     return [
         Sentence(
-            "The Gibbs function $S$ is half the sum of mass times the square of acceleration over all bodies; what is "
-            "free of accelerations is left out, because only derivatives by accelerations are needed:"
+            f"The Gibbs function ${S}$ is half the sum of mass times the square of acceleration over all bodies; what "
+            "is free of accelerations is left out, because only derivatives by accelerations are needed:"
         ),
-        *author.quantity("S", "gibbs_function"),
+        *author.quantity(S, "gibbs_function"),
         Sentence(
-            "Its derivatives by the accelerations are the generalized forces: $\\frac{\\partial "
-            "S}{\\partial\\ddot{q}} = Q_q$."
+            "Its derivatives by the accelerations are the generalized forces: "
+            f"$\\frac{{\\partial {S}}}{{\\partial\\ddot{{q}}}} = Q_q$."
         ),
         *_right_side(author),
     ]
@@ -186,13 +190,17 @@ def _gibbs_appell(author: Author) -> list[Piece]:
 def _hamilton(author: Author) -> list[Piece]:
     eqs = author.equations
     symbols = ", ".join(f"${author.symbol(str(p))}$" for p in eqs.momentum_symbols)
+    T, L, H = map(author.letter, "TLH")
     return [
-        Sentence(f"The momenta {symbols} are the derivatives of $T$ by the velocities:"),
+        Sentence(f"The momenta {symbols} are the derivatives of ${T}$ by the velocities:"),
         *author.quantity(r"\mathbf{p}", "momenta"),
-        Sentence("The Hamiltonian is $H = \\mathbf{p}^T \\dot{\\mathbf{q}} - L$, in coordinates and momenta:"),
-        *author.quantity("H", "hamiltonian"),
         Sentence(
-            "The rates of the momenta are $\\dot{p} = -\\frac{\\partial H}{\\partial q} + Q_q$; written in velocities:"
+            f"The Hamiltonian is ${H} = \\mathbf{{p}}^T \\dot{{\\mathbf{{q}}}} - {L}$, in coordinates and momenta:"
+        ),
+        *author.quantity(H, "hamiltonian"),
+        Sentence(
+            f"The rates of the momenta are $\\dot{{p}} = -\\frac{{\\partial {H}}}{{\\partial q}} + Q_q$; written in "
+            "velocities:"
         ),
         *author.quantity(r"\dot{\mathbf{p}}", "momentum_rates"),
     ]
@@ -255,10 +263,10 @@ def final(author: Author) -> Section:
     pieces: list[Piece] = [
         Sentence(f"$\\mathbf{{M}} \\ddot{{\\mathbf{{q}}}}_i = \\mathbf{{f}}$ for the accelerations {rates}, with")
     ]
-    if len(mass) == 1:
-        pieces = [Sentence(f"$M {author.symbol(eqs.acceleration_names[0])} = f$ with")]
     one = len(mass) == 1
-    left, right = ("M", "f") if one else (r"\mathbf{M}", r"\mathbf{f}")
+    left, right = map(author.letter, "Mf") if one else (r"\mathbf{M}", r"\mathbf{f}")
+    if one:
+        pieces = [Sentence(f"${left} {author.symbol(eqs.acceleration_names[0])} = {right}$ with")]
     pieces += author.formulas(left, mass[0] if one else mass, named, ("mass_matrix", None), True)
     known = {symbol for symbol, _ in needed(named, mass)}
     pieces += author.formulas(right, force[0] if one else force, named, ("force", None), told=known)

@@ -77,9 +77,7 @@ def constraints(author: Author) -> Section:
     pieces += author.quantity(r"\dot{\mathbf{C}}", "velocity_constraints")
     pieces.append(Sentence("The Jacobian $\\mathbf{C}_q$ is the derivative of $\\dot{\\mathbf{C}}$ by the velocities:"))
     pieces += author.quantity(r"\mathbf{C}_q", "constraint_jacobian")
-    pieces.append(
-        Sentence("$\\ddot{\\mathbf{C}} = \\mathbf{C}_q \\ddot{\\mathbf{q}} + \\mathbf{\\gamma} = \\mathbf{0}$ with")
-    )
+    pieces.append(Sentence(_second_derivative(eqs.kinematics.constraints.stabilised)))
     pieces += author.quantity(r"\mathbf{\gamma}", "gamma")
     pieces += _dead_centres(author)
     if free:
@@ -93,6 +91,19 @@ def constraints(author: Author) -> Section:
         if any(x != 0 for x in eqs.velocity_offset):
             pieces += author.quantity(r"\mathbf{b}", "velocity_offset")
     return Section("Constraints and degrees of freedom", tuple(pieces))
+
+
+def _second_derivative(stabilised: tuple[float, float] | None) -> str:
+    """What vanishes, and with Baumgarte's terms what of it is gamma."""
+    solved = "\\mathbf{C}_q \\ddot{\\mathbf{q}} + \\mathbf{\\gamma} = \\mathbf{0}$ with"
+    if stabilised is None:
+        return f"$\\ddot{{\\mathbf{{C}}}} = {solved}"
+    alpha, beta = (f"{x:.6g}" for x in stabilised)
+    terms = f"2 \\cdot {alpha} \\dot{{\\mathbf{{C}}}} + {beta}^2 \\mathbf{{C}}"
+    return (
+        f"Stabilised after Baumgarte, with $\\alpha = {alpha}$ and $\\beta = {beta}$ per second: "
+        f"$\\ddot{{\\mathbf{{C}}}} + {terms} = {solved}"
+    )
 
 
 def _freedoms(number: int) -> str:

@@ -11,8 +11,9 @@ from ..errors import UnavailableError
 from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
 from ..notation import with_instance
+from ..notation.latex_of_names import literal
 from ..reading import Quantities
-from ..reading.written import write
+from ..reading.written import needed, write
 from .document import Folded, FormulaLine, Piece, PutIn, Sentence
 from .printer import Printer
 
@@ -21,6 +22,16 @@ FOLD = 900  #: nodes of a quantity from which a page shows it only on request
 MOST = 9_000  #: nodes of a quantity that is left out
 LINES = 14  #: formulas of one quantity from which a page shows them only on request
 COLUMNS = 6  #: of a matrix that is shown as one
+#: Letters of scalars, and those that take their places.
+LETTERS = {
+    "T": r"E_{\mathrm{kin}}",
+    "V": r"E_{\mathrm{pot}}",
+    "L": r"\mathrm{Lagrangian}",
+    "S": r"\mathrm{Gibbs}",
+    "H": r"\mathrm{Hamiltonian}",
+    "M": r"\mathbf{M}",
+    "f": r"\mathbf{f}",
+}
 
 
 class Shown(NamedTuple):
@@ -53,12 +64,19 @@ class Author:
 
     # -- names --------------------------------------------------------------------------------------------------------
     def of(self, letter: str, name: str) -> str:
-        r"""LaTeX of a letter that belongs to something of the model: ``m_{\mathrm{rod}}``."""
-        return with_instance(letter, name)
+        r"""LaTeX of a letter that belongs to something of the model: ``m_{\mathrm{rod}}``.
+
+        Where a name of the model is printed so, the word stands above: ``m^{\mathrm{rod}}``.
+        """
+        return str(self.equations.notation.letter(with_instance(letter, name), f"{letter}^{{{literal(name)}}}"))
+
+    def letter(self, usual: str) -> str:
+        r"""LaTeX of a letter of ``LETTERS``, or what takes its place where a name of the model is printed so."""
+        return str(self.equations.notation.letter(usual, LETTERS[usual]))
 
     def symbol(self, name: str) -> str:
         """LaTeX of a name of the model."""
-        return str(self.equations.notation.latex(name))
+        return str(self.printer.names.latex(name))
 
     def variation(self, name: str) -> Any:
         """The variation of a coordinate in SymPy, printed with a delta."""
@@ -112,6 +130,7 @@ class Author:
         if size > MOST:
             where = f"`eqs.{key[0]}`" if key[0] else "the attributes of the equations"
             return [Sentence(f"${left}$ is left out: it has {size} terms and factors; {where} gives it as SymPy.")]
+        self.printer.meet(str(symbol) for symbol, _ in named)
         entries = list(self._entries(left, value, symmetric))
         self.shown.append(Shown(*key, named, entries))
         found: list[Piece] = [FormulaLine((self.printer.latex(s), x)) for s, x in named if s not in told]
@@ -132,6 +151,7 @@ class Author:
     def balance(self, left: Any, right: Any, named: Sequence[tuple[Any, Any]]) -> list[Piece]:
         """An equation between two expressions, with the named parts that it uses and that were not shown before."""
         parts = [pair for pair in needed(named, sympy.Matrix([left, right])) if pair not in self._told]
+        self.printer.meet(str(symbol) for symbol, _ in parts)
         self._told += parts
         return [*(FormulaLine((self.printer.latex(s), x)) for s, x in parts), FormulaLine((left, right))]
 
@@ -158,17 +178,6 @@ def nodes(value: Any) -> int:
     """Terms, factors and symbols of an expression or matrix."""
     flat = list(value) if isinstance(value, sympy.MatrixBase) else [value]
     return sum(1 for x in flat for _ in sympy.preorder_traversal(x))
-
-
-def needed(named: Sequence[tuple[Any, Any]], value: Any) -> list[tuple[Any, Any]]:
-    """The named parts that a value uses, and those that these use."""
-    wanted = set(value.free_symbols)
-    found = []
-    for symbol, expression in reversed(list(named)):
-        if symbol in wanted:
-            found.append((symbol, expression))
-            wanted |= expression.free_symbols
-    return found[::-1]
 
 
 def in_numbers(left: str, expression: Any, numbers: dict[str, float], value: float) -> FormulaLine:

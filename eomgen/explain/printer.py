@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from ..printing import Formulas, given_mathml, latex, mathml, number, sums_in_lines, text
@@ -18,6 +19,10 @@ class Printer:
     def __init__(self, equations: Any) -> None:
         self.names = equations.notation
         self._formula = Formulas(order_of(equations))
+
+    def meet(self, names: Iterable[str]) -> None:
+        """Keep names of intermediates apart from those of the model, as they are printed."""
+        self.names = self.names.with_names(names)
 
     def latex(self, side: Any) -> str:
         """LaTeX of a side, without dollars."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from functools import cache
 from typing import Any
 
@@ -55,7 +56,8 @@ class Notation:
         self.names = tuple(dict.fromkeys(names))
         self._sources: dict[str, str] = {}
         self._texts: dict[str, str] = {}  #: of those whose text would be another's name
-        self._keep_apart()
+        self._used: set[tuple[str, str]] = set()  #: forms that names have
+        self._keep_apart(self.names)
 
     @classmethod
     def of(cls, metadata: Mapping[str, Any]) -> Notation:
@@ -63,6 +65,37 @@ class Notation:
         keys = ("q_names", "v_names", "loop_names", "u_names", "p_names", "parameters", "y_names")
         names = [name for key in keys for name in metadata.get(key, ())]
         return cls(names, metadata.get("latex"), metadata.get("instances"))
+
+    def with_names(self, names: Iterable[str]) -> Notation:
+        """The same with further names, such as those of intermediates; names that there are keep their forms."""
+        more = [name for name in dict.fromkeys(names) if name not in self._sources]
+        if not more:
+            return self
+        twin = copy(self)
+        twin.names, twin._used = (*self.names, *more), set(self._used)
+        twin._sources, twin._texts = dict(self._sources), dict(self._texts)
+        twin._keep_apart(more)
+        return twin
+
+    def is_free(self, latex: str, with_numbers: bool = False) -> bool:
+        r"""Whether no name is printed as a letter, ``M``; nor, on request, as the letter with numbers, ``M_{12}``."""
+        text = re.escape(_printed("text", latex))
+        numbered = re.compile(rf"{text}_?[\d₀-₉,_]*\Z" if with_numbers else rf"{text}\Z")
+        alike = re.compile(rf"{re.escape(latex)}(_\{{?[\d,]+\}}?)?\Z" if with_numbers else rf"{re.escape(latex)}\Z")
+        return not any(alike.match(self.latex(name)) or numbered.match(self.text(name)) for name in self.names)
+
+    def letter(self, *choice: str, with_numbers: bool = False) -> str:
+        r"""A letter of a display that no name is printed as: the first of the choice, or the last with a star.
+
+        Parameters
+        ----------
+        *choice : str
+            LaTeX, such as ``M``.
+        with_numbers : bool
+            Whether it gets numbers as subscripts, ``M_{12}``, which no name may have either.
+        """
+        starred = f"{{{choice[-1]}}}^{{\\ast}}"
+        return next((letter for letter in choice if self.is_free(letter, with_numbers)), starred)
 
     def latex(self, name: str, of_time: bool = False) -> str:
         r"""LaTeX, without dollars: ``\theta_1``; as a function of time ``\theta_1(t)``."""
@@ -114,11 +147,10 @@ class Notation:
                 return f"{instance}.{name.removeprefix(prefix)}"
         return name
 
-    def _keep_apart(self) -> None:
-        """Find what every name is printed from, so that no two look alike: given LaTeX first, rates last."""
+    def _keep_apart(self, names: Iterable[str]) -> None:
+        """Find what these names are printed from, so that no two look alike: given LaTeX first, rates last."""
         known = set(self.names)
-        used: set[tuple[str, str]] = set()
-        for name in sorted(self.names, key=self._rank):
+        for name in sorted(names, key=self._rank):
             wanted = self._wanted(name)
             for source in (wanted, literal(name), literal(name, "mathtt")):
                 forms = {(form, _printed(form, source)) for form in ("latex", "text", "html")}
@@ -126,9 +158,9 @@ class Notation:
                 if name in self.given and text != name and text in known:
                     self._texts[name] = name
                     forms.discard(("text", text))
-                if used.isdisjoint(forms):
+                if self._used.isdisjoint(forms):
                     break
-            used |= forms
+            self._used |= forms
             self._sources[name] = source
 
     def _rank(self, name: str) -> int:

@@ -4,32 +4,19 @@ from __future__ import annotations
 
 from ..notation.latex_of_names import literal
 from ..notation.notation import Notation
-from .formula_tree import (
-    CallOf,
-    CasesOf,
-    Formula,
-    MatrixOf,
-    Name,
-    NumberPart,
-    Power,
-    Product,
-    Quotient,
-    Relation,
-    SumOf,
-    Words,
-    is_group,
-    is_simple,
-)
+from . import formula_tree as tree
+from .formula_writer import FormulaWriter
 
 _FUNCTIONS = {
     "sin": r"\sin", "cos": r"\cos", "tan": r"\tan", "asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan",
     "sinh": r"\sinh", "cosh": r"\cosh", "tanh": r"\tanh", "exp": r"\exp", "ln": r"\ln", "min": r"\min", "max": r"\max",
     "delta": r"\delta",
 }  # fmt: skip
+_NEXT_ROW = r" \\ "
 _RELATIONS = {"<=": r"\le", ">=": r"\ge", "and": r"\wedge", "or": r"\vee"}
 
 
-def latex(formula: Formula, names: Notation) -> str:
+def latex(formula: tree.Formula, names: Notation) -> str:
     """LaTeX of a formula.
 
     Parameters
@@ -37,7 +24,7 @@ def latex(formula: Formula, names: Notation) -> str:
     formula : Formula
     names : Notation
     """
-    return _Latex(names).line(formula)
+    return _LatexWriter(names).write(formula)
 
 
 def fenced(inside: str, left: str = "(", right: str = ")") -> str:
@@ -46,80 +33,63 @@ def fenced(inside: str, left: str = "(", right: str = ")") -> str:
     return rf"\left{left}{inside}\right{right}" if tall else f"{left}{inside}{right}"
 
 
-class _Latex:
-    def __init__(self, names: Notation) -> None:
-        self.names = names
+class _LatexWriter(FormulaWriter):
+    def grouped(self, inside: str) -> str:
+        return fenced(inside)
 
-    def line(self, formula: Formula) -> str:
-        match formula:
-            case NumberPart():
-                return rf"{formula.digits} \cdot 10^{{{formula.power}}}" if formula.power else formula.digits
-            case Name():
-                return self.names.latex(formula.name)
-            case Words():
-                return formula.latex
-            case SumOf():
-                return self._sum(formula)
-            case Product():
-                return self._product(formula)
-            case Quotient():
-                return rf"\frac{{{self.line(formula.above)}}}{{{self.line(formula.below)}}}"
-            case Power():
-                return self._power(formula)
-            case CallOf():
-                return self._call(formula, "")
-            case Relation():
-                sign = _RELATIONS.get(formula.sign, formula.sign)
-                return f" {sign} ".join(map(self.line, formula.sides))
-            case CasesOf():
-                rows = [
-                    rf"{self.line(value)} & \text{{otherwise}}" if when is None
-                    else rf"{self.line(value)} & \text{{if }} {self.line(when)}"
-                    for value, when in formula.branches
-                ]  # fmt: skip
-                body = r" \\ ".join(rows)
-                return rf"\begin{{cases}}{body}\end{{cases}}"
-            case MatrixOf():
-                body = r" \\ ".join(" & ".join(map(self.line, row)) for row in formula.rows)
-                return rf"\begin{{bmatrix}}{body}\end{{bmatrix}}"
+    def number(self, part: tree.NumberPart) -> str:
+        return rf"{part.digits} \cdot 10^{{{part.power}}}" if part.power else part.digits
 
-    def _sum(self, formula: SumOf) -> str:
+    def name(self, name: str) -> str:
+        return self.names.latex(name)
+
+    def words(self, part: tree.Words) -> str:
+        return part.latex
+
+    def product(self, formula: tree.Product) -> str:
         found = ""
-        for k, (subtracted, term) in enumerate(formula.terms):
-            sign = ("-" if subtracted else "") if k == 0 else (" - " if subtracted else " + ")
-            found += sign + self._factor(term)
-        return found
-
-    def _product(self, formula: Product) -> str:
-        found = ""
-        for factor in formula.factors:
-            shown = self._factor(factor)
+        for shown in map(self.factor, formula.factors):
             found += (r" \cdot " if found and shown[0].isdigit() else " " if found else "") + shown
         return found
 
-    def _factor(self, formula: Formula) -> str:
-        shown = self.line(formula)
-        return fenced(shown) if is_group(formula) else shown
+    def quotient(self, formula: tree.Quotient) -> str:
+        return rf"\frac{{{self.write(formula.above)}}}{{{self.write(formula.below)}}}"
 
-    def _power(self, formula: Power) -> str:
-        exponent = self.line(formula.exponent)
-        base = formula.base
-        if isinstance(base, CallOf) and base.function in _FUNCTIONS:
-            return self._call(base, f"^{{{exponent}}}" if len(exponent) > 1 else f"^{exponent}")
-        shown = self.line(base)
-        if isinstance(base, CallOf) and base.function == "abs":
-            return f"{shown}^{{{exponent}}}" if len(exponent) > 1 else f"{shown}^{exponent}"
-        if not is_simple(base) or "^" in shown or "'" in shown:
+    def power(self, formula: tree.Power) -> str:
+        exponent, base = self.write(formula.exponent), formula.base
+        raised = f"^{{{exponent}}}" if len(exponent) > 1 else f"^{exponent}"
+        if isinstance(base, tree.CallOf) and base.function in _FUNCTIONS:
+            return self._called(base, raised)
+        shown = self.write(base)
+        of_abs = isinstance(base, tree.CallOf) and base.function == "abs"
+        if not of_abs and (not tree.is_simple(base) or "^" in shown or "'" in shown):
             shown = fenced(shown)
-        return f"{shown}^{{{exponent}}}" if len(exponent) > 1 else f"{shown}^{exponent}"
+        return f"{shown}{raised}"
 
-    def _call(self, formula: CallOf, power: str) -> str:
-        inside = ", ".join(map(self.line, formula.arguments))
+    def call(self, formula: tree.CallOf) -> str:
+        return self._called(formula)
+
+    def _called(self, formula: tree.CallOf, power: str = "") -> str:
+        inside = ", ".join(map(self.write, formula.arguments))
         if formula.function == "sqrt":
             return rf"\sqrt{{{inside}}}"
         if formula.function == "abs":
             return rf"\left|{inside}\right|"
         name = _FUNCTIONS.get(formula.function) or literal(formula.function, "operatorname")
-        if len(formula.arguments) == 1 and is_simple(formula.arguments[0]) and formula.function in _FUNCTIONS:
+        if len(formula.arguments) == 1 and tree.is_simple(formula.arguments[0]) and formula.function in _FUNCTIONS:
             return f"{name}{power} {inside}"
         return f"{name}{power}{fenced(inside)}"
+
+    def relation(self, formula: tree.Relation) -> str:
+        return f" {_RELATIONS.get(formula.sign, formula.sign)} ".join(map(self.write, formula.sides))
+
+    def cases(self, formula: tree.CasesOf) -> str:
+        rows = (
+            rf"{self.write(value)} & " + (r"\text{otherwise}" if when is None else rf"\text{{if }} {self.write(when)}")
+            for value, when in formula.branches
+        )
+        return rf"\begin{{cases}}{_NEXT_ROW.join(rows)}\end{{cases}}"
+
+    def matrix(self, formula: tree.MatrixOf) -> str:
+        rows = (" & ".join(map(self.write, row)) for row in formula.rows)
+        return rf"\begin{{bmatrix}}{_NEXT_ROW.join(rows)}\end{{bmatrix}}"

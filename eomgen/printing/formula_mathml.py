@@ -4,22 +4,8 @@ from __future__ import annotations
 
 from ..notation.notation import Notation
 from ..texts import html_text
-from .formula_tree import (
-    CallOf,
-    CasesOf,
-    Formula,
-    MatrixOf,
-    Name,
-    NumberPart,
-    Power,
-    Product,
-    Quotient,
-    Relation,
-    SumOf,
-    Words,
-    is_group,
-    is_simple,
-)
+from . import formula_tree as tree
+from .formula_writer import FormulaWriter
 
 _FUNCTIONS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "delta": "δ"}
 _RELATIONS = {"<=": "≤", ">=": "≥", "and": "\u2227", "or": "\u2228"}
@@ -28,7 +14,7 @@ MINUS = f"<mo>{MINUS_SIGN}</mo>"
 _THIN = "<mspace width='0.17em'/>"
 
 
-def mathml(formula: Formula, names: Notation) -> str:
+def mathml(formula: tree.Formula, names: Notation) -> str:
     """Elements of MathML, without ``<math>``.
 
     Parameters
@@ -36,7 +22,7 @@ def mathml(formula: Formula, names: Notation) -> str:
     formula : Formula
     names : Notation
     """
-    return _MathML(names).element(formula)
+    return _MathMLWriter(names).write(formula)
 
 
 def row(*parts: str) -> str:
@@ -56,70 +42,44 @@ def table(rows: list[list[str]], style: str = "") -> str:
     return f"<mtable displaystyle='true'{look}>{''.join(f'<mtr>{one}</mtr>' for one in cells)}</mtable>"
 
 
-class _MathML:
-    def __init__(self, names: Notation) -> None:
-        self.names = names
+class _MathMLWriter(FormulaWriter):
+    minus, plus, negative = MINUS, "<mo>+</mo>", MINUS
 
-    def element(self, formula: Formula) -> str:
-        match formula:
-            case NumberPart():
-                if formula.power:
-                    ten = f"<msup><mn>10</mn><mn>{formula.power.replace('-', MINUS_SIGN)}</mn></msup>"
-                    return row(f"<mn>{formula.digits}</mn><mo>·</mo>", ten)
-                return f"<mn>{formula.digits}</mn>"
-            case Name():
-                return self.names.mathml(formula.name)
-            case Words():
-                return f"<mtext>{html_text(formula.text)}</mtext>"
-            case SumOf():
-                return self._sum(formula)
-            case Product():
-                return self._product(formula)
-            case Quotient():
-                return f"<mfrac>{row(self.element(formula.above))}{row(self.element(formula.below))}</mfrac>"
-            case Power():
-                return self._power(formula)
-            case CallOf():
-                return self._call(formula, "")
-            case Relation():
-                sign = html_text(_RELATIONS.get(formula.sign, formula.sign))
-                return row(f"<mo>{sign}</mo>".join(map(self.element, formula.sides)))
-            case CasesOf():
-                rows = [
-                    [self.element(value), "<mtext>otherwise</mtext>" if when is None
-                     else row("<mtext>if </mtext>", self.element(when))]
-                    for value, when in formula.branches
-                ]  # fmt: skip
-                return row("<mo>{</mo>", table(rows, "text-align:left"))
-            case MatrixOf():
-                body = table([list(map(self.element, one)) for one in formula.rows])
-                return f"<mrow class='matrix'><mo>[</mo>{body}<mo>]</mo></mrow>"
+    def grouped(self, inside: str) -> str:
+        return fenced(inside)
 
-    def _sum(self, formula: SumOf) -> str:
-        parts = []
-        for k, (subtracted, term) in enumerate(formula.terms):
-            sign = MINUS if subtracted else "<mo>+</mo>"
-            parts += [sign] * (subtracted or k > 0) + [self._factor(term)]
-        return row(*parts)
+    def number(self, part: tree.NumberPart) -> str:
+        digits = f"<mn>{part.digits}</mn>"
+        if not part.power:
+            return digits
+        return row(digits, f"<mo>·</mo><msup><mn>10</mn><mn>{part.power.replace('-', MINUS_SIGN)}</mn></msup>")
 
-    def _product(self, formula: Product) -> str:
+    def name(self, name: str) -> str:
+        return self.names.mathml(name)
+
+    def words(self, part: tree.Words) -> str:
+        return f"<mtext>{html_text(part.text)}</mtext>"
+
+    def sum(self, formula: tree.SumOf) -> str:
+        return row(super().sum(formula))
+
+    def product(self, formula: tree.Product) -> str:
         """Factors side by side; a point before one that begins with a digit."""
         found: list[str] = []
-        for shown in map(self._factor, formula.factors):
+        for shown in map(self.factor, formula.factors):
             begins = shown.removeprefix("<mrow>").removeprefix("<msup>").startswith("<mn>")
             found += [("<mo>·</mo>" if begins else _THIN) if found else "", shown]
         return row(*found)
 
-    def _factor(self, formula: Formula) -> str:
-        shown = self.element(formula)
-        return fenced(shown) if is_group(formula) else shown
+    def quotient(self, formula: tree.Quotient) -> str:
+        return f"<mfrac>{row(self.write(formula.above))}{row(self.write(formula.below))}</mfrac>"
 
-    def _power(self, formula: Power) -> str:
-        exponent, base = self.element(formula.exponent), formula.base
-        if isinstance(base, CallOf) and base.function not in ("sqrt", "abs"):
-            return self._call(base, exponent)
-        shown = self.element(base)
-        if not is_simple(base):
+    def power(self, formula: tree.Power) -> str:
+        exponent, base = self.write(formula.exponent), formula.base
+        if isinstance(base, tree.CallOf) and base.function not in ("sqrt", "abs"):
+            return self._called(base, exponent)
+        shown = self.write(base)
+        if not tree.is_simple(base):
             shown = fenced(shown)
         if shown.startswith("<msub>"):  # one element: the exponent stands above the subscript
             return f"<msubsup>{shown.removeprefix('<msub>').removesuffix('</msub>')}{exponent}</msubsup>"
@@ -127,14 +87,32 @@ class _MathML:
             shown = fenced(shown)
         return f"<msup>{shown}{exponent}</msup>"
 
-    def _call(self, formula: CallOf, power: str) -> str:
-        arguments = "<mo>,</mo>".join(map(self.element, formula.arguments))
+    def call(self, formula: tree.CallOf) -> str:
+        return self._called(formula)
+
+    def _called(self, formula: tree.CallOf, power: str = "") -> str:
+        arguments = "<mo>,</mo>".join(map(self.write, formula.arguments))
         if formula.function == "sqrt":
             return f"<msqrt>{arguments}</msqrt>"
         if formula.function == "abs":
             return fenced(arguments, "|", "|")
         name = f"<mi>{html_text(_FUNCTIONS.get(formula.function, formula.function))}</mi>"
         name = f"<msup>{name}{power}</msup>" if power else name
-        if len(formula.arguments) == 1 and is_simple(formula.arguments[0]):
+        if len(formula.arguments) == 1 and tree.is_simple(formula.arguments[0]):
             return row(name, _THIN, arguments)
         return row(name, fenced(arguments))
+
+    def relation(self, formula: tree.Relation) -> str:
+        sign = html_text(_RELATIONS.get(formula.sign, formula.sign))
+        return row(f"<mo>{sign}</mo>".join(map(self.write, formula.sides)))
+
+    def cases(self, formula: tree.CasesOf) -> str:
+        rows = []
+        for value, when in formula.branches:
+            held = "<mtext>otherwise</mtext>" if when is None else row("<mtext>if </mtext>", self.write(when))
+            rows.append([self.write(value), held])
+        return row("<mo>{</mo>", table(rows, "text-align:left"))
+
+    def matrix(self, formula: tree.MatrixOf) -> str:
+        body = table([list(map(self.write, one)) for one in formula.rows])
+        return f"<mrow class='matrix'><mo>[</mo>{body}<mo>]</mo></mrow>"

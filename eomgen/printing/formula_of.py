@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from decimal import Decimal
 from typing import Any
 
 import sympy
@@ -26,6 +27,7 @@ from .formula_tree import (
 
 _SIGNS = {"StrictLessThan": "<", "StrictGreaterThan": ">", "LessThan": "<=", "GreaterThan": ">=", "Equality": "="}
 _LOGIC = {"And": "and", "Or": "or"}
+DIGITS = 15  #: of a decimal
 _NAMES = {"Abs": "abs", "Max": "max", "Min": "min", "log": "ln", "ceiling": "ceil"}
 
 
@@ -96,6 +98,8 @@ class Formulas:
             upper = (_decimal(number), *upper)
         elif number.q == 1:
             upper = (NumberPart(str(number)), *upper) if number != 1 or not upper else upper
+        elif decimal := _as_decimal(number):
+            upper = (NumberPart(decimal), *upper)
         elif lower:
             upper = (NumberPart(str(number.p)), *upper) if number.p != 1 or not upper else upper
             lower = (NumberPart(str(number.q)), *lower)
@@ -122,10 +126,18 @@ def _product(factors: tuple[Formula, ...]) -> Formula:
     return factors[0] if len(factors) == 1 else Product(factors)
 
 
+def _as_decimal(number: Any) -> str:
+    """The decimal of a fraction that no hand would write, such as 981/100; empty of fractions such as 3/4 or 7/20."""
+    if number.q % 25 or 10**DIGITS % number.q:
+        return ""
+    shown = f"{Decimal(int(number.p)) / Decimal(int(number.q)):f}"
+    return shown if len(shown) <= DIGITS else ""
+
+
 def _decimal(x: Any) -> Formula:
     if not x.is_Float or not x.is_finite:
         return Words(str(x), sympy.latex(x))
-    return number(float(x), 15)
+    return number(float(x), DIGITS)
 
 
 def number(value: float, digits: int = 6) -> Formula:

@@ -80,9 +80,27 @@ class Words(NamedTuple):
 Formula = NumberPart | Name | SumOf | Product | Quotient | Power | CallOf | Relation | CasesOf | MatrixOf | Words
 
 
+def times(formula: Formula, factor: Formula) -> Formula:
+    """A formula with one more factor, within its fraction: of ``3 m/2`` and ``s``, ``3 m s/2``, which reads one way."""
+    match formula:
+        case Quotient():
+            return formula._replace(above=times(formula.above, factor))
+        case Product():
+            return Product((*formula.factors, factor))
+        case NumberPart("1", ""):
+            return factor
+        case _:
+            return Product((formula, factor))
+
+
 def is_group(formula: Formula) -> bool:
     """Whether a formula needs parentheses to be one factor."""
     return isinstance(formula, SumOf | Relation)
+
+
+def is_number(formula: Formula) -> bool:
+    """Whether a formula is a number without a sign."""
+    return isinstance(formula, NumberPart)
 
 
 def is_simple(formula: Formula) -> bool:

@@ -3,7 +3,8 @@
 Reading happens in copies of the graph: nothing that is read changes what is compiled.
 """
 
+from .displayed import Displayed
 from .quantities import Quantities
 from .readable import Readable
 
-__all__ = ["Quantities", "Readable"]
+__all__ = ["Displayed", "Quantities", "Readable"]

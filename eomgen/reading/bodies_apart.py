@@ -17,7 +17,8 @@ from ..graph.core import Expr
 from ..graph.spatial import Wrench
 from ..graph.vectors import Vec3
 from ..kinematics.wrenches import JointWrenches
-from .of_methods import multiplier_names, require_method
+from .names_of_unknowns import multiplier_names, wrench_names
+from .of_methods import require_method
 from .quantities import Quantities, Row
 
 METHODS_OF_BODIES = ("newton_euler", "amalgamated")
@@ -51,9 +52,10 @@ class BodiesApart:
         self.links = {link.body: k for k, link in enumerate(self.kinematics.links)}
         self.joints = [self.kinematics.mechanism.joints[b.joint].name for b in self.kinematics.topology.branches]
 
-    def _unknown(self, joint: str, kind: str) -> Vec3:
-        x, y, z = (self.graph.symbol(f"{joint}_{kind}_{axis}") for axis in "xyz")
-        return x, y, z
+    def _unknown(self, joint: str) -> tuple[Vec3, Vec3]:
+        """Force and moment of a joint."""
+        m_x, m_y, m_z, f_x, f_y, f_z = map(self.graph.symbol, wrench_names(self.kinematics, joint))
+        return (f_x, f_y, f_z), (m_x, m_y, m_z)
 
     def _centre(self, body: int) -> Vec3:
         pose = self.kinematics.poses.link(self.links[body])
@@ -102,7 +104,7 @@ class BodiesApart:
             if body not in (link.body, parent):
                 continue
             point = self.kinematics.poses.link(k).position
-            force, moment = self._unknown(joint, "F"), self._unknown(joint, "M")
+            force, moment = self._unknown(joint)
             if body == parent:
                 force, moment = vec.neg(force), vec.neg(moment)
             found.append(self._about_centre(body, point, force, moment))
@@ -111,7 +113,7 @@ class BodiesApart:
     def _multipliers(self) -> dict[str, Expr]:
         """The multiplier of each constraint equation that counts, by its label."""
         labels = self.kinematics.constraints.labels
-        names = multiplier_names(self.quantities)
+        names = multiplier_names(self.kinematics, len(self.quantities.rows))
         return {labels[i]: self.graph.symbol(n) for i, n in zip(self.quantities.rows, names, strict=True)}
 
     def _from_cut_joints(self, body: int) -> list[Wrench]:
@@ -140,7 +142,7 @@ class BodiesApart:
         k = self.joints.index(name)
         link, bodies = self.kinematics.links[k], FreeBodies(self.kinematics)
         rotation = self.kinematics.poses.link(k).rotation
-        force, moment = self._unknown(name, "F"), self._unknown(name, "M")
+        force, moment = self._unknown(name)
         pulls = self._pulls()
         found = []
         for c, (angular, linear) in enumerate(link.columns):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..printing import mathml, sums_in_lines
+from ..printing import given_mathml, mathml, sums_in_lines
 from ..printing.formula_mathml import fenced, row
 from ..printing.formula_tree import Formula, MatrixOf, Name, SumOf, is_group
 from ..texts import html_text
@@ -37,7 +37,19 @@ def facts_html(equations: Readable) -> str:
     name = html_text(equations.kinematics.mechanism.name)
     head = f"<p style='margin:0 0 0.6em 0'><b>{name}</b>: equations of motion, {html_text(printed.title)}</p>"
     attributes = ", ".join(f"<code>eqs.{name}</code>" for name in printed.attributes)
-    return f"{head}{_coordinates(printed)}<details><summary>read next</summary><p {LEFT}>{attributes}</p></details>"
+    further = f"<details><summary>read next</summary><p {LEFT}>{attributes}</p></details>"
+    return f"{head}{_values(printed)}{_coordinates(printed)}{further}"
+
+
+def _values(printed: PrintedEquations) -> str:
+    """What was put in."""
+    shown = [_math(mathml(x, printed.names)) for x in printed.values]
+    whole = f"with {', '.join(shown)}"
+    if not shown:
+        return ""
+    if len(shown) <= FOLDED:
+        return f"<p {LEFT}>{whole}</p>"
+    return f"<details><summary>with {len(shown)} values</summary><p {LEFT}>{whole}</p></details>"
 
 
 def _coordinates(printed: PrintedEquations) -> str:
@@ -69,30 +81,33 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
     def shown(formula: Formula) -> str:
         return mathml(formula, printed.names)
 
-    rates = [printed.names.mathml(name) for name in printed.equations.acceleration_names]
+    rates = [shown(x) for x in printed.accelerations]
     of_mass, of_force = printed.size
     M, f = printed.mass_matrix, printed.force
     equals = "<mo>=</mo>"
-    if len(rates) == 1 and of_mass + of_force <= WIDE:
+    if printed.is_one_equation and of_mass + of_force <= WIDE:
         factor = "" if printed.text(M[0][0]) == "1" else fenced(shown(M[0][0])) if is_group(M[0][0]) else shown(M[0][0])
         yield _block(row(factor, "<mspace width='0.17em'></mspace>", rates[0], equals, shown(f[0])))
         return
-    v = shown(MatrixOf(tuple((Name(name),) for name in printed.equations.acceleration_names)))
+    v = shown(MatrixOf(tuple((x,) for x in printed.accelerations)))
     right, left = shown(MatrixOf(tuple((x,) for x in f))), shown(MatrixOf(tuple(map(tuple, M))))
     if len(rates) > 1 and of_mass + of_force <= WIDE:
         yield _block(row(left, v, equals, right))
         return
-    yield _block(row("<mi>M</mi>", v if len(rates) > 1 else rates[0], equals, "<mi>f</mi>"))
+    mass, _, force = map(given_mathml, printed.letters)
+    yield _block(row(mass, rates[0] if printed.is_one_equation else v, equals, force))
+    if told := ", ".join(f"{_math(given_mathml(letter))} is {what}" for letter, what in printed.letters_told):
+        yield f"<p {LEFT}>{told}; the usual letters are names of the model.</p>"
     whole = len(rates) > 1 and of_mass <= WIDE
     if whole:
-        yield _block(row("<mi>M</mi>", equals, left))
+        yield _block(row(mass, equals, left))
     elif len(rates) > 1:
         zeros = "; entries that are not shown are 0" if printed.vanishing else ""
         yield f"<p {LEFT}>The mass matrix is symmetric{zeros}.</p>"
     entries = [
         _line(printed, _label(entry, len(rates)), entry.formula)
         for entry in printed.entries()
-        if not (whole and entry.letter == "M")
+        if not (whole and entry.letter == printed.letters.mass)
     ]
     if len(entries) <= FOLDED:
         yield from entries
@@ -102,9 +117,9 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
 
 def _label(entry: PrintedEntry, n: int) -> str:
     if n == 1:
-        return f"<mi>{entry.letter}</mi>"
+        return given_mathml(entry.letter)
     comma = "," if n > 9 else ""
-    return f"<msub><mi>{entry.letter}</mi><mn>{comma.join(map(str, entry.place))}</mn></msub>"
+    return f"<msub>{given_mathml(entry.letter)}<mn>{comma.join(map(str, entry.place))}</mn></msub>"
 
 
 def _line(printed: PrintedEquations, label: str, formula: Formula) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..printing import latex, sums_in_lines
-from ..printing.formula_tree import Formula, MatrixOf, Name, is_group
+from ..printing.formula_tree import Formula, MatrixOf, is_group
 from .printed_equations import PrintedEquations
 from .readable import Readable
 
@@ -13,9 +13,11 @@ WIDE = 150  #: characters of text up to which a matrix equation stands in one li
 
 
 def latex_lines(equations: Readable) -> list[str]:
-    """Each formula of the equations of motion, without dollars: M v' = f first, then what their names stand for."""
+    """Each formula of the equations of motion, without dollars: M v' = f, what its names stand for, what was put in."""
     printed = PrintedEquations(equations)
-    return [*_motion(printed), *(_broken(printed, _name(printed, n), x) for n, x in printed.intermediates)]
+    lines = [*_motion(printed), *(_broken(printed, printed.names.latex(n), x) for n, x in printed.intermediates)]
+    values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
+    return [*lines, rf"\text{{with }} {values}"] if values else lines
 
 
 def equations_latex(equations: Readable) -> str:
@@ -26,36 +28,33 @@ def equations_latex(equations: Readable) -> str:
     return "\n\n".join(f"$$\n{line}\n$$" for line in lines)
 
 
-def _name(printed: PrintedEquations, name: str) -> str:
-    return printed.names.latex(name)
-
-
 def _motion(printed: PrintedEquations) -> Iterator[str]:
     def shown(formula: Formula) -> str:
         return latex(formula, printed.names)
 
-    rates = [printed.names.latex(name) for name in printed.equations.acceleration_names]
+    rates = [shown(x) for x in printed.accelerations]
     if not rates:
         yield r"n = 0"
         return
     of_mass, of_force = printed.size
-    if len(rates) == 1 and of_mass + of_force <= WIDE:
+    if printed.is_one_equation and of_mass + of_force <= WIDE:
         M, f = printed.mass_matrix[0][0], printed.force[0]
         factor = rf"\left({shown(M)}\right)" if is_group(M) else shown(M)
         yield f"{'' if shown(M) == '1' else factor + ' '}{rates[0]} = {shown(f)}"
         return
     left = shown(MatrixOf(tuple(map(tuple, printed.mass_matrix))))
     right = shown(MatrixOf(tuple((x,) for x in printed.force)))
-    v = shown(MatrixOf(tuple((Name(name),) for name in printed.equations.acceleration_names)))
+    v = shown(MatrixOf(tuple((x,) for x in printed.accelerations)))
     if len(rates) > 1 and of_mass + of_force <= WIDE:
         yield f"{left} {v} = {right}"
         return
-    yield rf"M\, {v} = f" if len(rates) > 1 else rf"M\, {rates[0]} = f"
+    mass, _, right = printed.letters
+    yield rf"{mass}\, {rates[0] if printed.is_one_equation else v} = {right}"
     whole = len(rates) > 1 and of_mass <= WIDE
     if whole:
-        yield f"M = {left}"
+        yield f"{mass} = {left}"
     for entry in printed.entries():
-        if not (whole and entry.letter == "M"):
+        if not (whole and entry.letter == mass):
             comma = "," if len(rates) > 9 else ""
             label = f"{entry.letter}_{{{comma.join(map(str, entry.place))}}}" if len(rates) > 1 else entry.letter
             yield _broken(printed, label, entry.formula)

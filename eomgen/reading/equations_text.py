@@ -5,14 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ..files.terminal import fold
+from ..notation import read_latex
+from ..notation.printing import text_form
+from ..notation.signs import SUPERSCRIPTS
 from ..printing.formula_text import TIGHT
-from ..printing.formula_tree import Formula, is_group
+from ..printing.formula_tree import times
 from ..texts import visible
 from .printed_equations import PrintedEntry, PrintedEquations, plain
 from .readable import Readable
 
 COLUMNS = 80
+HIGH = "".join(map(chr, SUPERSCRIPTS.values()))  #: digits of a power between a function and its argument
 LINES = 60  #: of formulas; how to get the others is said
+DEEP = 9  #: parentheses in parentheses
+#: Where lines end, the best first: the kind of space, and within how many parentheses, and of arguments among them.
+#: Between terms, between terms within parentheses, the outer ones first, between factors, and within arguments at last.
+BREAKS = (*((" ", deep, 0) for deep in range(DEEP)), (TIGHT, DEEP, 0), (TIGHT, DEEP, DEEP))
 
 
 def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LINES) -> str:
@@ -32,7 +40,8 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
     """
     printed = PrintedEquations(equations)
     name = visible(equations.kinematics.mechanism.name, lines=False)
-    found = [f"equations of motion of {name}", f"  {printed.title}", *_coordinates(printed, columns)]
+    found = [f"equations of motion of {name}", f"  {printed.title}"]
+    found += [*_values(printed, columns), *_coordinates(printed, columns)]
     if equations.mobility.n_dof == 0:
         found.append("  nothing is free to move: the position follows from constraints and time")
     else:
@@ -43,6 +52,12 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
             found += [rest, "or in a shell: eomgen derive MODEL --format text"]
     found += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
     return "\n".join(found)
+
+
+def _values(printed: PrintedEquations, columns: int) -> list[str]:
+    """What was put in."""
+    shown = ", ".join(printed.text(x).replace(" ", TIGHT) for x in printed.values)
+    return [plain(line) for line in fold(shown, columns, "  with ", "    ")] if shown else []
 
 
 def _coordinates(printed: PrintedEquations, columns: int) -> Iterator[str]:
@@ -60,12 +75,11 @@ def _coordinates(printed: PrintedEquations, columns: int) -> Iterator[str]:
 
 
 def _equations(printed: PrintedEquations, columns: int) -> Iterator[str]:
-    rates = [printed.names.text(name) for name in printed.equations.acceleration_names]
+    rates = [printed.text(x) for x in printed.accelerations]
     M = [[printed.text(x) for x in row] for row in printed.mass_matrix]
     f = [printed.text(x) for x in printed.force]
-    if len(rates) == 1:
-        left = f"{_as_factor(M[0][0], printed.mass_matrix[0][0])}{rates[0]}"
-        whole = f"  {left} = {f[0]}"
+    if printed.is_one_equation:
+        whole = f"  {printed.text(times(printed.mass_matrix[0][0], printed.accelerations[0]))} = {f[0]}"
         if len(whole) <= columns:
             yield plain(whole)
             yield from _where(printed, columns)
@@ -75,31 +89,37 @@ def _equations(printed: PrintedEquations, columns: int) -> Iterator[str]:
         yield from map(plain, whole_rows)
         yield from _where(printed, columns)
         return
-    listed = f"M v' = f with v' = ({', '.join(rates)})"
-    yield f"M {rates[0]} = f" if len(rates) == 1 else listed if len(listed) <= columns else "M v' = f"
+    mass, v, right = (letter_text(letter) for letter in printed.letters)
+    short = f"{mass} {rates[0]} = {right}" if printed.is_one_equation else f"{mass} {v} = {right}"
+    listed = f"{short} with {v} = ({', '.join(rates)})"
+    yield short if printed.is_one_equation or len(listed) > columns else listed
+    if told := ", ".join(f"{letter_text(letter)} is {what}" for letter, what in printed.letters_told):
+        yield from fold(f"{told}; the usual letters are names of the model", columns, "  ", "  ")
     yield ""
-    rows = [*_matrix(M, "M = ")]
+    rows = [*_matrix(M, f"{mass} = ")]
     small = len(rates) > 1 and max(map(len, rows)) <= columns
     if small:
         yield from map(plain, rows)
         yield ""
     for entry in printed.entries():
-        if not (small and entry.letter == "M"):
+        if not (small and entry.letter == printed.letters.mass):
             yield from _wrapped(f"{_label(entry, len(rates))} = ", printed.text(entry.formula), columns)
     if not small and len(rates) > 1:
-        yield f"M is symmetric{'; its other entries are 0' if printed.vanishing else ''}"
+        yield f"{mass} is symmetric{'; its other entries are 0' if printed.vanishing else ''}"
     yield from _where(printed, columns)
 
 
-def _as_factor(shown: str, formula: Formula) -> str:
-    return "" if shown == "1" else f"({shown}){TIGHT}" if is_group(formula) else f"{shown}{TIGHT}"
+def letter_text(latex: str) -> str:
+    """A letter of a display in text."""
+    return text_form(read_latex(latex))
 
 
 def _label(entry: PrintedEntry, n: int) -> str:
+    letter = letter_text(entry.letter)
     if n == 1:
-        return entry.letter
+        return letter
     comma = "," if n > 9 else ""
-    return f"{entry.letter}_{comma.join(map(str, entry.place))}"
+    return f"{letter}_{comma.join(map(str, entry.place))}"
 
 
 def _where(printed: PrintedEquations, columns: int) -> Iterator[str]:
@@ -134,36 +154,55 @@ def _matrix_equation(M: list[list[str]], rates: list[str], f: list[str]) -> Iter
 
 
 def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
-    """A formula broken between terms, inside of a term where it is too long, and between factors at last."""
+    """A formula in lines that end where ``BREAKS`` says."""
     margin = " " * min(len(label) + 2, 12)
     line = f"  {label}"
-    for term in _pieces(shown, outside=True):
-        whole = len(margin) + len(term) <= columns
-        for word in [term] if whole else _pieces(term):
-            for part in [word] if len(margin) + len(word) <= columns else _cut(word, columns - len(margin)):
-                if len(line) + len(part) > columns and line.strip():
-                    yield plain(line.rstrip())
-                    line = margin
-                line += part + " "
+    for part in _fitting(shown, columns - len(margin), BREAKS):
+        if len(line) + len(part) > columns and line.strip():
+            yield plain(line.rstrip())
+            line = margin
+        line += part + " "
     yield plain(line.rstrip())
 
 
-def _pieces(shown: str, outside: bool = False) -> Iterator[str]:
-    """Parts between which a line may end, a sign with what comes after it; outside of parentheses alone if asked."""
-    piece, depth = "", 0
-    for word in shown.split(" "):
+def _fitting(shown: str, room: int, ways: Sequence[tuple[str, int, int]]) -> Iterator[str]:
+    """Parts between which a line may end, each cut no further than it has to be to fit."""
+    if not ways:
+        yield from (shown[k : k + room] for k in range(0, len(shown), room))
+        return
+    for part in _parts(shown, *ways[0]):
+        if len(part) <= room:
+            yield part
+        else:
+            yield from _fitting(part, room, ways[1:])
+
+
+def _parts(shown: str, space: str, deep: int, in_calls: int) -> Iterator[str]:
+    """The parts between spaces of one kind, a sign with what comes after it.
+
+    Spaces count within at most ``deep`` parentheses, ``in_calls`` of which are those of arguments.
+    """
+    piece, before = "", ""
+    opened: list[str] = []  # what each open parenthesis is
+    for word in shown.split(space):
+        for letter in word:
+            if letter == "|":
+                opened = opened[:-1] if opened[-1:] == ["bar"] else [*opened, "bar"]
+            elif letter in "({":
+                opened.append("call" if before.isalnum() or (before != "" and before in HIGH) else "group")
+            elif letter in ")}":
+                opened = opened[:-1]
+            before = letter
+        before = space
         piece += word
-        depth += sum(map(word.count, "({")) - sum(map(word.count, ")}"))
-        if word in ("+", "-", "if", "otherwise") or (outside and depth):
-            piece += TIGHT if word in ("+", "-", "if") else " "
+        if (
+            word in ("+", "-", "if", "otherwise")
+            or len(opened) > deep
+            or len(opened) - opened.count("group") > in_calls
+        ):
+            piece += TIGHT if word in ("+", "-", "if") else space
         else:
             yield piece
             piece = ""
     if piece:
-        yield piece
-
-
-def _cut(word: str, room: int) -> Iterator[str]:
-    """A long part between factors; a longer factor anywhere."""
-    for part in word.split(TIGHT):
-        yield from (part[k : k + room] for k in range(0, len(part), room))
+        yield piece.rstrip(space)

@@ -16,6 +16,8 @@ from sympy.printing.c import reserved_words as c_words
 from sympy.printing.mathematica import MCodePrinter
 
 from ..errors import UnavailableError
+from ..runtime.near_names import unknown
+from ..targets import FORMATS
 from .equations_latex import latex_lines
 from .equations_text import COLUMNS, equations_text
 from .readable import Readable
@@ -59,7 +61,6 @@ LANGUAGES = {
     ),
     "c": Language(sympy.ccode, "//", frozenset([*c_words, "M", "f", "double", "restrict", "inline", "y0", "y1", "jn"])),
 }
-FORMATS = ("latex", "text", *LANGUAGES)
 
 
 def write_format(equations: Readable, form: str) -> str:
@@ -69,13 +70,22 @@ def write_format(equations: Readable, form: str) -> str:
     ----------
     equations : Readable
     form : str
-        One of ``FORMATS``.  ``matlab``, ``octave``, ``julia`` and ``c`` give a function of the symbols, in
-        alphabetical order, for M and f; ``sympy`` and ``mathematica`` give statements that define M and f.
+        One of :data:`~eomgen.targets.FORMATS`.  ``matlab``, ``octave``, ``julia`` and ``c`` give a function of the
+        symbols, in alphabetical order, for M and f; ``sympy`` and ``mathematica`` give statements that define M and f.
 
     Returns
     -------
     str
+
+    Raises
+    ------
+    UsageError
+        Another format.
+    UnavailableError
+        The equations hold tables or functions, which no language has.
     """
+    if form not in FORMATS:
+        raise unknown("format", form, FORMATS)
     if form == "latex":
         return "\n".join(f"\\[\n{line}\n\\]" for line in latex_lines(equations)) + "\n"
     if form == "text":

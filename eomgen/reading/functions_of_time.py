@@ -9,6 +9,7 @@ from typing import Any
 from ..describe.input_names import split_rate
 from ..kinematics import Kinematics
 from ..kinematics.state import acceleration_name
+from .names_of_unknowns import momentum_names
 
 
 def dynamic_symbols(kinematics: Kinematics) -> Callable[[str], Any]:
@@ -28,7 +29,7 @@ def dynamic_symbols(kinematics: Kinematics) -> Callable[[str], Any]:
     for name in inputs:
         base, order = split_rate(name)
         orders[name] = (base, order) if base in inputs else (name, 0)
-    orders |= {f"p_{label}": (f"p_{label}", 0) for label in kinematics.velocity_labels}
+    orders |= {name: (name, 0) for name in momentum_names(kinematics)}
 
     return partial(_function_of_time, orders)
 

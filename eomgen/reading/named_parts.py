@@ -21,30 +21,36 @@ class NamedSum(sympy.Matrix):  # type: ignore[misc]  # SymPy has no types
     """
 
     parts: Mapping[str, Any] = {}
+    _plain: Callable[[str], str] = str
 
     @classmethod
-    def of(cls, total: Sequence[Any], parts: Mapping[str, Any]) -> NamedSum:
-        """The column of the total, with its parts."""
+    def of(cls, total: Sequence[Any], parts: Mapping[str, Any], plain: Callable[[str], str]) -> NamedSum:
+        """The column of the total, with its parts; ``plain`` gives ``left_motor`` of ``left.motor``."""
         made = cls(len(total), 1, list(total))
-        made.parts = dict(parts)
+        made.parts, made._plain = dict(parts), plain
         return made
 
     def __getitem__(self, key: Any) -> Any:
         if not isinstance(key, str):
             return super().__getitem__(key)
-        if key not in self.parts:
-            raise unknown("force element", key, self.parts)
-        return self.parts[key]
+        name = key if key in self.parts else self._plain(key)
+        if name not in self.parts:
+            raise unknown("force element", name, self.parts)
+        return self.parts[name]
 
 
 class ByName(Mapping[str, Value], Generic[Value]):
-    """Quantities by name, each made when it is first asked for."""
+    """Quantities by name, each made when it is first asked for; ``plain`` gives ``left_rod`` of ``left.rod``."""
 
-    def __init__(self, what: str, names: Sequence[str], make: Callable[[str], Value]) -> None:
-        self._what, self._names, self._make = what, tuple(names), make
+    def __init__(
+        self, what: str, names: Sequence[str], make: Callable[[str], Value], plain: Callable[[str], str]
+    ) -> None:
+        self._what, self._names, self._make, self._plain = what, tuple(names), make, plain
         self._made: dict[str, Value] = {}
 
     def __getitem__(self, name: str) -> Value:
+        if name not in self._names and isinstance(name, str):
+            name = self._plain(name)
         if name not in self._names:
             raise unknown(self._what, name, self._names)
         if name not in self._made:

@@ -22,6 +22,7 @@ from ..graph.symmetric import solve_symmetric
 from ..numeric.partitions import partition
 from .put_in import put_in
 from .quantities import Quantities, Row, Rows
+from .regular_state import require_finite, require_inverse
 
 
 class StateEquations(NamedTuple):
@@ -42,6 +43,9 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     ------
     UnavailableError
         Rates of coordinates were given as functions of velocities, or constraints depend on inputs.
+    SingularMassMatrixError, PartitionError, NonFiniteError
+        The mass matrix has no inverse at the state, or the velocities of the independent coordinates do not tell the
+        others, or an entry has no value.
     """
     kinematics, graph = quantities.kinematics, quantities.graph
     if kinematics.given_rates:
@@ -49,6 +53,7 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     inputs = kinematics.input_names
     if not symbols_of([*kinematics.constraints.velocity, *kinematics.constraints.gamma]).isdisjoint(inputs):
         raise UnavailableError("constraints depend on inputs; use linearize of the module")
+    named = at
     at = {name: 0.0 for name in kinematics.velocity_names if name not in at} | dict(at)
     free = [kinematics.velocity_labels.index(name) for name in quantities.mobility.independent]
     positions, Z = _displacements(quantities)
@@ -60,7 +65,8 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     slopes = jacobian(residual, [graph.symbol(name) for name in inputs])
     changes += [[slopes.get((i, k), graph.zero) for i in range(len(free))] for k in range(len(inputs))]
     flat = put_in([x for row in quantities.mass_matrix for x in row], at)
-    mass = [flat[k : k + len(free)] for k in range(0, len(flat), len(free))]
+    mass = [flat[k * len(free) : (k + 1) * len(free)] for k in range(len(free))]
+    require_inverse(quantities, mass, named)
     rates = [graph.zero] * len(free) if equilibrium else solve_symmetric(mass, put_in(quantities.force, at))
     still = dict(zip(a, rates, strict=True))
     columns = [solve_symmetric(mass, substitute(put_in(change, at), still)) for change in changes]
@@ -69,9 +75,12 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     shifts += [move.velocities for move in moves[len(shifts) :]]
     upper = [tuple(put_in([shift[k] for shift in shifts], at)) for k in positions]
     n = len(moves)
+    A: Rows = (*upper, *(row[:n] for row in lower))
+    B: Rows = (*((graph.zero,) * len(inputs) for _ in upper), *(row[n:] for row in lower))
+    require_finite(quantities, {"A": A, "B": B}, named)
     return StateEquations(
-        (*upper, *(row[:n] for row in lower)),
-        (*((graph.zero,) * len(inputs) for _ in upper), *(row[n:] for row in lower)),
+        A,
+        B,
         (*(_displacement_name(quantities, k) for k in positions), *(kinematics.velocity_names[k] for k in free)),
         inputs,
     )

@@ -15,8 +15,8 @@ from ..graph.differentiate import jacobian
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute
 from ..graph.symmetric import solve_symmetric
-from ..kinematics import Kinematics
-from .quantities import Quantities, Row, Rows
+from .names_of_unknowns import momentum_names, multiplier_names, twist_rate_names, wrench_names
+from .quantities import Quantities, Row, Rows, require_bodies
 
 BLOCKS = ("augmented", "newton_euler", "amalgamated")  #: methods that solve one system for more than accelerations
 
@@ -46,11 +46,6 @@ def gibbs_function(quantities: Quantities) -> Expr:
             row = row + mass[i][j] * a[j]
         total = total + row * x
     return total
-
-
-def momentum_names(kinematics: Kinematics) -> tuple[str, ...]:
-    """``p_theta``, ...: what momenta are called, one a velocity."""
-    return tuple(f"p_{label}" for label in kinematics.velocity_labels)
 
 
 def hamiltonian(quantities: Quantities) -> Expr:
@@ -100,7 +95,7 @@ def block_system(quantities: Quantities) -> LinearEquations:
         jacobian = quantities.constraint_jacobian
         upper = [(*row, *(line[i] for line in jacobian)) for i, row in enumerate(tree.mass_matrix)]
         lower = [(*line, *(zero for _ in jacobian)) for line in jacobian]
-        unknowns = (*(str(a.node[1]) for a in kinematics.a), *multiplier_names(quantities))
+        unknowns = (*(str(a.node[1]) for a in kinematics.a), *multiplier_names(kinematics, len(quantities.rows)))
         right = (*(-h for h in tree.bias), *(-g for g in quantities.gamma))
         return LinearEquations((*upper, *lower), unknowns, right)
     system = tree.system
@@ -109,11 +104,6 @@ def block_system(quantities: Quantities) -> LinearEquations:
     for (i, j), entry in zip(system.places, system.entries, strict=True):
         rows[i][j] = entry
     return LinearEquations(tuple(map(tuple, rows)), unknown_names(quantities), system.right)
-
-
-def multiplier_names(quantities: Quantities) -> tuple[str, ...]:
-    """``lambda_1``, ... of the constraint equations that are not redundant."""
-    return tuple(f"lambda_{k + 1}" for k in range(len(quantities.rows)))
 
 
 def unknown_names(quantities: Quantities) -> tuple[str, ...]:
@@ -129,11 +119,11 @@ def unknown_names(quantities: Quantities) -> tuple[str, ...]:
     for link, branch in zip(kinematics.links, kinematics.topology.branches, strict=True):
         joint = kinematics.mechanism.joints[branch.joint].name
         own = [str(kinematics.a[link.first + c].node[1]) for c in range(len(link.columns))]
-        names += [f"{link.name}_{kind}_{axis}" for kind in ("alpha", "a") for axis in "xyz"]
+        names += twist_rate_names(kinematics, link.name)
         names += own if tree.method == "amalgamated" else []
-        names += [f"{joint}_{kind}_{axis}" for kind in ("M", "F") for axis in "xyz"]
+        names += wrench_names(kinematics, joint)
     left = len(tree.system.unknowns) - len(names)
-    return (*names, *(f"lambda_{k + 1}" for k in range(left)))
+    return (*names, *multiplier_names(kinematics, left))
 
 
 def body_velocities(quantities: Quantities) -> Rows:
@@ -141,7 +131,7 @@ def body_velocities(quantities: Quantities) -> Rows:
 
     The six velocities of a body are that of its centre of mass in ground axes, then its angular velocity in body axes.
     """
-    _require_bodies(quantities)
+    require_bodies(quantities.kinematics)
     motion, v = quantities.kinematics.motion, list(quantities.kinematics.v)
     velocities: list[Expr] = []
     for body in quantities.kinematics.mechanism.bodies:
@@ -155,7 +145,7 @@ def body_velocities(quantities: Quantities) -> Rows:
 
 def body_mass_matrix(quantities: Quantities) -> Rows:
     """M_b (6 n_b, 6 n_b), mass and inertia body by body."""
-    _require_bodies(quantities)
+    require_bodies(quantities.kinematics)
     bodies = quantities.kinematics.mechanism.bodies
     mass = [[quantities.graph.zero] * (6 * len(bodies)) for _ in range(6 * len(bodies))]
     for k, body in enumerate(bodies):
@@ -163,8 +153,3 @@ def body_mass_matrix(quantities: Quantities) -> Rows:
             mass[6 * k + i][6 * k + i] = body.mass
             mass[6 * k + 3 + i][6 * k + 3 : 6 * k + 6] = body.inertia[i]
     return tuple(map(tuple, mass))
-
-
-def _require_bodies(quantities: Quantities) -> None:
-    if quantities.kinematics.mechanism.bare:
-        raise UnavailableError("there are no bodies: the model is a Lagrangian or given equations")

@@ -9,10 +9,10 @@ from typing import NamedTuple
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
 from ..notation.notation import Notation
-from ..printing import Formulas, Order, text
+from ..printing import Formulas, Order, number, text
 from ..printing.factor_order import COORDINATE, GRAVITY, INERTIA, INPUT, MASS, PARAMETER, RATE
 from ..printing.formula_text import TIGHT
-from ..printing.formula_tree import Formula, NumberPart
+from ..printing.formula_tree import Formula, Name, NumberPart, Relation
 from .readable import Readable
 
 UNITS = {"angle": "rad", "turn": "rad", "length": "m", "parameter": ""}
@@ -21,6 +21,8 @@ ATTRIBUTES = (
     "q", "v", "parameters", "T", "V", "lagrangian", "mass_matrix", "force", "quadratic_velocity", "generalized_forces",
     "poses", "velocities", "accelerations", "momenta", "linearize", "operations", "report",
 )  # fmt: skip
+OF_BODIES = ("poses", "velocities", "accelerations")
+OF_PARTS = ("T", "V", "lagrangian", "momenta", "quadratic_velocity", "generalized_forces")
 OF_LOOPS = ("constraints", "constraint_jacobian", "gamma", "velocity_transformation")
 
 
@@ -33,8 +35,21 @@ class PrintedCoordinate(NamedTuple):
     role: str
 
 
+class Letters(NamedTuple):
+    """LaTeX of the letters of M v' = f."""
+
+    mass: str
+    accelerations: str
+    force: str
+
+
+#: The usual letters, and those that take their places.
+USUAL = Letters("M", r"\dot{v}", "f")
+OTHERS = Letters("AK", "aw", "br")
+
+
 class PrintedEntry(NamedTuple):
-    """An entry of M or f: ``M_12`` with its formula; places count from 1."""
+    """An entry of M or f: its letter in LaTeX, its place, counted from 1, and its formula."""
 
     letter: str
     place: tuple[int, ...]
@@ -58,6 +73,7 @@ def order_of(equations: Readable) -> Order:
             kinds[p.name] = INERTIA
         else:
             kinds[p.name] = GRAVITY if p.name in gravity else PARAMETER
+    kinds |= dict.fromkeys(equations.names_put_in, PARAMETER)
     kinds |= dict.fromkeys(equations.kinematics.input_names, INPUT)
     kinds |= dict.fromkeys([*k.names, *k.loop_coordinates.names, "t"], COORDINATE)
     return Order(kinds | dict.fromkeys([*k.velocity_names, *equations.acceleration_names], RATE))
@@ -82,9 +98,23 @@ class PrintedEquations:
     """
 
     def __init__(self, equations: Readable) -> None:
-        self.equations = equations
-        self.names: Notation = equations.notation
+        self.equations = equations.in_plain_symbols()
+        self.of_time = self.equations is not equations
+        self.names: Notation = equations.notation.with_names(str(name) for name, _ in equations.intermediates)
         self.formula = Formulas(order_of(equations))
+
+    @cached_property
+    def letters(self) -> Letters:
+        """The letters of M v' = f; others where names of the model are printed so."""
+        M, f = (self.names.letter(USUAL[k], *OTHERS[k], with_numbers=True) for k in (0, 2))
+        rates = (USUAL.accelerations,) if self.names.is_free("v") else ()
+        return Letters(M, self.names.letter(*rates, *OTHERS.accelerations), f)
+
+    @property
+    def letters_told(self) -> list[tuple[str, str]]:
+        """Letters that are not the usual ones, in LaTeX, and what they stand for."""
+        told = [(self.letters.mass, USUAL.mass, "the mass matrix"), (self.letters.force, USUAL.force, "the right side")]
+        return [(letter, what) for letter, usual, what in told if letter != usual]
 
     @cached_property
     def mass_matrix(self) -> list[list[Formula]]:
@@ -101,14 +131,33 @@ class PrintedEquations:
         """Names that stand in M and f, with what they stand for."""
         return [(str(name), self.formula(x)) for name, x in self.equations.intermediates]
 
+    @cached_property
+    def accelerations(self) -> list[Formula]:
+        """v' of M v' = f."""
+        return [self.formula(x) for x in self.equations.symbols_put_in(self.equations.acceleration_names)]
+
+    @property
+    def values(self) -> list[Formula]:
+        """Equations of what was put in, ``l = 0.5``; a second time for a name with what came later."""
+        return [
+            Relation("=", (Name(name), number(float(x), 15) if isinstance(x, float | int) else self.formula(x)))
+            for given in self.equations.values_put_in()
+            for name, x in given
+        ]
+
+    @property
+    def is_one_equation(self) -> bool:
+        """Whether there is one acceleration, for which nothing was put in."""
+        return len(self.accelerations) == 1 and isinstance(self.accelerations[0], Name)
+
     def entries(self) -> Iterator[PrintedEntry]:
         """Entries of M on and below its diagonal that do not vanish, then those of f."""
         for i, row in enumerate(self.mass_matrix):
             for j, x in enumerate(row[: i + 1]):
                 if x != NumberPart("0"):
-                    yield PrintedEntry("M", (j + 1, i + 1), x)
+                    yield PrintedEntry(self.letters.mass, (j + 1, i + 1), x)
         for i, x in enumerate(self.force):
-            yield PrintedEntry("f", (i + 1,), x)
+            yield PrintedEntry(self.letters.force, (i + 1,), x)
 
     @property
     def vanishing(self) -> bool:
@@ -146,14 +195,16 @@ class PrintedEquations:
     def title(self) -> str:
         """What these equations are, in one line."""
         n = self.equations.mobility.n_dof
-        method = getattr(self.equations, "method", "").replace("_", "-")
-        return f"method {method}, {n} degree{'s' * (n != 1)} of freedom"
+        method = self.equations.method.replace("_", "-")
+        return f"method {method}, {n} degree{'s' * (n != 1)} of freedom{', functions of time' * self.of_time}"
 
     @property
     def attributes(self) -> tuple[str, ...]:
         """Attributes to read next."""
         loops = OF_LOOPS if self.equations.constraint_names else ()
-        return (*ATTRIBUTES, *loops)
+        mechanism, there = self.equations.kinematics.mechanism, type(self.equations)
+        lacking = {*(OF_BODIES if mechanism.bare else ()), *(OF_PARTS if mechanism.given is not None else ())}
+        return tuple(name for name in (*ATTRIBUTES, *loops) if hasattr(there, name) and name not in lacking)
 
 
 def plain(line: str) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..describe.expressions import parse
-from ..describe.sympy_face import is_sympy, lower_sympy, name_of
+from ..describe.rewritten_texts import rewritten
+from ..describe.sympy_face import free_names, is_sympy, lower_sympy, name_of, symbol
 from ..errors import ExpressionError, UsageError
 from ..graph.core import Expr, Graph
 from ..graph.evaluate import evaluate
@@ -39,22 +40,45 @@ def read_value(graph: Graph, name: str, value: Any) -> Expr:
         raise UsageError(f"{name} must be a number, a text or a SymPy expression, not {quoted(value)}") from None
 
 
-def read_values(given: Mapping[Any, Any], allowed: Sequence[str], what: str) -> dict[str, Any]:
+def read_values(given: Any, allowed: Sequence[str], what: str, plain: Callable[[str], str]) -> dict[str, Any]:
     """Values by name, names and values looked at.
+
+    Parameters
+    ----------
+    given : mapping
+    allowed : sequence of str
+    what : str
+        What the names are, in messages.
+    plain : callable
+        ``left.hinge`` of an instance of a component -> ``left_hinge``, in names and in values.
 
     Raises
     ------
     UsageError
-        An unknown name, or a value that is no expression.
+        An unknown name, one that is given twice, or a value that is no expression.
     """
     if not isinstance(given, Mapping):
         raise UsageError(f"values are given by name, as a mapping does, not {quoted(given)}")
-    values = {name_of(key): value for key, value in given.items()}
-    for name, value in values.items():
+    values: dict[str, Any] = {}
+    for key, value in given.items():
+        name = name_of(key)
+        name = plain(name) if isinstance(name, str) and name not in allowed else name
         if name not in allowed:
             raise unknown(what, name, allowed)
-        read_value(Graph(), name, value)
+        if name in values:
+            raise UsageError(f"{what} {name!r} is given twice; give it one value")
+        values[name] = _without_dots(value, plain)
+        read_value(Graph(), name, values[name])
     return values
+
+
+def _without_dots(value: Any, plain: Callable[[str], str]) -> Any:
+    """A value whose names of instances have no dots."""
+    if isinstance(value, str):
+        return rewritten(value, plain, lambda quantity, marker: f"{quantity}({marker})")
+    if not is_sympy(value):
+        return value
+    return value.xreplace({symbol(name): symbol(plain(name)) for name in free_names([value]) if "." in name})
 
 
 def put_in(expressions: Sequence[Expr], values: Mapping[str, Any]) -> list[Expr]:

@@ -29,6 +29,20 @@ Row = tuple[Expr, ...]
 Rows = tuple[Row, ...]
 
 
+def require_bodies(kinematics: Kinematics) -> None:
+    """Refuse what belongs to bodies where there are none.
+
+    Raises
+    ------
+    UnavailableError
+    """
+    if kinematics.mechanism.bare:
+        kind = "a Lagrangian" if kinematics.mechanism.lagrangian is not None else "given equations"
+        raise UnavailableError(
+            f"there are no bodies: the model is {kind}; describe it by bodies and joints to have their motion"
+        )
+
+
 class PointMotion(NamedTuple):
     """Velocity or acceleration of a body or marker, ground axes: angular, of its origin, of the centre of mass."""
 
@@ -58,34 +72,37 @@ class Quantities:
         return values | {u.name: u.value for u in m.inputs} | {"t": 0.0}
 
     # -- energies ---------------------------------------------------------------------------------------------------
-    def _require_energies(self, what: str) -> None:
+    def _require_energy(self, what: str, keys: tuple[str, ...]) -> None:
+        """Refuse energies of given equations of which none of the keys was given."""
         given = self.kinematics.mechanism.given
-        if given is not None and given.kinetic_energy.is_zero:
+        if given is not None and all(getattr(given, key).is_zero for key in keys):
             raise UnavailableError(
-                f"{what} is not known: the equations are given without kinetic_energy; give equations.kinetic_energy"
+                f"{what} is not known: the equations are given without {keys[0]}; give equations.{keys[0]}"
             )
 
     @property
     def kinetic_energy(self) -> Expr:
         """T (J)."""
-        self._require_energies("T")
+        self._require_energy("T", ("kinetic_energy",))
         return self.tree.kinetic_energy
 
     @property
     def potential_energy(self) -> Expr:
-        """V of gravity and springs (J)."""
-        self._require_energies("V")
+        """V of gravity and springs (J); of given equations with kinetic energy alone 0, as it is compiled."""
+        self._require_energy("V", ("potential_energy", "kinetic_energy"))
         return self.tree.potential_energy
 
     @property
     def lagrangian(self) -> Expr:
         """L = T - V; of a bare Lagrangian what was given."""
+        self._require_energy("the Lagrangian", ("kinetic_energy",))
         bare = self.kinematics.mechanism.lagrangian
         return bare.expression if bare is not None else self.kinetic_energy - self.potential_energy
 
     @cached_property
     def momenta(self) -> Row:
         """p = dT/dv (n_v,)."""
+        self._require_energy("the momentum", ("kinetic_energy",))
         return tuple(gradient(self.kinetic_energy, list(self.kinematics.v)))
 
     # -- equations of motion ------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..graph.core import Expr
 from .bodies_apart import BodiesApart
+from .names_of_unknowns import momentum_names
 from .near_state import linearize
 from .of_methods import (
     block_system,
@@ -15,11 +16,10 @@ from .of_methods import (
     body_velocities,
     gibbs_function,
     hamiltonian,
-    momentum_names,
     momentum_rates,
 )
-from .put_in import read_values
 from .quantities import Quantities
+from .regular_state import told
 from .writes_quantities import WritesQuantities
 
 if TYPE_CHECKING:
@@ -131,10 +131,8 @@ class QuantitiesOfMethods(WritesQuantities):
         Reactions of the joints of the tree are ``A_F_x``, ..., ``A_M_x``, ... on the body that the joint carries, at
         the joint, in ground axes; those of joints that close loops are written with their multipliers ``lambda_1``, ...
         """
-        from .named_parts import ByName
-
         BodiesApart(Quantities(*self.fresh()))  # refuses other methods now
-        return ByName("body", [body.name for body in self.kinematics.mechanism.bodies], self._free_body)
+        return self._by_name("body", [body.name for body in self.kinematics.mechanism.bodies], self._free_body)
 
     def _free_body(self, name: str) -> FreeBody:
         written = self._write(f"free_bodies.{name}", lambda s: [x for p in BodiesApart(s).balance(name) for x in p])
@@ -148,10 +146,8 @@ class QuantitiesOfMethods(WritesQuantities):
         The left side is the component of the reaction in ``free_bodies``; the right side what force elements and
         constraint elements exert along the coordinate, 0 if there are none.
         """
-        from .named_parts import ByName
-
         joints = BodiesApart(Quantities(*self.fresh())).joints  # refuses other methods
-        return ByName("joint of the tree", joints, self._joint_force)
+        return self._by_name("joint of the tree", joints, self._joint_force)
 
     def _joint_force(self, name: str) -> list[Any]:
         written = self._write(
@@ -193,6 +189,12 @@ class QuantitiesOfMethods(WritesQuantities):
         ------
         UnavailableError
             Constraints depend on inputs, or rates of coordinates are given as functions of velocities.
+        SingularMassMatrixError
+            The mass matrix has no inverse at the state.
+        PartitionError
+            The state is a dead centre: the velocities of ``independent`` do not tell the others.
+        NonFiniteError
+            An entry of A or B has no value at the state, such as for a spring of length 0.
         UsageError
             An unknown name, or a value that is no expression.
 
@@ -209,7 +211,7 @@ class QuantitiesOfMethods(WritesQuantities):
         """
         import sympy
 
-        values = read_values(at or {}, self._known, "symbol")
+        values = self._read(at or {})
         states: list[tuple[str, ...]] = []
 
         def choose(quantities: Quantities) -> Sequence[Expr]:
@@ -218,6 +220,7 @@ class QuantitiesOfMethods(WritesQuantities):
             return [x for matrix in (found.A, found.B) for row in matrix for x in row]
 
         written = self._write("linearize", choose, "A_")
+        self._require_finite("linearize", [*written, *(x for _, x in self._named["linearize"])], told(values))
         (names,), inputs = states, self.kinematics.input_names
         n = len(names)
         A, B = sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, len(inputs), written[n * n :])

@@ -1,22 +1,22 @@
 """Stage reading: a derivation -> every quantity of its equations as SymPy, an attribute each.
 
 A class that inherits :class:`Readable` says what was derived (``fresh``), what SymPy object stands for a name, and what
-values are put in; :class:`ReadingView` is the same derivation with other answers.
+values are put in; :class:`~.displayed.ReadingView` is the same derivation with other answers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from abc import abstractmethod
+from collections.abc import Callable
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
 from ..notation.notation import Notation
-from .put_in import read_values
-from .quantities import PointMotion, Quantities
+from .names_of_unknowns import model_notation
+from .quantities import PointMotion, Quantities, require_bodies
 from .quantities_of_methods import QuantitiesOfMethods
-from .writes_quantities import Derived
 
 if TYPE_CHECKING:
     from .named_parts import ByName, NamedSum, SpatialMotion
@@ -28,6 +28,16 @@ class Readable(QuantitiesOfMethods):
     Matrices of the size of the degrees of freedom belong to the velocities of ``independent``; those of the size of
     the tree to all velocities ``v``.  In open chains both are the same.
     """
+
+    @property
+    def name(self) -> str:
+        """Name of the model."""
+        return self.kinematics.mechanism.name
+
+    @property
+    @abstractmethod
+    def method(self) -> str:
+        """Name of the method of derivation."""
 
     @property
     def independent(self) -> tuple[str, ...]:
@@ -48,11 +58,7 @@ class Readable(QuantitiesOfMethods):
     @cached_property
     def notation(self) -> Notation:
         """How names are printed: ``.latex("theta1_dot")``, ``.text(name)``, ``.html(name)``, ``.mathtext(name)``."""
-        k = self.kinematics
-        outputs = [output.name for output in k.mechanism.outputs]
-        rates = [*k.velocity_names, *map(acceleration_name, k.velocity_names)]
-        names = [*k.names, *k.loop_coordinates.names, *k.parameter_names, *k.input_names, *outputs, *rates]
-        return Notation(names, k.mechanism.latex, k.mechanism.instances)
+        return model_notation(self.kinematics, self.names_put_in)
 
     # -- symbols ------------------------------------------------------------------------------------------------------
     @property
@@ -141,7 +147,7 @@ class Readable(QuantitiesOfMethods):
 
         written = self._write("generalized_forces", choose, "Q_")
         parts = {name: sympy.Matrix(n, 1, written[(k + 1) * n : (k + 2) * n]) for k, name in enumerate(names)}
-        return NamedSum.of(written[:n], parts)
+        return NamedSum.of(written[:n], parts, self._plain)
 
     # -- constraints --------------------------------------------------------------------------------------------------
     @cached_property
@@ -180,17 +186,16 @@ class Readable(QuantitiesOfMethods):
         return self._column("acceleration_offset", lambda s: s.transformation.acceleration_offset)
 
     # -- motion of bodies and markers ---------------------------------------------------------------------------------
-    @cached_property
     def _places(self) -> tuple[str, ...]:
+        """Names of bodies and of named markers."""
+        require_bodies(self.kinematics)
         mechanism = self.kinematics.mechanism
         return (*(b.name for b in mechanism.bodies), *(marker.label for marker in mechanism.named_markers))
 
     @cached_property
     def poses(self) -> ByName[Any]:
         """Pose (4, 4) of each body and named marker in ground axes: ``poses["rod"]``, ``poses["rod.tip"]``."""
-        from .named_parts import ByName
-
-        return ByName("body or marker", self._places, self._pose)
+        return self._by_name("body or marker", self._places(), self._pose)
 
     def _pose(self, name: str) -> Any:
         return self._matrix(f"poses.{name}", lambda s: s.pose(name), 4)
@@ -198,16 +203,16 @@ class Readable(QuantitiesOfMethods):
     @cached_property
     def velocities(self) -> ByName[SpatialMotion]:
         """Velocity of each body and named marker, ground axes: ``velocities["rod"].angular``, ``.linear`` ..."""
-        from .named_parts import ByName
-
-        return ByName("body or marker", self._places, partial(self._spatial, "velocities", Quantities.velocity))
+        return self._by_name(
+            "body or marker", self._places(), partial(self._spatial, "velocities", Quantities.velocity)
+        )
 
     @cached_property
     def accelerations(self) -> ByName[SpatialMotion]:
         """Acceleration of each body and named marker, ground axes: ``accelerations["rod"].angular``, ``.linear`` ..."""
-        from .named_parts import ByName
-
-        return ByName("body or marker", self._places, partial(self._spatial, "accelerations", Quantities.acceleration))
+        return self._by_name(
+            "body or marker", self._places(), partial(self._spatial, "accelerations", Quantities.acceleration)
+        )
 
     def _spatial(self, what: str, of: Callable[[Quantities, str], PointMotion], name: str) -> SpatialMotion:
         import sympy
@@ -220,76 +225,11 @@ class Readable(QuantitiesOfMethods):
     @cached_property
     def loop_coordinates(self) -> ByName[Any]:
         """Coordinates of the joints that close loops, as functions of ``q``: ``loop_coordinates["s"]``."""
-        from .named_parts import ByName
-
-        return ByName("coordinate of a cut joint", self.kinematics.loop_coordinates.names, self._loop_coordinate)
+        return self._by_name("coordinate of a cut joint", self.kinematics.loop_coordinates.names, self._loop_coordinate)
 
     def _loop_coordinate(self, name: str) -> Any:
         return self._write(f"loop_coordinates.{name}", lambda s: [s.loop_coordinates[name]])[0]
 
-    # -- the same with other symbols or values ------------------------------------------------------------------------
-    def with_dynamicsymbols(self) -> ReadingView:
-        """The same quantities in functions of time, as ``sympy.physics.mechanics.dynamicsymbols`` makes them.
-
-        ``theta`` becomes theta(t) and ``theta_dot`` its derivative; velocities that are no rates of coordinates, inputs
-        and multipliers are functions of time too; parameters stay symbols.
-
-        Returns
-        -------
-        ReadingView
-        """
-        from .functions_of_time import dynamic_symbols
-
-        return ReadingView(self, dynamic_symbols(self.kinematics), self._put_in)
-
-    def subs(self, values: Mapping[Any, Any]) -> ReadingView:
-        """The same quantities with values put in, all at once, after derivatives have been taken.
-
-        Parameters
-        ----------
-        values : mapping
-            Name, symbol or function of time of a coordinate, velocity, acceleration, parameter or input, or ``"t"`` ->
-            number, text or SymPy expression.
-
-        Returns
-        -------
-        ReadingView
-
-        Raises
-        ------
-        UsageError
-            An unknown name, or a value that is no expression.
-        """
-        return ReadingView(self, self._symbol, (*self._put_in, read_values(values, self._known, "symbol")))
-
-    def with_parameters(self, **values: Any) -> ReadingView:
-        """The same quantities with values of parameters put in: ``with_parameters(l=0.5)``; see :meth:`subs`."""
-        read = read_values(values, self.kinematics.parameter_names, "parameter")
-        return ReadingView(self, self._symbol, (*self._put_in, read))
-
-
-class ReadingView(Readable):
-    """Equations to read, with values put in or with functions of time; all quantities of :class:`Readable`.
-
-    Made by ``subs``, ``with_parameters`` and ``with_dynamicsymbols`` of equations and of other views.
-    """
-
-    def __init__(self, source: Readable, symbols: Callable[[str], Any], values: tuple[Mapping[str, Any], ...]) -> None:
-        self.source: Readable = source.source if isinstance(source, ReadingView) else source
-        self.kinematics, self.mobility = source.kinematics, source.mobility
-        self._symbols, self._values = symbols, values
-
-    def fresh(self) -> Derived:
-        return self.source.fresh()
-
-    @property
-    def _symbol(self) -> Callable[[str], Any]:
-        return self._symbols
-
-    @property
-    def _put_in(self) -> tuple[Mapping[str, Any], ...]:
-        return self._values
-
-    def __repr__(self) -> str:
-        put = ", ".join(f"{name} = {value}" for values in self._values for name, value in values.items())
-        return f"<equations of {self.kinematics.mechanism.name}{f' with {put}' if put else ''}>"
+    def in_plain_symbols(self) -> Readable:
+        """The same quantities in plain symbols; these equations, where they are in no functions of time."""
+        return self

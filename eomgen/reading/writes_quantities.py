@@ -5,20 +5,37 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ..describe.dotted_names import Undotted
 from ..equations import TreeEquations
-from ..errors import UsageError
+from ..errors import NonFiniteError, UsageError
 from ..graph.core import Expr, Graph
 from ..graph.substitute import symbols_of
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
 from ..kinematics.state import acceleration_name
-from .put_in import put_in, read_value
+from ..runtime.near_names import UnknownNameError
+from ..suggestions import hint
+from .names_of_unknowns import momentum_names
+from .put_in import put_in, read_value, read_values
 from .quantities import Quantities
-from .written import write
+from .written import needed, write
+
+if TYPE_CHECKING:
+    from .named_parts import ByName
 
 Derived = tuple[Kinematics, Mobility, TreeEquations]
+
+#: Attributes that are written as one, and those of which each body, marker or joint has one.
+WHOLE = (
+    *("T", "V", "lagrangian", "momenta", "mass_matrix", "force", "quadratic_velocity", "generalized_forces"),
+    *("constraints", "velocity_constraints", "constraint_jacobian", "gamma", "velocity_transformation"),
+    *("velocity_offset", "acceleration_offset", "body_velocity_transformation", "body_mass_matrix"),
+    *("gibbs_function", "hamiltonian", "momentum_rates", "block_system"),
+)
+SHOWN = 8  #: names that a message lists
+BY_NAME = ("poses", "velocities", "accelerations", "loop_coordinates", "free_bodies", "joint_forces")
 
 
 class WritesQuantities(ABC):
@@ -71,13 +88,44 @@ class WritesQuantities(ABC):
         named, written = write(
             expressions[:count], self._symbol, prefix, names, self._rates, self.kinematics.parameter_names
         )
+        if self._put_in:
+            self._require_finite(name, [*written, *(x for _, x in named)], f"with {self._told}")
         self._named[name] = named
         return written
+
+    @property
+    def _told(self) -> str:
+        """Values that were put in, for messages."""
+        return ", then ".join(", ".join(f"{name} = {value}" for name, value in one.items()) for one in self._put_in)
+
+    def _require_finite(self, name: str, written: Sequence[Any], where: str) -> None:
+        """Refuse a quantity that divides by zero."""
+        import sympy
+
+        if any(x.has(sympy.zoo, sympy.nan, sympy.oo) for x in written):
+            raise NonFiniteError(
+                f"{name} has no finite value {where}: it divides by zero there, as at a dead centre or where a "
+                "rotation is singular; put in other values, or leave one as a symbol"
+            )
 
     @cached_property
     def _rates(self) -> frozenset[str]:
         v = self.kinematics.velocity_names
         return frozenset((*v, *map(acceleration_name, v)))
+
+    def _plain(self, name: str) -> str:
+        """``left_hinge`` of ``left.hinge`` in an instance of a component; any other name as it is."""
+        return Undotted(self.kinematics.mechanism.instances).coordinate(name)
+
+    def _read(self, given: Any, what: str = "symbol") -> dict[str, Any]:
+        """Values that a user puts in for names."""
+        allowed = self.kinematics.parameter_names if what == "parameter" else self._known
+        return read_values(given, allowed, what, self._plain)
+
+    def _by_name(self, what: str, names: Sequence[str], make: Callable[[str], Any]) -> ByName[Any]:
+        from .named_parts import ByName
+
+        return ByName(what, names, make, self._plain)
 
     def _matrix(self, name: str, choose: Callable[[Quantities], Sequence[Sequence[Expr]]], columns: int) -> Any:
         import sympy
@@ -102,7 +150,7 @@ class WritesQuantities(ABC):
         name : str
             An attribute, such as ``"T"`` or ``"poses"``.
         part : str, optional
-            Of a quantity by name the one wanted, such as ``"rod"``.
+            Of a quantity by name the one wanted, such as ``"rod"``; of ``generalized_forces`` a force element.
 
         Returns
         -------
@@ -110,6 +158,11 @@ class WritesQuantities(ABC):
             In an order in which each uses only those before it; empty where the quantity is written out.
         value : sympy.Expr or sympy.Matrix
             What the attribute gives.
+
+        Raises
+        ------
+        UsageError
+            No quantity of this name, or no such part.
 
         Examples
         --------
@@ -120,24 +173,56 @@ class WritesQuantities(ABC):
         >>> m.derive().written("T")
         ([], m*s_dot**2/2)
         """
+        from .named_parts import NamedSum
+
+        if name not in (*WHOLE, *BY_NAME):
+            meant = hint(name, (*WHOLE, *BY_NAME), quoted=False) or f"there are {', '.join((*WHOLE, *BY_NAME))}"
+            raise UnknownNameError(f"{name!r} is no quantity that is written; {meant}")
         value = getattr(self, name)
-        key = name if part is None else f"{name}.{part}"
-        value = value if part is None else value[part]
-        if key not in self._named:
-            raise UsageError(f"{key!r} is no quantity that is written; there are {', '.join(sorted(self._named))}")
-        return self._named[key], value
+        if name in BY_NAME:
+            if part is None:
+                there = ", ".join(map(repr, tuple(value)[:SHOWN])) or "there are none"
+                raise UsageError(f"{name!r} are written one by one; give the name of one as part: {there}")
+            whole = value[part]
+            return self._named[f"{name}.{part if part in tuple(value) else self._plain(part)}"], whole
+        if part is None:
+            return self._named[name], value
+        if not isinstance(value, NamedSum):
+            raise UsageError(f"{name!r} has no parts; leave {part!r} out")
+        return needed(self._named[name], value[part]), value[part]
+
+    @property
+    def _own(self) -> tuple[str, ...]:
+        """Names of coordinates, their derivatives, parameters and inputs, and the time."""
+        k = self.kinematics
+        rates = (*k.velocity_names, *map(acceleration_name, k.velocity_names))
+        return (*k.names, *rates, *k.parameter_names, *k.input_names, "t")
 
     @property
     def _known(self) -> tuple[str, ...]:
         """Names for which values can be put in."""
-        k = self.kinematics
-        own = (*k.names, *k.velocity_names, *map(acceleration_name, k.velocity_names), *k.parameter_names)
-        momenta = (f"p_{label}" for label in k.velocity_labels)
+        return (*self._own, *momentum_names(self.kinematics), *self.names_put_in)
+
+    @property
+    def names_put_in(self) -> tuple[str, ...]:
+        """Names that the model does not have and that values put in have brought."""
         graph = Graph()
-        later = {
-            name
-            for given in self._put_in
-            for at, value in given.items()
-            for name in symbols_of([read_value(graph, at, value)])
-        }
-        return (*own, *k.input_names, "t", *momenta, *sorted(later.difference(own)))
+        values = (read_value(graph, name, value) for given in self._put_in for name, value in given.items())
+        return tuple(sorted({name for value in values for name in symbols_of([value])}.difference(self._own)))
+
+    def values_put_in(self) -> list[list[tuple[str, Any]]]:
+        """What was put in, one list after the other: names, and numbers as given or SymPy expressions."""
+        return [[(name, self._as_given(value)) for name, value in given.items()] for given in self._put_in]
+
+    def _as_given(self, value: Any) -> Any:
+        if isinstance(value, float | int):
+            return value
+        return write([read_value(Graph(), "", value)], self._symbol).expressions[0]
+
+    def symbols_put_in(self, names: Sequence[str]) -> list[Any]:
+        """What stands for names after values have been put in, in SymPy: their symbols, where none were."""
+        graph = Graph()
+        found = [graph.symbol(name) for name in names]
+        for values in self._put_in:
+            found = put_in(found, values)
+        return write(found, self._symbol).expressions

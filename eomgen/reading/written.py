@@ -36,6 +36,17 @@ def is_short(expressions: Sequence[Expr]) -> bool:
     return inlined_size(expressions) <= min(READABLE * len(expressions), LONGEST)
 
 
+def needed(named: Sequence[tuple[Any, Any]], value: Any) -> list[tuple[Any, Any]]:
+    """The named parts that a value uses, and those that these use."""
+    wanted = set(value.free_symbols)
+    found = []
+    for symbol, expression in reversed(list(named)):
+        if symbol in wanted:
+            found.append((symbol, expression))
+            wanted |= expression.free_symbols
+    return found[::-1]
+
+
 def write(
     expressions: Sequence[Expr],
     symbols: Callable[[str], Any] | None = None,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from eomgen.cli.verb_derive import FORMATS
 from eomgen.reading import formats
+from eomgen.targets import FORMATS
 
 from .conftest import EXAMPLES, Call
 
@@ -51,7 +51,7 @@ def test_what_does_not_fit_is_refused(call: Call) -> None:
 
 
 def test_derive_writes_the_equations_for_other_programs(call: Call, tmp_path: Path) -> None:
-    assert FORMATS == formats.FORMATS
+    assert tuple(FORMATS) == ("latex", "text", *formats.LANGUAGES)
     for form in FORMATS:
         said = call("derive", EXAMPLES / "double_pendulum.yaml", "--format", form)
         assert said.code == 0
@@ -83,3 +83,38 @@ def test_explain_writes_the_worked_solution(call: Call, tmp_path: Path) -> None:
     refused = call("explain", FILE, "--out", tmp_path / "solution.docx")
     assert refused.code == 2
     assert ".html" in refused.err
+
+
+def test_both_name_the_file_that_they_wrote_first(call: Call, tmp_path: Path) -> None:
+    for words, name in ((["derive", FILE, "--format", "c"], "x.c"), (["explain", FILE, "--level", "short"], "x.md")):
+        said = call(*words, "--out", tmp_path / name)
+        assert said.code == 0
+        assert said.out.splitlines()[0] == str(tmp_path / name)
+
+
+def test_neither_makes_folders(call: Call, tmp_path: Path) -> None:
+    """The refusal comes before the work, so that nothing is derived for it."""
+    link = tmp_path / "link.md"
+    link.symlink_to(tmp_path / "other.md")
+    for verb in (["derive", FILE, "--format", "text"], ["explain", FILE, "--level", "short"]):
+        for out, fault in (
+            (tmp_path / "none" / "x.md", f"there is no folder {tmp_path / 'none'}"),
+            (Path("/no_such_folder/x.md"), "there is no folder /no_such_folder"),
+            (tmp_path, "this is a folder; name a file in it"),
+            (link, "is a symbolic link"),
+        ):
+            refused = call(*verb, "--out", out)
+            assert refused.code == 2
+            assert fault in refused.err
+            assert "derive  " not in refused.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link.md"]
+
+
+def test_explain_takes_the_stabilisation_of_derive(call: Call, tmp_path: Path) -> None:
+    file = tmp_path / "solution.md"
+    told = call("explain", FILE, "--method", "augmented", "--baumgarte", "20,10", "--out", file, "--json").json
+    assert told["difference"] < 1e-10
+    text = file.read_text(encoding="utf-8")
+    assert r"$\ddot{\mathbf{C}} + 2 \cdot 20 \dot{\mathbf{C}} + 10^2 \mathbf{C} = \mathbf{C}_q" in text
+    refused = call("explain", FILE, "--method", "embedding", "--baumgarte", "20,10", "--out", file)
+    assert (refused.code, "works with method 'augmented' only" in refused.err) == (2, True)

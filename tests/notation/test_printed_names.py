@@ -192,3 +192,46 @@ def test_rates_of_rates(name: str) -> None:
     stem, order = split_rate(name)
     assert split_rate(rate_of(name)) == (stem, order + 1)
     assert split_rate(rate_of(name, 2)) == (stem, order + 2)
+
+
+@pytest.mark.parametrize(
+    ("names", "wanted"),
+    [
+        ((), "M"),
+        (("m", "M_c", "Mass", "mu"), "M"),
+        (("M",), "A"),
+        (("M12",), "A"),  # printed as an entry of M is
+        (("M_1_2",), "A"),
+        (("M", "A_3"), "K"),
+        (("M", "A", "K"), r"{K}^{\ast}"),
+    ],
+)
+def test_a_letter_of_a_display_is_no_name(names: tuple[str, ...], wanted: str) -> None:
+    notation = Notation(names)
+    letter = notation.letter("M", "A", "K", with_numbers=True)
+    assert letter == wanted
+    assert letter not in map(notation.latex, names)
+    ET.fromstring(f"<p>{Notation(latex={'it': letter}).mathml('it')}</p>")  # a symbol in every form
+
+
+def test_given_latex_counts_for_letters() -> None:
+    notation = Notation(["mass"], latex={"mass": "M"})
+    assert notation.letter("M", "A") == "A"
+    assert notation.is_free("m")
+    assert not notation.is_free("M")
+
+
+def test_further_names_keep_apart_from_those_that_there_are() -> None:
+    first = Notation(["z_0", "theta1"])
+    more = first.with_names(["z0", "theta_1", "c_1", "z_0"])
+    assert [more.text(name) for name in ("z_0", "z0", "theta1", "theta_1", "c_1")] == [
+        "z₀",
+        "z0",
+        "θ₁",
+        "theta_1",
+        "c₁",
+    ]
+    assert first.text("z0") == "z₀"  # unknown there, as it was
+    assert first.names == ("z_0", "theta1")
+    assert more.with_names(["c_1"]) is more
+    assert more.latex("z0_dot") == r"\dot{\mathrm{z0}}"

@@ -14,7 +14,8 @@ import pytest
 import sympy
 
 import eomgen as eg
-from eomgen.reading.formats import FORMATS, write_format
+from eomgen.reading.formats import write_format
+from eomgen.targets import FORMATS
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 Numbers = dict[str, float]
@@ -113,3 +114,8 @@ def test_conditions_in_mathematica() -> None:
     m.prismatic("rail", m.ground, m.body("block", mass=1.0), axis="x", coordinate="s")
     m.actuator("wall", "rail", sympy.Piecewise((-100 * sympy.Symbol("s"), sympy.Symbol("s") > 0), (0, True)))
     assert "f = {Piecewise[{{-100*s, s > 0}, {0, True}}]};" in write_format(m.derive(), "mathematica")
+
+
+def test_a_format_that_there_is_not_is_named() -> None:
+    with pytest.raises(eg.UsageError, match="no format 'matlb'; did you mean matlab"):
+        write_format(eg.load(EXAMPLES / "pendulum.yaml").derive(), "matlb")

@@ -307,3 +307,26 @@ def test_what_is_read_goes_through_pickle_and_copy() -> None:
             assert twin.generalized_forces == total
             assert twin.generalized_forces["motor"] == total["motor"]
             assert twin.velocities["rod"] == equations.velocities["rod"]
+
+
+def test_what_given_equations_do_not_tell_is_named_by_its_key() -> None:
+    """V follows from potential_energy alone; motion of bodies is refused, and not an empty mapping."""
+    whole = ("given", ["theta"], [["m*l**2"]], ["-3*m*l*sin(theta)"])
+    values = {"m": 1.0, "l": 2.0}
+    equations = eg.Model.from_equations(*whole, potential_energy="-3*m*l*cos(theta)", parameters=values).derive()
+    m, l = sp.symbols("m l")
+    assert sp.simplify(equations.V + 3 * m * l * sp.cos(sp.Symbol("theta"))) == 0
+    for name, key in (("T", "kinetic"), ("lagrangian", "kinetic"), ("momenta", "kinetic")):
+        with pytest.raises(UnavailableError, match=f"given without {key}_energy; give equations.{key}_energy"):
+            getattr(equations, name)
+    with pytest.raises(UnavailableError, match="V is not known: .* without potential_energy; give equations.potential"):
+        _ = eg.Model.from_equations(*whole).derive().V
+    oscillator = eg.Model.from_lagrangian("oscillator", "q_dot**2/2 - k*q**2/2", ["q"], parameters={"k": 4.0})
+    for bare, kind in ((equations, "given equations"), (oscillator.derive(), "a Lagrangian")):
+        for one in (bare, bare.subs({}), bare.with_dynamicsymbols()):
+            for name in ("poses", "velocities", "accelerations", "body_mass_matrix"):
+                with pytest.raises(UnavailableError, match=f"there are no bodies: the model is {kind}"):
+                    getattr(one, name)
+                assert not hasattr(one, name)
+                assert f"eqs.{name}" not in str(one)
+        assert bare.explain().difference < 1e-10

@@ -1,0 +1,180 @@
+"""Stage reading, display: equations -> what notebooks and terminals show of them, and views with values put in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from ..errors import UnavailableError, UsageError
+from ..runtime.near_names import find_lacking
+from .readable import Readable
+from .writes_quantities import Derived
+
+
+class Displayed(Readable):
+    """Equations that show themselves, and that give the same quantities with values put in or in functions of time."""
+
+    # -- display ------------------------------------------------------------------------------------------------------
+    def __str__(self) -> str:
+        return self._shown_text
+
+    def __repr__(self) -> str:
+        return self._shown_text
+
+    def _repr_html_(self) -> str:
+        return f"{self._picture_and_facts(self._facts_html)}{self._equations_html}"
+
+    def _repr_latex_(self) -> str:
+        from .equations_latex import equations_latex
+
+        return equations_latex(self)
+
+    @cached_property
+    def _shown_text(self) -> str:
+        from .equations_text import equations_text
+
+        return equations_text(self)
+
+    def _picture_and_facts(self, facts: str) -> str:
+        """What stands above the formulas; equations that can be compiled add a picture."""
+        return facts
+
+    @cached_property
+    def _facts_html(self) -> str:
+        from .equations_html import facts_html
+
+        return facts_html(self)
+
+    @cached_property
+    def _equations_html(self) -> str:
+        from .equations_html import equations_html
+
+        return equations_html(self)
+
+    # -- the same with other symbols or values ------------------------------------------------------------------------
+    def with_dynamicsymbols(self) -> ReadingView:
+        """The same quantities in functions of time, as ``sympy.physics.mechanics.dynamicsymbols`` makes them.
+
+        ``theta`` becomes theta(t) and ``theta_dot`` its derivative; velocities that are no rates of coordinates, inputs
+        and multipliers are functions of time too; parameters stay symbols.
+
+        Returns
+        -------
+        ReadingView
+        """
+        from .functions_of_time import dynamic_symbols
+
+        return ReadingView(self, dynamic_symbols(self.kinematics), self._put_in)
+
+    def subs(self, values: Mapping[Any, Any]) -> ReadingView:
+        """The same quantities with values put in, all at once, after derivatives have been taken.
+
+        Parameters
+        ----------
+        values : mapping
+            Name, symbol or function of time of a coordinate, velocity, acceleration, parameter or input, or ``"t"`` ->
+            number, text or SymPy expression.
+
+        Returns
+        -------
+        ReadingView
+
+        Raises
+        ------
+        UsageError
+            An unknown name, or a value that is no expression.
+        """
+        return ReadingView(self, self._symbol, (*self._put_in, self._read(values)))
+
+    def with_parameters(self, values: Mapping[Any, Any] | None = None, /, **named: Any) -> ReadingView:
+        """The same quantities with values of parameters put in: ``with_parameters(l=0.5)``; see :meth:`subs`.
+
+        Parameters
+        ----------
+        values : mapping, optional
+            Values by name, where names are no words of Python: ``with_parameters({"left.l": 0.5})``.
+        **named
+            Values by name.
+
+        Returns
+        -------
+        ReadingView
+
+        Raises
+        ------
+        UsageError
+            An unknown name, one that is given twice, or a value that is no expression.
+        """
+        read = {} if values is None else self._read(values, "parameter")
+        more = self._read(named, "parameter")
+        if both := sorted({*read} & {*more}):
+            raise UsageError(f"parameter {both[0]!r} is given twice; give it one value")
+        return ReadingView(self, self._symbol, (*self._put_in, read | more))
+
+
+class ReadingView(Displayed):
+    """Equations to read, with values put in or with functions of time; all quantities of :class:`Readable`.
+
+    Made by ``subs``, ``with_parameters`` and ``with_dynamicsymbols`` of equations and of other views.
+
+    Attributes
+    ----------
+    source : Displayed
+        The equations of which this is a view.
+    """
+
+    if not TYPE_CHECKING:  # type checkers know all attributes
+
+        def __getattr__(self, name: str) -> Any:
+            lacks = not name.startswith("_") and not hasattr(type(self), name)
+            if lacks and hasattr(type(self.source), name):
+                raise AttributeError(
+                    f"a view of equations has no {name!r}: values are put into what is read, not into what is "
+                    f"compiled and counted; take it of the equations themselves, which are .source of the view",
+                    name=name,
+                )
+            return find_lacking(self, "a view of equations", name)
+
+    def __init__(self, source: Displayed, symbols: Callable[[str], Any], values: tuple[Mapping[str, Any], ...]) -> None:
+        self.source: Displayed = source.source if isinstance(source, ReadingView) else source
+        self.kinematics, self.mobility = source.kinematics, source.mobility
+        self._symbols, self._values = symbols, tuple(given for given in values if given)
+
+    def fresh(self) -> Derived:
+        return self.source.fresh()
+
+    @property
+    def method(self) -> str:
+        return self.source.method
+
+    def explain(self, level: str = "full") -> Any:
+        """The worked solution of the equations that this is a view of; see ``explain`` of the equations.
+
+        Raises
+        ------
+        UnavailableError
+            Values were put in: the solution would mix them with numbers of the compiled module, which has none of them.
+        """
+        if not self._values:
+            return self.source.explain(level)  # type: ignore[attr-defined]
+        raise UnavailableError(
+            f"explain has no view with {self._told}: its numbers come from the compiled module, in which these values "
+            "do not stand; call explain of the equations themselves, and give values of parameters and inputs to the "
+            "model before you derive, such as model.parameter('l', 0.5), and those of coordinates by model.initial"
+        )
+
+    def _picture_and_facts(self, facts: str) -> str:
+        return facts if self._values else self.source._picture_and_facts(facts)
+
+    def in_plain_symbols(self) -> Readable:
+        plain = self.source._symbol
+        return self if self._symbols is plain else ReadingView(self.source, plain, self._values)
+
+    @property
+    def _symbol(self) -> Callable[[str], Any]:
+        return self._symbols
+
+    @property
+    def _put_in(self) -> tuple[Mapping[str, Any], ...]:
+        return self._values
