@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 import eomgen as eg
 
 
@@ -29,4 +31,43 @@ def n_four_bar(n: int) -> eg.Model:
     tip = cranks[0].marker("tip", at=("l", 0, 0))
     m.output("x", tip.position[0])
     m.output("y", tip.position[1])
+    return m
+
+
+def turn(seed: int) -> np.ndarray:
+    """A rotation by chance; none for 0."""
+    if not seed:
+        return np.eye(3)
+    Q, R = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    Q *= np.sign(np.diag(R))
+    return Q if np.linalg.det(Q) > 0 else Q[:, [1, 0, 2]]
+
+
+def v_engine(seed: int) -> eg.Model:
+    """A V6 engine at 60 degrees, two rods on each of three pins; all of it turned in space by a seed other than 0."""
+    T = turn(seed)
+
+    def vector(*x: float) -> tuple[float, ...]:
+        return tuple((T @ np.array(x)).tolist())
+
+    def inertia(*x: float) -> list[list[float]]:
+        return (T @ np.diag(x) @ T.T).tolist()
+
+    m = eg.Model("v6", gravity=vector(0, -9.81, 0))
+    crank = m.body("crank", mass=10, com=(0, 0, 0), inertia=inertia(0.01, 0.01, 0.02))
+    m.revolute("main", m.ground, crank, axis=vector(0, 0, 1), coordinate="theta")
+    for k in range(6):
+        phase, bank = k // 2 * 2 * np.pi / 3, (np.pi / 6 if k % 2 else -np.pi / 6)
+        depth = 0.1 * (k // 2) + 0.02 * (k % 2)
+        pin = np.array([0.04 * np.cos(phase), 0.04 * np.sin(phase)])
+        along = np.array([np.sin(bank), np.cos(bank)])
+        s = along @ pin + np.sqrt(0.15**2 - (pin @ pin - (along @ pin) ** 2))
+        rod = m.body(f"rod{k}", mass=0.5, com=vector(0.05, 0, 0), inertia=inertia(1e-4, 1e-3, 1e-3))
+        piston = m.body(f"piston{k}", mass=0.4)
+        m.revolute(f"big{k}", crank.at(*vector(*pin, depth)), rod, axis=vector(0, 0, 1))
+        m.revolute(f"small{k}", rod.at(*vector(0.15, 0, 0)), piston, axis=vector(0, 0, 1))
+        m.prismatic(f"bore{k}", m.ground.at(*vector(0, 0, depth)), piston, axis=vector(*along, 0), coordinate=f"s{k}")
+        reach = s * along - pin
+        m.guess(**{f"big{k}": float(np.arctan2(reach[1], reach[0])), f"s{k}": float(s)})
+    m.initial(theta=0.0, theta_dot=10.0)
     return m

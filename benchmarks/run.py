@@ -15,7 +15,7 @@ from .report import Report, show, write
 
 BENCHMARKS = (
     *("derive", "growth", "compile", "panda", "robots", "latency"),
-    *("call", "simulate", "integrate", "stiff", "loops", "four_bars"),
+    *("call", "simulate", "integrate", "stiff", "loops", "large_loops", "four_bars"),
     *("rhs", "lanes", "ensembles", "equilibria"),
 )
 
