@@ -68,8 +68,9 @@ class WritesQuantities(ABC):
         count = len(expressions) - len(names)
         names = [(known, x) for (known, _), x in zip(names, expressions[count:], strict=True)]
         prefix = prefix or f"{name.replace('.', '_')}_"
+        k = self.kinematics
         named, written = write(
-            expressions[:count], self._symbol, prefix, names, self._rates, self.kinematics.parameter_names
+            expressions[:count], self._symbol, prefix, names, self._rates, k.parameter_names, k.euler_parameters
         )
         self._named[name] = named
         return written

@@ -9,10 +9,10 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any, NamedTuple
 
 from ..graph.core import Expr
-from ..simplify import WHOLE, simplify
+from ..simplify import WHOLE, joined_nodes, simplify
 
 READABLE = 400  #: operations an expression, on average, up to which expressions are written out
-LONGEST = 20_000  #: operations of all of them together
+LONGEST = 5_000  #: operations of all of them together
 
 
 class Written(NamedTuple):
@@ -33,7 +33,8 @@ def is_short(expressions: Sequence[Expr]) -> bool:
     """Whether expressions are written out whole."""
     from ..graph.sympy_raise import inlined_size
 
-    return inlined_size(expressions) <= min(READABLE * len(expressions), LONGEST)
+    several = {x.id: x for x in expressions if x.value is None}
+    return inlined_size(expressions) <= min(READABLE * len(several), LONGEST)
 
 
 def write(
@@ -43,6 +44,7 @@ def write(
     given: Sequence[tuple[str, Expr]] = (),
     rates: Collection[str] = (),
     parameters: Collection[str] = (),
+    unit: Sequence[Sequence[str]] = (),
 ) -> Written:
     """Expressions of one graph in SymPy.
 
@@ -59,10 +61,15 @@ def write(
         Names of velocities and accelerations.
     parameters : collection of str, optional
         Names of parameters.
+    unit : sequence of sequence of str, optional
+        Names of Euler parameters, four by four: the sum of their squares is 1.
 
     Returns
     -------
     Written
     """
+    if not expressions:
+        return Written([], [])
+    expressions, given = joined_nodes(expressions, given, unit)
     form = simplify(expressions, given, rates, prefix, *([WHOLE] if not given and is_short(expressions) else []))
     return Written([], []) if form is None else Written(*form.sympy(symbols, parameters, prefix))

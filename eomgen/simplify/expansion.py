@@ -28,6 +28,7 @@ from .atoms import (
 )
 from .joined_angles import JoinedAngles
 
+FEW = 3  #: terms up to which a sum of sines and cosines is taken for a product where it is one
 MANY = 24  #: terms beyond which the sines and cosines of a sum are joined before it is used
 
 
@@ -90,7 +91,12 @@ class Expansion:
     def _sum(self, a: Poly, b: Poly, sign: int) -> Poly:
         self.work.spend((len(a) + len(b)) // 4)
         total = add(a, b, sign)
-        return self.angles.simplified(total) if len(total) > MANY else total
+        if len(total) > MANY:
+            return self.angles.simplified(total)
+        if 1 < len(total) <= FEW:  # a sum that is one product is multiplied and squared as one
+            short = self.angles.simplified(total)
+            return short if len(short) == 1 else total
+        return total
 
     def _settled(self, a: Poly) -> Poly:
         """With sums to whole positive powers multiplied out again."""

@@ -77,7 +77,7 @@ def test_long_equations_end_with_how_to_get_the_others() -> None:
 
 
 def test_page_has_picture_coordinates_and_folded_intermediates() -> None:
-    page = derived("rolling_disc")._repr_html_()
+    page = derived("bicycle")._repr_html_()
     assert page.index("<img") < page.index("<table>") < page.index("<math displaystyle")
     assert "named intermediates</summary>" in page
     assert page.count("<mi>M</mi><mn>12</mn>") == 1
