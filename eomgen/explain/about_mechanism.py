@@ -11,7 +11,6 @@ from ..errors import EomgenError
 from ..files.inline_pictures import DPI, SHOWN
 from ..frames import GROUND
 from ..graph.core import Expr
-from ..reading.written import write
 from .author import Author
 from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table
 
@@ -76,7 +75,8 @@ def bodies(author: Author) -> Section | None:
         )
         formulas: list[Piece] = []
         for body in m.bodies:
-            mass, *rest = write([body.mass, *body.com, *(x for row in body.inertia for x in row)]).expressions
+            properties = [body.mass, *body.com, *(x for row in body.inertia for x in row)]
+            mass, *rest = author.write("masses and inertias", properties).expressions
             formulas.append(FormulaLine((author.of("m", body.name), mass)))
             if any(x != 0 for x in rest[:3]):
                 formulas.append(FormulaLine((author.of(r"\mathbf{c}", body.name), sympy.Matrix(3, 1, rest[:3]))))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..equations import TreeEquations
 from ..errors import UsageError
@@ -19,6 +19,17 @@ from .quantities import Quantities
 from .written import write
 
 Derived = tuple[Kinematics, Mobility, TreeEquations]
+Names = list[tuple[str, Expr]]
+Choose = Callable[[Quantities], Sequence[Expr]]
+ChooseNames = Callable[[Quantities], Sequence[tuple[str, Expr]]]
+
+
+class WrittenQuantity(NamedTuple):
+    """A quantity in SymPy, entry by entry, with its named parts; ``formed`` gives it as the derivation formed it."""
+
+    named: list[tuple[Any, Any]]
+    flat: list[Any]
+    formed: Callable[[], tuple[list[Expr], Names]]
 
 
 class WritesQuantities(ABC):
@@ -48,17 +59,32 @@ class WritesQuantities(ABC):
         """Intermediates of what was written, by quantity."""
         return {}
 
+    @cached_property
+    def _all(self) -> dict[str, WrittenQuantity]:
+        """What was written, by quantity."""
+        return {}
+
     def _write(
         self,
         name: str,
-        choose: Callable[[Quantities], Sequence[Expr]],
+        choose: Choose,
         prefix: str = "",
-        given: Callable[[Quantities], Sequence[tuple[str, Expr]]] | None = None,
+        given: ChooseNames | None = None,
     ) -> list[Any]:
         """Expressions of the quantities in SymPy; their named parts are kept under the name.
 
         Each is formed in a copy of its own, so that what is read depends on the model alone.
         """
+        formed, names = self._form(choose, given)
+        prefix = prefix or f"{name.replace('.', '_')}_"
+        k = self.kinematics
+        written = write(formed, self._symbol, prefix, names, self._rates, k.parameter_names, k.euler_parameters)
+        self._named[name] = written.intermediates
+        self._all[name] = WrittenQuantity(*written, lambda: self._form(choose, given))
+        return written.expressions
+
+    def _form(self, choose: Choose, given: ChooseNames | None) -> tuple[list[Expr], Names]:
+        """Expressions of the quantities with values put in, and what names in them stand for."""
         quantities = Quantities(*self.fresh())
         expressions = list(choose(quantities))
         names = list(given(quantities)) if given is not None else []
@@ -66,14 +92,17 @@ class WritesQuantities(ABC):
         for values in self._put_in:
             expressions = put_in(expressions, values)
         count = len(expressions) - len(names)
-        names = [(known, x) for (known, _), x in zip(names, expressions[count:], strict=True)]
-        prefix = prefix or f"{name.replace('.', '_')}_"
-        k = self.kinematics
-        named, written = write(
-            expressions[:count], self._symbol, prefix, names, self._rates, k.parameter_names, k.euler_parameters
-        )
-        self._named[name] = named
-        return written
+        return expressions[:count], [(name, x) for (name, _), x in zip(names, expressions[count:], strict=True)]
+
+    def as_formed(self, name: str, part: str | None = None) -> WrittenQuantity:
+        """A quantity as it was written and, to compare with, as it was formed; keys are those of :meth:`written`.
+
+        Parts that were written together, such as those of generalized forces, are in the whole.
+        """
+        value, key = getattr(self, name), f"{name}.{part}"
+        if isinstance(value, Mapping) and part is not None:
+            value[part]
+        return self._all[key if key in self._all else name]
 
     @cached_property
     def _rates(self) -> frozenset[str]:
@@ -86,7 +115,7 @@ class WritesQuantities(ABC):
         rows: list[Sequence[Expr]] = []
 
         def flat(quantities: Quantities) -> list[Expr]:
-            rows.extend(choose(quantities))
+            rows[:] = choose(quantities)
             return [x for row in rows for x in row]
 
         written = self._write(name, flat)
