@@ -222,18 +222,29 @@ def _compare_gibbs_function(found: dict[str, float], equations: Any, s: StateNum
 
 
 def _compare_block_system(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
-    """What K x = k gives for accelerations are those of the module."""
+    """K x = k can be solved with the accelerations of the module."""
     written = equations.as_formed("block_system")
     numbers = evaluate(written.named, written.flat, s.values)
     n = len(equations.block_system.unknowns)
     K, k = numbers[: n * n].reshape(n, n), numbers[n * n :]
-    rows, columns = (np.abs(K).max(axis=axis) for axis in (1, 0))
-    rows, columns = (np.where(x > 0, x, 1.0) for x in (rows, columns))
-    x = np.linalg.lstsq(K / rows[:, None] / columns, k / rows, rcond=1e-12)[0] / columns
-    places = [(i, str(u)) for i, u in enumerate(equations.block_system.unknowns) if str(u) in s.values]
-    if places:
-        given = np.array([s.values[name] for _, name in places])
-        _note(found, "block_system", x[[i for i, _ in places]], given, float(np.abs(given).max(initial=0.0)))
+    unknowns = [str(x) for x in equations.block_system.unknowns]
+    known = np.array([name in s.values for name in unknowns], dtype=bool)
+    x = np.array([s.values.get(name, 0.0) for name in unknowns])
+    rows = np.maximum(np.abs(K).max(axis=1, initial=0.0), SMALLEST)
+    columns = np.maximum((np.abs(K) / rows[:, None]).max(axis=0, initial=0.0), SMALLEST)
+    scaled = K / rows[:, None] / columns
+    rest = (k - K @ x) / rows
+    x = x + np.where(known, 0.0, _solved(scaled, rest, ~known) / columns)
+    _note(found, "block_system", K @ x, k, float((np.abs(K) @ np.abs(x)).max(initial=0.0)))
+
+
+def _solved(matrix: np.ndarray, right: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """The least-squares solution in the unknowns at some places, once refined; 0 at the others."""
+    solution = np.zeros(len(places))
+    for _ in range(2):
+        rest = right - matrix @ solution
+        solution[places] += np.linalg.lstsq(matrix[:, places], rest, rcond=None)[0]
+    return solution
 
 
 def _compare_transformation(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
