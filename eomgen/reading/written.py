@@ -72,4 +72,16 @@ def write(
         return Written([], [])
     expressions, given = joined_nodes(expressions, given, unit)
     form = simplify(expressions, given, rates, prefix, *([WHOLE] if not given and is_short(expressions) else []))
-    return Written([], []) if form is None else Written(*form.sympy(symbols, parameters, prefix))
+    if form is None:
+        return Written([], [])
+    named, found = form.sympy(symbols, parameters, prefix)
+    return Written([(name, _with_derivatives(x)) for name, x in named], [_with_derivatives(x) for x in found])
+
+
+def _with_derivatives(expression: Any) -> Any:
+    """With sqrt(x^2) for |x|: SymPy takes names for complex numbers, of which |x| has no derivative."""
+    import sympy
+
+    if not expression.has(sympy.Abs):
+        return expression
+    return expression.replace(sympy.Abs, lambda x: sympy.sqrt(x**2))

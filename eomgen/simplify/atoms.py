@@ -70,6 +70,19 @@ class Atoms:
             self._names.append(own.union(*(self._names[part] for part in self.inside(k))))
         return frozenset().union(*(self._names[a] for monomial in poly for a, _ in monomial))
 
+    def without_squared_signs(self, monomial: Monomial, kind: str) -> Monomial:
+        """With x^2 for |x|^2; a sum in it is an atom of the kind."""
+        for atom, n in monomial:
+            of, what = self.table[atom]
+            if of == "abs" and n % 2 == 0:
+                ((inner, x), *others) = what[0]
+                if not others and abs(x) == 1:
+                    powers = tuple((a, n * k) for a, k in inner)
+                else:
+                    powers = ((self.id(kind, what[0]), n),)
+                return self.without_squared_signs(join(join(monomial, ((atom, -n),)), powers), kind)
+        return monomial
+
     def poly(self, kind: str, what: Any) -> Poly:
         """The polynomial of one atom."""
         return {((self.id(kind, what), 1),): 1}

@@ -105,7 +105,7 @@ class Expansion:
         while waiting:
             done: Poly = {}
             for given, x in waiting.pop().items():
-                monomial = self._without_squared_signs(given)
+                monomial = self.atoms.without_squared_signs(given, "sum")
                 power = next((f for f in monomial if f[1] >= 1 and self.atoms.table[f[0]].kind == "sum"), None)
                 if power is None:
                     done[monomial] = done.get(monomial, 0) + x
@@ -116,15 +116,6 @@ class Expansion:
                 waiting.append(multiply({below: x}, base))
             result = add(result, done) if result else done
         return result
-
-    def _without_squared_signs(self, monomial: Monomial) -> Monomial:
-        """|x|^2 = x^2 of products x."""
-        for atom, n in monomial:
-            kind, what = self.atoms.table[atom]
-            if kind == "abs" and n % 2 == 0 and len(what[0]) == 1 and what[0][0][1] == 1:
-                inner = tuple((a, k * n) for a, k in what[0][0][0])
-                return self._without_squared_signs(join(join(monomial, ((atom, -n),)), inner))
-        return monomial
 
     def _over(self, a: Poly, b: Poly) -> Poly:
         b = self.angles.simplified(b)

@@ -203,3 +203,19 @@ def test_deep_nesting_needs_no_recursion() -> None:
 
 def test_nothing_of_nothing() -> None:
     assert simplify([]) is None
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        (sympy.Abs(x - y) ** 2, (x - y) ** 2),
+        (a * sympy.Abs(x - y) ** 2 - a * x**2, a * y * (y - 2 * x)),
+        (sympy.Abs(x - y) ** -2, (x - y) ** -2),
+        (sqrt((x - y) ** 2) * sympy.Abs(x - y), (x - y) ** 2),
+        (sympy.Abs(x * y) ** 2, x**2 * y**2),
+    ],
+)
+def test_squares_of_magnitudes_are_squares(given: Any, wanted: Any) -> None:
+    found = short(given)
+    assert not found.has(sympy.Abs)
+    assert sympy.expand(found / wanted) == 1 or sympy.expand(found - wanted) == 0
