@@ -77,7 +77,7 @@ class Form:
         """
         import sympy
 
-        from .to_sympy import Raising
+        from .to_sympy import Raising, in_one_fashion
 
         raising = Raising(self.graph, self.expansion.atoms, self.factoring, symbols or sympy.Symbol)
         named: list[tuple[Any, Any]] = []
@@ -89,7 +89,8 @@ class Form:
             name = self.expansion.atoms.table[atom].what
             raising.names[name] = sympy.Symbol(good.intermediates.get(name, name))
             named.append((raising.names[name], raising.expression(poly)))
-        return named, [raising.expression(p) for p in self.polys]
+        written = [in_one_fashion(raising.expression(p)) for p in self.polys]
+        return [(name, in_one_fashion(x)) for name, x in named], written
 
     def _good_names(self, parameters: Collection[str], prefix: str) -> GoodNames:
         atoms = self.expansion.atoms

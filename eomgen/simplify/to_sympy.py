@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
@@ -80,6 +81,30 @@ def _exponent(n: Fraction | int) -> Any:
 def _number(x: Number) -> Any:
     if isinstance(x, float):
         return sympy.Float(x)
-    if x.denominator > SMALL:
+    decimal = _decimal(x)
+    if x.denominator > SMALL or (decimal and len(decimal) < len(f"{x.numerator}/{x.denominator}")):
         return sympy.Float(float(x))
     return sympy.Rational(x.numerator, x.denominator)
+
+
+def _decimal(x: Fraction | int) -> str:
+    """The text of a fraction as a decimal, empty where it has no end or is whole."""
+    if x.denominator == 1:
+        return ""
+    text = f"{Decimal(x.numerator) / Decimal(x.denominator):f}"
+    return text if Fraction(text) == x else ""
+
+
+def in_one_fashion(expression: Any) -> Any:
+    """With fractions as decimals, as far as those have an end, in an expression that has a decimal."""
+    return _in_decimals(expression) if expression.has(sympy.Float) else expression
+
+
+def _in_decimals(x: Any) -> Any:
+    if x.is_Rational and not x.is_Integer:
+        return sympy.Float(float(x)) if _decimal(Fraction(x.p, x.q)) else x
+    if not x.args or not x.has(sympy.Rational):
+        return x
+    if x.is_Pow:
+        return sympy.Pow(_in_decimals(x.base), x.exp)
+    return x.func(*map(_in_decimals, x.args))
