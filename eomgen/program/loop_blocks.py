@@ -17,10 +17,10 @@ from ..limits.constraints import GENTLE, LEFT, LOST, TIKHONOV, UNMOVED, VANISHED
 from ..limits.crossings import NEAR_SQUARE
 from ..limits.inertia import STILL
 from ..limits.rounding import ROW
+from ..numeric.triangular import DiagonalBlock, diagonal_blocks
 from .factor import exceeding
 from .sparse import Row, SparseFactor, dot, factorize, fill, gram, rows_of, times, transpose
 from .terms import SystemTerms
-from .triangular import DiagonalBlock, diagonal_blocks
 
 #: Linear corrections with GENTLE of velocities, whose errors gamma squares, and of accelerations; where weak rows keep
 #: something, drivers take more.
