@@ -78,7 +78,10 @@ class WritesQuantities(ABC):
         formed, names = self._form(choose, given)
         prefix = prefix or f"{name.replace('.', '_')}_"
         k = self.kinematics
-        written = write(formed, self._symbol, prefix, names, self._rates, k.parameter_names, k.euler_parameters)
+        of_motion = given is not None
+        written = write(
+            formed, self._symbol, prefix, names, self._rates, k.parameter_names, k.euler_parameters, of_motion
+        )
         self._named[name] = written.intermediates
         self._all[name] = WrittenQuantity(*written, lambda: self._form(choose, given))
         return written.expressions

@@ -45,6 +45,7 @@ def write(
     rates: Collection[str] = (),
     parameters: Collection[str] = (),
     unit: Sequence[Sequence[str]] = (),
+    roots: bool = False,
 ) -> Written:
     """Expressions of one graph in SymPy.
 
@@ -63,6 +64,8 @@ def write(
         Names of parameters.
     unit : sequence of sequence of str, optional
         Names of Euler parameters, four by four: the sum of their squares is 1.
+    roots : bool, optional
+        Whether long roots and denominators that are written several times get names in any case.
 
     Returns
     -------
@@ -74,7 +77,7 @@ def write(
     form = simplify(expressions, given, rates, prefix, *([WHOLE] if not given and is_short(expressions) else []))
     if form is None:
         return Written([], [])
-    named, found = form.sympy(symbols, parameters, prefix)
+    named, found = form.sympy(symbols, parameters, prefix, roots)
     return Written([(name, _with_derivatives(x)) for name, x in named], [_with_derivatives(x) for x in found])
 
 

@@ -25,6 +25,7 @@ class Raising:
         self.symbols = symbols
         self.names: dict[Any, Any] = {}  #: what stands for an intermediate
         self.turns: dict[int, Any] = {}  #: what stands for a sine or cosine
+        self.roots: dict[int, tuple[Any, int]] = {}  #: what stands for a sum (1) or its root (2)
         self._made: dict[int, Any] = {}
 
     def expression(self, poly: Poly) -> Any:
@@ -36,8 +37,17 @@ class Raising:
         return sympy.Add(*(self._term(m, x) for m, x in poly.items()))
 
     def _term(self, monomial: Monomial, x: Number) -> Any:
-        factors = [sympy.Pow(as_number(self._atom(a)), _exponent(n)) for a, n in monomial]
+        factors = [self._power(a, n) for a, n in monomial]
         return sympy.Mul(_number(x), *factors)
+
+    def _power(self, atom: int, n: Fraction | int) -> Any:
+        symbol, times = self.roots.get(atom, (None, 1))
+        return sympy.Pow(as_number(self._atom(atom)) if symbol is None else symbol, _exponent(times * n))
+
+    def root(self, atom: int) -> Any:
+        """A sum or its root, written out."""
+        found = self.expression(self.factoring.factored(dict(self.atoms.table[atom].what)))
+        return sympy.sqrt(found) if self.roots[atom][1] == 2 else found
 
     def turn(self, atom: int) -> Any:
         """A sine or cosine, written out."""

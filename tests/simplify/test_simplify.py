@@ -247,3 +247,19 @@ def test_decimals_and_fractions_do_not_mix() -> None:
     assert str(short(sqrt(x) / 2 + sympy.Float(0.431) * y)) == "0.5*sqrt(x) + 0.431*y"
     assert str(short(sympy.Float(0.023751) * a + sympy.Float(0.1462528) * b)) == "0.023751*a + 0.1462528*b"
     assert str(short(sympy.Float(0.023751) * a * x + sympy.Float(0.023751) * b * x)) == "0.023751*x*(a + b)"
+
+
+def test_long_roots_that_repeat_have_names() -> None:
+    graph = Graph()
+    inside = a**2 + 2 * l * (l - l * cos(A) + a * sin(A))
+    given = [x / sqrt(inside) + a * sqrt(inside), y / inside, sqrt(a + b) / x]
+    form = simplify([lower(graph, e) for e in given], sizes=WHOLE)
+    assert form is not None
+    assert form.sympy()[0] == []
+    named, found = form.sympy(roots=True)
+    ((name, root),) = named
+    assert str(name) == "r0"
+    assert found == [x / name + a * name, y / name**2, sqrt(a + b) / x]
+    values = {a: 0.7, l: 1.3, A: 0.4, x: 2.0, y: -1.1, b: 0.2}
+    for shown, wanted in zip(found, given, strict=True):
+        assert float(shown.subs(name, root).subs(values)) == pytest.approx(float(wanted.subs(values)), rel=1e-14)
