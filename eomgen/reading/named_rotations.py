@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute, symbols_of
-from ..graph.sympy_raise import inlined_size
 from ..kinematics import Kinematics
 from ..simplify import joined_nodes
 
@@ -33,7 +32,11 @@ def name_rotations(kinematics: Kinematics, expressions: Sequence[Expr]) -> tuple
     values = [x for _, x in entries]
     joined, _ = joined_nodes([*expressions, *values], (), kinematics.euler_parameters)
     whole, values = joined[: len(expressions)], joined[len(expressions) :]
-    if not entries or inlined_size(whole) <= FEW:
+    if not entries:
+        return whole, []
+    from ..graph.sympy_raise import inlined_size
+
+    if inlined_size(whole) <= FEW:
         return whole, []
     taken = symbols_of(whole)
     graph = whole[0].graph

@@ -227,6 +227,10 @@ class Readable(QuantitiesOfMethods):
     def _loop_coordinate(self, name: str) -> Any:
         return self._write(f"loop_coordinates.{name}", lambda s: [s.loop_coordinates[name]])[0]
 
+    def again(self) -> ReadingView:
+        """The same quantities, none of them made yet."""
+        return ReadingView(self, self._symbol, self._put_in)
+
     # -- the same with other symbols or values ------------------------------------------------------------------------
     def with_dynamicsymbols(self) -> ReadingView:
         """The same quantities in functions of time, as ``sympy.physics.mechanics.dynamicsymbols`` makes them.

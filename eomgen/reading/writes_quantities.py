@@ -42,6 +42,10 @@ class WritesQuantities(ABC):
     def fresh(self) -> Derived:
         """A copy of what was derived, in a graph of its own."""
 
+    @abstractmethod
+    def again(self) -> WritesQuantities:
+        """The same with nothing made yet."""
+
     @property
     def _symbol(self) -> Callable[[str], Any]:
         """Name -> the SymPy object that stands for it."""
@@ -63,6 +67,10 @@ class WritesQuantities(ABC):
     def _all(self) -> dict[str, WrittenQuantity]:
         """What was written, by quantity."""
         return {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what gives quantities as they were formed, which are functions here."""
+        return {name: value for name, value in vars(self).items() if name != "_all"}
 
     def _write(
         self,
@@ -105,6 +113,8 @@ class WritesQuantities(ABC):
         value, key = getattr(self, name), f"{name}.{part}"
         if isinstance(value, Mapping) and part is not None:
             value[part]
+        if key not in self._all and name not in self._all:  # made before this went through pickle
+            return self.again().as_formed(name, part)
         return self._all[key if key in self._all else name]
 
     @cached_property

@@ -16,11 +16,11 @@ from ..graph.core import Expr, Graph
 from ..graph.rounding_bounds import is_rounding, with_bounds
 from ..graph.substitute import substitute
 from ..graph.traverse import LEAVES, operands, reachable
+from ..limits.rounding import ALIKE
 
 POINTS = 12  #: random points
 MOVED = 4  #: of these, at which each symbol is changed alone
 LEAST = 6  #: points at which two functions must be finite to be compared
-CLOSE = 1e-7  #: values of one class agree to this before their rounding is looked at
 NUMBERS = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0)  #: what a node may be for a constant
 OPEN = ("add", "sub", "mul", "div", "neg", "sin", "cos", "sqrt")  #: operations that are looked into
 MOST = 4_000_000  #: values that are looked at
@@ -241,7 +241,7 @@ class _Joined:
             if is_rounding(v[finite] - sign * number, np.maximum(e[finite], number)).all():
                 return self.graph.constant(sign * number).id
         mantissa, exponent = np.frexp(abs(v[first]))
-        key = (first, int(mantissa / CLOSE), int(exponent))
+        key = (first, int(mantissa / ALIKE), int(exponent))
         for near in (0, 1, -1):
             for j in known.get((first, key[1] + near, key[2]), ()):
                 if self.rank[new[j]] > self.rank[i]:
