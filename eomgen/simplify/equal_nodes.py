@@ -24,6 +24,7 @@ LEAST = 6  #: points at which two functions must be finite to be compared
 NUMBERS = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0)  #: what a node may be for a constant
 OPEN = ("add", "sub", "mul", "div", "neg", "sin", "cos", "sqrt")  #: operations that are looked into
 MOST = 4_000_000  #: values that are looked at
+LONG = 20_000  #: operations from which expressions need names for what they share
 WORK = 100_000  #: nodes that are formed anew to leave out symbols
 
 Given = Sequence[tuple[str, Expr]]
@@ -57,11 +58,15 @@ def joined_nodes(
     order = reachable(graph, [*opened.roots, *opened.operands])
     own = [name for name, _ in given]
     names = sorted(graph.nodes[i][1] for i in order if graph.nodes[i][0] == "sym" and graph.nodes[i][1] not in own)
+    found: dict[int, int] = {}
     if names and len(order) * (POINTS + MOVED * len(names)) <= MOST:
         meant = list(zip(own, (Expr(graph, i) for i in opened.roots), strict=False))
-        ids = opened.closed(_Joined(Values(graph, order, names, meant, unit), own).nodes())
-    else:
-        ids = opened.closed({})
+        joined = _Joined(Values(graph, order, names, meant, unit), own)
+        found = joined.nodes()
+        long = sum(joined.size[found[i]] for i in opened.roots) > LONG
+        if long and len(reachable(graph, [found[i] for i in opened.roots])) > len(reachable(graph, opened.roots)):
+            found = {}  # parts written anew share less with the others
+    ids = opened.closed(found)
     made = _copied(graph, ids)
     return made[len(own) :], list(zip(own, made, strict=False))
 
