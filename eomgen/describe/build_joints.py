@@ -113,7 +113,7 @@ def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, .
         if columns != TURNS["z"]:
             turn = turn_matrix(reader.graph, columns)
             pair = (_turned(pair[0], turn), _turned(pair[1], turn))
-        spec = JointSpec(joint.entry.name, kind, *pair, joint.coordinates, joint.named)
+        spec = JointSpec(joint.entry.name, kind, *pair, joint.coordinates, joint.named, axes=columns)
         result.append(_with_data(reader, spec, path, values))
     return tuple(result)
 

@@ -20,6 +20,7 @@ from ..graph.vectors import Mat3, Vec3
 from ..limits.runs import ATOL, RTOL
 from ..records import dataclass
 from .description import place_of
+from .placement import TURNS, Columns
 
 if TYPE_CHECKING:
     from ..constraints.constraint import Constraint
@@ -76,7 +77,8 @@ class Body:
 class JointSpec:
     """A joint between two markers; ``joint`` answers what its type means, ``coordinates`` are the full names.
 
-    ``predecessor`` and ``successor`` already include the turn that brings the joint's axis to their z.
+    ``predecessor`` and ``successor`` already include the turn that brings the joint's axis to their z; ``axes`` are the
+    directions of x, y and z of the joint in the markers as they were given.
     ``named`` tells whether the user named the coordinates (such joints are kept in the spanning tree first).
     """
 
@@ -89,6 +91,7 @@ class JointSpec:
     limits: tuple[tuple[tuple[str, float], ...], ...] = ()  #: (key, value) of each coordinate; data only
     dry_friction: float = 0.0  #: data only
     armature: Expr | None = None  #: inertia of the drive, added to the coordinate's own
+    axes: Columns = TURNS["z"]
 
     @property
     def velocities(self) -> tuple[str, ...]:

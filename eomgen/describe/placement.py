@@ -14,9 +14,10 @@ _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 _NX, _NY, _NZ = (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
 
 Numbers = tuple[float, float, float]
+Columns = tuple[Numbers, Numbers, Numbers]
 
 #: Word for an axis -> columns of the turn that brings it to z.
-TURNS: dict[str, tuple[Numbers, Numbers, Numbers]] = {
+TURNS: dict[str, Columns] = {
     "x": (_Y, _Z, _X),
     "y": (_Z, _X, _Y),
     "z": (_X, _Y, _Z),
@@ -24,6 +25,14 @@ TURNS: dict[str, tuple[Numbers, Numbers, Numbers]] = {
     "-y": (_Z, _NX, _NY),
     "-z": (_X, _NY, _NZ),
 }
+
+
+def axis_word(direction: Numbers) -> str:
+    """``x``, ``-z``, or ``(0.6, 0, 0.8)`` for an axis that is none of a marker's."""
+    for word, columns in TURNS.items():
+        if direction == columns[2]:
+            return word
+    return f"({', '.join(f'{part:.6g}' for part in direction)})"
 
 
 def rpy_rotation(graph: Graph, rpy: Sequence[Expr]) -> Mat3:
@@ -43,7 +52,7 @@ def rpy_rotation(graph: Graph, rpy: Sequence[Expr]) -> Mat3:
     return vec.matrix(graph, matrix_from_roll_pitch_yaw(rpy))
 
 
-def axis_columns(axis: Numbers) -> tuple[Numbers, Numbers, Numbers] | None:
+def axis_columns(axis: Numbers) -> Columns | None:
     """Columns of a right-handed turn whose third column is the axis; None for the zero vector.
 
     Along a coordinate axis the entries are those of :data:`TURNS`; an axis in a coordinate plane keeps that plane's
@@ -65,7 +74,7 @@ def axis_columns(axis: Numbers) -> tuple[Numbers, Numbers, Numbers] | None:
     return first, _cross(n, first), n
 
 
-def axes_columns(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+def axes_columns(x: Numbers, y: Numbers) -> Columns:
     """Columns of the turn that brings x and y to two unit vectors at right angles; y is made so to the last digit."""
     z = _cross(x, y)
     z = z if sum(a == 0.0 for a in z) == 2 else _unit(z)

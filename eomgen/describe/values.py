@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import numbers
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ from .expressions import parse
 from .fields import CONSTANT, INERTIA, KINDS, MARKER, NUMBER, OUTPUT, PLACED, Field
 from .mechanism import Quantity
 from .names import nearest
-from .placement import TURNS, Numbers, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
+from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
 from .scope import Namespace, Scope
 from .sympy_face import is_sympy, lower_sympy
 from .units import Unit
@@ -317,7 +317,7 @@ class Reader:
         first, second = (self.marker(f"{path}[{k}]", part) for k, part in enumerate(parts))
         return None if first is None or second is None else (first, second)
 
-    def axes(self, path: str, value: Any) -> Sequence[Numbers]:
+    def axes(self, path: str, value: Any) -> Columns:
         """Columns of the turn that brings x and y to two directions at right angles."""
         parts = items(value)
         if parts is None or len(parts) != 2:
@@ -331,7 +331,7 @@ class Reader:
             return TURNS["z"]
         return axes_columns(x, y)
 
-    def axis(self, path: str, value: Any) -> Sequence[Numbers]:
+    def axis(self, path: str, value: Any) -> Columns:
         """Columns of the turn that brings an axis to z."""
         if isinstance(value, str):
             if value in TURNS:

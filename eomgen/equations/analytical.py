@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
+from ..graph.count import count
 from ..graph.differentiate import gradient, vjp
 from ..graph.substitute import substitute
+from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
 
 
@@ -21,13 +23,15 @@ def form_energies(kinematics: Kinematics) -> tuple[Expr, Expr]:
         return bare.expression - at_rest, -at_rest
     kinetic, potential = graph.zero, graph.zero
     # g . r of each link's origin and g in link axes, outwards from ground, so that no ground pose is needed
-    heights: list[tuple[Expr, vec.Vec3]] = []
-    for link, (angular, linear) in zip(kinematics.links, kinematics.twists, strict=True):
+    heights: list[tuple[Expr, Vec3]] = []
+    for k, (link, (angular, linear)) in enumerate(zip(kinematics.links, kinematics.twists, strict=True)):
         height, pull = (graph.zero, kinematics.mechanism.gravity) if link.parent == GROUND else heights[link.parent]
         height = height + vec.dot(pull, link.position)
         pull = link.down(pull)
         heights.append((height, pull))
         center = vec.add(linear, vec.cross(angular, link.com))
+        if link.parent == GROUND:
+            center = min(center, _velocity(kinematics, k), key=lambda v: count([vec.dot(v, v)]).total)
         spin = vec.dot(angular, vec.times(link.inertia, angular))
         kinetic = kinetic + (link.mass * vec.dot(center, center) + spin)
         potential = potential - link.mass * (height + vec.dot(pull, link.com))
@@ -35,6 +39,14 @@ def form_energies(kinematics: Kinematics) -> tuple[Expr, Expr]:
         if force.potential is not None:
             potential = potential + force.potential
     return 0.5 * kinetic, potential
+
+
+def _velocity(kinematics: Kinematics, k: int) -> Vec3:
+    """Velocity of a link's centre of mass in ground axes, in which that of a free body is the rate of its place."""
+    pose, link = kinematics.poses.link(k), kinematics.links[k]
+    x, y, z = kinematics.total_derivative(pose.position)
+    turned = vec.times(pose.rotation, vec.cross(kinematics.twists[k][0], link.com))
+    return vec.add((x, y, z), turned)
 
 
 def generalized_forces(kinematics: Kinematics) -> list[Expr]:

@@ -14,6 +14,7 @@ from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
+from ..numeric.triangular import diagonal_blocks
 from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
@@ -170,22 +171,10 @@ def eliminate(
 
 def _blocks(given: Sequence[Sequence[Expr]], bound: Sequence[int]) -> list[tuple[list[int], list[int]]]:
     """Rows and unknowns of each block, in an order in which each needs only those before it."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
-
-    filled = [[int(not row[j].is_zero) for j in bound] for row in given]
-    row_of = maximum_bipartite_matching(csr_array(filled).T.tocsr(), perm_type="column").tolist()
-    needs = [[filled[row_of[a]][b] for b in range(len(bound))] for a in range(len(bound))]
-    _, labels = connected_components(csr_array(needs), directed=True, connection="strong")
-    waiting = [[k for k, label in enumerate(labels) if label == one] for one in sorted(set(labels.tolist()))]
-    left = set(range(len(bound)))
-    blocks = []
-    while waiting:
-        ready = next(group for group in waiting if not any(needs[a][b] for a in group for b in left - {*group}))
-        waiting.remove(ready)
-        left -= {*ready}
-        blocks.append(([row_of[k] for k in ready], [bound[k] for k in ready]))
-    return blocks
+    blocks = diagonal_blocks([{k: None for k, j in enumerate(bound) if not row[j].is_zero} for row in given])
+    if blocks is None:  # no order exists: a pivot will vanish
+        return [(list(range(len(given))), list(bound))]
+    return [(list(block.rows), [bound[k] for k in block.columns]) for block in blocks]
 
 
 def _solve(

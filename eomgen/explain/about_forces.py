@@ -8,7 +8,6 @@ import sympy
 
 from ..errors import UnavailableError
 from ..graph.core import Expr
-from ..reading.written import write
 from .author import Author
 from .document import FormulaLine, Piece, Section, Sentence
 
@@ -56,7 +55,7 @@ def _weight(author: Author, name: str) -> list[Piece]:
     """Gravity, and other parts that are no elements."""
     if name != "gravity":
         return [Sentence(f"`{name}` of the model.")]
-    gravity = write(list(author.mechanism.gravity)).expressions
+    gravity = author.write("gravity", list(author.mechanism.gravity)).expressions
     return [
         Sentence(
             "The weight of each body acts at its centre of mass, $\\delta W = m \\mathbf{g}^T \\delta "
@@ -72,6 +71,6 @@ def _law(author: Author, force: Any) -> list[Piece]:
     pieces: list[Piece] = [Sentence(f"{force.sentence} ${force.formula}$" if force.formula else force.sentence)]
     for key, value in vars(force).items():
         if isinstance(value, Expr) and not key.startswith("_"):
-            (expression,) = write([value]).expressions
+            (expression,) = author.write("laws of force elements", [value]).expressions
             pieces.append(FormulaLine((rf"\mathrm{{{key.replace('_', '.')}}}", expression)))
     return pieces

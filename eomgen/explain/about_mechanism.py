@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import io
+import re
 from typing import Any
 
 import sympy
 
+from ..describe.mechanism import JointSpec
+from ..describe.placement import axis_word
 from ..errors import EomgenError
 from ..files.inline_pictures import DPI, SHOWN
 from ..frames import GROUND
 from ..graph.core import Expr
-from ..reading.written import write
 from .author import Author
 from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table
 
+_AXIS = re.compile(r"\{([xyz])\}")  #: stands in sentences and formulas of joints for an axis of the joint
+_UNIT = re.compile(r"\\mathbf\{e\}_\{(\\mathbf\{n\}_[xyz])\}")  #: e along an axis n, which is n itself
 MANY = 8  #: bodies from which their masses are folded
 
 
@@ -39,13 +43,29 @@ def mechanism(author: Author, module: Any | None) -> Section:
         )
     )
     rows = tuple(
-        (f"`{s.name}`", s.joint.type_name, f"`{s.predecessor.label}`", f"`{s.successor.label}`", str(s.joint.allows))
-        for s in m.joints
+        (f"`{s.name}`", s.joint.type_name, f"`{s.predecessor.label}`", f"`{s.successor.label}`", _axis(s), allowed)
+        for s, allowed in ((spec, str(spec.joint.allows)) for spec in m.joints)
     )
-    pieces.append(Table(("joint", "type", "from (P)", "to (S)", "degrees of freedom"), rows))
-    for joint in {s.joint.type_name: s.joint for s in m.joints}.values():
-        pieces.append(Sentence(f"A {joint.type_name} joint: {joint.sentence} ${joint.formula}$"))
+    pieces.append(Table(("joint", "type", "from (P)", "to (S)", "axis", "degrees of freedom"), rows))
+    pieces += [Sentence(text) for text in dict.fromkeys(map(_joint, m.joints))]
     return Section("Mechanism", tuple(pieces))
+
+
+def _joint(spec: JointSpec) -> str:
+    """What a joint does, about and along its own axes as P has them."""
+    words = dict(zip("xyz", map(axis_word, spec.axes), strict=True))
+    names = {letter: word if word.strip("-") in words else rf"\mathbf{{n}}_{letter}" for letter, word in words.items()}
+    told = {x: word if names[x] == word else f"${names[x]}$ = {word}" for x, word in words.items()}
+    sentence = _AXIS.sub(lambda found: told[found[1]], spec.joint.sentence)
+    formula = _AXIS.sub(lambda found: f"{{{names[found[1]]}}}", spec.joint.formula)
+    formula = _UNIT.sub(r"\1", formula)
+    return f"A {spec.joint.type_name} joint: {sentence} ${formula}$"
+
+
+def _axis(spec: JointSpec) -> str:
+    """The axis of a joint in the axes of P, two of a cross."""
+    x, y, z = map(axis_word, spec.axes)
+    return f"{x}, {y}" if spec.joint.has_axes else z if spec.joint.has_axis else ""
 
 
 def _picture(module: Any | None) -> Piece:
@@ -76,7 +96,8 @@ def bodies(author: Author) -> Section | None:
         )
         formulas: list[Piece] = []
         for body in m.bodies:
-            mass, *rest = write([body.mass, *body.com, *(x for row in body.inertia for x in row)]).expressions
+            properties = [body.mass, *body.com, *(x for row in body.inertia for x in row)]
+            mass, *rest = author.write("masses and inertias", properties).expressions
             formulas.append(FormulaLine((author.of("m", body.name), mass)))
             if any(x != 0 for x in rest[:3]):
                 formulas.append(FormulaLine((author.of(r"\mathbf{c}", body.name), sympy.Matrix(3, 1, rest[:3]))))

@@ -14,7 +14,7 @@ from ..graph.differentiate import gradient
 from ..notation import dotted
 from ..reading import Quantities
 from ..reading.written import needed
-from .author import Author
+from .author import Author, Shown
 from .document import FormulaLine, Piece, Section, Sentence
 
 
@@ -92,7 +92,7 @@ def _lagrange(author: Author) -> list[Piece]:
             break
         q = author.symbol(name)
         for left, choose in _derivatives(q, j, T, V):
-            named, (value,) = author.form(choose, "d_")
+            named, (value,) = author.form("derivatives of energies", choose, "d_")
             pieces += author.formulas(left, value, named)
     if k.velocity_names and author.equations.constraint_names:
         pieces.append(Sentence("Multiplied by $\\mathbf{B}^T$, these equations lose the forces of the constraints:"))
@@ -126,12 +126,14 @@ def _newton_euler(author: Author) -> list[Piece]:
     for name in eqs.free_bodies:
         named, body = eqs.written("free_bodies", name)
         pieces.append(Sentence(f"`{name}`:"))
+        author.shown.append(Shown("free_bodies", name, [], []))
         pieces += _equations(author, [*body.force, *body.moment], named)
     pieces.append(
         Sentence("Along the directions in which a joint is free, its reaction is what drives and forces give:")
     )
     for name in eqs.joint_forces:
         named, pairs = eqs.written("joint_forces", name)
+        author.shown.append(Shown("joint_forces", name, [], []))
         pieces += _equations(author, pairs, named)
     return [*pieces, *_block(author)]
 
@@ -223,7 +225,7 @@ def _recursive(author: Author) -> list[Piece]:
         body, joint = k.mechanism.bodies[branch.body].name, k.mechanism.joints[branch.joint]
         below = "ground" if branch.parent < 0 else f"`{k.mechanism.bodies[branch.parent].name}`"
         pieces.append(Sentence(f"Link {place + 1} is `{body}`, carried by {below} through joint `{joint.name}`:"))
-        named, flat = author.form(partial(_twist, place), "w_")
+        named, flat = author.form("velocities of links", partial(_twist, place), "w_")
         pieces += author.formulas(author.of(r"\mathbf{v}", body), sympy.Matrix(6, 1, flat), named)
     if author.equations.constraint_names:
         pieces.append(Sentence("The equations of the tree are then multiplied by $\\mathbf{B}^T$ of the constraints:"))

@@ -131,7 +131,7 @@ def _dead_centres(author: Author) -> list[Piece]:
         block = [[row[k] for k in dependent] for row in quantities.constraint_jacobian]
         return [_determinant(block)]
 
-    named, (value,) = author.form(choose, "d_")
+    named, (value,) = author.form("determinant of the dependent columns", choose, "d_")
     return [told, *author.formulas(r"\mathrm{det} \mathbf{C}_d", value, named)]
 
 

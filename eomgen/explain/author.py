@@ -13,7 +13,7 @@ from ..kinematics.state import acceleration_name
 from ..notation import with_instance
 from ..notation.latex_of_names import literal
 from ..reading import Quantities
-from ..reading.written import needed, write
+from ..reading.written import Written, needed, write
 from .document import Folded, FormulaLine, Piece, PutIn, Sentence
 from .printer import Printer
 
@@ -58,6 +58,7 @@ class Author:
         self.mechanism = equations.kinematics.mechanism
         self.printer = Printer(equations)
         self.shown: list[Shown] = []
+        self.formed: list[tuple[str, Sequence[Expr], Written]] = []
         self._told: list[tuple[Any, Any]] = []
         names = equations.kinematics.velocity_names
         self._rates = frozenset((*names, *map(acceleration_name, names)))
@@ -155,10 +156,16 @@ class Author:
         self._told += parts
         return [*(FormulaLine((self.printer.latex(s), x)) for s, x in parts), FormulaLine((left, right))]
 
-    def form(self, choose: Callable[[Quantities], Sequence[Expr]], prefix: str) -> tuple[list[Any], list[Any]]:
-        """Expressions that no attribute has, formed in a copy of the graph: named parts, SymPy expressions."""
-        written = write(list(choose(Quantities(*self.equations.fresh()))), prefix=prefix, rates=self._rates)
-        return written.intermediates, written.expressions
+    def form(self, what: str, choose: Callable[[Quantities], Sequence[Expr]], prefix: str) -> Written:
+        """Expressions that no attribute has, formed in a copy of the graph; ``what`` calls them in the comparison."""
+        return self.write(what, list(choose(Quantities(*self.equations.fresh()))), prefix)
+
+    def write(self, what: str, expressions: Sequence[Expr], prefix: str = "z") -> Written:
+        """Expressions in SymPy, kept to be compared with what they were."""
+        k = self.equations.kinematics
+        written = write(expressions, None, prefix, (), self._rates, k.parameter_names, k.euler_parameters)
+        self.formed.append((what, expressions, written))
+        return written
 
     def _entries(self, left: str, value: Any, symmetric: bool) -> Iterator[tuple[str, Any]]:
         """Left sides and values of the entries that do not vanish."""

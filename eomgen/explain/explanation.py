@@ -157,8 +157,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
     if full:
         state = {} if module is None else state_values(module, module.x0(), 0.0)
         sections.append(about_numbers.calculation(author, state, reason))
-    shown = {(s.name, s.part) for s in author.shown}
-    found = None if module is None else compare(equations, module, shown)
+    found = None if module is None else compare(author, module)
     sections.append(about_numbers.difference(found, reason))
     title = f"Equations of motion of `{equations.name}`, method `{equations.method}`"
     kept = [section for section in sections if section is not None]

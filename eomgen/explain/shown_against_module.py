@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import sympy
 
+from ..graph.core import Expr
+from ..graph.evaluate import evaluate as of_graph
+from ..graph.rounding_bounds import with_bounds
+from ..graph.substitute import symbols_of
 from ..limits.rounding import EPS
+from .author import Author
 from .shown_values import evaluate, random_state, state_values
 
 STATES = 2
@@ -54,25 +59,28 @@ class StateNumbers(NamedTuple):
         return self.module.rhs(0.0, self.x)[self.module.n_q :]
 
 
-def compare(equations: Any, module: Any, shown: set[tuple[str, str | None]]) -> Difference:
-    """Compare every shown quantity that a module has too; mass matrix and force always."""
+def compare(author: Author, module: Any) -> Difference:
+    """Compare every shown formula: with what the module has for it, else with the derivation as it was formed."""
     found: dict[str, float] = {}
-    wanted = {name for name, _ in shown} | {"mass_matrix", "force"}
+    equations = author.equations
+    shown = {(s.name, s.part) for s in author.shown if s.name} | {("mass_matrix", None), ("force", None)}
+    wanted = {name for name, _ in shown}
+    moves = bool(equations.mobility.n_dof)
     for seed in range(STATES):
         x = random_state(module, seed + 1)
         free = list(module.layout.metadata["independent"])
         state = StateNumbers(module, x, state_values(module, x, 0.0), free)
         for name, of_module in COMPARED.items():
-            if name in wanted and (equations.mobility.n_dof or name in ("T", "V")):
+            if name in wanted and (moves or name in ("T", "V")):
                 _note(found, name, _number(equations, name, None, state.values), *of_module(state))
         if "poses" in wanted:
             for body, pose in zip(module.body_names, module.poses(state.q), strict=True):
                 if ("poses", body) in shown:
                     _note(found, f"poses[{body}]", _number(equations, "poses", body, state.values), pose.ravel(), 1.0)
-        if "generalized_forces" in wanted and {"force", "quadratic_velocity"} <= set(found) | {"quadratic_velocity"}:
-            _compare_forces(found, equations, state)
-        if "velocity_transformation" in wanted and equations.mobility.n_dof:
-            _compare_transformation(found, equations, state)
+        for name, compare_sum in SUMS.items():
+            if name in wanted and (moves or name == "velocities"):
+                compare_sum(found, equations, state)
+        compare_as_formed(found, author, {key for key in shown if key[0] not in COMPARED}, state.values)
     return Difference(found, STATES)
 
 
@@ -118,7 +126,47 @@ COMPARED: dict[str, Callable[[StateNumbers], Wanted]] = {
 
 def _number(equations: Any, name: str, part: str | None, values: Mapping[str, float]) -> Any:
     named, value = equations.written(name, part)
-    return evaluate(named, list(value) if isinstance(value, sympy.MatrixBase) else [value], values)
+    columns = value if isinstance(value, tuple) else (value,)
+    flat = [x for column in columns for x in (column if isinstance(column, sympy.MatrixBase) else [column])]
+    return evaluate(named, flat, values)
+
+
+def compare_as_formed(
+    found: dict[str, float], author: Author, shown: Collection[tuple[str, str | None]], values: Mapping[str, float]
+) -> None:
+    """Formulas in SymPy against the expressions of the derivation, evaluated on their graph.
+
+    What the state does not know, such as reactions, variations and momenta, gets numbers at random.
+    """
+    done = set()
+    for name, part in sorted(shown, key=str):
+        written = author.equations.as_formed(name, part)
+        if id(written) in done:
+            continue
+        done.add(id(written))
+        formed, given = written.formed()
+        label = name if part is None else f"{name}[{part}]"
+        _compare_formed(found, label, formed, given, (written.named, written.flat), values)
+    for what, expressions, own in author.formed:
+        _compare_formed(found, what, expressions, (), own, values)
+
+
+def _compare_formed(
+    found: dict[str, float],
+    what: str,
+    formed: Sequence[Expr],
+    given: Sequence[tuple[str, Expr]],
+    written: tuple[Sequence[tuple[Any, Any]], Sequence[Any]],
+    values: Mapping[str, float],
+) -> None:
+    unknown = symbols_of([*formed, *(x for _, x in given)]).difference(values, (name for name, _ in given))
+    random = np.random.default_rng(2)
+    numbers = dict(values) | {name: float(random.uniform(-1, 1)) for name in sorted(unknown)}
+    at = dict(numbers)
+    for name, x in given:
+        at[name] = float(of_graph([x], at)[0])
+    wanted, terms = with_bounds(formed, at)
+    _note(found, what, evaluate(*written, numbers), wanted, float(np.max(terms[np.isfinite(terms)], initial=0.0)))
 
 
 def _note(found: dict[str, float], name: str, shown: Any, wanted: Any, size: float) -> None:
@@ -136,8 +184,82 @@ def _compare_forces(found: dict[str, float], equations: Any, s: StateNumbers) ->
     _note(found, "generalized_forces", sum(parts, Q_v), wanted, largest)
 
 
+def _compare_velocities(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
+    """The kinetic energy of the bodies at their velocities is that of the module, where drives have no inertia."""
+    mechanism = equations.kinematics.mechanism
+    if any(spec.armature is not None for spec in mechanism.joints):
+        return
+    T = 0.0
+    for body, pose in zip(mechanism.bodies, s.module.poses(s.q), strict=True):
+        mass, *inertia = of_graph([body.mass, *(x for row in body.inertia for x in row)], s.values)
+        angular, _, centre = _number(equations, "velocities", body.name, s.values).reshape(3, 3)
+        own = pose[:3, :3].T @ angular
+        T += 0.5 * (mass * centre @ centre + own @ np.reshape(inertia, (3, 3)) @ own)
+    _note(found, "velocities", np.array([T]), *_energy(0)(s))
+
+
+def _compare_hamiltonian(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
+    """H is p . v - T + V at the momenta p = dT/dv."""
+    p = _number(equations, "momenta", None, s.values)
+    T, V = s.module.energy(s.x)
+    values = dict(s.values) | dict(zip(map(str, equations.momentum_symbols), p, strict=True))
+    size = float(np.abs(p * s.v).sum()) + abs(T) + abs(V)
+    _note(found, "hamiltonian", _number(equations, "hamiltonian", None, values), np.array([p @ s.v - T + V]), size)
+
+
+def _compare_gibbs_function(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
+    """dS/da is Q along the independent velocities; S is quadratic, so that differences are its derivatives."""
+    names = [str(a.node[1]) for a in equations.kinematics.a]
+    slopes = []
+    for name in names:
+        ends = [{**s.values, name: s.values[name] + step} for step in (1.0, -1.0)]
+        up, down = (float(_number(equations, "gibbs_function", None, at)[0]) for at in ends)
+        slopes.append((up - down) / 2)
+    B = _number(equations, "velocity_transformation", None, s.values).reshape(len(names), -1)
+    Q = _number(equations, "generalized_forces", None, s.values)
+    S = abs(float(_number(equations, "gibbs_function", None, s.values)[0]))
+    _note(found, "gibbs_function", B.T @ slopes, Q, max(S, float(np.abs(B.T * slopes).max(initial=0.0))))
+
+
+def _compare_block_system(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
+    """K x = k can be solved with the accelerations of the module."""
+    written = equations.as_formed("block_system")
+    numbers = evaluate(written.named, written.flat, s.values)
+    n = len(equations.block_system.unknowns)
+    K, k = numbers[: n * n].reshape(n, n), numbers[n * n :]
+    unknowns = [str(x) for x in equations.block_system.unknowns]
+    known = np.array([name in s.values for name in unknowns], dtype=bool)
+    x = np.array([s.values.get(name, 0.0) for name in unknowns])
+    rows = np.maximum(np.abs(K).max(axis=1, initial=0.0), SMALLEST)
+    columns = np.maximum((np.abs(K) / rows[:, None]).max(axis=0, initial=0.0), SMALLEST)
+    scaled = K / rows[:, None] / columns
+    rest = (k - K @ x) / rows
+    x = x + np.where(known, 0.0, _solved(scaled, rest, ~known) / columns)
+    _note(found, "block_system", K @ x, k, float((np.abs(K) @ np.abs(x)).max(initial=0.0)))
+
+
+def _solved(matrix: np.ndarray, right: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """The least-squares solution in the unknowns at some places, once refined; 0 at the others."""
+    solution = np.zeros(len(places))
+    for _ in range(2):
+        rest = right - matrix @ solution
+        solution[places] += np.linalg.lstsq(matrix[:, places], rest, rcond=None)[0]
+    return solution
+
+
 def _compare_transformation(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
     """B v_i + b is v."""
     B = _number(equations, "velocity_transformation", None, s.values).reshape(len(s.v), -1)
     b = _number(equations, "velocity_offset", None, s.values)
     _note(found, "velocity_transformation", B @ s.v[s.free] + b, s.v, 0.0)
+
+
+#: Quantity -> what compares a sum or a product in which it stands.
+SUMS: dict[str, Callable[[dict[str, float], Any, StateNumbers], None]] = {
+    "generalized_forces": _compare_forces,
+    "velocity_transformation": _compare_transformation,
+    "velocities": _compare_velocities,
+    "hamiltonian": _compare_hamiltonian,
+    "gibbs_function": _compare_gibbs_function,
+    "block_system": _compare_block_system,
+}

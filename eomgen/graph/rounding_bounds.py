@@ -17,7 +17,7 @@ from ..operations import OPERATIONS, operations_with
 from ..operations.table import unit
 from .core import Expr, Graph
 from .differentiate import gradient
-from .evaluate import Evaluator
+from .evaluate import Evaluator, Value
 from .substitute import symbols_of
 from .traverse import LEAVES, common_graph, reachable
 from .vectors import Mat3, Vec3
@@ -25,28 +25,28 @@ from .vectors import Mat3, Vec3
 TRIES = 3  #: random points at which an identity is tried
 
 
-def with_bounds(outputs: Sequence[Expr], values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+def with_bounds(outputs: Sequence[Expr], values: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
     """Values of expressions and the bounds of their rounding.
 
     Parameters
     ----------
     outputs : sequence of Expr
         Expressions of one graph.
-    values : mapping of str to float
+    values : mapping of str to float or (k,) array
         Of all symbols, taken as exact.
 
     Returns
     -------
-    values : (n,) array
+    values : (n,) or (n, k) array
         NaN outside of an operation's domain.
-    bounds : (n,) array
-        In units of eps; infinite where nothing is known, as of a square root at 0.
+    bounds : (n,) or (n, k) array
+        In units of eps; infinite or NaN where nothing is known, as of a square root at 0.
     """
     return _spread(outputs, values, {})
 
 
 def _spread(
-    outputs: Sequence[Expr], values: Mapping[str, float], given: Mapping[str, float]
+    outputs: Sequence[Expr], values: Mapping[str, Value], given: Mapping[str, float]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Values of expressions, and what the bounds of some symbols make of theirs; of rounding, if none is given."""
     graph = common_graph(outputs)
@@ -55,7 +55,7 @@ def _spread(
     order, nodes = reachable(graph, (y.id for y in outputs)), graph.nodes
     names = [nodes[i][1] for i in order if nodes[i][0] == "sym" and nodes[i][1] in values]  # of many, few are used
     found = dict(zip(order, Evaluator([Expr(graph, i) for i in order], names)([values[n] for n in names]), strict=True))
-    bounds: dict[int, float] = {}
+    bounds: dict[int, Value] = {}
     with np.errstate(all="ignore"):
         for i in order:
             operation, *operands = nodes[i]
@@ -68,12 +68,17 @@ def _spread(
                 try:
                     x = [found[k] for k in operands]
                     for rate, k in zip(row.rates, operands, strict=True):
-                        if bounds[k]:
+                        if np.any(bounds[k]):
                             bound += bounds[k] if rate is unit else rate(y, *x) * bounds[k]
                 except (ValueError, ArithmeticError):
                     bound = math.inf
-            bounds[i] = float(bound)
-    return np.array([found[y.id] for y in outputs]), np.array([bounds[y.id] for y in outputs])
+            bounds[i] = bound
+    width = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
+    shape = (len(outputs), *width)
+    result = np.empty(shape), np.empty(shape)
+    for k, y in enumerate(outputs):
+        result[0][k], result[1][k] = found[y.id], bounds[y.id]
+    return result
 
 
 def vanishing(outputs: Sequence[Expr]) -> list[bool]:

@@ -91,7 +91,8 @@ class Joint(ABC):
     counts_turns : whether :meth:`measure` tells its one angle beyond half a turn
     quaternion_slots : where four of the coordinates are Euler parameters
     look : its symbol in pictures
-    sentence, formula : what it allows, for readers; P and S are its markers
+    sentence, formula : what it allows, for readers; P and S are its markers, {x}, {y}, {z} the axes of the joint as the
+        markers have them
     """
 
     type_name: ClassVar[str]

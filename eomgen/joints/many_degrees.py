@@ -17,10 +17,10 @@ from .rotation_coordinates import about, unit
 
 @dataclass(frozen=True)
 class Cylindrical(Joint):
-    """S slides along the common z axis and turns about it.  Allows 2, removes 4."""
+    """S slides along the common axis {z} and turns about it.  Allows 2, removes 4."""
 
-    sentence: ClassVar[str] = "S slides along the common z axis and turns about it."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_z(q_2), \quad \mathbf{u} = q_1 \mathbf{e}_z"
+    sentence: ClassVar[str] = "S slides along the common axis {z} and turns about it."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_2), \quad \mathbf{u} = q_1 \mathbf{e}_{z}"
     type_name: ClassVar[str] = "cylindrical"
     look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (1.0, 3.2)),), slides=True)
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("_z", "length"), Coordinate("_3", "angle"))
@@ -45,9 +45,9 @@ class Cylindrical(Joint):
 class Planar(Joint):
     """S moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
 
-    sentence: ClassVar[str] = "S moves in the x-y plane of P and turns about its z axis."
+    sentence: ClassVar[str] = "S slides along the axes {x} and {y} of P and turns about the axis {z}."
     formula: ClassVar[str] = (
-        r"\mathbf{R}_{PS} = \mathbf{R}_z(q_3), \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y"
+        r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_3), \quad \mathbf{u} = q_1 \mathbf{e}_{x} + q_2 \mathbf{e}_{y}"
     )
     type_name: ClassVar[str] = "planar"
     look: ClassVar[JointLook] = JointLook((SymbolPart("box", (3.0, 3.0, 0.8)),))

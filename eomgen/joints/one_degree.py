@@ -22,8 +22,8 @@ from .rotation_coordinates import about, unit
 class Revolute(Joint):
     """S turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
 
-    sentence: ClassVar[str] = "S turns about the z axis that it shares with P; the origins coincide."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_z(q), \quad \mathbf{u} = \mathbf{0}"
+    sentence: ClassVar[str] = "S turns about the axis {z} that it shares with P; the origins coincide."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q), \quad \mathbf{u} = \mathbf{0}"
     type_name: ClassVar[str] = "revolute"
     look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (0.75, 2.5)),))
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
@@ -55,8 +55,8 @@ class Continuous(Revolute):
 class Prismatic(Joint):
     """S slides along the common z axis without turning.  Allows 1, removes 5."""
 
-    sentence: ClassVar[str] = "S slides along the z axis that it shares with P, without turning."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q \mathbf{e}_z"
+    sentence: ClassVar[str] = "S slides along the axis {z} that it shares with P, without turning."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q \mathbf{e}_{z}"
     type_name: ClassVar[str] = "prismatic"
     look: ClassVar[JointLook] = JointLook((SymbolPart("box", (2.2, 2.2, 4.0)),), slides=True)
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
@@ -84,8 +84,8 @@ class Screw(Joint):
     The coordinate is the angle; a positive pitch is a right-handed thread (Shabana, sec. 7.7, screw joint).
     """
 
-    sentence: ClassVar[str] = "S turns about the common z axis and advances by the pitch $p$ in each turn."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_z(q), \quad \mathbf{u} = \frac{p}{2\pi} q \mathbf{e}_z"
+    sentence: ClassVar[str] = "S turns about the common axis {z} and advances by the pitch $p$ in each turn."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q), \quad \mathbf{u} = \frac{p}{2\pi} q \mathbf{e}_{z}"
     type_name: ClassVar[str] = "screw"
     look: ClassVar[JointLook] = JointLook(
         (SymbolPart("cylinder", (1.2, 0.6)), SymbolPart("cylinder", (0.8, 2.4))), slides=True

@@ -69,8 +69,8 @@ class Distance(RodJoint):
 class RevoluteSpherical(RodJoint):
     """A massless rod of ``length`` turns about z of P, across it, with a ball joint at S.  Allows 4, removes 2."""
 
-    sentence: ClassVar[str] = "A massless rod of length $l$ turns about z of P and holds S by a ball."
-    formula: ClassVar[str] = r"u_z = 0, \quad u_x^2 + u_y^2 - l^2 = 0"
+    sentence: ClassVar[str] = "A massless rod of length $l$ turns about the axis {z} of P and holds S by a ball."
+    formula: ClassVar[str] = r"u_{z} = 0, \quad u_{x}^2 + u_{y}^2 - l^2 = 0"
     type_name: ClassVar[str] = "revolute_spherical"
     look: ClassVar[JointLook] = JointLook(
         (SymbolPart("cylinder", (0.75, 2.2), on="P"), SymbolPart("sphere", (0.8,))), bar=True
@@ -85,10 +85,10 @@ class RevoluteSpherical(RodJoint):
 
 @dataclass(frozen=True)
 class Inline(RodJoint):
-    """The origin of S stays on the z axis of P.  Allows 4, removes 2."""
+    """The origin of S stays on the axis {z} of P.  Allows 4, removes 2."""
 
-    sentence: ClassVar[str] = "The origin of S stays on the z axis of P."
-    formula: ClassVar[str] = r"u_x = 0, \quad u_y = 0"
+    sentence: ClassVar[str] = "The origin of S stays on the axis {z} of P."
+    formula: ClassVar[str] = r"u_{x} = 0, \quad u_{y} = 0"
     type_name: ClassVar[str] = "inline"
     look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (0.8,)),), slides=True)
     removes: ClassVar[int] = 2
@@ -99,10 +99,10 @@ class Inline(RodJoint):
 
 @dataclass(frozen=True)
 class Inplane(RodJoint):
-    """The origin of S stays in the x-y plane of P.  Allows 5, removes 1."""
+    """The origin of S stays in the plane of P across the axis {z}.  Allows 5, removes 1."""
 
-    sentence: ClassVar[str] = "The origin of S stays in the x-y plane of P."
-    formula: ClassVar[str] = r"u_z = 0"
+    sentence: ClassVar[str] = "The origin of S stays in the plane of P across the axis {z}."
+    formula: ClassVar[str] = r"u_{z} = 0"
     type_name: ClassVar[str] = "inplane"
     look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (0.8,)),))
     removes: ClassVar[int] = 1
@@ -115,8 +115,10 @@ class Inplane(RodJoint):
 class Parallel(RodJoint):
     """The z axes stay parallel.  Allows 4, removes 2."""
 
-    sentence: ClassVar[str] = "The z axes of P and S stay parallel."
-    formula: ClassVar[str] = r"\mathbf{x}_P \cdot \mathbf{z}_S = 0, \quad \mathbf{y}_P \cdot \mathbf{z}_S = 0"
+    sentence: ClassVar[str] = "The axes {z} of P and S stay parallel."
+    formula: ClassVar[str] = (
+        r"\mathbf{e}_{x}^P \cdot \mathbf{e}_{z}^S = 0, \quad \mathbf{e}_{y}^P \cdot \mathbf{e}_{z}^S = 0"
+    )
     type_name: ClassVar[str] = "parallel"
     removes: ClassVar[int] = 2
 
@@ -131,8 +133,8 @@ class Parallel(RodJoint):
 class Perpendicular(RodJoint):
     """The z axes stay perpendicular: turn one marker by ``rpy``, as ``axis`` turns both.  Allows 5, removes 1."""
 
-    sentence: ClassVar[str] = "The z axes of P and S stay perpendicular."
-    formula: ClassVar[str] = r"\mathbf{z}_P \cdot \mathbf{z}_S = 0"
+    sentence: ClassVar[str] = "The axes {z} of P and S stay perpendicular."
+    formula: ClassVar[str] = r"\mathbf{e}_{z}^P \cdot \mathbf{e}_{z}^S = 0"
     type_name: ClassVar[str] = "perpendicular"
     removes: ClassVar[int] = 1
 

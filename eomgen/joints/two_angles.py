@@ -19,13 +19,13 @@ TWO_ANGLES = (Coordinate("_1", "angle"), Coordinate("_2", "angle"))
 
 @dataclass(frozen=True)
 class Universal(Joint):
-    """A cross turns about x of P and y of S, which stay perpendicular.  Allows 2, removes 4.
+    """A cross turns about the axis {x} of P and the axis {y} of S, which stay perpendicular.  Allows 2, removes 4.
 
     R = R_x(q1) R_y(q2); the shafts are the z axes, in line at zero (Shabana, sec. 7.7, universal joint).
     """
 
-    sentence: ClassVar[str] = "A cross turns about x of P and y of S, which stay perpendicular."
-    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_x(q_1) \mathbf{R}_y(q_2), \quad \mathbf{u} = \mathbf{0}"
+    sentence: ClassVar[str] = "A cross turns about the axis {x} of P and the axis {y} of S, which stay perpendicular."
+    formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{x}(q_1) \mathbf{R}_{y}(q_2), \quad \mathbf{u} = \mathbf{0}"
     type_name: ClassVar[str] = "universal"
     look: ClassVar[JointLook] = JointLook(
         (SymbolPart("cylinder", (0.4, 2.6), "x", "P"), SymbolPart("cylinder", (0.4, 2.6), "y"))
@@ -56,8 +56,10 @@ class ConstantVelocity(Joint):
     1978, sec. 13.2: constant-velocity connections).  The shafts are the z axes; a bend of half a turn is singular.
     """
 
-    sentence: ClassVar[str] = "The shaft bends about any axis across it and passes its turning on evenly."
-    formula: ClassVar[str] = r"\omega_S \cdot \mathbf{z}_S = \omega_P \cdot \mathbf{z}_P"
+    sentence: ClassVar[str] = (
+        "The shaft along the axis {z} bends about any axis across it and passes its turning on evenly."
+    )
+    formula: ClassVar[str] = r"\omega_S \cdot \mathbf{e}_{z}^S = \omega_P \cdot \mathbf{e}_{z}^P"
     type_name: ClassVar[str] = "constant_velocity"
     look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)), SymbolPart("cylinder", (0.4, 3.0), "x")))
     coordinates: ClassVar[tuple[Coordinate, ...]] = TWO_ANGLES

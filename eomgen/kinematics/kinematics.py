@@ -106,6 +106,11 @@ class Kinematics:
         return tuple(u.name for u in self.mechanism.inputs)
 
     @property
+    def euler_parameters(self) -> tuple[tuple[str, ...], ...]:
+        """Names of the coordinates that are Euler parameters, four by four."""
+        return tuple(self.names[i : i + 4] for i, _ in self.quaternion_slots)
+
+    @property
     def flow(self) -> dict[Expr, Expr]:
         """The rates of the coordinates, q' = N(q) v, as the direction of a derivative."""
         return dict(zip(self.q, self.rates, strict=True))

@@ -22,3 +22,6 @@ NEXT = 4e-16
 #: By which an angle may miss a multiple of a quarter turn, relative to it, and an entry of a rotation a whole number: 4
 #: to 5 eps, what pi / 2 written in sixteen digits leaves.
 QUARTER = 1e-15
+#: Numbers that agree to this, relative to them, are compared by their bounds of rounding; others are different in any
+#: case: half of all digits is far more than a formula loses.
+ALIKE = 1e-7

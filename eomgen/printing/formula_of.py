@@ -111,13 +111,27 @@ class Formulas:
         return tuple(self(factor) for factor in self.order.factors(factors))
 
     def _power(self, base: Any, exponent: Any) -> Formula:
-        if exponent == sympy.Rational(1, 2):
-            return CallOf("sqrt", (self(base),))
         if exponent.is_Number and exponent.is_negative:
             return Quotient(NumberPart("1"), self._power(base, -exponent))
+        root = _root(base) if (2 * exponent).is_Integer and not exponent.is_Integer else None
+        if root is not None:  # (x^2)^(n/2) is |x|^n
+            size = CallOf("abs", (self(root),))
+            return size if exponent == sympy.Rational(1, 2) else Power(size, self(2 * exponent))
+        if exponent == sympy.Rational(1, 2):
+            return CallOf("sqrt", (self(base),))
         if exponent == 1:
             return self(base)
         return Power(self(base), self(exponent))
+
+
+def _root(base: Any) -> Any:
+    """x of x^2, also of products and higher powers; None where it is no square of names and sums."""
+    found = []
+    for factor in sympy.Mul.make_args(base):
+        if not (factor.is_Pow and factor.exp.is_Integer and factor.exp % 2 == 0):
+            return None
+        found.append(sympy.Pow(factor.base, factor.exp / 2))
+    return sympy.Mul(*found)
 
 
 def _product(factors: tuple[Formula, ...]) -> Formula:

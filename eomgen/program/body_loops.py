@@ -9,10 +9,10 @@ from ..graph.core import Expr
 from ..graph.substitute import substitute
 from ..limits.constraints import KEPT, LEFT, TIKHONOV
 from ..limits.crossings import NEAR_SQUARE
+from ..numeric.triangular import diagonal_blocks
 from .factor import outward
 from .loop_blocks import NOTHING, LoopBlocks, apart, total_magnitude
 from .sparse import dot, times, transpose
-from .triangular import diagonal_blocks
 
 
 class BodyLoops(LoopBlocks):

@@ -9,11 +9,11 @@ from ..graph.substitute import substitute
 from ..limits.constraints import LOST, VANISHED
 from ..limits.crossings import NEAR_SQUARE
 from ..limits.inertia import STILL
+from ..numeric.triangular import DiagonalBlock, diagonal_blocks
 from .factor import exceeding
 from .loop_blocks import LoopBlocks, apart, largest
 from .sparse import Row, dot, factorize, gram, rows_of, times, transpose
 from .terms import SystemTerms
-from .triangular import DiagonalBlock, diagonal_blocks
 
 SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast as independent ones (scaled)
 

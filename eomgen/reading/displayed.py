@@ -52,6 +52,10 @@ class Displayed(Readable):
 
         return equations_html(self)
 
+    def again(self) -> ReadingView:
+        """The same quantities, none of them made yet."""
+        return ReadingView(self, self._symbol, self._put_in)
+
     # -- the same with other symbols or values ------------------------------------------------------------------------
     def with_dynamicsymbols(self) -> ReadingView:
         """The same quantities in functions of time, as ``sympy.physics.mechanics.dynamicsymbols`` makes them.

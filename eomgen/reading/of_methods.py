@@ -38,7 +38,7 @@ def require_method(quantities: Quantities, what: str, methods: tuple[str, ...]) 
 def gibbs_function(quantities: Quantities) -> Expr:
     """S (W^2 kg) = v' . M v' / 2 - Q_v . v' on the tree, the energy of acceleration less what has no accelerations."""
     require_method(quantities, "function of Gibbs and Appell", ("gibbs_appell",))
-    a, mass = quantities.kinematics.a, quantities.tree.mass_matrix
+    a, mass = quantities.kinematics.a, quantities.equations.mass_matrix
     total = quantities.graph.zero
     for i, x in enumerate(a):
         row = 0.5 * mass[i][i] * x - quantities.tree_quadratic_velocity[i]
@@ -57,7 +57,7 @@ def hamiltonian(quantities: Quantities) -> Expr:
     *linear, at_rest = substitute([*quantities.momenta, tree.kinetic_energy], still)
     moved = [x - b for x, b in zip(p, linear, strict=True)]
     total = graph.zero
-    for x, rate in zip(moved, solve_symmetric(tree.mass_matrix, moved), strict=True):
+    for x, rate in zip(moved, solve_symmetric(quantities.equations.mass_matrix, moved), strict=True):
         total = total + x * rate
     found = 0.5 * total - at_rest + tree.potential_energy
     places = enumerate(quantities.mobility.q_reference)  # somewhere else: coordinates may be singular at the reference
@@ -93,10 +93,10 @@ def block_system(quantities: Quantities) -> LinearEquations:
     kinematics, tree, zero = quantities.kinematics, quantities.tree, quantities.graph.zero
     if tree.method == "augmented" or tree.system is None:
         jacobian = quantities.constraint_jacobian
-        upper = [(*row, *(line[i] for line in jacobian)) for i, row in enumerate(tree.mass_matrix)]
+        upper = [(*row, *(line[i] for line in jacobian)) for i, row in enumerate(quantities.equations.mass_matrix)]
         lower = [(*line, *(zero for _ in jacobian)) for line in jacobian]
         unknowns = (*(str(a.node[1]) for a in kinematics.a), *multiplier_names(kinematics, len(quantities.rows)))
-        right = (*(-h for h in tree.bias), *(-g for g in quantities.gamma))
+        right = (*(-h for h in quantities.equations.bias), *(-g for g in quantities.gamma))
         return LinearEquations((*upper, *lower), unknowns, right)
     system = tree.system
     n = len(system.unknowns)

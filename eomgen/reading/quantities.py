@@ -23,6 +23,7 @@ from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
 from .applied_forces import forces_by_element, without_forces
+from .named_rotations import name_rotations
 from .written import is_short
 
 Row = tuple[Expr, ...]
@@ -107,16 +108,25 @@ class Quantities:
 
     # -- equations of motion ------------------------------------------------------------------------------------------
     @cached_property
+    def equations(self) -> TreeEquations:
+        """M and h of the tree as they are read: by the embedding technique, which forms them shortest.
+
+        They are the same functions by every method; what else a method has is taken from its own equations.
+        """
+        return self.tree if self.kinematics.mechanism.bare else METHODS["embedding"](self.kinematics)
+
+    @cached_property
     def transformation(self) -> VelocityTransformation:
         """v = B v_i + b, a = B a_i + c."""
         return transform_velocities(self.kinematics, self.mobility, self.numbers)
 
     @cached_property
     def motion(self) -> tuple[list[Expr], list[tuple[str, Expr]]]:
-        """M row by row and M v_i', and names that stand in them for what loops give, with their values, where long."""
+        """M row by row and M v_i'; names for rotations or for what loops give that stand in long ones, with values."""
         whole = [*(x for row in self.mass_matrix for x in row), *self.force]
-        if is_short(whole):
-            return whole, []
+        whole, rotations = name_rotations(self.kinematics, whole)
+        if not self._embeds or is_short(whole):
+            return whole, rotations
         return [*(x for row in self.mass_matrix_by_names for x in row), *self.force_by_names], self._by_names[0].given
 
     @cached_property
@@ -127,23 +137,25 @@ class Quantities:
     @cached_property
     def mass_matrix_by_names(self) -> Rows:
         """M (n_dof, n_dof) in the names of B's entries, as the book writes it: B^T M B."""
-        return self._by_names[1].mass_matrix(self.tree.mass_matrix) if self._embeds else self.tree.mass_matrix
+        return self._by_names[1].mass_matrix(self.equations.mass_matrix) if self._embeds else self.equations.mass_matrix
 
     @cached_property
     def force_by_names(self) -> Row:
         """M v_i' (n_dof,) in the names of the entries of B and c."""
-        right = tuple(-h for h in self.tree.bias)
-        return self._by_names[1].force(self.tree.mass_matrix, right) if self._embeds else right
+        right = tuple(-h for h in self.equations.bias)
+        return self._by_names[1].force(self.equations.mass_matrix, right) if self._embeds else right
 
     @cached_property
     def mass_matrix(self) -> Rows:
         """M (n_dof, n_dof)."""
-        return self.transformation.mass_matrix(self.tree.mass_matrix) if self._embeds else self.tree.mass_matrix
+        return (
+            self.transformation.mass_matrix(self.equations.mass_matrix) if self._embeds else self.equations.mass_matrix
+        )
 
     @cached_property
     def force(self) -> Row:
         """M v_i' (n_dof,), quadratic velocity terms and generalized forces."""
-        return self.embedded_force([-h for h in self.tree.bias])
+        return self.embedded_force([-h for h in self.equations.bias])
 
     @property
     def _embeds(self) -> bool:
@@ -151,7 +163,7 @@ class Quantities:
 
     def embedded_force(self, right: Sequence[Expr]) -> Row:
         """B^T (Q - M c) of forces Q on the tree."""
-        return self.transformation.force(self.tree.mass_matrix, right) if self._embeds else tuple(right)
+        return self.transformation.force(self.equations.mass_matrix, right) if self._embeds else tuple(right)
 
     def along_independent(self, row: Sequence[Expr]) -> Row:
         """B^T x: derivatives by the velocities of the tree -> by the independent ones."""
@@ -165,9 +177,7 @@ class Quantities:
     def tree_quadratic_velocity(self) -> Row:
         """Q_v on the tree (n_v,): what is left of -h without gravity and force elements."""
         self._require_separate("quadratic velocity terms")
-        method = self.tree.method if self.kinematics.mechanism.lagrangian is None else "lagrange"
-        if method == "augmented" or self.tree.system is not None:
-            method = "embedding"  # the same terms, without the system of equations around them
+        method = "embedding" if self.kinematics.mechanism.lagrangian is None else "lagrange"
         return tuple(-h for h in METHODS[method](without_forces(self.kinematics)).bias)
 
     @cached_property

@@ -116,7 +116,7 @@ class QuantitiesOfMethods(WritesQuantities):
 
         def choose(quantities: Quantities) -> list[Expr]:
             found = block_system(quantities)
-            names.extend(found.unknowns)
+            names[:] = found.unknowns
             return [*(x for row in found.matrix for x in row), *found.right]
 
         written, n = self._write("block_system", choose, "K_"), len(names)

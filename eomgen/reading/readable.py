@@ -142,7 +142,7 @@ class Readable(QuantitiesOfMethods):
         names: list[str] = []
 
         def choose(s: Quantities) -> list[Expr]:
-            names.extend(s.forces)
+            names[:] = s.forces
             return [*s.total_force, *(x for force in s.forces.values() for x in force)]
 
         written = self._write("generalized_forces", choose, "Q_")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..describe.dotted_names import Undotted
 from ..equations import TreeEquations
@@ -26,6 +26,18 @@ if TYPE_CHECKING:
     from .named_parts import ByName
 
 Derived = tuple[Kinematics, Mobility, TreeEquations]
+Names = list[tuple[str, Expr]]
+Choose = Callable[[Quantities], Sequence[Expr]]
+ChooseNames = Callable[[Quantities], Sequence[tuple[str, Expr]]]
+
+
+class WrittenQuantity(NamedTuple):
+    """A quantity in SymPy, entry by entry, with its named parts; ``formed`` gives it as the derivation formed it."""
+
+    named: list[tuple[Any, Any]]
+    flat: list[Any]
+    formed: Callable[[], tuple[list[Expr], Names]]
+
 
 #: Attributes that are written as one, and those of which each body, marker or joint has one.
 WHOLE = (
@@ -48,6 +60,10 @@ class WritesQuantities(ABC):
     def fresh(self) -> Derived:
         """A copy of what was derived, in a graph of its own."""
 
+    @abstractmethod
+    def again(self) -> WritesQuantities:
+        """The same with nothing made yet."""
+
     @property
     def _symbol(self) -> Callable[[str], Any]:
         """Name -> the SymPy object that stands for it."""
@@ -65,17 +81,42 @@ class WritesQuantities(ABC):
         """Intermediates of what was written, by quantity."""
         return {}
 
+    @cached_property
+    def _all(self) -> dict[str, WrittenQuantity]:
+        """What was written, by quantity."""
+        return {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what gives quantities as they were formed, which are functions here."""
+        return {name: value for name, value in vars(self).items() if name != "_all"}
+
     def _write(
         self,
         name: str,
-        choose: Callable[[Quantities], Sequence[Expr]],
+        choose: Choose,
         prefix: str = "",
-        given: Callable[[Quantities], Sequence[tuple[str, Expr]]] | None = None,
+        given: ChooseNames | None = None,
     ) -> list[Any]:
         """Expressions of the quantities in SymPy; their named parts are kept under the name.
 
         Each is formed in a copy of its own, so that what is read depends on the model alone.
         """
+        formed, names = self._form(choose, given)
+        prefix = prefix or f"{name.replace('.', '_')}_"
+        k = self.kinematics
+        of_motion = given is not None
+        written = write(
+            formed, self._symbol, prefix, names, self._rates, k.parameter_names, k.euler_parameters, of_motion
+        )
+        if self._put_in:
+            values = [*written.expressions, *(x for _, x in written.intermediates)]
+            self._require_finite(name, values, f"with {self._told}")
+        self._named[name] = written.intermediates
+        self._all[name] = WrittenQuantity(*written, lambda: self._form(choose, given))
+        return written.expressions
+
+    def _form(self, choose: Choose, given: ChooseNames | None) -> tuple[list[Expr], Names]:
+        """Expressions of the quantities with values put in, and what names in them stand for."""
         quantities = Quantities(*self.fresh())
         expressions = list(choose(quantities))
         names = list(given(quantities)) if given is not None else []
@@ -83,15 +124,19 @@ class WritesQuantities(ABC):
         for values in self._put_in:
             expressions = put_in(expressions, values)
         count = len(expressions) - len(names)
-        names = [(known, x) for (known, _), x in zip(names, expressions[count:], strict=True)]
-        prefix = prefix or f"{name.replace('.', '_')}_"
-        named, written = write(
-            expressions[:count], self._symbol, prefix, names, self._rates, self.kinematics.parameter_names
-        )
-        if self._put_in:
-            self._require_finite(name, [*written, *(x for _, x in named)], f"with {self._told}")
-        self._named[name] = named
-        return written
+        return expressions[:count], [(name, x) for (name, _), x in zip(names, expressions[count:], strict=True)]
+
+    def as_formed(self, name: str, part: str | None = None) -> WrittenQuantity:
+        """A quantity as it was written and, to compare with, as it was formed; keys are those of :meth:`written`.
+
+        Parts that were written together, such as those of generalized forces, are in the whole.
+        """
+        value, key = getattr(self, name), f"{name}.{part}"
+        if isinstance(value, Mapping) and part is not None:
+            value[part]
+        if key not in self._all and name not in self._all:  # made before this went through pickle
+            return self.again().as_formed(name, part)
+        return self._all[key if key in self._all else name]
 
     @property
     def _told(self) -> str:
@@ -133,7 +178,7 @@ class WritesQuantities(ABC):
         rows: list[Sequence[Expr]] = []
 
         def flat(quantities: Quantities) -> list[Expr]:
-            rows.extend(choose(quantities))
+            rows[:] = choose(quantities)
             return [x for row in rows for x in row]
 
         written = self._write(name, flat)

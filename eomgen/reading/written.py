@@ -9,10 +9,10 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any, NamedTuple
 
 from ..graph.core import Expr
-from ..simplify import WHOLE, simplify
+from ..simplify import WHOLE, joined_nodes, simplify
 
 READABLE = 400  #: operations an expression, on average, up to which expressions are written out
-LONGEST = 20_000  #: operations of all of them together
+LONGEST = 5_000  #: operations of all of them together
 
 
 class Written(NamedTuple):
@@ -33,7 +33,8 @@ def is_short(expressions: Sequence[Expr]) -> bool:
     """Whether expressions are written out whole."""
     from ..graph.sympy_raise import inlined_size
 
-    return inlined_size(expressions) <= min(READABLE * len(expressions), LONGEST)
+    several = {x.id: x for x in expressions if x.value is None}
+    return inlined_size(expressions) <= min(READABLE * len(several), LONGEST)
 
 
 def needed(named: Sequence[tuple[Any, Any]], value: Any) -> list[tuple[Any, Any]]:
@@ -54,6 +55,8 @@ def write(
     given: Sequence[tuple[str, Expr]] = (),
     rates: Collection[str] = (),
     parameters: Collection[str] = (),
+    unit: Sequence[Sequence[str]] = (),
+    roots: bool = False,
 ) -> Written:
     """Expressions of one graph in SymPy.
 
@@ -70,10 +73,29 @@ def write(
         Names of velocities and accelerations.
     parameters : collection of str, optional
         Names of parameters.
+    unit : sequence of sequence of str, optional
+        Names of Euler parameters, four by four: the sum of their squares is 1.
+    roots : bool, optional
+        Whether long roots and denominators that are written several times get names in any case.
 
     Returns
     -------
     Written
     """
+    if not expressions:
+        return Written([], [])
+    expressions, given = joined_nodes(expressions, given, unit)
     form = simplify(expressions, given, rates, prefix, *([WHOLE] if not given and is_short(expressions) else []))
-    return Written([], []) if form is None else Written(*form.sympy(symbols, parameters, prefix))
+    if form is None:
+        return Written([], [])
+    named, found = form.sympy(symbols, parameters, prefix, roots)
+    return Written([(name, _with_derivatives(x)) for name, x in named], [_with_derivatives(x) for x in found])
+
+
+def _with_derivatives(expression: Any) -> Any:
+    """With sqrt(x^2) for |x|: SymPy takes names for complex numbers, of which |x| has no derivative."""
+    import sympy
+
+    if not expression.has(sympy.Abs):
+        return expression
+    return expression.replace(sympy.Abs, lambda x: sympy.sqrt(x**2))

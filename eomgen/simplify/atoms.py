@@ -16,7 +16,8 @@ Frozen = tuple[tuple[Monomial, Number], ...]  #: a Poly as a key, by rising mono
 ONE: Monomial = ()
 TURNS = ("sin", "cos")
 SUMS = ("sum", "factor")  #: kinds of atoms that are one polynomial
-DIGITS = 12  #: characters up to which a decimal is taken as it is written
+DIGITS = 12  #: of a decimal that is taken as it is written
+ROUNDED_BY = 3  #: units in the last place that a constant may have lost to the operations that made it
 SMALL = 1000  #: denominators up to which a number is written as a fraction
 
 
@@ -70,6 +71,19 @@ class Atoms:
             self._names.append(own.union(*(self._names[part] for part in self.inside(k))))
         return frozenset().union(*(self._names[a] for monomial in poly for a, _ in monomial))
 
+    def without_squared_signs(self, monomial: Monomial, kind: str) -> Monomial:
+        """With x^2 for |x|^2; a sum in it is an atom of the kind."""
+        for atom, n in monomial:
+            of, what = self.table[atom]
+            if of == "abs" and n % 2 == 0:
+                ((inner, x), *others) = what[0]
+                if not others and abs(x) == 1:
+                    powers = tuple((a, n * k) for a, k in inner)
+                else:
+                    powers = ((self.id(kind, what[0]), n),)
+                return self.without_squared_signs(join(join(monomial, ((atom, -n),)), powers), kind)
+        return monomial
+
     def poly(self, kind: str, what: Any) -> Poly:
         """The polynomial of one atom."""
         return {((self.id(kind, what), 1),): 1}
@@ -78,16 +92,19 @@ class Atoms:
 def number(value: float) -> tuple[Number, bool]:
     """A double as it was probably meant, and whether it is that many times pi.
 
-    The fraction with a denominator up to 1000, the decimal of few digits, or the multiple of pi, whose double this is;
-    else the double itself.
+    The fraction with a denominator up to 1000, the decimal of few digits, or the multiple of pi, that is within the
+    rounding of a few operations of it, such as 8.7 for 0.1 * 87.0; else the double itself.
     """
     near = Fraction(value).limit_denominator(SMALL)
-    if abs(near.numerator) < 10**15 and near.numerator / near.denominator == value:
+    room = ROUNDED_BY * math.ulp(value)
+    if abs(near.numerator) < 10**12 and abs(near.numerator / near.denominator - value) <= room:
         return ratio(near, 1), False
-    if len(repr(value).partition("e")[0]) <= DIGITS:
-        return ratio(Fraction(repr(value)), 1), False
+    for digits in range(1, DIGITS + 1):
+        text = f"{value:.{digits}g}"
+        if abs(float(text) - value) <= room:
+            return ratio(Fraction(text), 1), False
     turns = Fraction(value / math.pi).limit_denominator(360)
-    if 0 < abs(turns.numerator) <= SMALL and turns.numerator / turns.denominator * math.pi == value:
+    if 0 < abs(turns.numerator) <= SMALL and abs(turns.numerator / turns.denominator * math.pi - value) <= room:
         return ratio(turns, 1), True
     return value, False
 

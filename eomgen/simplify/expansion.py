@@ -28,6 +28,7 @@ from .atoms import (
 )
 from .joined_angles import JoinedAngles
 
+FEW = 3  #: terms up to which a sum of sines and cosines is taken for a product where it is one
 MANY = 24  #: terms beyond which the sines and cosines of a sum are joined before it is used
 
 
@@ -90,7 +91,12 @@ class Expansion:
     def _sum(self, a: Poly, b: Poly, sign: int) -> Poly:
         self.work.spend((len(a) + len(b)) // 4)
         total = add(a, b, sign)
-        return self.angles.simplified(total) if len(total) > MANY else total
+        if len(total) > MANY:
+            return self.angles.simplified(total)
+        if 1 < len(total) <= FEW:  # a sum that is one product is multiplied and squared as one
+            short = self.angles.simplified(total)
+            return short if len(short) == 1 else total
+        return total
 
     def _settled(self, a: Poly) -> Poly:
         """With sums to whole positive powers multiplied out again."""
@@ -99,7 +105,7 @@ class Expansion:
         while waiting:
             done: Poly = {}
             for given, x in waiting.pop().items():
-                monomial = self._without_squared_signs(given)
+                monomial = self.atoms.without_squared_signs(given, "sum")
                 power = next((f for f in monomial if f[1] >= 1 and self.atoms.table[f[0]].kind == "sum"), None)
                 if power is None:
                     done[monomial] = done.get(monomial, 0) + x
@@ -110,15 +116,6 @@ class Expansion:
                 waiting.append(multiply({below: x}, base))
             result = add(result, done) if result else done
         return result
-
-    def _without_squared_signs(self, monomial: Monomial) -> Monomial:
-        """|x|^2 = x^2 of products x."""
-        for atom, n in monomial:
-            kind, what = self.atoms.table[atom]
-            if kind == "abs" and n % 2 == 0 and len(what[0]) == 1 and what[0][0][1] == 1:
-                inner = tuple((a, k * n) for a, k in what[0][0][0])
-                return self._without_squared_signs(join(join(monomial, ((atom, -n),)), inner))
-        return monomial
 
     def _over(self, a: Poly, b: Poly) -> Poly:
         b = self.angles.simplified(b)

@@ -32,6 +32,7 @@ from .expansion import content
 PAIRS = 40  #: terms up to which all pairs are tried for their common factor
 TRIED = 3  #: factors that are tried to the end where there are few terms
 FEW = 8  #: terms
+LARGEST = 12  #: whole number that stands in a sum of decimals with a common factor
 
 
 class Factoring:
@@ -58,7 +59,7 @@ class Factoring:
 
     def _product(self, poly: Poly) -> Poly:
         """With all that is common taken out."""
-        amount, monomial = content(list(poly.values())), reduce(common, poly)
+        amount, monomial = readable_content(list(poly.values())), reduce(common, poly)
         if all(x < 0 for x in poly.values()):
             amount = -amount
         found = self._sum(multiply(poly, {inverse(monomial): ratio(1, amount)}))
@@ -160,6 +161,14 @@ class Factoring:
         if multiply(base, base) != poly:
             return None
         return {((self.atoms.id("factor", freeze(self.factored(base))), 2),): 1}
+
+
+def readable_content(values: list[Number]) -> Number:
+    """What divides all numbers into whole ones, if these are short; 1 beside decimals, 0.39 a + 0.5 b being one."""
+    amount = content(values)
+    if isinstance(amount, float) or amount.denominator % 25:
+        return amount
+    return amount if all(-LARGEST <= ratio(x, amount) <= LARGEST for x in values) else 1
 
 
 def _whole_root(n: int) -> int:

@@ -62,7 +62,11 @@ class Form:
         )
 
     def sympy(
-        self, symbols: Callable[[str], Any] | None = None, parameters: Collection[str] = (), prefix: str = "z"
+        self,
+        symbols: Callable[[str], Any] | None = None,
+        parameters: Collection[str] = (),
+        prefix: str = "z",
+        roots: bool = False,
     ) -> tuple[list[tuple[Any, Any]], list[Any]]:
         """Named intermediates, each a symbol and its expression, and expressions.
 
@@ -74,29 +78,45 @@ class Form:
             Names of what is constant.
         prefix : str, optional
             Of the names to which better ones are given where there are better ones.
+        roots : bool, optional
+            Whether long roots and denominators that are written several times get names too.
         """
         import sympy
 
-        from .to_sympy import Raising
+        from .to_sympy import Raising, in_one_fashion
 
         raising = Raising(self.graph, self.expansion.atoms, self.factoring, symbols or sympy.Symbol)
         named: list[tuple[Any, Any]] = []
-        good = self._good_names(parameters, prefix)
+        good = self._good_names(parameters, prefix, roots)
         for atom, name in good.turns.items():
             named.append((sympy.Symbol(name), raising.turn(atom)))
         raising.turns = {atom: symbol for atom, (symbol, _) in zip(good.turns, named, strict=True)}
+        raising.roots = {atom: (sympy.Symbol(name), n) for atom, (name, n) in good.roots.items()}
+        told: set[int] = set()
+
+        def tell_roots(poly: Poly) -> None:
+            for root in sorted({a for a, _ in good.powers(poly)}.intersection(raising.roots).difference(told)):
+                told.add(root)
+                named.append((raising.roots[root][0], raising.root(root)))
+
         for atom, poly in self.named:
+            tell_roots(poly)
             name = self.expansion.atoms.table[atom].what
             raising.names[name] = sympy.Symbol(good.intermediates.get(name, name))
             named.append((raising.names[name], raising.expression(poly)))
-        return named, [raising.expression(p) for p in self.polys]
+        for poly in self.polys:
+            tell_roots(poly)
+        written = [in_one_fashion(raising.expression(p)) for p in self.polys]
+        return [(name, in_one_fashion(x)) for name, x in named], written
 
-    def _good_names(self, parameters: Collection[str], prefix: str) -> GoodNames:
+    def _good_names(self, parameters: Collection[str], prefix: str, roots: bool) -> GoodNames:
         atoms = self.expansion.atoms
         taken = {node[1] for node in self.graph.nodes if node[0] == "sym"} | {
             atoms.table[a].what for a, _ in self.named
         }
         good = GoodNames(atoms, self.factoring.costs, parameters, taken)
+        if roots:
+            good.choose_roots(self.named, self.polys)
         if self.named:
             good.choose(self.named, self.polys, prefix)
         return good

@@ -5,12 +5,15 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
+from fractions import Fraction
 
 from .atoms import SUMS, TURNS, Atoms, Poly
 from .costs import Costs
 from .inline import NAME, Named
 
 NUMBERED = re.compile(r"([A-Za-z]+?)_?(\d+)")
+ROOT, BELOW = "r", "D"  #: begin names of roots and of denominators
+LONG = 30.0  #: length of a root or denominator from which it is worth a name
 CONSTANT = "k"  #: begins names of what parameters and numbers alone give
 
 
@@ -23,6 +26,9 @@ class GoodNames:
         Sines and cosines, by atom, that are worth a name.
     intermediates : dict of str to str
         Better names of intermediates.
+    roots : dict of int to (str, int)
+        Long sums that stand in several roots and denominators, by atom: the name of their root, and 2; of the sum
+        itself, and 1, where no root is taken.
     """
 
     def __init__(self, atoms: Atoms, costs: Costs, parameters: Collection[str], taken: Collection[str]) -> None:
@@ -30,6 +36,32 @@ class GoodNames:
         self._taken = set(taken)
         self.turns: dict[int, str] = {}
         self.intermediates: dict[str, str] = {}
+        self.roots: dict[int, tuple[str, int]] = {}
+
+    def choose_roots(self, named: Named, polys: Sequence[Poly]) -> None:
+        """Of a form, the long sums that are written several times in roots and denominators."""
+        uses: Counter[int] = Counter()
+        in_root: set[int] = set()
+        for poly in (*(poly for _, poly in named), *polys):
+            for atom, n in self.powers(poly):
+                if n < 0 or n != int(n):
+                    uses[atom] += 1
+                    in_root.update([atom] if n != int(n) else [])
+        for atom, count in sorted(uses.items()):
+            length = self.costs.of_atom(atom)
+            if length >= LONG and (count - 1) * length > 2 * count + NAME:
+                name = self._free(ROOT if atom in in_root else BELOW)
+                self.roots[atom] = name, 2 if atom in in_root else 1
+                self._taken.add(name)
+
+    def powers(self, poly: Poly) -> Iterator[tuple[int, Fraction | int]]:
+        """Sums that stand in products in a sum, with their exponents, those in its factors included."""
+        for monomial in poly:
+            for atom, n in monomial:
+                kind, what = self.atoms.table[atom]
+                if kind in SUMS:
+                    yield atom, n
+                    yield from self.powers(dict(what))
 
     def choose(self, named: Named, polys: Sequence[Poly], prefix: str) -> None:
         """Of a form with intermediates, those that begin with ``prefix`` and a number get better names."""

@@ -41,7 +41,8 @@ class Literal:
         if kind == "neg":
             return scaled(parts[0], -1)
         if kind == "mul":
-            return multiply(self._one_term(parts[0]), self._one_term(parts[1]))
+            product = multiply(self._one_term(parts[0]), self._one_term(parts[1]))
+            return {self.atoms.without_squared_signs(m, "factor"): x for m, x in product.items()}
         if kind == "div" and parts[1]:
             ((below, x),) = self._one_term(parts[1]).items()
             return multiply(self._one_term(parts[0]), {inverse(below): Fraction(1) / x})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
@@ -24,6 +25,7 @@ class Raising:
         self.symbols = symbols
         self.names: dict[Any, Any] = {}  #: what stands for an intermediate
         self.turns: dict[int, Any] = {}  #: what stands for a sine or cosine
+        self.roots: dict[int, tuple[Any, int]] = {}  #: what stands for a sum (1) or its root (2)
         self._made: dict[int, Any] = {}
 
     def expression(self, poly: Poly) -> Any:
@@ -35,8 +37,17 @@ class Raising:
         return sympy.Add(*(self._term(m, x) for m, x in poly.items()))
 
     def _term(self, monomial: Monomial, x: Number) -> Any:
-        factors = [sympy.Pow(as_number(self._atom(a)), _exponent(n)) for a, n in monomial]
+        factors = [self._power(a, n) for a, n in monomial]
         return sympy.Mul(_number(x), *factors)
+
+    def _power(self, atom: int, n: Fraction | int) -> Any:
+        symbol, times = self.roots.get(atom, (None, 1))
+        return sympy.Pow(as_number(self._atom(atom)) if symbol is None else symbol, _exponent(times * n))
+
+    def root(self, atom: int) -> Any:
+        """A sum or its root, written out."""
+        found = self.expression(self.factoring.factored(dict(self.atoms.table[atom].what)))
+        return sympy.sqrt(found) if self.roots[atom][1] == 2 else found
 
     def turn(self, atom: int) -> Any:
         """A sine or cosine, written out."""
@@ -80,6 +91,30 @@ def _exponent(n: Fraction | int) -> Any:
 def _number(x: Number) -> Any:
     if isinstance(x, float):
         return sympy.Float(x)
-    if x.denominator > SMALL:
+    decimal = _decimal(x)
+    if x.denominator > SMALL or (decimal and len(decimal) < len(f"{x.numerator}/{x.denominator}")):
         return sympy.Float(float(x))
     return sympy.Rational(x.numerator, x.denominator)
+
+
+def _decimal(x: Fraction | int) -> str:
+    """The text of a fraction as a decimal, empty where it has no end or is whole."""
+    if x.denominator == 1:
+        return ""
+    text = f"{Decimal(x.numerator) / Decimal(x.denominator):f}"
+    return text if Fraction(text) == x else ""
+
+
+def in_one_fashion(expression: Any) -> Any:
+    """With fractions as decimals, as far as those have an end, in an expression that has a decimal."""
+    return _in_decimals(expression) if expression.has(sympy.Float) else expression
+
+
+def _in_decimals(x: Any) -> Any:
+    if x.is_Rational and not x.is_Integer:
+        return sympy.Float(float(x)) if _decimal(Fraction(x.p, x.q)) else x
+    if not x.args or not x.has(sympy.Rational):
+        return x
+    if x.is_Pow:
+        return sympy.Pow(_in_decimals(x.base), x.exp)
+    return x.func(*map(_in_decimals, x.args))

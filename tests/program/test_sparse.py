@@ -8,8 +8,8 @@ import pytest
 from eomgen.graph import Graph
 from eomgen.graph.count import count
 from eomgen.graph.evaluate import evaluate
+from eomgen.numeric.triangular import diagonal_blocks, match
 from eomgen.program.sparse import factorize, fill, gram, minimum_degree, rows_of, times, transpose
-from eomgen.program.triangular import diagonal_blocks, match
 
 
 def symbolic(graph: Graph, A: np.ndarray, name: str) -> tuple[list[list[object]], dict[str, float]]:

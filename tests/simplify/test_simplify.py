@@ -203,3 +203,63 @@ def test_deep_nesting_needs_no_recursion() -> None:
 
 def test_nothing_of_nothing() -> None:
     assert simplify([]) is None
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        (sympy.Abs(x - y) ** 2, (x - y) ** 2),
+        (a * sympy.Abs(x - y) ** 2 - a * x**2, a * y * (y - 2 * x)),
+        (sympy.Abs(x - y) ** -2, (x - y) ** -2),
+        (sqrt((x - y) ** 2) * sympy.Abs(x - y), (x - y) ** 2),
+        (sympy.Abs(x * y) ** 2, x**2 * y**2),
+    ],
+)
+def test_squares_of_magnitudes_are_squares(given: Any, wanted: Any) -> None:
+    found = short(given)
+    assert not found.has(sympy.Abs)
+    assert sympy.expand(found / wanted) == 1 or sympy.expand(found - wanted) == 0
+
+
+def test_numbers_are_what_was_written() -> None:
+    """0.1 * 87 is 8.700000000000001 to a computer."""
+    graph = Graph()
+    s = graph.symbol("s")
+    for value, wanted in (
+        (0.1 * 87.0, sympy.Float(8.7)),
+        (8.534699999999999, sympy.Float(8.5347)),
+        (0.1 + 0.2, sympy.Float(0.3)),
+        (1 / 3 - 1e-16, sympy.Rational(1, 3)),
+        (3 * math.pi / 4 + 4e-16, 3 * sympy.pi / 4),
+        (math.e, sympy.Float(math.e)),
+    ):
+        form = simplify([graph.constant(value) * s], sizes=WHOLE)
+        assert form is not None
+        (found,) = form.sympy()[1]
+        assert str(found) == str(wanted * sympy.Symbol("s"))
+        assert float(found.subs("s", 1)) == pytest.approx(value, rel=1e-15)
+
+
+def test_decimals_and_fractions_do_not_mix() -> None:
+    assert str(short(x / 2 + sympy.Float(0.431) * y + 87 * a / 5)) == "17.4*a + 0.5*x + 0.431*y"
+    assert str(short(x / 2 + 2 * y / 5)) == "x/2 + 2*y/5"
+    assert str(short(x / 3 + sympy.Float(0.431) * y)) == "x/3 + 0.431*y"
+    assert str(short(sqrt(x) / 2 + sympy.Float(0.431) * y)) == "0.5*sqrt(x) + 0.431*y"
+    assert str(short(sympy.Float(0.023751) * a + sympy.Float(0.1462528) * b)) == "0.023751*a + 0.1462528*b"
+    assert str(short(sympy.Float(0.023751) * a * x + sympy.Float(0.023751) * b * x)) == "0.023751*x*(a + b)"
+
+
+def test_long_roots_that_repeat_have_names() -> None:
+    graph = Graph()
+    inside = a**2 + 2 * l * (l - l * cos(A) + a * sin(A))
+    given = [x / sqrt(inside) + a * sqrt(inside), y / inside, sqrt(a + b) / x]
+    form = simplify([lower(graph, e) for e in given], sizes=WHOLE)
+    assert form is not None
+    assert form.sympy()[0] == []
+    named, found = form.sympy(roots=True)
+    ((name, root),) = named
+    assert str(name) == "r0"
+    assert found == [x / name + a * name, y / name**2, sqrt(a + b) / x]
+    values = {a: 0.7, l: 1.3, A: 0.4, x: 2.0, y: -1.1, b: 0.2}
+    for shown, wanted in zip(found, given, strict=True):
+        assert float(shown.subs(name, root).subs(values)) == pytest.approx(float(wanted.subs(values)), rel=1e-14)

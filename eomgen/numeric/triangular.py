@@ -1,4 +1,4 @@
-"""Stage program: pattern of a square sparse matrix -> its diagonal blocks in the order in which they can be solved.
+"""Stage numeric: pattern of a square sparse matrix -> its diagonal blocks in the order in which they can be solved.
 
 Duff, Erisman and Reid, *Direct Methods for Sparse Matrices* (2nd ed. 2017), chapter 6: rows are matched with columns,
 and the strong components (Tarjan 1972) of what then depends on what are the blocks.
