@@ -26,7 +26,7 @@ demo: $(VENV)/.installed-plot
 	@$(BIN)/eomgen run examples/slider_crank.yaml --plot demo_output/slider_crank.png --animate demo_output/slider_crank.gif
 
 test: lint
-	@$(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal
+	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal
 
 lint: $(VENV)/.installed-test
 	@$(BIN)/ruff check .

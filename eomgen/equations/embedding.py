@@ -27,6 +27,7 @@ from ..kinematics.link_inertia import SpatialInertia
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias
 from ..kinematics.parallel import Resolved, resolve_parallel
 from ..kinematics.regroup import regroup
+from .composite_bodies import composite_mass_matrix
 from .tree_equations import TreeEquations
 
 
@@ -42,11 +43,11 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     plain = _sweep(kinematics, own, given, a)
     if count(plain).total < count(inverse).total:  # grouping symbols is work too
         inertias, inverse = given, plain
-    chosen, mass, bias = own, _composite_mass_matrix(own, inertias), _sweep(kinematics, own, inertias, rest)
+    chosen, mass, bias = own, composite_mass_matrix(own.links, inertias), _sweep(kinematics, own, inertias, rest)
     common = resolve_parallel(graph, kinematics.links, kinematics.v, rates, applied)
     if any(axes is not None for axes in common.axes):
         turned_inertias = common.inertias(inertias)
-        other = _composite_mass_matrix(common, turned_inertias), _sweep(kinematics, common, turned_inertias, rest)
+        other = composite_mass_matrix(common.links, turned_inertias), _sweep(kinematics, common, turned_inertias, rest)
         if _cost(*other) < _cost(mass, bias):
             chosen, inertias, (mass, bias) = common, turned_inertias, other
             inverse = _sweep(kinematics, chosen, inertias, a)
@@ -72,7 +73,7 @@ def _turned_system(
     blocks: Sequence[SlidingTriple],
 ) -> tuple[Rows, tuple[Expr, ...]]:
     """M and h in turned velocities."""
-    matrix = [list(row) for row in _composite_mass_matrix(resolved, inertias)]
+    matrix = [list(row) for row in composite_mass_matrix(resolved.links, inertias)]
     for k, drive in drive_inertias(kinematics).items():
         matrix[k][k] = matrix[k][k] + drive
     return tuple(map(tuple, matrix)), _sweep(kinematics, resolved, inertias, rest, blocks)
@@ -149,28 +150,3 @@ def _sweep(
         if link.parent != GROUND:
             wrenches[link.parent] = add(wrenches[link.parent], link.lift(wrenches[k]))
     return tuple(result)
-
-
-def _composite_mass_matrix(resolved: Resolved, inertias: list[SpatialInertia]) -> Rows:
-    """M_ij = s_i . I^c_max(i,j) s_j along each branch, composite inertias summed inwards."""
-    links, n = resolved.links, sum(len(link.columns) for link in resolved.links)
-    composite = list(inertias)
-    graph = links[0].mass.graph
-    rows = [[graph.zero] * n for _ in range(n)]
-    for k in reversed(range(len(links))):
-        link = links[k]
-        if link.parent != GROUND:
-            composite[link.parent] = composite[link.parent].plus(link.up_inertia(composite[k]))
-        for c, column in enumerate(link.columns):
-            i = link.first + c
-            wrench = composite[k].times(*column)
-            for d in range(c + 1):
-                rows[i][link.first + d] = rows[link.first + d][i] = dot(link.columns[d], wrench)
-            outer, at = link, link.parent
-            while at != GROUND:
-                wrench = outer.lift(wrench)
-                outer = links[at]
-                for d, other in enumerate(outer.columns):
-                    rows[i][outer.first + d] = rows[outer.first + d][i] = dot(other, wrench)
-                at = outer.parent
-    return tuple(tuple(row) for row in rows)

@@ -14,7 +14,6 @@ from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.count import count
-from ..graph.differentiate import jacobian
 from ..graph.spatial import Twist, Wrench, add, dot, scaled
 from ..kinematics import Kinematics
 from ..kinematics.energies import kinetic_energy, potential_energy
@@ -24,6 +23,7 @@ from ..kinematics.link_inertia import SpatialInertia
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias, drives_cut_joint
 from ..kinematics.regroup import regroup
 from .articulated import ArticulatedBodies, ConstraintRow, TreeMotion
+from .composite_bodies import composite_mass_matrix
 from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
@@ -46,7 +46,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     tree = solve() if solve is not None and not kinematics.constraints.labels else None
     return TreeEquations(
         method="recursive",
-        mass_matrix=partial(_mass_matrix, kinematics, inverse),
+        mass_matrix=partial(composite_mass_matrix, kinematics.links, inertias),
         bias=_newton_euler(kinematics, inertias, products, loads, rest),
         inverse_dynamics=inverse,
         kinetic_energy=kinetic_energy(kinematics),
@@ -162,10 +162,3 @@ def _turn_row(blocks: Sequence[SlidingTriple], row: ConstraintRow) -> Constraint
         if b.gravity is not None:
             rest = rest + vec.dot((along[0], along[1], along[2]), b.gravity)
     return ConstraintRow(entries, rest)
-
-
-def _mass_matrix(kinematics: Kinematics, inverse: tuple[Expr, ...]) -> Rows:
-    """M as the derivative of M a + h by a."""
-    entries = jacobian(list(inverse), list(kinematics.a))
-    zero, n = kinematics.graph.zero, len(kinematics.v)
-    return tuple(tuple(entries.get((max(i, j), min(i, j)), zero) for j in range(n)) for i in range(n))

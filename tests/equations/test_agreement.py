@@ -26,7 +26,8 @@ def test_methods_import_only_what_they_may_share() -> None:
         "newton_euler": {"free_bodies", "free_body_system"},
         "amalgamated": {"free_bodies", "free_body_system"},
         "augmented": {"", "armature"},
-        "recursive": {"articulated"},
+        "embedding": {"composite_bodies"},
+        "recursive": {"articulated", "composite_bodies"},
     }
     for name in METHODS:
         allowed = common | families.get(name, set())

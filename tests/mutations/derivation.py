@@ -41,7 +41,7 @@ FAULTS = (
         ("tests/equations/test_against_pinocchio.py::test_tree_equals_pinocchio[1-False-augmented]",),
     ),
     Fault(
-        "embedding-composite", "eomgen/equations/embedding.py",
+        "embedding-composite", "eomgen/equations/composite_bodies.py",
         "composite[link.parent].plus(link.up_inertia(composite[k]))",
         "composite[link.parent].plus(composite[k])",
         "inertia of a child is added to the parent's in its own axes, about its own origin",
