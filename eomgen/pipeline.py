@@ -13,7 +13,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from . import __version__
 from .derivation import Derivation
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .program.program import Program
     from .runtime.protocols import Core
 
+LINEAR_ALGEBRA = ThreadpoolController()  #: found once: that looks through the libraries of the process
 OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a bare Lagrangian
 
 
@@ -53,7 +54,7 @@ def _alone() -> Iterator[None]:
     was_on = gc.isenabled()
     gc.disable()
     try:
-        with threadpool_limits(1, "blas"):
+        with LINEAR_ALGEBRA.limit(limits=1, user_api="blas"):
             yield
     finally:
         if was_on:

@@ -43,7 +43,8 @@ class ElementMethods(Described):
         axes: Sequence[Any] | None = None, coordinates: Sequence[Any] | None = None,
         limits: Mapping[str, float] | None = None,
         latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
-        """Add a joint of type universal: A cross turns about x of P and y of S, which stay perpendicular."""
+        """Add a joint of type universal: A cross turns about the axis {x} of P and the axis {y} of S, which stay
+        perpendicular."""
     def constant_velocity(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
         latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
@@ -100,10 +101,10 @@ class ElementMethods(Described):
         ball joint at S."""
     def inline(self, name: str, predecessor: Any, successor: Any,
         axis: str | Sequence[float] | None = None) -> JointHandle:
-        """Add a joint of type inline: The origin of S stays on the z axis of P."""
+        """Add a joint of type inline: The origin of S stays on the axis {z} of P."""
     def inplane(self, name: str, predecessor: Any, successor: Any,
         axis: str | Sequence[float] | None = None) -> JointHandle:
-        """Add a joint of type inplane: The origin of S stays in the x-y plane of P."""
+        """Add a joint of type inplane: The origin of S stays in the plane of P across the axis {z}."""
     def parallel(self, name: str, predecessor: Any, successor: Any,
         axis: str | Sequence[float] | None = None) -> JointHandle:
         """Add a joint of type parallel: The z axes stay parallel."""

@@ -13,6 +13,7 @@ from ..graph.evaluate import evaluate as of_graph
 from ..graph.rounding_bounds import with_bounds
 from ..graph.substitute import symbols_of
 from ..limits.rounding import EPS
+from ..numeric import algebra
 from .author import Author
 from .shown_values import evaluate, random_state, state_values
 
@@ -243,7 +244,7 @@ def _solved(matrix: np.ndarray, right: np.ndarray, places: np.ndarray) -> np.nda
     solution = np.zeros(len(places))
     for _ in range(2):
         rest = right - matrix @ solution
-        solution[places] += np.linalg.lstsq(matrix[:, places], rest, rcond=None)[0]
+        solution[places] += algebra.lstsq(matrix[:, places], rest)
     return solution
 
 

@@ -17,7 +17,7 @@ from .rotation_coordinates import about, unit
 
 @dataclass(frozen=True)
 class Cylindrical(Joint):
-    """S slides along the common axis {z} and turns about it.  Allows 2, removes 4."""
+    """S slides along the common z axis and turns about it.  Allows 2, removes 4."""
 
     sentence: ClassVar[str] = "S slides along the common axis {z} and turns about it."
     formula: ClassVar[str] = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_2), \quad \mathbf{u} = q_1 \mathbf{e}_{z}"

@@ -16,6 +16,7 @@ from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
 from ..limits.inertia import LEAST, SINGULAR
+from ..numeric import algebra
 from ..numeric.definite import correlated
 from .quantities import Quantities
 
@@ -76,7 +77,7 @@ def require_finite(
 
 def _least(M: Any) -> tuple[float, Any]:
     """The smallest size of an eigenvalue of M with its diagonal scaled to 1, and the motion that belongs to it."""
-    values, motions = np.linalg.eigh(correlated(M))
+    values, motions = algebra.eigh(correlated(M))
     k = int(np.abs(values).argmin())
     return float(abs(values[k])), motions[:, k]
 

@@ -17,7 +17,7 @@ from ..graph.core import Expr, Graph
 from ..graph.traverse import LEAVES, common_graph, operands, reachable
 from ..operations import CONDITION, operations_with
 from ..records import dataclass
-from .atoms import Frozen, Poly, TooLongError, Work, freeze
+from .atoms import TURNS, Frozen, Poly, TooLongError, Work, freeze
 from .expansion import Expansion
 from .factoring import Factoring
 from .good_names import GoodNames
@@ -88,9 +88,16 @@ class Form:
         raising = Raising(self.graph, self.expansion.atoms, self.factoring, symbols or sympy.Symbol)
         named: list[tuple[Any, Any]] = []
         good = self._good_names(parameters, prefix, roots)
-        for atom, name in good.turns.items():
-            named.append((sympy.Symbol(name), raising.turn(atom)))
-        raising.turns = {atom: symbol for atom, (symbol, _) in zip(good.turns, named, strict=True)}
+        waiting, known = dict(good.turns), set[int]()
+
+        def tell_turns() -> None:
+            """Those whose angles hold no other names than those that were told."""
+            for atom in [a for a in waiting if self.expansion.atoms.names({((a, 1),): 1}) <= known]:
+                symbol = sympy.Symbol(waiting.pop(atom))
+                named.append((symbol, raising.turn(atom)))
+                raising.turns[atom] = symbol
+
+        tell_turns()
         raising.roots = {atom: (sympy.Symbol(name), n) for atom, (name, n) in good.roots.items()}
         told: set[int] = set()
 
@@ -104,6 +111,8 @@ class Form:
             name = self.expansion.atoms.table[atom].what
             raising.names[name] = sympy.Symbol(good.intermediates.get(name, name))
             named.append((raising.names[name], raising.expression(poly)))
+            known.add(atom)
+            tell_turns()
         for poly in self.polys:
             tell_roots(poly)
         written = [in_one_fashion(raising.expression(p)) for p in self.polys]
@@ -173,6 +182,7 @@ def _shared(graph: Graph, roots: Sequence[int], largest: int) -> tuple[tuple[int
     order = reachable(graph, roots)
     uses = Counter(k for i in order for k in operands(graph.nodes[i])) + Counter(roots)
     unnamed = operations_with(lambda row: row.kind == CONDITION) | {"neg"}  # read best where they stand
+    angles = _angles(graph, order)  # are joined with others
     size: dict[int, int] = {}
     cuts: list[int] = []
     total = 0
@@ -180,11 +190,23 @@ def _shared(graph: Graph, roots: Sequence[int], largest: int) -> tuple[tuple[int
         node = graph.nodes[i]
         size[i] = 0 if node[0] in LEAVES else 1 + sum(size[k] for k in operands(node))
         limit = largest if uses[i] > 1 else max(largest, ALONE)
-        if size[i] > limit and node[0] not in unnamed and i not in roots:
+        if size[i] > limit and node[0] not in unnamed and i not in roots and i not in angles:
             cuts.append(i)
             total += size[i]
             size[i] = 0
     return tuple(cuts), total + sum(size[i] for i in roots)
+
+
+def _angles(graph: Graph, order: Sequence[int]) -> set[int]:
+    """What stands in sines and cosines, and the sums in it."""
+    found: set[int] = set()
+    left = [graph.nodes[i][1] for i in order if graph.nodes[i][0] in TURNS]
+    while left:
+        i = left.pop()
+        if i not in found and graph.nodes[i][0] in ("add", "sub", "neg"):
+            found.add(i)
+            left += operands(graph.nodes[i])
+    return found
 
 
 class _Attempt:

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import sympy
 from shown_numbers import evaluate, random_state, state_values
@@ -104,3 +105,25 @@ def test_a_satellite_names_its_rotation() -> None:
     assert not any("flight_e" in str(x) for x in equations.mass_matrix)
     assert len(named) <= 60
     compared(equations)
+
+
+@pytest.mark.parametrize("n", [6, 9])
+def test_a_chain_has_no_names_for_sums_of_angles(n: int) -> None:
+    """Sums that stand in sines and cosines are joined there, and M in numbers is that of the module."""
+    m = eg.Model("chain", gravity=(0, -9.81, 0))
+    last: Any = m.ground
+    for k in range(1, n + 1):
+        rod = m.body(f"rod{k}", mass=1.0, com=(0, -0.5, 0), inertia={"zz": 1 / 12})
+        m.revolute(f"q{k}", last, rod)
+        last = rod.at(0, -1, 0)
+    equations = m.derive("embedding")
+    named, mass = equations.written("mass_matrix")
+    angles = {f"q{k}" for k in range(1, n + 1)}
+    for _, x in named:
+        assert not (x.is_Add and {str(a) for a in x.args} <= angles)
+    q = np.linspace(0.3, 1.1, n)
+    values: dict[Any, float] = dict(zip((sympy.Symbol(f"q{k}") for k in range(1, n + 1)), q.tolist(), strict=True))
+    for symbol, x in named:
+        values[symbol] = float(x.subs(values))
+    shown = np.array(mass.subs(values), dtype=float)
+    np.testing.assert_allclose(shown, equations.compile(target="numpy").mass_matrix(q), rtol=1e-12)

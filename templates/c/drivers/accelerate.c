@@ -32,7 +32,9 @@ static int accelerate(double t, const double *restrict u, const double *restrict
     const double *const s = w + AT_SCALES, *const packed = w + AT_TERMS;
     double *const r = w + AT_RATE;
     const double *const bias = packed + N * (N + 1) / 2, *const C_q = bias + N, *const gamma = C_q + M * N;
-    (void)terms_block(t, w + AT_X, u, c, w + AT_TERMS, w);
+    if (terms_block(t, w + AT_X, u, c, w + AT_TERMS, w) != 0) { /* Euler parameters that are all zero */
+        return EOMGEN_NON_FINITE;
+    }
     form_scaled(C_q, s, w + AT_J);
     form_rows(w + AT_J, gamma, width, w);
     int status = split(width, 0, parts, w);

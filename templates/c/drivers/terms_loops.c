@@ -3,8 +3,8 @@ static int terms_block(double t, const double *restrict x, const double *restric
                        double *restrict out, double *restrict w)
 {
     double *const C_q = out + N * (N + 1) / 2 + N;
-    (void)tree_terms(t, x, u, c, out, w);
+    const int status = tree_terms(t, x, u, c, out, w);
     (void)constraint_jacobian_block(t, x, u, c, C_q, w);
     (void)gamma_block(t, x, u, c, C_q + M * N, w);
-    return 0;
+    return status;
 }
