@@ -5,6 +5,9 @@ from __future__ import annotations
 #: Subtracted from K at the places of constraints: far above the rounding of a pivot (1e-14), so that redundant rows do
 #: not spoil it, and so small that two or three passes leave nothing of it.
 RELAXATION = 1e-10
+#: The same in the first pass, whose rounding leaves eps / this in the reactions of redundant rows; what later passes
+#: correct is as much smaller.
+FIRST = 1e-6
 #: K counts as singular where it answers more than 1 / PIVOT times what is asked: nothing is left of sixteen digits.
 PIVOT = 1e-14
 #: A largest entry up to this factor from 1 counts as balanced: a power of two costs no digits.

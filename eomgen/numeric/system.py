@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import NonFiniteError, SingularMassMatrixError, UnsolvedError
-from ..limits.systems import BALANCED, FAINT, LEFT, PIVOT, RELAXATION, ROUNDED, WEAKEST
+from ..limits.systems import BALANCED, FAINT, FIRST, LEFT, PIVOT, RELAXATION, ROUNDED, WEAKEST
 from .scales import Array, Indices
 
 STEPS = 30
@@ -70,29 +70,31 @@ class Pattern:
             balanced = row[:, None] * K * column
             if calm == 2:
                 break
-        relaxed = np.array(balanced)
+        first, relaxed = np.array(balanced), np.array(balanced)
+        first[self.relaxed] -= FIRST
         relaxed[self.relaxed] -= RELAXATION
-        return Balanced(balanced, relaxed, row, column, self.relaxed[0])
+        return Balanced(balanced, first, relaxed, row, column, self.relaxed[0])
 
 
 class Balanced:
-    """K with the scales of rows and columns that bring its entries to about 1, and its relaxed form.
+    """K with the scales of rows and columns that bring its entries to about 1, and its relaxed forms.
 
     Raises
     ------
     SingularMassMatrixError
     """
 
-    def __init__(self, K: Array, relaxed: Array, row: Array, column: Array, constraints: Indices) -> None:
-        self.K, self.relaxed, self.row, self.column, self.constraints = K, relaxed, row, column, constraints
+    def __init__(self, K: Array, first: Array, relaxed: Array, row: Array, column: Array, constraints: Indices) -> None:
+        self.K, self.first, self.relaxed = K, first, relaxed
+        self.row, self.column, self.constraints = row, column, constraints
         probe = np.cos(np.arange(1.0, len(K) + 1.0))[:, None]  # along no axis and no plane
-        answer = self._step(probe)
+        answer = self._step(self.relaxed, probe)
         if not np.abs(answer).max(initial=0.0) <= 1.0 / PIVOT:
             raise SingularMassMatrixError("the equations of motion are singular: no inertia is behind some motion")
 
-    def _step(self, right: Array) -> Array:
+    def _step(self, relaxed: Array, right: Array) -> Array:
         try:
-            return np.asarray(np.linalg.solve(self.relaxed, right), dtype=np.float64)
+            return np.asarray(np.linalg.solve(relaxed, right), dtype=np.float64)
         except np.linalg.LinAlgError:
             return np.full(right.shape, np.inf)
 
@@ -114,7 +116,7 @@ class Balanced:
             if size == 0.0 or count == STEPS or (count > 1 and size > 0.5 * before):
                 break
             before = size
-            z = z + self._step(defect)
+            z = z + self._step(self.relaxed if count else self.first, defect)
         # a step leaves RELAXATION / (s^2 + RELAXATION) along constraints of singular value s
         weak = max(WEAKEST, RELAXATION * (before / size - 1.0)) if size else 1.0
         limit = np.full((len(r), 1), LEFT)

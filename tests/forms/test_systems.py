@@ -11,8 +11,6 @@ import pytest
 
 import eomgen as eg
 from eomgen.graph.evaluate import compile_evaluator
-from eomgen.limits.rounding import EPS
-from eomgen.limits.systems import RELAXATION
 from eomgen.numeric.system import Pattern
 
 FREE = ["newton_euler", "amalgamated"]
@@ -92,6 +90,4 @@ def test_redundant_equations_get_the_least_reactions() -> None:
     }
     K = np.array([2.0, 1.0, 1.0, 1.0, 1.0, 1e-17])
     z = Pattern(described).balance(K, np.ones(8)).solve(np.array([6.0, 0.0, 0.0, 0.0]))
-    # which carries more is known as well as the relaxation stands out of rounding, which differs between processors
-    np.testing.assert_allclose(z, [0.0, 3.0, 3.0, 0.0], rtol=4.0 * EPS / RELAXATION, atol=1e-12)
-    assert z[1] + z[2] == pytest.approx(6.0, rel=1e-12)
+    np.testing.assert_allclose(z, [0.0, 3.0, 3.0, 0.0], atol=1e-12)
