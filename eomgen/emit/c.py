@@ -22,9 +22,9 @@ from .layouts import describe_layouts
 from .single_precision import in_single_precision, refuse_double
 from .sources import SourceSet, metadata_json, read_template, render
 
-#: Headers of the numbers that functions compute with.
-NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h", "eomgen_processor.h",
-           "eomgen_contraction.h")  # fmt: skip
+#: Headers of the numbers that functions compute with, and those that lanes need besides.
+NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h")
+PROCESSORS = ("eomgen_processor.h", "eomgen_contraction.h")
 
 
 def emit_c(program: Program, precision: str | None = None) -> SourceSet:
@@ -82,7 +82,7 @@ def emit_c(program: Program, precision: str | None = None) -> SourceSet:
         context["costs"] = _costs(program, sources)
     sources |= {
         f"{program.name}.h": render("c/model.h.j2", context),
-        **{name: read_template(f"c/{name}") for name in ("eomgen.h", *NUMBERS)},
+        **{name: read_template(f"c/{name}") for name in ("eomgen.h", *NUMBERS, *(() if single else PROCESSORS))},
         "model.json": metadata_json(program),
     }
     return SourceSet(in_single_precision(sources) if single else sources)

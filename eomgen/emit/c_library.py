@@ -1,4 +1,4 @@
-"""Stage emit: Program -> a C library that stands alone, with what builds it and a program that steps it in real time."""
+"""Stage emit: Program -> a C library that stands alone, what builds it, and a program that steps it in real time."""
 
 from __future__ import annotations
 

@@ -225,8 +225,8 @@ int main(void)
     return 0;
 }}
 """
-#: Compiler and emulator of each processor.  Code for Cortex-M7 runs on a larger one, whose instructions include its own:
-#: qemu 7.2 starts no program on a Cortex-M7 without a machine around it.
+#: Compiler and emulator of each processor.  Code for Cortex-M7 runs on a larger one, whose instructions include
+#: its own: qemu 7.2 starts no program on a Cortex-M7 without a machine around it.
 PROCESSORS = {
     "this one": (["gcc"], []),
     "cortex-m7": (
