@@ -29,6 +29,7 @@ def generate(
     independent: Sequence[str] | None = None,
     baumgarte: tuple[float, float] | None = None,
     slim: bool = False,
+    precision: str = "double",
 ) -> Path:
     """Write a package that stands alone into ``directory/<name>/`` and return that path.
 
@@ -43,6 +44,9 @@ def generate(
     target : {'cython', 'numpy', 'c'}
     slim : bool, optional
         Write calls, events and ``simulate`` only, in a tenth of the Python text; what else is called refuses by name.
+    precision : {'double', 'float'}, optional
+        Of the numbers of a ``c`` library: ``float`` is for processors whose unit knows single precision alone, and
+        leaves five to six digits.
 
     Raises
     ------
@@ -52,7 +56,7 @@ def generate(
     folder = as_path("directory", directory)
     equations = derive(model, method, independent, baumgarte)
     program = build(equations, target)
-    sources = dict(emit_package(program, target, slim))
+    sources = dict(emit_package(program, target, slim, precision))
     if TARGETS[target].module and not slim:
         sources[FILE] = record(program)
     return write_package(sources, folder / equations.name)

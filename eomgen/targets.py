@@ -17,6 +17,9 @@ Files = dict[str, str]
 #: What ``eomgen derive --format`` writes equations in; all but the first two are languages of other programs.
 FORMATS = ("latex", "text", "sympy", "matlab", "octave", "julia", "mathematica", "c")
 
+#: Types of the numbers of a C library.
+PRECISIONS = ("double", "float")
+
 
 class Target(NamedTuple):
     """One target.
@@ -32,12 +35,15 @@ class Target(NamedTuple):
         Whether a module can be compiled and loaded in this process.
     arrays : bool
         Whether loops over arrays do better than straight-line code.
+    precisions : bool
+        Whether its numbers may be of single precision.
     """
 
     about: str
     package: Callable[[Any, dict[str, Any]], Files] | str
     module: bool = False
     arrays: bool = False
+    precisions: bool = False
 
     def files(self, program: Any, context: dict[str, Any]) -> Files:
         """The package of a program."""
@@ -53,7 +59,7 @@ TARGETS: dict[str, Target] = {
     "numpy": Target(
         "Python that imports NumPy alone, no compiler", "emit.package.numpy_package", module=True, arrays=True
     ),
-    "c": Target("C library", "emit.package.c_library"),
+    "c": Target("C library", "emit.c_library.c_library", precisions=True),
 }
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ..targets import TARGETS
+from ..targets import PRECISIONS, TARGETS
 from .failures import reports_failures
 from .screen import print_json, say, stage
 from .sections import verb_command
@@ -40,6 +40,13 @@ from .shared_options import (
     is_flag=True,
     help="Write a small package with calls, events and simulate only; other methods raise an error.",
 )
+@click.option(
+    "--precision",
+    type=click.Choice(PRECISIONS),
+    default="double",
+    show_default=True,
+    help="Type of the numbers of a C library; float is for processors that know single precision alone.",
+)
 @json_option
 @robot_options
 @reports_failures
@@ -52,6 +59,7 @@ def generate(
     independent: tuple[str, ...],
     target: str,
     slim: bool,
+    precision: str,
     as_json: bool,
     robot: dict[str, Any],
 ) -> None:
@@ -60,7 +68,7 @@ def generate(
 
     with blaming_option(independent), stage("generate"):
         described = load_model(model, allow_native, robot)
-        folder = write_out(described, out, method, target, independent or None, baumgarte, slim)
+        folder = write_out(described, out, method, target, independent or None, baumgarte, slim, precision)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     if as_json:
         print_json({"name": folder.name, "target": target, "slim": slim, "folder": str(folder), "files": files})
