@@ -21,6 +21,13 @@ FORMATS = ("latex", "text", "sympy", "matlab", "octave", "julia", "mathematica",
 PRECISIONS = ("double", "float")
 
 
+#: Kernels of targets whose library differentiates by itself.
+TRACED_KERNELS = (
+    "rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "constraints", "constraint_jacobian",
+    "velocity_constraints", "project", "poses", "outputs", "events", "kinematics", "dae_residual",
+)  # fmt: skip
+
+
 class Target(NamedTuple):
     """One target.
 
@@ -37,6 +44,8 @@ class Target(NamedTuple):
         Whether loops over arrays do better than straight-line code.
     precisions : bool
         Whether its numbers may be of single precision.
+    kernels : tuple of str
+        The functions it has, of :data:`~.kernel_table.KERNELS`; all if empty.
     """
 
     about: str
@@ -44,6 +53,7 @@ class Target(NamedTuple):
     module: bool = False
     arrays: bool = False
     precisions: bool = False
+    kernels: tuple[str, ...] = ()
 
     def files(self, program: Any, context: dict[str, Any]) -> Files:
         """The package of a program."""
@@ -60,6 +70,10 @@ TARGETS: dict[str, Target] = {
         "Python that imports NumPy alone, no compiler", "emit.package.numpy_package", module=True, arrays=True
     ),
     "c": Target("C library", "emit.c_library.c_library", precisions=True),
+    "casadi": Target(
+        "set of functions of CasADi's SX", "emit.traced.casadi_package", arrays=True, kernels=TRACED_KERNELS
+    ),
+    "jax": Target("set of pure functions of JAX", "emit.traced.jax_package", arrays=True, kernels=TRACED_KERNELS),
 }
 
 
