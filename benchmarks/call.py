@@ -30,22 +30,31 @@ WITH_BOTH, START = 60, 15
 SHORT = (0.0, 1e-9)
 
 
+def compile_call_loop(folder: Path) -> Any:
+    """The loop in C over a kernel: its address, calls, x, u, constants, result, work -> nanoseconds a call."""
+    library, source = folder / "call_loop.so", Path(__file__).with_name("call_loop.c")
+    command = [*find_compiler().command, "-O2", "-shared", "-fPIC", str(source), "-o", str(library)]
+    subprocess.run(command, check=True)
+    measure = ctypes.CDLL(str(library)).measure
+    measure.restype = ctypes.c_double
+    return measure
+
+
+def over_kernel(module: Any, name: str, x: np.ndarray, out: np.ndarray) -> list[Any]:
+    """What the loop takes for a kernel of a module besides the number of calls, and the arrays to be kept."""
+    core, context = eager(module.core), module.kernels.context
+    x = np.array(x)  # of its own, in one piece
+    arrays = (x, context.u, context.c, out, np.empty(max(core.sizes["n_work"], 1)))
+    return [ctypes.c_void_p(core.address(name)), *(ctypes.c_void_p(a.ctypes.data) for a in arrays), arrays]
+
+
 class Above:
     """Calls of a module's rhs as users make them, held against a loop in C over the same kernel."""
 
     def __init__(self, module: Any, x: np.ndarray, folder: Path) -> None:
-        library = folder / "call_loop.so"
-        source = Path(__file__).with_name("call_loop.c")
-        command = [*find_compiler().command, "-O2", "-shared", "-fPIC", str(source), "-o", str(library)]
-        subprocess.run(command, check=True)
-        self.loop = ctypes.CDLL(str(library)).measure
-        self.loop.restype = ctypes.c_double
-        core, context = eager(module.core), module.kernels.context
-        self.module, self.x, self.out = module, x, np.empty_like(x)
-        self.work = np.empty(max(core.sizes["n_work"], 1))
-        arrays = (x, context.u, context.c, self.out, self.work)
-        pointers = [ctypes.c_void_p(a.ctypes.data) for a in arrays]
-        self.given = [ctypes.c_void_p(core.address("rhs")), ctypes.c_long(CALLS), *pointers]
+        self.module, self.x, self.out, self.loop = module, x, np.empty_like(x), compile_call_loop(folder)
+        address, *pointers, self.arrays = over_kernel(module, "rhs", x, self.out)
+        self.given = [address, ctypes.c_long(CALLS), *pointers]
 
     def kernel(self) -> float:
         """Seconds of one call in C."""

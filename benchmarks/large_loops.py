@@ -16,7 +16,7 @@ from eomgen.emit import emit_c
 from .linkages import v_engine
 from .models import humanoid
 from .report import Limit, Report, Table
-from .robot_loops import in_turns
+from .robot_calls import in_turns
 
 TITLE = "closed loops of any size beside open trees"
 

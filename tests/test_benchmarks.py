@@ -10,7 +10,7 @@ import pytest
 from benchmarks.derive import largest_difference
 from benchmarks.report import Limit, number
 from benchmarks.rhs import contest
-from benchmarks.robot_loops import ROBOTS
+from benchmarks.robot_calls import ROBOTS
 from benchmarks.run import main
 
 

@@ -15,7 +15,7 @@ import pytest
 import eomgen as eg
 from benchmarks.growth import operations
 from benchmarks.models import ARMS, chain, humanoid, numeric_arm, panda, spatial_chain, symbolic_arm
-from benchmarks.robot_loops import ROBOTS, Robot, build
+from benchmarks.robot_calls import ROBOTS, Robot, build
 from eomgen import pipeline
 from eomgen.emit import emit_c
 from eomgen.equations import METHODS
