@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import platform
 import sys
 import zipfile
@@ -14,13 +15,14 @@ from . import pipeline
 from .compilation.build import compile_c_library
 from .compilation.options import Options
 from .emit.fmu import emit_fmu
-from .emit.fmu.versions import KERNELS, check_version, require_values
+from .emit.fmu.versions import KERNELS, check_version, refuse_impacts
 from .errors import UsageError
 from .files.path_names import as_path
-from .files.writing import write_whole
+from .files.writing import refuse_link, write_whole
+from .runtime.bound_model import BoundModel
 
 if TYPE_CHECKING:
-    from .api.equations import Equations
+    from .derivation import Derivation
 
 #: Folders of binaries, of FMI 2.0 and 3.0, by system and processor; elsewhere a unit holds its sources alone.
 _FOLDERS = {
@@ -31,7 +33,7 @@ _WHEN = (1980, 1, 1, 0, 0, 0)  #: the same model gives the same bytes
 
 
 def write_fmu(
-    equations: Equations,
+    equations: Derivation,
     path: str | Path | None = None,
     version: str = "2.0",
     progress: Callable[[str], None] | None = None,
@@ -40,7 +42,7 @@ def write_fmu(
 
     Parameters
     ----------
-    equations : Equations
+    equations : Derivation
     path : str or Path, optional
         Of the file, by default ``<name>.fmu`` here; a file of this name is replaced.
     version : {'2.0', '3.0'}, optional
@@ -76,20 +78,44 @@ def write_fmu(
     return where
 
 
-def fmu_bytes(equations: Equations, version: str, progress: Callable[[str], None] | None = None) -> bytes:
+def generate_fmu(equations: Derivation, directory: Path, version: str = "2.0") -> Path:
+    """Write ``<name>.fmu`` into a folder, in the place of one that eomgen wrote before.
+
+    Raises
+    ------
+    UsageError
+        There is another file of this name.
+    """
+    where = directory / f"{equations.name}.fmu"
+    if os.path.lexists(where) and not _is_ours(where):
+        raise UsageError(f"{where} exists and was not written by eomgen; move it, or choose another --out")
+    directory.mkdir(parents=True, exist_ok=True)
+    return write_fmu(equations, where, version)
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a file is a unit that eomgen wrote."""
+    refuse_link(path)
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as description:
+            return b'generationTool="eomgen ' in description.read(2000)
+    except (OSError, KeyError, zipfile.BadZipFile):
+        return False
+
+
+def fmu_bytes(equations: Derivation, version: str, progress: Callable[[str], None] | None = None) -> bytes:
     """The content of the file that :func:`write_fmu` writes; the same model gives the same bytes."""
     program = pipeline.build(equations, "c", KERNELS)
-    require_values(program)
-    start = equations.compile(target="numpy").x0()
+    refuse_impacts(program)
+    start = BoundModel(pipeline.compile_core(equations, "numpy")).x0()
     unit = emit_fmu(program, [float(x) for x in start], version)
     files: dict[str, bytes] = {name: text.encode() for name, text in unit.files.items()}
     folder = _FOLDERS.get((sys.platform, platform.machine()), (None, None))[version == "3.0"]
     if folder is not None:
-        sources = {name.removeprefix("sources/"): text for name, text in unit.files.items() if name.startswith("sources/")}
-        code = {name: text for name, text in sources.items() if name.endswith((".c", ".h"))}
+        code = {Path(name).name: text for name, text in unit.files.items() if name.endswith((".c", ".h"))}
         options = Options(extra=("-fvisibility=hidden",))
         library = compile_c_library(code, program.name, options, progress, steppers=True).path
-        files[f"binaries/{folder}/{program.name}{'.dylib' if sys.platform == 'darwin' else '.so'}"] = library.read_bytes()
+        files[f"binaries/{folder}/{program.name}{library.suffix}"] = library.read_bytes()
     memory = io.BytesIO()
     with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted(files, key=lambda name: (name != "modelDescription.xml", name)):

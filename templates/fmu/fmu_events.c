@@ -64,7 +64,7 @@ int fmu_completed(fmu_instance *f, int *event)
         return closes;
     }
     for (int i = 0; i < FMU_N_X; i++) {
-        *event = *event || fabs(f->closed[i] - m->x[i]) > 0.1 * m->rtol * fmax(FMU_NOMINAL[i], fabs(m->x[i]));
+        *event = *event || fabs(f->closed[i] - m->x[i]) > m->rtol * fmax(FMU_NOMINAL[i], fabs(m->x[i]));
     }
 #endif
     double *const g = f->values, *const slope = f->values + FMU_N_EVENTS;
@@ -111,6 +111,9 @@ static int find_fired(fmu_instance *f, int *fired, int *ended)
     for (int i = 0; i < FMU_N_EVENTS; i++) {
         const int side = g[i] > 0.0, way = side - m->side[i];
         before[i] = g[i];
+        if (way * slope[i] < 0.0) { /* it leaves for the side that it was sent to, and is not there yet */
+            continue;
+        }
         fired[i] = way != 0 && FMU_DIRECTION[i] * way >= 0;
         if (fired[i]) {
             m->count[i]++;

@@ -4,6 +4,5 @@ https://fmi-standard.org: version 2.0.3 and 3.0, model exchange and co-simulatio
 """
 
 from .content import FmuFiles, emit_fmu
-from .versions import VERSIONS
 
-__all__ = ["VERSIONS", "FmuFiles", "emit_fmu"]
+__all__ = ["FmuFiles", "emit_fmu"]

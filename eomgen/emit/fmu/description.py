@@ -59,18 +59,19 @@ def _text(root: ElementTree.Element) -> str:
 
 def _add_kinds(root: ElementTree.Element, name: str, two: bool, files: Sequence[str]) -> None:
     """Model exchange and co-simulation, with what each can do."""
-    state = ("canGetAndSetFMUstate", "canSerializeFMUstate") if two else ("canGetAndSetFMUState", "canSerializeFMUState")
-    able = dict.fromkeys([*state, "providesDirectionalDerivative" + ("" if two else "s")], "true")
+    word, plural = ("state", "") if two else ("State", "s")
+    able = {"modelIdentifier": name, f"canGetAndSetFMU{word}": "true", f"canSerializeFMU{word}": "true"}
+    able[f"providesDirectionalDerivative{plural}"] = "true"
     able |= {"canNotUseMemoryManagementFunctions": "true"} if two else {}
     exchange = {"completedIntegratorStepNotNeeded": "false"} if two else {"needsCompletedIntegratorStep": "true"}
-    exchange_tag = ElementTree.SubElement(root, "ModelExchange", modelIdentifier=name, **able, **exchange)
-    stepping = {"canHandleVariableCommunicationStepSize": "true"}
-    stepping_tag = ElementTree.SubElement(root, "CoSimulation", modelIdentifier=name, **able, **stepping)
-    if two:
-        for tag in (exchange_tag, stepping_tag):
-            listed = ElementTree.SubElement(tag, "SourceFiles")
-            for file in files:
-                ElementTree.SubElement(listed, "File", name=file)
+    tags = [
+        ElementTree.SubElement(root, "ModelExchange", able | exchange),
+        ElementTree.SubElement(root, "CoSimulation", able | {"canHandleVariableCommunicationStepSize": "true"}),
+    ]
+    for tag in tags if two else ():
+        listed = ElementTree.SubElement(tag, "SourceFiles")
+        for file in files:
+            ElementTree.SubElement(listed, "File", name=file)
 
 
 def _add_units(root: ElementTree.Element, variables: Sequence[Variable]) -> None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from ...errors import ModelError, UsageError
+from ...errors import ModelError, Problem, UsageError
 from ...program import Program
-
-VERSIONS = ("2.0", "3.0")
+from ...targets import FMI_VERSIONS
 
 #: Kernels that a unit calls; an FMU has those of them that the model has.
 KERNELS = (
@@ -21,31 +20,24 @@ def check_version(version: str) -> str:
     ------
     UsageError
     """
-    for known in VERSIONS:
+    for known in FMI_VERSIONS:
         if str(version) in (known, known.partition(".")[0]):
             return known
-    raise UsageError(f"there is no version {version!r} of FMI here; there are {', '.join(VERSIONS)}")
+    raise UsageError(f"there is no version {version!r} of FMI here; there are {', '.join(FMI_VERSIONS)}")
 
 
-def require_values(program: Program) -> None:
-    """Refuse what a unit cannot hold, all of it at once.
+def refuse_impacts(program: Program) -> None:
+    """Refuse events whose impacts the generated code leaves to Python.
 
     Raises
     ------
     ModelError
-        Parameters without values, or events whose impacts the generated code leaves to Python.
     """
-    metadata, found = program.metadata, []
-    missing = [name for name, x in zip(metadata["p_names"], metadata["p_values"], strict=True) if x is None]
-    if missing:
-        found.append(f"every parameter of an FMU needs a start value; give one to {', '.join(missing)}")
-    impacts = [event["name"] for event in metadata.get("events", ()) if event["restitution"] is not None]
-    if impacts:
-        found.append(
-            f"events with restitution cannot be exported to an FMU: {', '.join(impacts)}; describe the new velocities "
-            "with reset"
-        )
-    if not metadata["n_x"]:
-        found.append("the model has no coordinates, so that an FMU of it would have no states")
-    if found:
-        raise ModelError("; ".join(found))
+    remedy = "describe the new velocities with reset, or leave the event out"
+    problems = [
+        Problem(f"events.{event['name']}.restitution", "an FMU cannot hold an impact", remedy)
+        for event in program.metadata.get("events", ())
+        if event["restitution"] is not None
+    ]
+    if problems:
+        raise ModelError(problems)
