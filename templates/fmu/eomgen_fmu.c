@@ -212,6 +212,7 @@ int fmu_keep(fmu_instance *f, void **kept)
         return fmu_say(f, FMU_ERROR, "there is no memory for a copy of the state");
     }
     memcpy(copy->digest, FMU_TOKEN, sizeof copy->digest);
+    copy->steps = f->steps != NULL;
     copy->m = f->m;
     *kept = copy;
     return FMU_OK;
@@ -220,8 +221,8 @@ int fmu_keep(fmu_instance *f, void **kept)
 int fmu_restore(fmu_instance *f, const void *kept)
 {
     const fmu_snapshot *const copy = (const fmu_snapshot *)kept;
-    if (copy == NULL || memcmp(copy->digest, FMU_TOKEN, sizeof copy->digest) != 0) {
-        return fmu_say(f, FMU_ERROR, "the state to return to is not one of %s", FMU_NAME);
+    if (copy == NULL || memcmp(copy->digest, FMU_TOKEN, sizeof copy->digest) != 0 || copy->steps != (f->steps != NULL)) {
+        return fmu_say(f, FMU_ERROR, "the state to return to is not one of such an instance of %s", FMU_NAME);
     }
     f->m = copy->m;
     return FMU_OK;

@@ -91,6 +91,7 @@ long fmu_step_room(void);
 /* A copy of what the instance remembers, as bytes that another instance of the same model takes. */
 typedef struct {
     char digest[16];
+    int steps; /* whether it is one of co-simulation */
     fmu_memory m;
 } fmu_snapshot;
 int fmu_keep(fmu_instance *f, void **kept);
