@@ -437,7 +437,7 @@ FMU_EXPORT fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 s
     }
     (void)no_return;
     const int status = fmu_step(INSTANCE, time, step, &ended);
-    *event = false, *terminate = *early = ended != 0, *last = INSTANCE->m.t;
+    *event = *early = false, *terminate = ended != 0, *last = INSTANCE->m.t;
     return fail(INSTANCE, status);
 }
 #endif

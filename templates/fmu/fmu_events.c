@@ -69,8 +69,9 @@ int fmu_completed(fmu_instance *f, int *event)
 #endif
     double *const g = f->values, *const slope = f->values + FMU_N_EVENTS;
     const int status = FMU_N_EVENTS > 0 ? look(f, g, slope) : (int)FMU_OK;
-    for (int i = 0; i < FMU_N_EVENTS && status == FMU_OK; i++) { /* one that came back before it was seen on its side */
-        *event = *event || (m->side[i] && g[i] < 0.0 && slope[i] < 0.0);
+    for (int i = 0; i < FMU_N_EVENTS && status == FMU_OK; i++) { /* one that nobody has seen change sides */
+        const int way = (g[i] > 0.0) - m->side[i];
+        *event = *event || (way * slope[i] > 0.0 && g[i] != 0.0);
     }
     return status;
 }
@@ -96,6 +97,13 @@ static int reset(fmu_instance *f, const int *fired)
 }
 #endif
 
+/* The side of zero of a value: 1 above, or the other one where it gets there at this very instant. */
+static int side_of(const fmu_memory *m, double g, double slope, int i)
+{
+    const int side = g > 0.0, coming = side != (slope > 0.0) && slope != 0.0;
+    return side == m->side[i] && coming && fabs(g) <= RUNS_SAME * fmax(fabs(m->t), 1.0) * fabs(slope) ? !side : side;
+}
+
 /* Events whose values have changed sides in their direction: the first FMU_N_EVENTS of fired. */
 static int find_fired(fmu_instance *f, int *fired, int *ended)
 {
@@ -109,7 +117,7 @@ static int find_fired(fmu_instance *f, int *fired, int *ended)
         return 0;
     }
     for (int i = 0; i < FMU_N_EVENTS; i++) {
-        const int side = g[i] > 0.0, way = side - m->side[i];
+        const int side = side_of(m, g[i], slope[i], i), way = side - m->side[i];
         before[i] = g[i];
         if (way * slope[i] < 0.0) { /* it leaves for the side that it was sent to, and is not there yet */
             continue;

@@ -135,7 +135,7 @@ static int go_on(fmu_instance *f, double t_end)
 int fmu_step(fmu_instance *f, double t, double step, int *ended)
 {
     fmu_memory *const m = &f->m;
-    if (!(fabs(t - m->t) <= RUNS_SAME * fmax(fabs(t), fmax(step, RUNS_EARLIEST)))) {
+    if (!isfinite(t) || !(fabs(t - m->t) <= RUNS_SAME * fmax(fabs(t), fmax(step, RUNS_EARLIEST)))) {
         return fmu_say(f, FMU_ERROR, "the step begins at t = %.9g s, but the last one ended at %.9g s", t, m->t);
     }
     if (!(step >= 0.0 && isfinite(step))) {

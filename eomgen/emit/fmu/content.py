@@ -14,7 +14,7 @@ from ...limits.in_c import definitions
 from ...program import Program
 from ..c import emit_c
 from ..sources import read_template, render
-from .description import describe_build, describe_model
+from .model_description import describe_build, describe_model
 from .model_header import model_context, run_settings
 from .variables import Variable, list_variables
 from .versions import check_version, refuse_impacts

@@ -1,6 +1,7 @@
 /* Calls the functions of FMI 2.0 in random order, with arguments right and wrong; nothing may crash, leak or write beyond. */
 #include "fmi2.c"
 
+#include <math.h>
 #include <stdio.h>
 
 static unsigned long seed;
@@ -90,7 +91,7 @@ static void call(fmi2Component c, fmi2FMUstate *states, char *bytes, size_t size
     case 31: fmi2GetEventIndicators(c, result, draw(30) ? FMU_N_EVENTS : n); break;
     case 32: fmi2GetContinuousStates(c, result, draw(30) ? FMU_N_X : n); break;
     case 33: fmi2GetNominalsOfContinuousStates(c, result, draw(30) ? FMU_N_X : n); break;
-    case 34: case 35: fmi2DoStep(c, draw(3) ? (c != NULL ? INSTANCE->m.t : 0.0) : number(), draw(3) ? 0.01 : number() * 1e-2, 1); break;
+    case 34: case 35: fmi2DoStep(c, draw(3) ? (c != NULL ? INSTANCE->m.t : 0.0) : number(), draw(8) ? 1e-4 : fmin(number(), 1.0) * 1e-3, 1); break;
     case 36: fmi2GetRealStatus(c, (int)draw(5), values); fmi2GetBooleanStatus(c, (int)draw(5), wrong ? NULL : whole); break;
     default: fmi2SetDebugLogging(c, (int)draw(2), 0, NULL);
     }
