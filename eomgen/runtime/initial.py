@@ -80,8 +80,7 @@ class Initial:
 
     def rate(self, q: Array) -> Array:
         """C_t (n_c,)."""
-        x = np.concatenate([q, np.zeros(self.layout.n_v)])
-        return self.kernels.velocity_constraints.every(x, t=self.t)
+        return self.kernels.velocity_constraints.every(np.concatenate([q, np.zeros(self.layout.n_v)]), t=self.t)
 
     # positions
 
@@ -220,7 +219,7 @@ class Initial:
             return self._solve_rates(q, declared).v
         self._require_motion(q, given)
         rest = {name: value for name, value in declared.items() if name not in given}
-        return self._solve_rates(q, {**given, **self.compatible(q, given, rest, positions=False)}).v
+        return self._solve_rates(q, {**given, **(self.compatible(q, given, rest, positions=False) if rest else {})}).v
 
     def _require_motion(self, q: Array, given: Mapping[str, float]) -> None:
         """Refuse the rate of a coordinate that stands still at q, whatever moves: it would need boundless rates.
@@ -267,9 +266,8 @@ class Initial:
 
     def rate_equation(self, q: Array, name: str) -> tuple[Array, float, float]:
         """y_q (n,), y_t and the typical size of a rate y' = y_q v + y_t that is no velocity of the tree."""
-        layout, zero = self.layout, np.zeros(self.layout.n_v)
+        layout, zero, k = self.layout, np.zeros(self.layout.n_v), self.layout.loop_rates.index(name)
         y_t = self.kernels.motion("loop_coordinates")(q, zero, zero, t=self.t)[1]
-        k = layout.loop_rates.index(name)
         return self.system.cut.evaluate(q, self.t)[1][k], y_t[k], layout.loop_scales[k]
 
     # which values can be held together
@@ -281,8 +279,6 @@ class Initial:
 
         Nonholonomic constraints count for rates only, where `positions` is False.
         """
-        if not rest:
-            return {}
         layout = self.layout
         scales = self.place if positions else self.scales
         C_q = self.system.position(q)[1][: self.layout.n_h] if positions else self._C_q(q, t=self.t)
