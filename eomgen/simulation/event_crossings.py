@@ -14,24 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import ZenoError
-from ..limits.runs import (
-    ASIDE,
-    CROWDED,
-    EARLIEST,
-    HALVED,
-    INSTANT,
-    LATE,
-    MOMENTARY,
-    RESTING,
-    SAMPLED,
-    TOUCHED,
-    TOUCHING,
-    TURNING,
-)
+from ..limits.runs import ASIDE, CROWDED, HALVED, INSTANT, LATE, MOMENTARY, RESTING, SAMPLED, TOUCHED, TOUCHING, TURNING
 from ..numeric.roots import Found, Search, search_least, search_root
 from ..numeric.scales import Array
 from .event_values import EventValues
-from .events import GO_ON, RESET, UNWATCHED, WAIT, Events, RunEvent, crowd_of
+from .events import GO_ON, RESET, UNWATCHED, WAIT, Events, RunEvent, crowd_of, instant
 
 
 class Step(NamedTuple):
@@ -191,9 +178,7 @@ class Crossings:
                 return [Bracket(i, t, later, g, value)]
             seen = seen or value * side > 0.0
             t, g = later, value
-        moment = INSTANT * max(abs(step.t), EARLIEST)  # a step this short shows rounding only
-        long = abs(step.t - step.t_old) > moment
-        back = long and not seen and last * side < 0.0  # within the accuracy of the step: resets that die away
+        back = not seen and last * side < 0.0 and abs(step.t - step.t_old) > instant(step.t)  # resets that die away
         self.leaving[i] = 0 if seen or back else side
         event = self.events[i]
         if back and event.direction * side <= 0 and event.action in (RESET, WAIT):
