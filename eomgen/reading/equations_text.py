@@ -8,10 +8,12 @@ from ..files.terminal import fold
 from ..notation import read_latex
 from ..notation.printing import text_form
 from ..notation.signs import SUPERSCRIPTS
+from ..printing import text
 from ..printing.formula_text import TIGHT
-from ..printing.formula_tree import times
+from ..printing.formula_tree import MatrixOf, times
 from ..texts import visible
 from .printed_equations import PrintedEntry, PrintedEquations, plain
+from .printed_parts import PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
 COLUMNS = 80
@@ -45,10 +47,11 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
     if equations.mobility.n_dof == 0:
         found.append("  nothing is free to move: the position follows from constraints and time")
     else:
-        shown = [*_equations(printed, columns)]
+        shown = [*(_large(PrintedParts(printed), columns) if printed.is_long else _equations(printed, columns))]
         found += ["", *shown[:lines]]
         if len(shown) > lines:
-            rest = f"... and {len(shown) - lines} lines more: eqs.mass_matrix, eqs.force, eqs.intermediates"
+            where = "eqs.tree_system" if printed.of_loops else "eqs.mass_matrix, eqs.force, eqs.intermediates"
+            rest = f"... and {len(shown) - lines} lines more: {where}"
             found += [rest, "or in a shell: eomgen derive MODEL --format text"]
     found += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
     return "\n".join(found)
@@ -107,6 +110,38 @@ def _equations(printed: PrintedEquations, columns: int) -> Iterator[str]:
     if not small and len(rates) > 1:
         yield f"{mass} is symmetric{'; its other entries are 0' if printed.vanishing else ''}"
     yield from _where(printed, columns)
+
+
+def _large(parts: PrintedParts, columns: int) -> Iterator[str]:
+    """Large equations: matrices with letters for their entries, and groups of what these are."""
+    rates = [parts.printed.text(x) for x in parts.printed.accelerations]
+
+    def words(sentence: PrintedSentence) -> str:
+        return "".join(x if isinstance(x, str) else text(x, parts.names) for x in sentence.pieces)
+
+    def equation(line: PrintedLine) -> Iterator[str]:
+        before = f"{text(line.left, parts.names)} = "
+        if isinstance(line.right, MatrixOf):
+            rows = _matrix([[text(x, parts.names) for x in row] for row in line.right.rows], before)
+            if max(map(len, rows)) <= columns - 2:
+                yield from (f"  {plain(row)}" for row in rows)
+                return
+            yield f"  {before}of {len(line.right.rows)} rows and {len(line.right.rows[0])} columns"
+            return
+        yield from _wrapped(before, text(line.right, parts.names), columns)
+
+    mass, v, right = (letter_text(letter) for letter in parts.printed.letters)
+    yield from fold(f"{mass} {v} = {right} with {v} = ({', '.join(rates)})", columns, "", "  ")
+    for k, item in enumerate(parts.items()):
+        match item:
+            case PrintedRow() if k:
+                yield from (line for one in item.lines for line in equation(one))
+            case PrintedSentence():
+                yield from fold(words(item), columns, "", "  ")
+            case PrintedGroup():
+                yield ""
+                yield words(item.title)
+                yield from (line for one in item.lines for line in equation(one))
 
 
 def letter_text(latex: str) -> str:
