@@ -30,7 +30,9 @@ def equations_html(equations: Readable) -> str:
     printed = PrintedEquations(equations)
     if equations.mobility.n_dof == 0:
         return "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
-    return "".join(parts_html(PrintedParts(printed)) if printed.is_long else [*_motion(printed), *_intermediates(printed)])
+    return "".join(
+        parts_html(PrintedParts(printed)) if printed.is_long else [*_motion(printed), *_intermediates(printed)]
+    )
 
 
 def facts_html(equations: Readable) -> str:
@@ -152,9 +154,7 @@ def parts_html(parts: PrintedParts) -> Iterator[str]:
     """Large equations: matrices with letters for their entries, and groups of what these are."""
 
     def words(sentence: PrintedSentence) -> str:
-        return "".join(
-            html_text(x) if isinstance(x, str) else _math(mathml(x, parts.names)) for x in sentence.pieces
-        )
+        return "".join(html_text(x) if isinstance(x, str) else _math(mathml(x, parts.names)) for x in sentence.pieces)
 
     def equation(line: PrintedLine) -> str:
         return row(mathml(line.left, parts.names), "<mo>=</mo>", mathml(line.right, parts.names))

@@ -137,20 +137,20 @@ class PrintedParts:
         yield PrintedRow((PrintedLine(M, of_mass), PrintedLine(f, of_force)))
         every = [Name(acceleration_name(name)) for name in k.velocity_names]
         free = [x for x, label in zip(every, k.velocity_labels, strict=True) if label in self._free]
+        constrained = SumOf(((False, Product((C, rates))), (False, gamma)))
         yield PrintedSentence(
-            (mass, " and ", force, " are of all accelerations of the tree, ", rates, " = (", *_listed(every))
-            + ("). With the constraints ", C, " ", rates, " + ", gamma, " = 0,")
-        )
-        inverse, tied = Letter(f"{C.latex}_d^{{-1}}"), Letter(f"{C.latex}_i")
-        moved = SumOf(((False, Product((Letter(B), v))), (False, Letter(a))))
-        B_d, a_d = Letter(f"{B}_d"), Letter(f"{a}_d")
-        solved = (PrintedLine(left, SumOf(((True, Product((inverse, x))),))) for left, x in ((B_d, tied), (a_d, gamma)))
+            (mass, " and ", force, " are of all accelerations of the tree, ", rates, " = (", *_listed(every), "). With ",
+             "the constraints ", constrained, " = 0,")
+        )  # fmt: skip
+        C_d, C_i, B_d, a_d = (Letter(f"{x}_{part}") for x, part in ((C.latex, "d"), (C.latex, "i"), (B, "d"), (a, "d")))
+        inverse, moved = Letter(f"{C_d.latex}^{{-1}}"), SumOf(((False, Product((Letter(B), v))), (False, Letter(a))))
+        solved = (PrintedLine(left, SumOf(((True, Product((inverse, x))),))) for left, x in ((B_d, C_i), (a_d, gamma)))
         yield PrintedRow((PrintedLine(rates, moved), *solved))
         yield PrintedSentence(
-            ("where ", tied, " holds the columns of ", C, " that belong to ", *_listed(free), ", and ")
-            + (Letter(f"{C.latex}_d"), " the others. ", B_d, " and ", a_d, " are the rows of the other accelerations; in ")
-            + ("the rows of ", v, ", ", Letter(B), " is the identity and ", Letter(a), " is 0.")
-        )
+            ("where ", C_i, " holds the columns of ", C, " that belong to ", *_listed(free), ", and ", C_d, " the others. ",
+             B_d, " and ", a_d, " are the rows of the other accelerations; in the rows of ", v, ", ", Letter(B), " is the ",
+             "identity and ", Letter(a), " is 0.")
+        )  # fmt: skip
 
     @property
     def _zeros(self) -> tuple[str, ...]:
@@ -220,9 +220,7 @@ class PrintedParts:
         found = grouped(self.printed.named, outputs, constants, {*k.velocity_names, *k.input_names})
         matrices = {matrix.meaning: matrix for matrix in self._matrices}
         for meaning, title in TITLES.items():
-            lines = [
-                PrintedLine(Name(str(name)), self.printed.formula(x)) for name, x in found.get(meaning, ())
-            ]
+            lines = [PrintedLine(Name(str(name)), self.printed.formula(x)) for name, x in found.get(meaning, ())]
             words: tuple[Piece, ...] = (title,)
             if matrix := matrices.get(meaning):
                 lines += self._entries(matrix)

@@ -195,10 +195,11 @@ class Readable(QuantitiesOfMethods):
 
     @cached_property
     def tree_system(self) -> TreeSystem:
-        """M_t v' = f_t + C^T lambda and C v' + gamma = 0: the parts of which long ``mass_matrix`` and ``force`` consist.
+        """M_t v' = f_t + C^T lambda and C v' + gamma = 0: the parts that long ``mass_matrix`` and ``force`` are made of.
 
-        With B and a of v' = B v_i' + a, M = B^T M_t B and f = B^T (f_t - M_t a).  Of a long system ``zeros`` names the
-        coordinates on which M and f do not depend; all parts are written with 0 for them.
+        With v' = B v_i' + a, which the constraints give, M = B^T M_t B and f = B^T (f_t - M_t a).  Where
+        ``has_long_loops``, ``zeros`` names the coordinates on which M and f do not depend; 0 stands for them in all
+        parts.
         """
         import sympy
 
