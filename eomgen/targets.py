@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from importlib import import_module
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from .errors import UsageError
@@ -16,6 +17,12 @@ Files = dict[str, str]
 
 #: What ``eomgen derive --format`` writes equations in; all but the first two are languages of other programs.
 FORMATS = ("latex", "text", "sympy", "matlab", "octave", "julia", "mathematica", "c")
+
+#: Types of the numbers of a C library.
+PRECISIONS = ("double", "float")
+
+#: Versions of FMI, the standard of functional mock-up units.
+FMI_VERSIONS = ("2.0", "3.0")
 
 
 class Target(NamedTuple):
@@ -32,20 +39,35 @@ class Target(NamedTuple):
         Whether a module can be compiled and loaded in this process.
     arrays : bool
         Whether loops over arrays do better than straight-line code.
+    precisions : bool
+        Whether its numbers may be of single precision.
+    whole : str
+        "file.function" of (equations, directory, version) that writes one file instead of a package.
     """
 
     about: str
-    package: Callable[[Any, dict[str, Any]], Files] | str
+    package: Callable[[Any, dict[str, Any]], Files] | str = ""
     module: bool = False
     arrays: bool = False
+    precisions: bool = False
+    whole: str = ""
 
     def files(self, program: Any, context: dict[str, Any]) -> Files:
         """The package of a program."""
-        if callable(self.package):
-            return self.package(program, context)
-        home, name = self.package.rsplit(".", 1)
-        found: Files = getattr(import_module(f".{home}", __package__), name)(program, context)
+        found: Files = (self.package if callable(self.package) else _find(self.package))(program, context)
         return found
+
+    def write(self, equations: Any, directory: Path, version: str) -> Path:
+        """The one file of a model."""
+        written: Path = _find(self.whole)(equations, directory, version)
+        return written
+
+
+def _find(name: str) -> Callable[..., Any]:
+    """The function "file.function" within eomgen."""
+    home, function = name.rsplit(".", 1)
+    found: Callable[..., Any] = getattr(import_module(f".{home}", __package__), function)
+    return found
 
 
 TARGETS: dict[str, Target] = {
@@ -53,7 +75,8 @@ TARGETS: dict[str, Target] = {
     "numpy": Target(
         "Python that imports NumPy alone, no compiler", "emit.package.numpy_package", module=True, arrays=True
     ),
-    "c": Target("C library", "emit.package.c_library"),
+    "c": Target("C library", "emit.c_library.c_library", precisions=True),
+    "fmu": Target("functional mock-up unit for other simulators, one file", whole="fmu.generate_fmu"),
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ from ..limits.in_c import definitions
 from ..program import KERNELS, Block, Program
 from ..program.loop_blocks import LARGE
 from ..program.series import NoSeriesError
+from .c_bounds import operations_of, stack_of, states_beside_change_points
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_files, lane_kernels
 from .c_layout import driver_files, work_areas
@@ -17,15 +19,24 @@ from .c_parts import distribute, part_names
 from .c_series import series_files
 from .c_text import Printed, print_block, print_precompute, used_helpers
 from .layouts import describe_layouts
+from .single_precision import in_single_precision, refuse_double
 from .sources import SourceSet, metadata_json, read_template, render
 
-#: Headers of the numbers that functions compute with.
-NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h", "eomgen_processor.h",
-           "eomgen_contraction.h")  # fmt: skip
+#: Headers of the numbers that functions compute with, and those that lanes need besides.
+NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h")
+PROCESSORS = ("eomgen_processor.h", "eomgen_contraction.h")
 
 
-def emit_c(program: Program) -> SourceSet:
+def emit_c(program: Program, precision: str | None = None, lanes: bool = True) -> SourceSet:
     """The C sources of a program.
+
+    Parameters
+    ----------
+    precision : {'double', 'float'}, optional
+        Of a library that stands alone: its header says what calls cost, and it has a semi-implicit stepper too.  One
+        in single precision has neither lanes nor Taylor series.
+    lanes : bool, optional
+        Whether there are functions for several states at a time, and Taylor series.
 
     Returns
     -------
@@ -35,18 +46,27 @@ def emit_c(program: Program) -> SourceSet:
         further files ``<name>_part1.c``, ..., so that they can be compiled side by side; tables stand in
         ``<name>_tables.c``, native functions in ``<name>_native_<first of them>.c``.
     """
-    in_lanes = lane_kernels(program)
+    single = precision == "float"
+    if single:
+        refuse_double(program)
+    lanes = lanes and not single
+    in_lanes = lane_kernels(program) if lanes else []
     series: dict[str, str] = {}
     about: dict[str, Any] = {"lanes": in_lanes, "series": True}
     try:
+        if not lanes:
+            raise NoSeriesError("single precision has too few digits for Taylor series" if single else "not asked for")
         series = series_files(program)
     except NoSeriesError as error:
         about |= {"series": False, "no_series": str(error)}
+    if precision:
+        about["precision"] = precision
     program = replace(program, metadata={**program.metadata, **about})
     printed = _print(program)
     parts = distribute(program, printed)
     calls = used_calls(program)
     context = _context(program, printed) | {"parts": parts, "part_names": part_names(printed) if parts else []}
+    context |= {"library": precision is not None, "costs": {}, "most_states": states_beside_change_points()}
     further = {
         f"{program.name}_part{k}.c": render(
             "c/part.c.j2",  # each declares its own pieces alone, so that the text grows as the pieces do
@@ -54,18 +74,28 @@ def emit_c(program: Program) -> SourceSet:
         )
         for k, part in enumerate(parts, 1)
     }
-    return SourceSet(
-        {
-            f"{program.name}.c": render("c/model.c.j2", context),
-            **further,
-            **lane_files(program, context),
-            **series,
-            **function_files(program, calls),
-            f"{program.name}.h": render("c/model.h.j2", context),
-            **{name: read_template(f"c/{name}") for name in ("eomgen.h", *NUMBERS)},
-            "model.json": metadata_json(program),
-        }
-    )
+    sources = {
+        f"{program.name}.c": render("c/model.c.j2", context),
+        **further,
+        **(lane_files(program, context) if lanes else {}),
+        **series,
+        **function_files(program, calls),
+    }
+    if precision:
+        context["costs"] = _costs(program, sources)
+    sources |= {
+        f"{program.name}.h": render("c/model.h.j2", context),
+        **{name: read_template(f"c/{name}") for name in ("eomgen.h", *NUMBERS, *(PROCESSORS if lanes else ()))},
+        "model.json": metadata_json(program),
+    }
+    return SourceSet(in_single_precision(sources) if single else sources)
+
+
+def _costs(program: Program, sources: Mapping[str, str]) -> dict[str, tuple[str, int]]:
+    """Operations and bytes of stack of every public function, by name."""
+    stacks = stack_of(text for name, text in sources.items() if name.endswith(".c"))
+    names = [k.name for k in program.kernels]
+    return {name: (operations_of(program, name), stacks[f"{program.name}_{name}"]) for name in names}
 
 
 def _print(program: Program) -> list[Printed]:
@@ -108,6 +138,8 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "parent": program.parent,
         "quaternion_slots": program.quaternion_slots,
         "coordinate_of": program.coordinate_of,
+        "has_loops": program.has_loops and program.projects,
+        "rates_are_velocities": not (program.quaternion_slots or program.given_rates),
         "by_columns": program.by_columns,
         "system": program.system if "system" in program.block_names else None,
         "kernels": [

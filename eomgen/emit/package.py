@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from textwrap import fill
@@ -11,16 +10,15 @@ from typing import Any
 from ..errors import UsageError
 from ..layer import read_layer
 from ..program import Program
-from ..targets import find_target
+from ..targets import PRECISIONS, find_target
 from ..texts import summary_text
 from .c import emit_c
 from .carried import carry
-from .example_state import example_state
 from .layouts import describe_layouts
 from .numpy import emit_numpy
 from .python_calls import describe_calls
 from .slim import carry_slim
-from .sources import SourceSet, metadata_json, render
+from .sources import SourceSet, metadata_json, number_texts, render
 
 #: Annotated attributes of the package, all of its default module.
 ANNOTATED: tuple[tuple[str, str], ...] = (
@@ -45,7 +43,7 @@ METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", 
 SLIM_METHODS = ("x0", "assemble", "bind", "simulate")
 
 
-def emit_package(program: Program, target: str, slim: bool = False) -> SourceSet:
+def emit_package(program: Program, target: str, slim: bool = False, precision: str = "double") -> SourceSet:
     """All files of an exported package, relative to its own folder.
 
     Parameters
@@ -54,6 +52,8 @@ def emit_package(program: Program, target: str, slim: bool = False) -> SourceSet
     target : {'cython', 'numpy', 'c'}
     slim : bool, optional
         Only calls and runs, as ``cython`` or ``numpy``; everything else refuses by name.
+    precision : {'double', 'float'}, optional
+        Of the numbers of a ``c`` library.
 
     Returns
     -------
@@ -64,15 +64,22 @@ def emit_package(program: Program, target: str, slim: bool = False) -> SourceSet
     Raises
     ------
     UsageError
-        An unknown target, or ``slim`` for a library of C, which holds no Python.
+        An unknown target or precision, ``slim`` for a library of C, which holds no Python, or ``float`` for another.
     """
     row = find_target(target)
+    if row.whole:
+        raise UsageError(f"target {target!r} makes one file, not a package; use generate")
     if slim and not row.module:
         raise UsageError(
             f"slim is for target cython or numpy; packages of target {target} contain no Python to leave out"
         )
+    if precision not in PRECISIONS:
+        raise UsageError(f"no precision {precision!r}; there are {', '.join(PRECISIONS)}")
+    if precision != "double" and not row.precisions:
+        raise UsageError(f"precision={precision!r} is for target c; packages of target {target} compute in double")
     program = replace(program, metadata={**program.metadata, "target": target})
-    return SourceSet({"model.json": metadata_json(program), **row.files(program, _context(program, slim))})
+    context = _context(program, slim) | {"precision": precision}
+    return SourceSet({"model.json": metadata_json(program), **row.files(program, context)})
 
 
 def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
@@ -95,19 +102,6 @@ def numpy_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
     """Functions of NumPy arrays, and what of eomgen they need."""
     own = emit_numpy(program, bundled=True)
     return {**own, **_python_files(context, own)}
-
-
-def c_library(program: Program, context: dict[str, Any]) -> dict[str, str]:
-    """Sources, headers, Makefile."""
-    sources = emit_c(program)
-    c_files = [name for name in sources if name.endswith(".c")]
-    objects = [name.removesuffix(".c") + ".o" for name in c_files]
-    context |= {"c_files": c_files, "object_files": objects, "x_values": _numbers(example_state(program))}
-    return {
-        **sources,
-        "Makefile": render("c/Makefile.j2", context),
-        "README.md": render("c/README.md.j2", context),
-    }
 
 
 def _python_files(context: dict[str, Any], core: Mapping[str, str]) -> dict[str, str]:
@@ -142,11 +136,6 @@ def _context(program: Program, slim: bool) -> dict[str, Any]:
         "listed": fill(", ".join(f'"{name}"' for name in (*attributes, *forms)), 110).splitlines(),
         "annotations": ANNOTATED,
         "methods": methods,
-        "p_values": _numbers(metadata.get("p_values")),
-        "u_values": _numbers(metadata.get("u_values")),
+        "p_values": number_texts(metadata.get("p_values")),
+        "u_values": number_texts(metadata.get("u_values")),
     }
-
-
-def _numbers(values: Any) -> str:
-    """Numbers as the inside of a C initialiser; a value that is not given becomes 0."""
-    return ", ".join(json.dumps(0.0 if x is None else float(x)) for x in values or ()) or "0.0"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -92,3 +92,8 @@ def read_template(name: str) -> str:
 def metadata_json(program: Program) -> str:
     """The text of model.json."""
     return json.dumps(program.metadata, indent=1, allow_nan=False) + "\n"
+
+
+def number_texts(values: Iterable[float | None] | None) -> str:
+    """Numbers as the inside of a C initialiser; a value that is not given becomes 0."""
+    return ", ".join(json.dumps(0.0 if x is None else float(x)) for x in values or ()) or "0.0"

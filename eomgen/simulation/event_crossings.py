@@ -14,7 +14,20 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import ZenoError
-from ..limits.runs import ASIDE, CROWDED, HALVED, INSTANT, LATE, MOMENTARY, RESTING, SAMPLED, TOUCHED, TOUCHING, TURNING
+from ..limits.runs import (
+    ASIDE,
+    CROWDED,
+    EARLIEST,
+    HALVED,
+    INSTANT,
+    LATE,
+    MOMENTARY,
+    RESTING,
+    SAMPLED,
+    TOUCHED,
+    TOUCHING,
+    TURNING,
+)
 from ..numeric.roots import Found, Search, search_least, search_root
 from ..numeric.scales import Array
 from .event_values import EventValues
@@ -76,7 +89,8 @@ class Crossings:
     # -- values ---------------------------------------------------------------------------------------------------
     def _slopes(self, t: float, x: Array, f: Array, g: Array, length: float, way: float = 1.0) -> Array:
         """Rates of the values along the motion, by a short way along x', onward (1) or back (-1)."""
-        h = way * ASIDE * (length or self.forward * max(abs(t), 1.0) * MOMENTARY)
+        least = max(abs(t), 1.0) * MOMENTARY  # a step that ends with a part of the run may be as short as rounding
+        h = way * ASIDE * (length if abs(length) >= least else self.forward * least)
         return (self.values(t + h, x + h * f) - g) / h
 
     def arm(self, t: float, x: Array, length: float = 0.0) -> None:
@@ -177,7 +191,9 @@ class Crossings:
                 return [Bracket(i, t, later, g, value)]
             seen = seen or value * side > 0.0
             t, g = later, value
-        back = not seen and last * side < 0.0  # within the accuracy of the step: resets that die away
+        moment = INSTANT * max(abs(step.t), EARLIEST)  # a step this short shows rounding only
+        long = abs(step.t - step.t_old) > moment
+        back = long and not seen and last * side < 0.0  # within the accuracy of the step: resets that die away
         self.leaving[i] = 0 if seen or back else side
         event = self.events[i]
         if back and event.direction * side <= 0 and event.action in (RESET, WAIT):

@@ -1,6 +1,8 @@
 /* sincos_one, _two, _four: of so many angles, into consecutive places; what they return tells any_far whether some are. */
 
-#ifndef EOMGEN_VECTORS
+#if defined(EOMGEN_SINGLE)
+/* sincos_one has been defined */
+#elif !defined(EOMGEN_VECTORS)
 static inline bits sincos_one(real a, real *restrict sines, real *restrict cosines)
 {
     *sines = sin(a);

@@ -1,5 +1,5 @@
 /* sin and cos of several angles together, without branches, within 2 units in the last place for |angle| <= EOMGEN_NEAR;
-   farther angles, infinities and NaN are left to libm. Plain functions take packs of angles, lanes one angle each.
+   farther angles, infinities and NaN are left to libm, or NaN where EOMGEN_OWN_ANGLES is defined. Plain functions take packs of angles, lanes one angle each.
 
    Reduction by multiples of pi/2 in four parts (W. J. Cody, W. Waite, Software Manual for the Elementary Functions,
    1980), of 33 bits each, so that their products with up to 2^20 are exact; then polynomials on [-pi/4, pi/4], made by
@@ -76,13 +76,17 @@ typedef int bits;
 #define any_far(far) (far)
 #endif
 
-/* What is far in these angles, by libm. */
+/* What is far in these angles. */
 static inline void sincos_far(real a, real *restrict sine, real *restrict cosine)
 {
     for (int k = 0; k < EOMGEN_WIDTH; k++) {
         if (!(fabs(EOMGEN_LANE(a, k)) <= EOMGEN_NEAR)) {
+#ifdef EOMGEN_OWN_ANGLES
+            EOMGEN_LANE(*sine, k) = EOMGEN_LANE(*cosine, k) = NAN;
+#else
             EOMGEN_LANE(*sine, k) = sin(EOMGEN_LANE(a, k));
             EOMGEN_LANE(*cosine, k) = cos(EOMGEN_LANE(a, k));
+#endif
         }
     }
 }

@@ -18,7 +18,7 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
     }
     for (int pair = 1; pair <= PAIRS; pair++) {
         for (int side = 0; side < 2; side++) {
-            const double at = t + (side ? -reach : reach) * pair * time_per_length;
+            const double at = t + (side ? -reach : reach) * (double)pair * time_per_length;
             const double *const p = next_point(t, u, c, pair, side, reach, time_per_length, w);
             for (int k = 0; k < NX && p != NULL; k++) {
                 state[k] = k < NQ ? p[k] : w[AT_STATE + k];

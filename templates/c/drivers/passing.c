@@ -8,7 +8,7 @@ static const double WEIGHT[4][PAIRS] = {{ 2.0 / 3, -1.0 / 6, 0.0, 0.0, 0.0 },
 static double *next_point(double t, const double *restrict u, const double *restrict c, int pair, int side,
                           double reach, double time_per_length, double *restrict w)
 {
-    const double distance = (side ? -reach : reach) * pair;
+    const double distance = (side ? -reach : reach) * (double)pair;
     double *const p = w + AT_POINTS + (side * PAIRS + pair - 1) * NQ;
     const double *const q = w + AT_STATE;
     if (pair == 1) {
@@ -36,7 +36,7 @@ static double interpolate(double t, const double *restrict u, const double *rest
     }
     for (int pair = 1; pair <= PAIRS; pair++) {
         for (int side = 0; side < 2; side++) { /* no curve: around = 0 */
-            const double at = t + (side ? -reach : reach) * pair * time_per_length;
+            const double at = t + (side ? -reach : reach) * (double)pair * time_per_length;
             const double *const p = around > 0.0 ? next_point(t, u, c, pair, side, reach, time_per_length, w) : NULL;
             if (p == NULL) {
                 return HUGE_VAL;
