@@ -127,7 +127,7 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
 
     def equation(line: PrintedLine) -> Iterator[str]:
         rows = _rows(parts, line)
-        if not rows:
+        if not isinstance(line.right, MatrixOf):
             yield from _wrapped(f"{text(line.left, parts.names)} = ", text(line.right, parts.names), columns)
         elif max(map(len, rows)) <= columns:
             yield from ("", *map(plain, rows))

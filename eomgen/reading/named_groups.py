@@ -10,7 +10,7 @@ from typing import Any
 import sympy
 
 
-class Meaning(IntEnum):
+class PartMeaning(IntEnum):
     """What a named part is, in the order in which parts are told."""
 
     CONSTANT = 0  #: of parameters alone
@@ -27,25 +27,25 @@ class Meaning(IntEnum):
 
 #: Names that tell what they are: ``R_rod_12``, ``omega_rod_x``.
 NAMES = (
-    (re.compile(r"R_(?:.+_)?[123]{2}"), Meaning.ROTATION),
-    (re.compile(r"omega_.+_[xyz]"), Meaning.ANGULAR_VELOCITY),
+    (re.compile(r"R_(?:.+_)?[123]{2}"), PartMeaning.ROTATION),
+    (re.compile(r"omega_.+_[xyz]"), PartMeaning.ANGULAR_VELOCITY),
 )
 Named = Sequence[tuple[Any, Any]]
 
 
 def grouped(
     named: Named,
-    outputs: Mapping[Meaning, Sequence[Any]],
+    outputs: Mapping[PartMeaning, Sequence[Any]],
     constants: Collection[str],
     moving: Collection[str],
-) -> dict[Meaning, list[tuple[Any, Any]]]:
+) -> dict[PartMeaning, list[tuple[Any, Any]]]:
     """Named parts by meaning.
 
     Parameters
     ----------
     named : sequence of (sympy.Symbol, sympy.Expr)
         In an order in which each uses only those before it; so are those of each group, and the groups.
-    outputs : mapping of Meaning to sequence of sympy.Expr
+    outputs : mapping of PartMeaning to sequence of sympy.Expr
         What uses the parts: entries of the mass matrix, of the right side, of the constraints.
     constants, moving : collection of str
         Names of parameters; of velocities and inputs.
@@ -54,8 +54,8 @@ def grouped(
     inside = {symbol: x.free_symbols for symbol, x in named}
     uses = _uses(named, outputs, known, inside)
     level: dict[Any, int] = {}  # 0 of parameters, 1 of coordinates, 2 of velocities
-    meaning: dict[Any, Meaning] = {}
-    groups: dict[Meaning, list[tuple[Any, Any]]] = {}
+    meaning: dict[Any, PartMeaning] = {}
+    groups: dict[PartMeaning, list[tuple[Any, Any]]] = {}
     for symbol, x in named:
         below = [level[s] if s in level else _level(s.name, constants, moving) for s in inside[symbol]]
         level[symbol] = max(below, default=0)
@@ -66,10 +66,13 @@ def grouped(
 
 
 def _uses(
-    named: Named, outputs: Mapping[Meaning, Sequence[Any]], known: Mapping[str, Meaning], inside: Mapping[Any, set[Any]]
-) -> dict[Any, set[Meaning]]:
+    named: Named,
+    outputs: Mapping[PartMeaning, Sequence[Any]],
+    known: Mapping[str, PartMeaning],
+    inside: Mapping[Any, set[Any]],
+) -> dict[Any, set[PartMeaning]]:
     """For what each part is used in the end, on the way to a known part too."""
-    uses: dict[Any, set[Meaning]] = {symbol: set() for symbol, _ in named}
+    uses: dict[Any, set[PartMeaning]] = {symbol: set() for symbol, _ in named}
     for meaning, entries in outputs.items():
         for x in entries:
             for symbol in x.free_symbols & uses.keys():
@@ -85,18 +88,21 @@ def _level(name: str, constants: Collection[str], moving: Collection[str]) -> in
     return 0 if name in constants else 2 if name in moving else 1
 
 
-def _meaning(x: Any, level: int, uses: set[Meaning]) -> Meaning:
+def _meaning(x: Any, level: int, uses: set[PartMeaning]) -> PartMeaning:
     if level == 0:
-        return Meaning.CONSTANT
+        return PartMeaning.CONSTANT
     if isinstance(x, sympy.sin | sympy.cos):
-        return Meaning.TURN
-    for known, at in ((Meaning.ROTATION, 1), (Meaning.ANGULAR_VELOCITY, 2)):
+        return PartMeaning.TURN
+    for known, at in ((PartMeaning.ROTATION, 1), (PartMeaning.ANGULAR_VELOCITY, 2)):
         if known in uses and level <= at:
             return known
-    body, row = uses & {Meaning.INERTIA, Meaning.FORCE}, uses & {Meaning.CONSTRAINT, Meaning.CONSTRAINT_RATE}
+    body, row = (
+        uses & {PartMeaning.INERTIA, PartMeaning.FORCE},
+        uses & {PartMeaning.CONSTRAINT, PartMeaning.CONSTRAINT_RATE},
+    )
     if body and row:
-        return Meaning.POSITION if level == 1 else Meaning.VELOCITY
+        return PartMeaning.POSITION if level == 1 else PartMeaning.VELOCITY
     own = body or row
     if level == 1 and len(own) > 1:
-        own = own & {Meaning.INERTIA, Meaning.CONSTRAINT}
-    return max(own, default=Meaning.FORCE)
+        own = own & {PartMeaning.INERTIA, PartMeaning.CONSTRAINT}
+    return max(own, default=PartMeaning.FORCE)

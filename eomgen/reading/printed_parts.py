@@ -15,22 +15,22 @@ from ..notation import dotted
 from ..notation.notation import Notation
 from ..printing import text
 from ..printing.formula_tree import Formula, Letter, MatrixOf, Name, NumberPart, Product, SumOf, Words
-from .named_groups import Meaning, grouped
+from .named_groups import PartMeaning, grouped
 from .printed_equations import PrintedEquations
 
 SHORT = 14  #: characters of an entry that stands in its matrix
 LARGE = 12  #: rows or columns of a matrix that is shown on request
 TITLES = {
-    Meaning.CONSTANT: "constants",
-    Meaning.TURN: "sines and cosines",
-    Meaning.ROTATION: "rotations: from the axes of the joint that holds a body to those of ground",
-    Meaning.POSITION: "positions",
-    Meaning.INERTIA: "mass matrix",
-    Meaning.CONSTRAINT: "Jacobian of the constraints",
-    Meaning.ANGULAR_VELOCITY: "angular velocities, along the axes of the joint that holds a body",
-    Meaning.VELOCITY: "velocities",
-    Meaning.FORCE: "right side",
-    Meaning.CONSTRAINT_RATE: "velocity terms of the constraints",
+    PartMeaning.CONSTANT: "constants",
+    PartMeaning.TURN: "sines and cosines",
+    PartMeaning.ROTATION: "rotations: from the axes of the joint that holds a body to those of ground",
+    PartMeaning.POSITION: "positions",
+    PartMeaning.INERTIA: "mass matrix",
+    PartMeaning.CONSTRAINT: "Jacobian of the constraints",
+    PartMeaning.ANGULAR_VELOCITY: "angular velocities, along the axes of the joint that holds a body",
+    PartMeaning.VELOCITY: "velocities",
+    PartMeaning.FORCE: "right side",
+    PartMeaning.CONSTRAINT_RATE: "velocity terms of the constraints",
 }
 ZERO = NumberPart("0")
 Piece = str | Formula
@@ -65,12 +65,12 @@ class PrintedGroup(NamedTuple):
 class _Matrix(NamedTuple):
     letter: str  #: in LaTeX
     entries: list[list[Formula]]
-    meaning: Meaning
+    meaning: PartMeaning
     values: Any
 
     @property
     def symmetric(self) -> bool:
-        return self.meaning == Meaning.INERTIA
+        return self.meaning == PartMeaning.INERTIA
 
     @property
     def is_column(self) -> bool:
@@ -110,8 +110,9 @@ class PrintedParts:
         rates = self.printed.accelerations
         column = rates[0] if self.printed.is_one_equation else MatrixOf(tuple((x,) for x in rates))
         yield PrintedRow((PrintedLine(Product((M, column)), f),))
-        if told := [x for letter, what in self.printed.letters_told for x in (Letter(letter), f" is {what}, ")]:
-            yield PrintedSentence((*told, "because the usual letters are names of the model."))
+        if told := [(Letter(letter), f" is {what}") for letter, what in self.printed.letters_told]:
+            pieces = [x for k, pair in enumerate(told) for x in ((", ", *pair) if k else pair)]
+            yield PrintedSentence((*pieces, "; the usual letters are names of the model."))
         if self.printed.of_loops:
             yield from self._embedding(M, v, f)
         for matrix in self._matrices:
@@ -139,18 +140,18 @@ class PrintedParts:
         free = [x for x, label in zip(every, k.velocity_labels, strict=True) if label in self._free]
         constrained = SumOf(((False, Product((C, rates))), (False, gamma)))
         yield PrintedSentence(
-            (mass, " and ", force, " are of all accelerations of the tree, ", rates, " = (", *_listed(every), "). With ",
-             "the constraints ", constrained, " = 0,")
-        )  # fmt: skip
+            (
+                *(mass, " and ", force, " are of all accelerations of the tree, ", rates, " = (", *_listed(every)),
+                *("). With the constraints ", constrained, " = 0,"),
+            )
+        )
         C_d, C_i, B_d, a_d = (Letter(f"{x}_{part}") for x, part in ((C.latex, "d"), (C.latex, "i"), (B, "d"), (a, "d")))
         inverse, moved = Letter(f"{C_d.latex}^{{-1}}"), SumOf(((False, Product((Letter(B), v))), (False, Letter(a))))
         solved = (PrintedLine(left, SumOf(((True, Product((inverse, x))),))) for left, x in ((B_d, C_i), (a_d, gamma)))
         yield PrintedRow((PrintedLine(rates, moved), *solved))
-        yield PrintedSentence(
-            ("where ", C_i, " holds the columns of ", C, " that belong to ", *_listed(free), ", and ", C_d, " the others. ",
-             B_d, " and ", a_d, " are the rows of the other accelerations; in the rows of ", v, ", ", Letter(B), " is the ",
-             "identity and ", Letter(a), " is 0.")
-        )  # fmt: skip
+        of_free = ("where ", C_i, " holds the columns of ", C, " that belong to ", *_listed(free), ", and ", C_d)
+        of_others = (" the others. ", B_d, " and ", a_d, " are the rows of the other accelerations; in the rows of ", v)
+        yield PrintedSentence((*of_free, *of_others, ", ", Letter(B), " is the identity and ", Letter(a), " is 0."))
 
     @property
     def _zeros(self) -> tuple[str, ...]:
@@ -169,7 +170,7 @@ class PrintedParts:
             system = eqs.tree_system
             choices = ("M_t", "A_t"), ("f_t", "b_t"), ("C", "J"), (r"\gamma", "c")
             given = [(self._letter(*choice), x) for choice, x in zip(choices, system[:4], strict=True)]
-        meanings = Meaning.INERTIA, Meaning.FORCE, Meaning.CONSTRAINT, Meaning.CONSTRAINT_RATE
+        meanings = PartMeaning.INERTIA, PartMeaning.FORCE, PartMeaning.CONSTRAINT, PartMeaning.CONSTRAINT_RATE
         return [
             _Matrix(letter, [list(map(self.printed.formula, row)) for row in x.tolist()], meaning, x)
             for (letter, x), meaning in zip(given, meanings, strict=False)

@@ -195,7 +195,7 @@ class Readable(QuantitiesOfMethods):
 
     @cached_property
     def tree_system(self) -> TreeSystem:
-        """M_t v' = f_t + C^T lambda and C v' + gamma = 0: the parts that long ``mass_matrix`` and ``force`` are made of.
+        """M_t v' = f_t + C^T lambda, C v' + gamma = 0: the parts that long ``mass_matrix`` and ``force`` are made of.
 
         With v' = B v_i' + a, which the constraints give, M = B^T M_t B and f = B^T (f_t - M_t a).  Where
         ``has_long_loops``, ``zeros`` names the coordinates on which M and f do not depend; 0 stands for them in all
@@ -212,8 +212,8 @@ class Readable(QuantitiesOfMethods):
 
         written = iter(self._write("tree_system", choose, "z", lambda _: formed[0].given))
         shapes = ((n_v, n_v), (n_v, 1), (n_c, n_v), (n_c, 1))
-        parts = (sympy.Matrix(m, n, [next(written) for _ in range(m * n)]) for m, n in shapes)
-        return TreeSystem(*parts, formed[0].zeros)
+        mass, force, C, gamma = (sympy.Matrix(m, n, [next(written) for _ in range(m * n)]) for m, n in shapes)
+        return TreeSystem(mass, force, C, gamma, formed[0].zeros)
 
     # -- motion of bodies and markers ---------------------------------------------------------------------------------
     def _places(self) -> tuple[str, ...]:

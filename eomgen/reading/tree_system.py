@@ -160,7 +160,7 @@ def _with_names(flat: Sequence[Expr], motion: Named) -> tuple[list[Expr], Named]
         if name in used:
             inner = substitute([value], {x: symbol for x, symbol in symbols.items() if x != value})
             used |= symbols_of(inner)
-            given.append((name, *inner))
+            given.append((name, inner[0]))
     return found, given[::-1]
 
 
