@@ -16,7 +16,7 @@ from eomgen.emit import emit_c
 from .linkages import v_engine
 from .models import humanoid
 from .report import Limit, Report, Table
-from .robot_loops import in_turns
+from .robot_calls import in_turns
 
 TITLE = "closed loops of any size beside open trees"
 
@@ -143,7 +143,7 @@ def run(quick: bool) -> Report:
         ),
         ("V6 engine, turned over straight", lambda: v_engine(0), lambda: v_engine(3), 1.2),
         ("40 sliders with a gear, over without", lambda: sliders(40, False), lambda: sliders(40, True), None),
-    ):
+    )[2 if quick else 0 :]:
         us = microseconds(plain=Built(plain), other=Built(other))
         pairs.append([what, us["plain"], us["other"], us["other"] / us["plain"]])
         if bound is None:

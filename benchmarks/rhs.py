@@ -21,7 +21,7 @@ from .latency import cold_cache
 from .measure import Sample
 from .models import spatial_chain
 from .report import Limit, Report, Table
-from .robot_loops import (
+from .robot_calls import (
     HERE,
     ROBOTS,
     Contestant,

@@ -1,234 +1,148 @@
-"""Robots as eomgen and its peers have them, each behind one C loop, so that calls are timed in turns in one process."""
+"""Robots with closed loops: accelerations by eomgen, Pinocchio with constraints, and MuJoCo, from one MJCF text."""
 
 from __future__ import annotations
 
 import ctypes
-import subprocess
-import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from time import perf_counter
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.compilation.compiler import find_compiler
-from eomgen.emit import emit_c
 
-from .measure import ROOT, Sample
+from .call import compile_call_loop, over_kernel
+from .loop_robots import ROBOTS
+from .report import Limit, Report, Table
+from .robot_calls import in_turns
+from .robot_kernels import timed
 
-HERE = Path(__file__).parent
-sys.path.insert(0, str(ROOT / "tests"))
-NUMBERS = ctypes.POINTER(ctypes.c_double)
-
-
-@dataclass(frozen=True)
-class Robot:
-    """A file of the package example-robot-data; ``locked`` joints are welds."""
-
-    name: str
-    file: str
-    floating: bool = False
-    locked: tuple[str, ...] = ()
+TITLE = "robots with closed loops beside Pinocchio and MuJoCo"
+#: What peers take at least of our time, and the largest relative residual of accelerations of ours.
+FASTER, RESIDUAL = 5.0, 1e-10
+#: Of Pinocchio's proximal solver: tolerances, regularisation, steps; its residuals come nearest to ours with these.
+PROXIMAL = (1e-12, 1e-12, 1e-10, 20)
+PAUSE = 0.05  #: seconds of motion before the state that all are given
 
 
-ROBOTS = (
-    Robot("Panda", "panda_description/urdf/panda.urdf", locked=("panda_finger_joint1", "panda_finger_joint2")),
-    Robot("UR5", "ur_description/urdf/ur5_robot.urdf"),
-    Robot("Talos", "talos_data/robots/talos_reduced.urdf"),
-    Robot("ANYmal", "anymal_b_simple_description/robots/anymal.urdf", floating=True),
-)
+class Pinocchio:
+    """A robot in Pinocchio, which judges the accelerations of all."""
+
+    def __init__(self, path: Path) -> None:
+        self.pin = pin = import_module("pinocchio")
+        self.model, self.loops = pin.buildModelAndLegacyConstraintsFromMJCF(str(path))[:2]
+        self.data, self.loop_data = self.model.createData(), pin.StdVec_RigidConstraintData()
+        for loop in self.loops:
+            self.loop_data.append(loop.createData())
+        pin.initConstraintDynamics(self.model, self.data, self.loops, self.loop_data)
+        self.names: list[str] = []
+        for joint, name in list(zip(self.model.joints, self.model.names, strict=True))[1:]:
+            body = name.removeprefix("Composite_").removesuffix("_0")
+            self.names += [f"{body}_{k}" for k in range(joint.nv)]
+        self.settings = pin.ProximalSettings(*PROXIMAL)
+        self.torques = np.zeros(self.model.nv)
+
+    def call(self, q: np.ndarray, v: np.ndarray) -> Callable[[], Any]:
+        """Its constrained forward dynamics."""
+        dynamics, model, data, settings = self.pin.constraintDynamics, self.model, self.data, self.settings
+        torques, loops, loop_data = self.torques, self.loops, self.loop_data
+        return lambda: dynamics(model, data, q, v, torques, loops, loop_data, settings)
+
+    def residual(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> float:
+        """By how much the connected points accelerate apart, over their accelerations."""
+        model, data = self.model, self.model.createData()
+        self.pin.forwardKinematics(model, data, q, v, a)
+
+        def point(joint: int, place: Any) -> np.ndarray:
+            motion, twist = place.actInv(data.a[joint]), place.actInv(data.v[joint])
+            local = motion.linear + np.cross(twist.angular, twist.linear)
+            return np.asarray((data.oMi[joint] * place).rotation @ local)
+
+        worst, size = 0.0, 1.0
+        for loop in self.loops:
+            one = point(loop.joint1_id, loop.joint1_placement)
+            other = point(loop.joint2_id, loop.joint2_placement)
+            worst, size = max(worst, np.abs(one - other).max()), max(size, np.abs(one).max())
+        return float(worst / size)
 
 
-def load(robot: Robot, **options: Any) -> eg.Model:
-    """The robot with a torque on every joint, inertias as numbers unless ``symbolic``."""
-    from robots.shipped import EXAMPLES
+def contest(name: str, folder: Path, rounds: int, burst: float, loop: Any) -> dict[str, Any]:
+    """One robot: sizes, operations, residuals, and the least nanoseconds of one call of each."""
+    mujoco = import_module("mujoco")
+    path = folder / "robot.xml"
+    path.write_text(ROBOTS[name]().text(), encoding="utf-8")
+    equations = eg.load(path).derive()
+    module = equations.compile()
+    rates = dict.fromkeys((module.v_names[i] for i in module.layout.independent), 0.4)
+    x = module.simulate((0.0, PAUSE), rates).x[:, -1]
+    ours = module.rhs(0.0, x)[module.n_q :]
 
-    settings = {"actuate": True, "lock": robot.locked, "floating": robot.floating, "rotation": "euler_parameters"}
-    return eg.load(EXAMPLES / robot.file, **settings | options)
-
-
-def load_pinocchio(robot: Robot) -> Any:
-    """The same in Pinocchio."""
-    from robots.shipped import EXAMPLES
-
-    pin = import_module("pinocchio")
-    root = (pin.JointModelFreeFlyer(),) if robot.floating else ()
-    model = pin.buildModelFromUrdf(str(EXAMPLES / robot.file), *root)
-    locked = [model.getJointId(name) for name in robot.locked]
-    return pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
-
-
-def state(model: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q, v, tau of a Pinocchio model: all joints turned and moving."""
-    pin = import_module("pinocchio")
-    q, free = pin.neutral(model), model.nq - model.nv
-    first = 7 if free else 0
-    q[first:] = 0.1 + 0.05 * np.arange(model.nq - first)
-    if free:
-        q[3:7] = np.array([0.2, -0.1, 0.3, 0.927]) / np.linalg.norm([0.2, -0.1, 0.3, 0.927])
-    tau = np.full(model.nv, 0.1)
-    tau[: 6 if free else 0] = 0.0
-    return q, np.full(model.nv, 0.3), tau
-
-
-class Contestant:
-    """A compiled right-hand side behind ``rhs_loop.c``."""
-
-    def __init__(self, library: Path, n_q: int, n_v: int, x: np.ndarray, u: np.ndarray) -> None:
-        self.library = ctypes.CDLL(str(library))
-        self.library.measure.restype = ctypes.c_double
-        self.sizes, self.start = (n_q, n_v), np.array(x, dtype=float)
-        self.x, self.u, self.out = self.start.copy(), np.array(u, dtype=float), np.zeros(n_q + n_v)
-
-    def measure(self, calls: int) -> float:
-        """Nanoseconds a call."""
-        self.x[:] = self.start
-        x, u, out = (a.ctypes.data_as(NUMBERS) for a in (self.x, self.u, self.out))
-        return float(self.library.measure(ctypes.c_long(calls), *self.sizes, x, u, out))
-
-    def result(self) -> np.ndarray:
-        """x' at the start."""
-        self.measure(1)
-        return self.out.copy()
-
-
-def compile_loop(
-    folder: Path, name: str, texts: Mapping[str, str], flags: Sequence[str], extra: Sequence[str] = ()
-) -> tuple[Path, float]:
-    """Compile texts and the loop into a library; the seconds are those of the texts alone, one after the other."""
-    compiler, own = find_compiler(), folder / name
-    own.mkdir()
-    for file, text in texts.items():
-        (own / file).write_text(text, encoding="utf-8")
-    objects, seconds = [], 0.0
-    for file in [f for f in texts if f.endswith(".c")]:
-        start = perf_counter()
-        includes = ["-I", str(own), "-DEOMGEN_LANES=0"]  # one state at a time: no files of vector kernels
-        _run([*compiler.command, *flags, *includes, *extra, "-c", str(own / file), "-o", str(own / f"{file}.o")])
-        seconds += perf_counter() - start
-        objects.append(str(own / f"{file}.o"))
-    library, loop = own / "loop.so", str(HERE / "rhs_loop.c")
-    libraries = [word for word in extra if not word.startswith("-I")]
-    _run([*compiler.command, "-O2", "-fPIC", "-shared", loop, *objects, *libraries, "-lm", "-o", str(library)])
-    return library, seconds
-
-
-def _run(command: Sequence[str]) -> None:
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise RuntimeError(f"{' '.join(command)} failed:\n{done.stderr[-2000:]}")
-
-
-def of_eomgen(program: Any) -> dict[str, str]:
-    """The C files of a program and what puts its right-hand side behind the loop."""
-    name, upper = program.name, program.name.upper()
-    values = ", ".join(repr(float(value)) for value in program.metadata["p_values"]) or "0.0"
-    adapter = f"""#include "{name}.h"
-static double constants[{upper}_N_CONST + 1], work[{upper}_N_WORK + 1];
-void prepare(void)
-{{
-    const double p[] = {{{values}}};
-    {name}_precompute(p, constants);
-}}
-void call(const double *x, const double *u, double *out)
-{{
-    {name}_rhs(0.0, x, u, constants, out, work);
-}}
-"""
-    files = {file: text for file, text in emit_c(program).items() if file.endswith((".c", ".h"))}
-    return {file: text for file, text in files.items() if "_lanes" not in file or file.endswith(".h")} | {
-        "adapter.c": adapter
+    peer = Pinocchio(path)
+    place = [module.q_names.index(name) for name in peer.names]
+    q, v = x[: module.n_q][place], x[module.n_q :][place]
+    theirs = np.array(peer.call(q, v)())
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data, empty = mujoco.MjData(model), mujoco.MjModel.from_xml_string("<mujoco/>")
+    joints = [module.q_names.index(model.joint(k).name) for k in range(model.njnt)]
+    data.qpos[:], data.qvel[:] = x[: module.n_q][joints], x[module.n_q :][joints]
+    mujoco.mj_forward(model, data)
+    soft = np.empty(module.n_v)
+    soft[joints] = data.qacc
+    nothing, none = import_module("pinocchio").Model(), mujoco.MjData(empty)
+    zero, spare, pin = np.zeros(0), import_module("pinocchio").Model().createData(), import_module("pinocchio")
+    address, *pointers, kept = over_kernel(module, "rhs", x, np.empty(module.n_x))
+    actions = {
+        "eomgen": lambda calls: float(loop(address, ctypes.c_long(calls), *pointers)),
+        "Pinocchio": timed(peer.call(q, v)),
+        "MuJoCo": timed(lambda: mujoco.mj_forward(model, data)),
+        "a call of Pinocchio": timed(lambda: pin.aba(nothing, spare, zero, zero, zero)),
+        "a call of MuJoCo": timed(lambda: mujoco.mj_forward(empty, none)),
     }
+    times = {who: sample.best for who, sample in in_turns(actions, rounds, burst).items()}
+    for who in ("Pinocchio", "MuJoCo"):
+        times[who] -= times.pop(f"a call of {who}")
+    del kept
+    counts = pipeline.build(equations, "c", ["rhs"]).counts
+    return {
+        "velocities": module.n_v, "rows": module.n_rows, "freedoms": module.n_dof,
+        "method": equations.method, "operations": sum(x.total for x in counts.values()),
+        "ns": times,
+        "residual": {
+            "eomgen": peer.residual(q, v, ours[place]), "Pinocchio": peer.residual(q, v, theirs),
+            "MuJoCo": peer.residual(q, v, soft[place]),
+        },
+        "difference": float(np.abs(theirs - ours[place]).max() / np.abs(ours).max()),
+    }  # fmt: skip
 
 
-def of_casadi(source: str) -> dict[str, str]:
-    """CasADi's C text, whose work array is asked for when it is loaded."""
-    adapter = """int f(const double **arg, double **res, long long *iw, double *w, int mem);
-static double work[100000];
-void call(const double *x, const double *u, double *out)
-{
-    const double *arguments[4] = {x, u};
-    double *results[4] = {out};
-    f(arguments, results, 0, work, 0);
-}
-"""
-    return {"f.c": source, "adapter.c": adapter}
-
-
-def mujoco_library() -> tuple[list[str], str]:
-    """Flags for MuJoCo's headers and library, and the adapter."""
-    package = Path(str(import_module("mujoco").__file__)).parent
-    library = next(package.glob("libmujoco.so*"))
-    return [f"-I{package / 'include'}", str(library), f"-Wl,-rpath,{package}"], "rhs_mujoco.c"
-
-
-def as_mjcf(model: Any) -> str:
-    """A Pinocchio model as MJCF text, without contacts."""
-    pin = import_module("pinocchio")
-    children: dict[int, list[int]] = {}
-    for k in range(1, model.njoints):
-        children.setdefault(model.parents[k], []).append(k)
-
-    def numbers(values: Any) -> str:
-        return " ".join(repr(float(x)) for x in values)
-
-    def body(k: int) -> str:
-        place, inertia, kind = model.jointPlacements[k], model.inertias[k], model.joints[k].shortname()
-        x, y, z, w = pin.Quaternion(place.rotation).coeffs()
-        J = np.asarray(inertia.inertia)
-        axis = {"X": "1 0 0", "Y": "0 1 0", "Z": "0 0 1"}.get(kind[-1])
-        damping = 0.0 if kind == "JointModelFreeFlyer" else float(model.damping[model.joints[k].idx_v])
-        joint = f'<joint type="hinge" axis="{axis}" damping="{damping!r}"/>'
-        if kind == "JointModelFreeFlyer":
-            joint = "<freejoint/>"
-        full = numbers((J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]))
-        return (
-            f'<body pos="{numbers(place.translation)}" quat="{numbers((w, x, y, z))}">{joint}'
-            f'<inertial pos="{numbers(inertia.lever)}" mass="{float(inertia.mass)!r}" fullinertia="{full}"/>'
-            + "".join(map(body, children.get(k, [])))
-            + "</body>"
-        )
-
-    return (
-        '<mujoco><compiler autolimits="true" balanceinertia="false" boundmass="0"/>'
-        '<option gravity="0 0 -9.81"><flag contact="disable" constraint="disable"/></option>'
-        f"<worldbody>{''.join(map(body, children[0]))}</worldbody></mujoco>"
+def run(quick: bool) -> Report:
+    """All robots, the first alone if it is to be quick."""
+    rounds, burst = (3, 2e-4) if quick else (60, 2e-3)
+    found = {}
+    with TemporaryDirectory() as name:
+        loop = compile_call_loop(Path(name))
+        for robot in [*ROBOTS][:1] if quick else ROBOTS:
+            found[robot] = contest(robot, Path(name), rounds, burst, loop)
+    rows: list[list[Any]] = []
+    limits = []
+    for robot, r in found.items():
+        own, sizes = r["ns"]["eomgen"], [r[key] for key in ("velocities", "rows", "freedoms", "method", "operations")]
+        rows.append([robot, *sizes, *r["ns"].values(), *(r["ns"][who] / own for who in ("Pinocchio", "MuJoCo")),
+                     *(f"{r['residual'][who]:.0e}" for who in ("eomgen", "Pinocchio", "MuJoCo"))])  # fmt: skip
+        limits.append(Limit(f"{robot}: residual of the accelerations", r["residual"]["eomgen"], RESIDUAL))
+        if not quick:
+            for who in ("Pinocchio", "MuJoCo"):
+                limits.append(Limit(f"{robot}, {who} over ours,", r["ns"][who] / own, FASTER, at_least=True))
+    columns = ("robot", "n", "rows", "freedoms", "method", "operations", "eomgen ns", "Pinocchio ns", "MuJoCo ns",
+               "Pinocchio over", "MuJoCo over", "residual", "Pinocchio's", "MuJoCo's")  # fmt: skip
+    notes = (
+        "One MJCF text for all: hinges and slides, points connected; a state after 0.05 s of motion from the first.",
+        "Ours: rhs in a loop in C, projection onto the loops included. Pinocchio: constraintDynamics of its wheel.",
+        "MuJoCo: mj_forward, constraints as stiff as it allows. Both from Python, less a call of an empty model.",
+        "Residual: by how much connected points accelerate apart, relative, computed by Pinocchio from each result.",
+        "Operations: of the function of all steps of rhs, the projection's for one Newton step.",
     )
-
-
-def pinocchio_calls(model: Any) -> dict[str, Callable[[int], float]]:
-    """Nanoseconds a call of ABA from Python, and of the same call on a model without joints, which is its overhead."""
-    pin = import_module("pinocchio")
-    empty, found = pin.Model(), {}
-    for title, one in (("aba", model), ("overhead", empty)):
-        arguments = (one, one.createData(), *(state(one) if one.nv else (np.zeros(0),) * 3))
-
-        def timed(calls: int, arguments: tuple[Any, ...] = arguments, aba: Any = pin.aba) -> float:
-            start = perf_counter()
-            for _ in range(calls):
-                aba(*arguments)
-            return (perf_counter() - start) / calls * 1e9
-
-        found[title] = timed
-    return found
-
-
-def in_turns(actions: Mapping[str, Callable[[int], float]], rounds: int, burst: float) -> dict[str, Sample]:
-    """Nanoseconds a call: many short bursts (s), a contestant after the other."""
-    calls = {who: max(3, int(burst * 1e9 / action(10))) for who, action in actions.items()}
-    values: dict[str, list[float]] = {who: [] for who in actions}
-    for _ in range(rounds):
-        for who, action in actions.items():
-            values[who].append(action(calls[who]))
-    return {who: Sample(tuple(found)) for who, found in values.items()}
-
-
-def build(robot: Robot, **options: Any) -> tuple[Any, Any]:
-    """The derived equations and the program of the right-hand side alone."""
-    equations = load(robot, **options).derive()
-    return equations, pipeline.build(equations, "c", kernels=["rhs"])
+    return Report((Table("accelerations", columns, rows),), tuple(limits), notes, found)

@@ -15,8 +15,8 @@ from .report import Report, show, write
 
 BENCHMARKS = (
     *("derive", "growth", "compile", "panda", "robots", "latency"),
-    *("call", "simulate", "integrate", "stiff", "loops", "large_loops", "four_bars"),
-    *("rhs", "lanes", "ensembles", "equilibria"),
+    *("call", "simulate", "integrate", "stiff", "loops", "large_loops", "four_bars", "robot_loops"),
+    *("operation_counts", "rhs", "robot_kernels", "grid_robots", "lanes", "ensembles", "equilibria"),
 )
 
 

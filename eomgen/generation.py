@@ -10,9 +10,10 @@ import numpy as np
 
 from .emit import emit_package
 from .emit.write import write_package
+from .errors import UsageError
 from .files.path_names import as_path
 from .pipeline import build, derive
-from .targets import TARGETS
+from .targets import find_target
 from .verification.record import record
 from .verification.recorded import FILE
 
@@ -30,8 +31,9 @@ def generate(
     baumgarte: tuple[float, float] | None = None,
     slim: bool = False,
     precision: str = "double",
+    fmi: str = "2.0",
 ) -> Path:
-    """Write a package that stands alone into ``directory/<name>/`` and return that path.
+    """Write a package that stands alone into ``directory/<name>/``, or ``directory/<name>.fmu``, and return that path.
 
     Files of an earlier generation that are no longer needed are removed; those of others are left alone.
 
@@ -41,12 +43,14 @@ def generate(
     directory : Path or str
     method, independent, baumgarte : optional
         As for ``Model.compile``.
-    target : {'cython', 'numpy', 'c'}
+    target : {'cython', 'numpy', 'c', 'fmu'}
     slim : bool, optional
         Write calls, events and ``simulate`` only, in a tenth of the Python text; what else is called refuses by name.
     precision : {'double', 'float'}, optional
         Of the numbers of a ``c`` library: ``float`` is for processors whose unit knows single precision alone, and
         leaves five to six digits.
+    fmi : {'2.0', '3.0'}, optional
+        Version of FMI of a functional mock-up unit.
 
     Raises
     ------
@@ -54,9 +58,14 @@ def generate(
         The folder exists and is no generated package, or holds a file in the way that eomgen did not write.
     """
     folder = as_path("directory", directory)
+    row = find_target(target)
     equations = derive(model, method, independent, baumgarte)
+    if row.whole:
+        if slim or precision != "double":
+            raise UsageError(f"slim and precision are for packages; target {target} makes one file")
+        return row.write(equations, folder, fmi)
     program = build(equations, target)
     sources = dict(emit_package(program, target, slim, precision))
-    if TARGETS[target].module and not slim:
+    if row.module and not slim:
         sources[FILE] = record(program)
     return write_package(sources, folder / equations.name)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from importlib import import_module
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from .errors import UsageError
@@ -19,6 +20,9 @@ FORMATS = ("latex", "text", "sympy", "matlab", "octave", "julia", "mathematica",
 
 #: Types of the numbers of a C library.
 PRECISIONS = ("double", "float")
+
+#: Versions of FMI, the standard of functional mock-up units.
+FMI_VERSIONS = ("2.0", "3.0")
 
 
 #: Kernels of targets whose library differentiates by itself.
@@ -46,22 +50,34 @@ class Target(NamedTuple):
         Whether its numbers may be of single precision.
     kernels : tuple of str
         The functions it has, of :data:`~.kernel_table.KERNELS`; all if empty.
+    whole : str
+        "file.function" of (equations, directory, version) that writes one file instead of a package.
     """
 
     about: str
-    package: Callable[[Any, dict[str, Any]], Files] | str
+    package: Callable[[Any, dict[str, Any]], Files] | str = ""
     module: bool = False
     arrays: bool = False
     precisions: bool = False
     kernels: tuple[str, ...] = ()
+    whole: str = ""
 
     def files(self, program: Any, context: dict[str, Any]) -> Files:
         """The package of a program."""
-        if callable(self.package):
-            return self.package(program, context)
-        home, name = self.package.rsplit(".", 1)
-        found: Files = getattr(import_module(f".{home}", __package__), name)(program, context)
+        found: Files = (self.package if callable(self.package) else _find(self.package))(program, context)
         return found
+
+    def write(self, equations: Any, directory: Path, version: str) -> Path:
+        """The one file of a model."""
+        written: Path = _find(self.whole)(equations, directory, version)
+        return written
+
+
+def _find(name: str) -> Callable[..., Any]:
+    """The function "file.function" within eomgen."""
+    home, function = name.rsplit(".", 1)
+    found: Callable[..., Any] = getattr(import_module(f".{home}", __package__), function)
+    return found
 
 
 TARGETS: dict[str, Target] = {
@@ -74,6 +90,7 @@ TARGETS: dict[str, Target] = {
         "set of functions of CasADi's SX", "emit.traced.casadi_package", arrays=True, kernels=TRACED_KERNELS
     ),
     "jax": Target("set of pure functions of JAX", "emit.traced.jax_package", arrays=True, kernels=TRACED_KERNELS),
+    "fmu": Target("functional mock-up unit for other simulators, one file", whole="fmu.generate_fmu"),
 }
 
 

@@ -11,6 +11,14 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 CACHE = pytest.StashKey[str]()
+#: Programs that some tests need and the README does not promise: a mark ``needs(name)`` leaves a test out where there
+#: is none, and the end of the run says so.  Name -> the commands it goes by, and Debian's package.
+PROGRAMS = {
+    "chromium": (("chromium", "chromium-browser", "google-chrome"), "chromium"),
+    "gcc for ARM": (("arm-none-eabi-gcc",), "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
+    "gcc for RISC-V": (("riscv64-linux-gnu-gcc",), "gcc-riscv64-linux-gnu libc6-dev-riscv64-cross"),
+    "qemu": (("qemu-arm",), "qemu-user"),
+}
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -37,8 +45,24 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--no-skips", action="store_true", help="fail the run when a test was skipped or expected to fail")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def is_there(program: str) -> bool:
+    """Whether one of PROGRAMS is on the path."""
+    return any(shutil.which(command) for command in PROGRAMS[program][0])
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    needs = {item: [name for mark in item.iter_markers("needs") for name in mark.args] for item in items}
+    left_out = [item for item in items if not all(map(is_there, needs[item]))]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+    items[:] = [item for item in items if item not in left_out]
     items.sort(key=lambda item: (item.get_closest_marker("slow") is not None, "acceptance" in item.path.parts))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    for name, (_, package) in PROGRAMS.items():
+        if not is_there(name):
+            terminalreporter.write_line(f"tests that need {name} were left out; to run them: apt install {package}")
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.call import compile_call_loop
 from benchmarks.derive import largest_difference
 from benchmarks.report import Limit, number
 from benchmarks.rhs import contest
-from benchmarks.robot_loops import ROBOTS
+from benchmarks.robot_calls import ROBOTS
+from benchmarks.robot_loops import contest as loops_contest
 from benchmarks.run import main
 
 
@@ -34,6 +36,14 @@ def test_robots_in_c_move_as_pinocchio_and_mujoco_say(tmp_path: Path) -> None:
     assert {"eomgen, default", "eomgen, symbols, default", "MuJoCo"} <= set(found["differences"])
     assert max(found["differences"].values()) < 1e-9
     assert set(found["ns"]) >= set(found["differences"])
+
+
+@pytest.mark.slow
+def test_robots_with_loops_move_as_pinocchio_says(tmp_path: Path) -> None:
+    found = loops_contest("hand of three parallel fingers", tmp_path, 2, 1e-4, compile_call_loop(tmp_path))
+    assert found["difference"] < 1e-10
+    assert found["residual"]["eomgen"] < 1e-12
+    assert (found["velocities"], found["rows"], found["freedoms"]) == (9, 6, 3)
 
 
 def test_unknown_benchmark_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

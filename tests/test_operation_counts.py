@@ -14,8 +14,10 @@ import pytest
 
 import eomgen as eg
 from benchmarks.growth import operations
+from benchmarks.loop_robots import ROBOTS as LOOP_ROBOTS
 from benchmarks.models import ARMS, chain, humanoid, numeric_arm, panda, spatial_chain, symbolic_arm
-from benchmarks.robot_loops import ROBOTS, Robot, build
+from benchmarks.operation_counts import base_inertias, of_eomgen
+from benchmarks.robot_calls import ROBOTS, Robot, build, load_pinocchio, state
 from eomgen import pipeline
 from eomgen.emit import emit_c
 from eomgen.equations import METHODS
@@ -108,6 +110,57 @@ def test_right_hand_sides_of_robots(robot: Robot) -> None:
     _, symbolic = build(robot, symbolic=True)
     assert symbolic.counts["rhs"].total <= total
     assert symbolic.counts["precompute"].total > 50
+
+
+#: Operations without base parameters, and multiplications, additions, divisions with them (docs/operations.md).
+WITHOUT_BASE = {"Panda": 1316, "UR5": 618, "Talos": 7109, "ANYmal": 3677}
+SPLIT = {"Panda": (642, 550, 6), "UR5": (308, 243, 5), "Talos": (3539, 3091, 27), "ANYmal": (1760, 1622, 15)}
+
+
+@pytest.mark.parametrize("robot", ROBOTS[:2], ids=lambda robot: robot.name)
+def test_operations_on_equal_terms(robot: Robot) -> None:
+    """What the page counts with base parameters and without."""
+    on, off = of_eomgen(robot, True), of_eomgen(robot, False)
+    assert tuple(on.values()) == SPLIT[robot.name]
+    assert sum(off.values()) == WITHOUT_BASE[robot.name]
+
+
+LOOPS_FOUND = {
+    "ankle with two rods": 6453,
+    "two legs with such ankles": 12901,
+    "hand of three parallel fingers": 2083,
+    "delta robot": 27044,
+    "Stewart platform": 24332,
+}
+
+
+@pytest.mark.parametrize("name", LOOPS_FOUND)
+def test_right_hand_sides_of_robots_with_loops(name: str, tmp_path: Path) -> None:
+    (tmp_path / "robot.xml").write_text(LOOP_ROBOTS[name]().text())
+    counts = pipeline.build(eg.load(tmp_path / "robot.xml").derive(), "c", ["rhs"]).counts
+    assert sum(x.total for x in counts.values()) == LOOPS_FOUND[name]
+
+
+@pytest.mark.parametrize("robot", ROBOTS[:3], ids=lambda robot: robot.name)
+def test_regrouped_inertia_of_peers_takes_the_same_torques(robot: Robot) -> None:
+    """Newton-Euler over Pinocchio's twists, once with its own inertia and once with what the peers are given."""
+    pin, model = pytest.importorskip("pinocchio"), load_pinocchio(robot)
+    data = model.createData()
+    q, v, _ = state(model)
+    expected = pin.rnea(model, data, q, v, 0.7 * v)
+    base = base_inertias(model)
+    assert sum(m == 0.0 for m, _, _ in base) == model.njoints - 1  # hinges alone: what ground carries is gone
+    forces = [pin.Force.Zero() for _ in range(model.njoints)]
+    found = np.zeros(model.nv)
+    for k in reversed(range(1, model.njoints)):
+        m, h, J = base[k - 1]
+        skew = np.array([[0, -h[2], h[1]], [h[2], 0, -h[0]], [-h[1], h[0], 0]])
+        inertia = np.block([[m * np.eye(3), -skew], [skew, J]])
+        own = pin.Force(inertia @ data.a_gf[k].vector) + data.v[k].cross(pin.Force(inertia @ data.v[k].vector))
+        total = forces[k] + own
+        found[model.joints[k].idx_v] = total.angular["XYZ".index(model.joints[k].shortname()[-1])]
+        forces[model.parents[k]] = forces[model.parents[k]] + data.liMi[k].act(total)
+    np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
 
 
 def test_hinges_about_parallel_axes_are_resolved_together() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import pipeline
@@ -111,6 +112,33 @@ class Equations(Derivation):
         module = Module(pipeline.compile_core(self, target, kernels, **options))
         module.equations = self
         return module
+
+    def write_fmu(self, path: str | Path | None = None, version: str = "2.0") -> Path:
+        """Write a functional mock-up unit for other simulators: see :func:`eomgen.fmu.write_fmu`.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            Of the file, by default ``<name>.fmu`` here.
+        version : {'2.0', '3.0'}, optional
+            Of FMI.
+
+        Returns
+        -------
+        Path
+
+        Examples
+        --------
+        >>> import eomgen as eg
+        >>> m = eg.Model("pendulum", gravity=(0, "-g", 0))
+        >>> g, l = m.parameter("g", 9.81), m.parameter("l", 0.5)
+        >>> hinge = m.revolute("hinge", m.ground, m.body("bob", mass=2, com=(0, -l, 0)), coordinate="theta")
+        >>> m.derive().write_fmu("pendulum.fmu", version="3.0").name  # doctest: +SKIP
+        'pendulum.fmu'
+        """
+        from ..fmu import write_fmu
+
+        return write_fmu(self, path, version)
 
     def _picture_and_facts(self, facts: str) -> str:
         return side_by_side(self._picture, facts)

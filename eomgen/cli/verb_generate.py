@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ..targets import PRECISIONS, TARGETS
+from ..targets import FMI_VERSIONS, PRECISIONS, TARGETS
 from .failures import reports_failures
 from .screen import print_json, say, stage
 from .sections import verb_command
@@ -47,6 +47,13 @@ from .shared_options import (
     show_default=True,
     help="Type of the numbers of a C library; float is for processors that know single precision alone.",
 )
+@click.option(
+    "--fmi",
+    type=click.Choice(FMI_VERSIONS),
+    default="2.0",
+    show_default=True,
+    help="Version of FMI, the standard of functional mock-up units, for target fmu.",
+)
 @json_option
 @robot_options
 @reports_failures
@@ -60,18 +67,22 @@ def generate(
     target: str,
     slim: bool,
     precision: str,
+    fmi: str,
     as_json: bool,
     robot: dict[str, Any],
 ) -> None:
-    """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`."""
+    """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`.
+
+    Target fmu is one file, DIR/<name>.fmu.
+    """
     from ..generation import generate as write_out
 
     with blaming_option(independent), stage("generate"):
         described = load_model(model, allow_native, robot)
-        folder = write_out(described, out, method, target, independent or None, baumgarte, slim, precision)
+        folder = write_out(described, out, method, target, independent or None, baumgarte, slim, precision, fmi)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     if as_json:
-        print_json({"name": folder.name, "target": target, "slim": slim, "folder": str(folder), "files": files})
+        print_json({"name": folder.stem, "target": target, "slim": slim, "folder": str(folder), "files": files})
         return
     say(str(folder))
     for name in files:

@@ -110,15 +110,17 @@ def compile_sources(
 
 
 def compile_c_library(
-    sources: Mapping[str, str], name: str, options: Options | None = None, progress: Progress | None = None
-) -> Artifact:
+    sources: Mapping[str, str], name: str, options: Options | None = None, progress: Progress | None = None,
+    *, steppers: bool = False,
+) -> Artifact:  # fmt: skip
     """Compile a model into a plain shared library for C programs or ctypes; needs neither Python.h nor Cython.
 
     Parameters and errors are those of :func:`compile_sources`. Every function that is not static can be called.
+    With ``steppers`` the files of the layer that are among the sources are compiled too.
     """
     start = time.perf_counter()
     options = options or Options()
-    sources = {file: text for file, text in sources.items() if file not in LAYER}
+    sources = {file: text for file, text in sources.items() if steppers or file not in LAYER}
     _check(sources, name)
     sources, width = choose_lanes(sources, options.lanes)
     compiler = find_compiler(options.compiler)

@@ -27,7 +27,7 @@ NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h")
 PROCESSORS = ("eomgen_processor.h", "eomgen_contraction.h")
 
 
-def emit_c(program: Program, precision: str | None = None) -> SourceSet:
+def emit_c(program: Program, precision: str | None = None, lanes: bool = True) -> SourceSet:
     """The C sources of a program.
 
     Parameters
@@ -35,6 +35,8 @@ def emit_c(program: Program, precision: str | None = None) -> SourceSet:
     precision : {'double', 'float'}, optional
         Of a library that stands alone: its header says what calls cost, and it has a semi-implicit stepper too.  One
         in single precision has neither lanes nor Taylor series.
+    lanes : bool, optional
+        Whether there are functions for several states at a time, and Taylor series.
 
     Returns
     -------
@@ -47,12 +49,13 @@ def emit_c(program: Program, precision: str | None = None) -> SourceSet:
     single = precision == "float"
     if single:
         refuse_double(program)
-    in_lanes = [] if single else lane_kernels(program)
+    lanes = lanes and not single
+    in_lanes = lane_kernels(program) if lanes else []
     series: dict[str, str] = {}
     about: dict[str, Any] = {"lanes": in_lanes, "series": True}
     try:
-        if single:
-            raise NoSeriesError("single precision has too few digits for Taylor series")
+        if not lanes:
+            raise NoSeriesError("single precision has too few digits for Taylor series" if single else "not asked for")
         series = series_files(program)
     except NoSeriesError as error:
         about |= {"series": False, "no_series": str(error)}
@@ -74,7 +77,7 @@ def emit_c(program: Program, precision: str | None = None) -> SourceSet:
     sources = {
         f"{program.name}.c": render("c/model.c.j2", context),
         **further,
-        **({} if single else lane_files(program, context)),
+        **(lane_files(program, context) if lanes else {}),
         **series,
         **function_files(program, calls),
     }
@@ -82,7 +85,7 @@ def emit_c(program: Program, precision: str | None = None) -> SourceSet:
         context["costs"] = _costs(program, sources)
     sources |= {
         f"{program.name}.h": render("c/model.h.j2", context),
-        **{name: read_template(f"c/{name}") for name in ("eomgen.h", *NUMBERS, *(() if single else PROCESSORS))},
+        **{name: read_template(f"c/{name}") for name in ("eomgen.h", *NUMBERS, *(PROCESSORS if lanes else ()))},
         "model.json": metadata_json(program),
     }
     return SourceSet(in_single_precision(sources) if single else sources)

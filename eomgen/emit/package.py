@@ -67,6 +67,8 @@ def emit_package(program: Program, target: str, slim: bool = False, precision: s
         An unknown target or precision, ``slim`` for a library of C, which holds no Python, or ``float`` for another.
     """
     row = find_target(target)
+    if row.whole:
+        raise UsageError(f"target {target!r} makes one file, not a package; use generate")
     if slim and not row.module:
         raise UsageError(
             f"slim is for target cython or numpy; packages of target {target} contain no Python to leave out"

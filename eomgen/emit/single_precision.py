@@ -12,7 +12,7 @@ from math import log
 
 from ..errors import UsageError
 from ..limits.in_c import KINDS
-from ..limits.rounding import EPS
+from ..limits.rounding import EPS, SINGLE_COARSE, SINGLE_FAR
 from ..operations import FUNCTION, OPERATIONS
 from ..program import Program
 from .c_functions import used_calls
@@ -20,8 +20,6 @@ from .sources import read_template
 
 SINGLE_EPS = 2.0**-23  #: distance from 1 to the next number of single precision
 LEAST, MOST = 2.0**-126, 2.0**127  #: normal numbers of single precision
-#: Limits above have nothing to do with rounding.
-_COARSE = 5e-5
 _DIGITS = log(SINGLE_EPS) / log(EPS)
 _RANGE = log(LEAST) / log(2.0**-1022)
 
@@ -49,9 +47,9 @@ def single_limit(value: float) -> float:
     So a few roundings stay a few roundings, and half of the digits half of the digits.  Stand-ins for zero and infinity
     keep their place in the range of numbers.
     """
-    if not 1e-100 < value < 1e100:
+    if not SINGLE_FAR < value < 1.0 / SINGLE_FAR:
         return float(value**_RANGE)
-    return float(value**_DIGITS) if value < _COARSE else value
+    return float(value**_DIGITS) if value < SINGLE_COARSE else value
 
 
 def refuse_double(program: Program) -> None:

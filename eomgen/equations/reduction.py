@@ -1,6 +1,6 @@
 """Stage equations: tree equations, constraints -> the embedded system in the independent coordinates, as expressions.
 
-M_e = B^T M B and f_e = -B^T (h + M a_p) with v = B v_i and a = B a_i + a_p (Shabana, sec. 5.7).  For reading: compiled
+M_e = B^T M B and f_e = -B^T (h + M a) with v = B v_i and v' = B v_i' + a (Shabana, sec. 5.7).  For reading: compiled
 modules eliminate numerically with pivoting.  Here the pivots are fixed, chosen by their size at the reference.
 """
 
@@ -37,10 +37,10 @@ def reduce_to_independent(
 
 
 class VelocityTransformation(NamedTuple):
-    """v = B v_i + b and a = B a_i + c: the velocities of the tree by the independent ones, and their rates.
+    """v = B v_i + b and v' = B v_i' + a: the velocities of the tree by the independent ones, and their rates.
 
     ``matrix`` is B (n_v, n_dof), row by row; ``offset`` is b (n_v,), what drivers and other prescribed motions add;
-    ``acceleration_offset`` is c (n_v,).
+    ``acceleration_offset`` is a (n_v,).
     """
 
     matrix: Rows
@@ -58,7 +58,7 @@ class VelocityTransformation(NamedTuple):
         return tuple(tuple(_dot(column, other) for other in weighted) for column in columns)
 
     def force(self, mass: Rows, right: Sequence[Expr]) -> tuple[Expr, ...]:
-        """B^T (Q - M c)."""
+        """B^T (Q - M a)."""
         rest = [-f + _dot(row, self.acceleration_offset) for f, row in zip(right, mass, strict=True)]
         return tuple(-x for x in self.project(rest))
 
@@ -66,9 +66,9 @@ class VelocityTransformation(NamedTuple):
 def transform_velocities(
     kinematics: Kinematics, mobility: Mobility, values: Mapping[str, float], names: LoopNames | None = None
 ) -> VelocityTransformation:
-    """B, b and c of the independent velocities of the mobility, with pivots judged by numbers as above.
+    """B, b and a of the independent velocities of the mobility, with pivots judged by numbers as above.
 
-    With ``names`` what loops give is named on the way; the names then stand as symbols in B, b and c.
+    With ``names`` what loops give is named on the way; the names then stand as symbols in B, b and a.
     """
     graph, n = kinematics.graph, len(kinematics.v)
     free = [kinematics.velocity_labels.index(name) for name in mobility.independent]
@@ -95,25 +95,25 @@ def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
 
 
 class LoopNames:
-    """LoopNames for what is formed on the way to the dependent velocities.
+    """Names for what is formed on the way to the dependent velocities.
 
     Attributes
     ----------
     given : list of (str, Expr)
-        LoopNames, which stand as symbols in what follows, and their values, in order.
+        Names, which stand as symbols in what follows, and their values, in order.
     """
 
     def __init__(self, kinematics: Kinematics, independent: Sequence[str]) -> None:
         self.given: list[tuple[str, Expr]] = []
         self._graph = kinematics.graph
         self._labels, n = kinematics.velocity_labels, len(kinematics.v)
-        self._columns = {n: "c", n + 1: "b"} | {
+        self._columns = {n: "a", n + 1: "b"} | {
             self._labels.index(name): f"B_{name}" if len(independent) > 1 else "" for name in independent
         }
         self._taken = {node[1] for node in self._graph.nodes if node[0] == "sym"}
 
     def entry(self, j: int, column: int, value: Expr) -> Expr:
-        """-B_jk, -c_j or -b_j by the name of what it is."""
+        """-B_jk, -a_j or -b_j by the name of what it is."""
         label, of = self._labels[j], self._columns.get(column)
         if of is None:
             return value

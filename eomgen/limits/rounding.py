@@ -25,3 +25,7 @@ QUARTER = 1e-15
 #: Numbers that agree to this, relative to them, are compared by their bounds of rounding; others are different in any
 #: case: half of all digits is far more than a formula loses.
 ALIKE = 1e-7
+
+# -- single precision, in libraries of C -------------------------------------------------------------------------------
+SINGLE_COARSE = 5e-5  #: limits above have nothing to do with rounding, and stay as they are
+SINGLE_FAR = 1e-100  #: numbers below stand for zero, and those above its inverse for infinity

@@ -43,6 +43,9 @@ class _LatexWriter(FormulaWriter):
     def name(self, name: str) -> str:
         return self.names.latex(name)
 
+    def letter(self, latex: str) -> str:
+        return latex
+
     def words(self, part: tree.Words) -> str:
         return part.latex
 

@@ -6,6 +6,7 @@ from ..notation.notation import Notation
 from ..texts import html_text
 from . import formula_tree as tree
 from .formula_writer import FormulaWriter
+from .given_latex import given_mathml
 
 _FUNCTIONS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "delta": "δ"}
 _RELATIONS = {"<=": "≤", ">=": "≥", "and": "\u2227", "or": "\u2228"}
@@ -56,6 +57,9 @@ class _MathMLWriter(FormulaWriter):
 
     def name(self, name: str) -> str:
         return self.names.mathml(name)
+
+    def letter(self, latex: str) -> str:
+        return given_mathml(latex)
 
     def words(self, part: tree.Words) -> str:
         return f"<mtext>{html_text(part.text)}</mtext>"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from ..notation import read_latex
 from ..notation.notation import Notation
+from ..notation.printing import text_form
 from ..notation.signs import SUPERSCRIPTS
 from . import formula_tree as tree
 from .formula_writer import FormulaWriter
@@ -49,6 +51,9 @@ class _TextWriter(FormulaWriter):
 
     def name(self, name: str) -> str:
         return self.names.text(name)
+
+    def letter(self, latex: str) -> str:
+        return text_form(read_latex(latex))
 
     def words(self, part: tree.Words) -> str:
         return part.text

@@ -18,6 +18,12 @@ class Name(NamedTuple):
     name: str
 
 
+class Letter(NamedTuple):
+    r"""A symbol of a display that no name of the model stands for, in LaTeX: ``M_{12}``, ``B^T``."""
+
+    latex: str
+
+
 class SumOf(NamedTuple):
     """Terms, each with whether it is subtracted."""
 
@@ -77,7 +83,9 @@ class Words(NamedTuple):
     latex: str
 
 
-Formula = NumberPart | Name | SumOf | Product | Quotient | Power | CallOf | Relation | CasesOf | MatrixOf | Words
+Formula = (
+    NumberPart | Name | Letter | SumOf | Product | Quotient | Power | CallOf | Relation | CasesOf | MatrixOf | Words
+)
 
 
 def times(formula: Formula, factor: Formula) -> Formula:
@@ -105,4 +113,4 @@ def is_number(formula: Formula) -> bool:
 
 def is_simple(formula: Formula) -> bool:
     """Whether a formula is one symbol."""
-    return isinstance(formula, Name) or (isinstance(formula, NumberPart) and not formula.power)
+    return isinstance(formula, Name | Letter) or (isinstance(formula, NumberPart) and not formula.power)

@@ -30,6 +30,8 @@ class FormulaWriter(ABC):
                 return self.number(formula)
             case tree.Name():
                 return self.name(formula.name)
+            case tree.Letter():
+                return self.letter(formula.latex)
             case tree.Words():
                 return self.words(formula)
             case tree.SumOf():
@@ -73,6 +75,10 @@ class FormulaWriter(ABC):
     @abstractmethod
     def name(self, name: str) -> str:
         """A name."""
+
+    @abstractmethod
+    def letter(self, latex: str) -> str:
+        """A symbol that is given in LaTeX."""
 
     @abstractmethod
     def words(self, part: tree.Words) -> str:

@@ -13,12 +13,14 @@ from ..printing.formula_tree import Formula, MatrixOf, Name, SumOf, is_group
 from ..texts import html_text
 from .equations_latex import WIDE
 from .printed_equations import PrintedEntry, PrintedEquations
+from .printed_parts import PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
 FOLDED = 12  #: formulas more than which are folded up
 MOST = 1_000  #: intermediates that are shown
 LEFT = "style='text-align:left'"
 _STYLE = "margin:0.5em 0;padding:0.2em 0;overflow-x:auto;overflow-y:hidden;font-size:1.15em"
+_FLOW = "display:flex;flex-wrap:wrap;column-gap:2.5em;margin-left:1em"  #: short formulas side by side
 #: Fonts with brackets that grow, of the usual systems.
 _FONT = "font-family:Latin Modern Math,STIX Two Math,Cambria Math,TeX Gyre Termes Math,DejaVu Math TeX Gyre,math"
 
@@ -28,7 +30,9 @@ def equations_html(equations: Readable) -> str:
     printed = PrintedEquations(equations)
     if equations.mobility.n_dof == 0:
         return "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
-    return "".join([*_motion(printed), *_intermediates(printed)])
+    return "".join(
+        parts_html(PrintedParts(printed)) if printed.is_long else [*_motion(printed), *_intermediates(printed)]
+    )
 
 
 def facts_html(equations: Readable) -> str:
@@ -141,12 +145,28 @@ def _line(printed: PrintedEquations, label: str, formula: Formula) -> str:
 
 
 def _intermediates(printed: PrintedEquations) -> Iterator[str]:
-    named = printed.intermediates
-    if not named:
-        return
-    lines = "".join(_line(printed, mathml(Name(name), printed.names), x) for name, x in named[:MOST])
-    more = f"<p {LEFT}>and {len(named) - MOST} more: <code>eqs.intermediates</code></p>" if len(named) > MOST else ""
-    if len(named) <= FOLDED:
-        yield f"<p {LEFT}>where</p>{lines}"
-    else:
-        yield f"<details><summary>where: {len(named)} named intermediates</summary>{lines}{more}</details>"
+    if printed.intermediates:
+        yield f"<p {LEFT}>where</p>"
+        yield from (_line(printed, mathml(Name(name), printed.names), x) for name, x in printed.intermediates)
+
+
+def parts_html(parts: PrintedParts) -> Iterator[str]:
+    """Large equations: matrices with letters for their entries, and groups of what these are."""
+
+    def words(sentence: PrintedSentence) -> str:
+        return "".join(html_text(x) if isinstance(x, str) else _math(mathml(x, parts.names)) for x in sentence.pieces)
+
+    def equation(line: PrintedLine) -> str:
+        return row(mathml(line.left, parts.names), "<mo>=</mo>", mathml(line.right, parts.names))
+
+    for item in parts.items():
+        match item:
+            case PrintedRow():
+                yield _block("<mspace width='2em'></mspace>".join(map(equation, item.lines)))
+            case PrintedSentence():
+                yield f"<p {LEFT}>{words(item)}</p>"
+            case PrintedGroup():
+                lines = "".join(
+                    _line(parts.printed, mathml(line.left, parts.names), line.right) for line in item.lines[:MOST]
+                )
+                yield f"<details><summary>{words(item.title)}</summary><div style='{_FLOW}'>{lines}</div></details>"

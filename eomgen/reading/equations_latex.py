@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from ..printing import latex, sums_in_lines
 from ..printing.formula_tree import Formula, MatrixOf, is_group
 from .printed_equations import PrintedEquations
+from .printed_parts import PrintedGroup, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
 WIDE = 150  #: characters of text up to which a matrix equation stands in one line
@@ -15,7 +16,10 @@ WIDE = 150  #: characters of text up to which a matrix equation stands in one li
 def latex_lines(equations: Readable) -> list[str]:
     """Each formula of the equations of motion, without dollars: M v' = f, what its names stand for, what was put in."""
     printed = PrintedEquations(equations)
-    lines = [*_motion(printed), *(_broken(printed, printed.names.latex(n), x) for n, x in printed.intermediates)]
+    if printed.is_long:
+        lines = [*_parts(PrintedParts(printed))]
+    else:
+        lines = [*_motion(printed), *(_broken(printed, printed.names.latex(n), x) for n, x in printed.intermediates)]
     values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
     return [*lines, rf"\text{{with }} {values}"] if values else lines
 
@@ -69,3 +73,23 @@ def _broken(printed: PrintedEquations, label: str, formula: Formula) -> str:
     others = (line if line.startswith("-") else f"+ {line}" for line in shown[1:])
     body = r" \\ & \quad ".join([shown[0], *others])
     return rf"\begin{{aligned}}{label} & = {body}\end{{aligned}}"
+
+
+def _parts(parts: PrintedParts) -> Iterator[str]:
+    """Large equations: matrices with letters for their entries, and groups of what these are."""
+
+    def shown(formula: Formula) -> str:
+        return latex(formula, parts.names)
+
+    def words(sentence: PrintedSentence) -> str:
+        return "".join(rf"\text{{{x}}}" if isinstance(x, str) else shown(x) for x in sentence.pieces)
+
+    for item in parts.items():
+        match item:
+            case PrintedRow():
+                yield r" \qquad ".join(f"{shown(line.left)} = {shown(line.right)}" for line in item.lines)
+            case PrintedSentence():
+                yield words(item)
+            case PrintedGroup():
+                yield words(item.title)
+                yield from (_broken(parts.printed, shown(line.left), line.right) for line in item.lines)

@@ -8,15 +8,18 @@ from ..files.terminal import fold
 from ..notation import read_latex
 from ..notation.printing import text_form
 from ..notation.signs import SUPERSCRIPTS
+from ..printing import text
 from ..printing.formula_text import TIGHT
-from ..printing.formula_tree import times
+from ..printing.formula_tree import MatrixOf, times
 from ..texts import visible
 from .printed_equations import PrintedEntry, PrintedEquations, plain
+from .printed_parts import SHORT, PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
 COLUMNS = 80
 HIGH = "".join(map(chr, SUPERSCRIPTS.values()))  #: digits of a power between a function and its argument
 LINES = 60  #: of formulas; how to get the others is said
+ENTRIES = (SHORT, 8, 5, 2)  #: characters of entries of a matrix, tried until the matrix fits
 DEEP = 9  #: parentheses in parentheses
 #: Where lines end, the best first: the kind of space, and within how many parentheses, and of arguments among them.
 #: Between terms, between terms within parentheses, the outer ones first, between factors, and within arguments at last.
@@ -45,10 +48,11 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
     if equations.mobility.n_dof == 0:
         found.append("  nothing is free to move: the position follows from constraints and time")
     else:
-        shown = [*_equations(printed, columns)]
+        shown = [*(_large(printed, columns) if printed.is_long else _equations(printed, columns))]
         found += ["", *shown[:lines]]
         if len(shown) > lines:
-            rest = f"... and {len(shown) - lines} lines more: eqs.mass_matrix, eqs.force, eqs.intermediates"
+            where = "eqs.tree_system" if printed.of_loops else "eqs.mass_matrix, eqs.force, eqs.intermediates"
+            rest = f"... and {len(shown) - lines} lines more: {where}"
             found += [rest, "or in a shell: eomgen derive MODEL --format text"]
     found += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
     return "\n".join(found)
@@ -107,6 +111,53 @@ def _equations(printed: PrintedEquations, columns: int) -> Iterator[str]:
     if not small and len(rates) > 1:
         yield f"{mass} is symmetric{'; its other entries are 0' if printed.vanishing else ''}"
     yield from _where(printed, columns)
+
+
+def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
+    """Large equations: matrices with letters for their entries, and groups of what these are."""
+    for short in ENTRIES:
+        parts = PrintedParts(printed, short)
+        items = list(parts.items())
+        rows = [row for item in items if isinstance(item, PrintedRow) for x in item.lines for row in _rows(parts, x)]
+        if max(map(len, rows), default=0) <= columns:
+            break
+
+    def words(sentence: PrintedSentence) -> str:
+        return "".join(x if isinstance(x, str) else text(x, parts.names) for x in sentence.pieces)
+
+    def equation(line: PrintedLine) -> Iterator[str]:
+        rows = _rows(parts, line)
+        if not isinstance(line.right, MatrixOf):
+            yield from _wrapped(f"{text(line.left, parts.names)} = ", text(line.right, parts.names), columns)
+        elif max(map(len, rows)) <= columns:
+            yield from ("", *map(plain, rows))
+        else:
+            size = f"{len(line.right.rows)} rows and {len(line.right.rows[0])} columns"
+            yield f"  {text(line.left, parts.names)} has {size}: eqs.tree_system"
+
+    mass, v, right = (letter_text(letter) for letter in printed.letters)
+    rates = ", ".join(map(printed.text, printed.accelerations))
+    one = printed.is_one_equation
+    yield from fold(
+        f"{mass} {rates} = {right}" if one else f"{mass} {v} = {right} with {v} = ({rates})", columns, "", "  "
+    )
+    for item in items[1:]:
+        match item:
+            case PrintedRow():
+                yield from (line for one in item.lines for line in equation(one))
+            case PrintedSentence():
+                yield from fold(words(item), columns, "", "  ")
+            case PrintedGroup():
+                yield from ("", words(item.title))
+                yield from (line for one in item.lines for line in equation(one))
+
+
+def _rows(parts: PrintedParts, line: PrintedLine) -> list[str]:
+    """A matrix in rows; none of what is no matrix."""
+    if not isinstance(line.right, MatrixOf):
+        return []
+    before = f"  {text(line.left, parts.names)} = "
+    return _matrix([[text(x, parts.names) for x in row] for row in line.right.rows], before)
 
 
 def letter_text(latex: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
@@ -14,6 +14,7 @@ from ..printing.factor_order import COORDINATE, GRAVITY, INERTIA, INPUT, MASS, P
 from ..printing.formula_text import TIGHT
 from ..printing.formula_tree import Formula, Name, NumberPart, Relation
 from .readable import Readable
+from .tree_system import MANY
 
 UNITS = {"angle": "rad", "turn": "rad", "length": "m", "parameter": ""}
 #: What a reader may want next: attributes of the equations, in the order of a derivation.
@@ -100,8 +101,19 @@ class PrintedEquations:
     def __init__(self, equations: Readable) -> None:
         self.equations = equations.in_plain_symbols()
         self.of_time = self.equations is not equations
-        self.names: Notation = equations.notation.with_names(str(name) for name, _ in equations.intermediates)
+        self.of_loops = equations.has_long_loops  #: whether the parts of B^T M_t B are shown
+        self.names: Notation = equations.notation.with_names(str(name) for name, _ in self.named)
         self.formula = Formulas(order_of(equations))
+
+    @cached_property
+    def named(self) -> list[tuple[Any, Any]]:
+        """The named parts that are shown, in SymPy."""
+        return self.equations.written("tree_system")[0] if self.of_loops else self.equations.intermediates
+
+    @property
+    def is_long(self) -> bool:
+        """Whether matrices are shown with letters for their entries, and named parts in groups."""
+        return self.of_loops or len(self.named) > MANY
 
     @cached_property
     def letters(self) -> Letters:
@@ -129,7 +141,7 @@ class PrintedEquations:
     @cached_property
     def intermediates(self) -> list[tuple[str, Formula]]:
         """Names that stand in M and f, with what they stand for."""
-        return [(str(name), self.formula(x)) for name, x in self.equations.intermediates]
+        return [(str(name), self.formula(x)) for name, x in self.named]
 
     @cached_property
     def accelerations(self) -> list[Formula]:

@@ -1,7 +1,7 @@
 """Stage reading: Kinematics, Mobility, TreeEquations -> each quantity of the equations as expressions of their graph.
 
 What is of the size of the degrees of freedom is embedded with B of v = B v_i + b (Shabana, Computational Dynamics,
-sec. 5.7): M = B^T M_t B, Q = B^T Q_t, Q_v = B^T (Q_v,t - M_t c), so that M v_i' = Q_v + Q.
+sec. 5.7): M = B^T M_t B, Q = B^T Q_t, Q_v = B^T (Q_v,t - M_t a), so that M v_i' = Q_v + Q.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class Quantities:
 
     @cached_property
     def transformation(self) -> VelocityTransformation:
-        """v = B v_i + b, a = B a_i + c."""
+        """v = B v_i + b, v' = B v_i' + a."""
         return transform_velocities(self.kinematics, self.mobility, self.numbers)
 
     @cached_property
@@ -127,23 +127,24 @@ class Quantities:
         whole, rotations = name_rotations(self.kinematics, whole)
         if not self._embeds or is_short(whole):
             return whole, rotations
-        return [*(x for row in self.mass_matrix_by_names for x in row), *self.force_by_names], self._by_names[0].given
+        return [*(x for row in self.mass_matrix_by_names for x in row), *self.force_by_names], self.by_names[0].given
 
     @cached_property
-    def _by_names(self) -> tuple[LoopNames, VelocityTransformation]:
+    def by_names(self) -> tuple[LoopNames, VelocityTransformation]:
+        """v = B v_i + b and v' = B v_i' + a in names of their entries."""
         names = LoopNames(self.kinematics, self.mobility.independent)
         return names, transform_velocities(self.kinematics, self.mobility, self.numbers, names)
 
     @cached_property
     def mass_matrix_by_names(self) -> Rows:
         """M (n_dof, n_dof) in the names of B's entries, as the book writes it: B^T M B."""
-        return self._by_names[1].mass_matrix(self.equations.mass_matrix) if self._embeds else self.equations.mass_matrix
+        return self.by_names[1].mass_matrix(self.equations.mass_matrix) if self._embeds else self.equations.mass_matrix
 
     @cached_property
     def force_by_names(self) -> Row:
-        """M v_i' (n_dof,) in the names of the entries of B and c."""
+        """M v_i' (n_dof,) in the names of the entries of B and a."""
         right = tuple(-h for h in self.equations.bias)
-        return self._by_names[1].force(self.equations.mass_matrix, right) if self._embeds else right
+        return self.by_names[1].force(self.equations.mass_matrix, right) if self._embeds else right
 
     @cached_property
     def mass_matrix(self) -> Rows:
@@ -162,7 +163,7 @@ class Quantities:
         return self.mobility.n_dof != len(self.kinematics.v)
 
     def embedded_force(self, right: Sequence[Expr]) -> Row:
-        """B^T (Q - M c) of forces Q on the tree."""
+        """B^T (Q - M a) of forces Q on the tree."""
         return self.transformation.force(self.equations.mass_matrix, right) if self._embeds else tuple(right)
 
     def along_independent(self, row: Sequence[Expr]) -> Row:

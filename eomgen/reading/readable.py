@@ -17,6 +17,7 @@ from ..notation.notation import Notation
 from .names_of_unknowns import model_notation
 from .quantities import PointMotion, Quantities, require_bodies
 from .quantities_of_methods import QuantitiesOfMethods
+from .tree_system import MANY, TreeParts, TreeSystem, is_long, tree_parts
 
 if TYPE_CHECKING:
     from .named_parts import ByName, NamedSum, SpatialMotion
@@ -182,8 +183,37 @@ class Readable(QuantitiesOfMethods):
 
     @cached_property
     def acceleration_offset(self) -> Any:
-        """c (n_v, 1) of v' = B v_i' + c."""
+        """a (n_v, 1) of v' = B v_i' + a."""
         return self._column("acceleration_offset", lambda s: s.transformation.acceleration_offset)
+
+    @cached_property
+    def has_long_loops(self) -> bool:
+        """Whether loops make ``mass_matrix`` and ``force`` so long that ``tree_system`` is read more easily."""
+        if self.mobility.n_dof in (0, len(self.kinematics.v)):
+            return False
+        return is_long(Quantities(*self.fresh())) or len(self.intermediates) > MANY
+
+    @cached_property
+    def tree_system(self) -> TreeSystem:
+        """M_t v' = f_t + C^T lambda, C v' + gamma = 0: the parts that long ``mass_matrix`` and ``force`` are made of.
+
+        With v' = B v_i' + a, which the constraints give, M = B^T M_t B and f = B^T (f_t - M_t a).  Where
+        ``has_long_loops``, ``zeros`` names the coordinates on which M and f do not depend; 0 stands for them in all
+        parts.
+        """
+        import sympy
+
+        n_v, n_c = len(self.kinematics.v), len(self.constraint_names)
+        formed: list[TreeParts] = []
+
+        def choose(quantities: Quantities) -> list[Expr]:
+            formed[:] = [tree_parts(quantities, self.has_long_loops)]
+            return formed[0].flat
+
+        written = iter(self._write("tree_system", choose, "z", lambda _: formed[0].given))
+        shapes = ((n_v, n_v), (n_v, 1), (n_c, n_v), (n_c, 1))
+        mass, force, C, gamma = (sympy.Matrix(m, n, [next(written) for _ in range(m * n)]) for m, n in shapes)
+        return TreeSystem(mass, force, C, gamma, formed[0].zeros)
 
     # -- motion of bodies and markers ---------------------------------------------------------------------------------
     def _places(self) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ def both_names(function: Function) -> Function:
 
     @wraps(function)
     def call(*args, **given):  # type: ignore[no-untyped-def]
-        for other in others.keys() & given.keys():
+        for other in others.keys() & given.keys() if given else ():
             if others[other] in given:
                 raise UsageError(f"{others[other]} and {other} are the same argument; give one of them")
             given[others[other]] = given.pop(other)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -79,6 +80,8 @@ class Assembled:
         q = initial.assembled(given.positions)
         v = initial.velocities(q, given.rates if given.positions or given.rates else None)
         return np.concatenate([q, v])
+
+    _declared_start = cached_property[Array](lambda self: self.x0())  # of the declared initial values at t = 0
 
     @both_names
     @np.errstate(all="ignore")

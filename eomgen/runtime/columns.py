@@ -180,7 +180,7 @@ def project(module: BoundModel, t: Array, raw: Array, forcing: Forcing | None = 
         here = forcing.sample(t, x)
         x = module.project(x, t=t, u=here)
     position = module.constraints.every
-    velocity = module.kernels.state("velocity_constraints")
+    velocity = module.velocity_constraints.every
     correction = np.abs(x - raw)
     for i, _ in module.layout.quaternion_slots:  # their length means nothing
         e = raw[i : i + 4]

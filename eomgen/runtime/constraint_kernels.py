@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from ..numeric.constraint_system import ConstraintSystem, CutJoints
@@ -9,7 +11,8 @@ from ..numeric.scales import Array
 from .kernels import Kernels
 
 
-def constraint_system(kernels: Kernels, t: float = 0.0) -> ConstraintSystem:
+@lru_cache(maxsize=64)
+def constraint_system(kernels: Kernels) -> ConstraintSystem:
     """The constraints of positions with the parameters of the kernels; dC/dq for C_q where q' is given."""
     layout = kernels.layout
     C = kernels.state("constraints", nan=True)
@@ -29,5 +32,4 @@ def constraint_system(kernels: Kernels, t: float = 0.0) -> ConstraintSystem:
         layout.constraint_labels,
         CutJoints(layout.loops, layout.loop_kinds, layout.loop_scales, cut),
         (lambda q, t: alignment(q, t=t)) if layout.n_alignments else None,
-        t,
     )

@@ -54,9 +54,8 @@ class Initial:
         self.kernels = kernels
         self.layout = layout = kernels.layout
         self.t = t
-        self.system = constraint_system(kernels, t)
+        self.system = constraint_system(kernels).at(t)
         self._C_q = kernels.state("constraint_jacobian", nan=True)
-        self._loop = kernels.motion("loop_coordinates") if layout.n_loop_coordinates else None
         self.scales, self.place = layout.scales, layout.place_scales
         self.coordinates = layout.q + layout.loops
 
@@ -81,8 +80,7 @@ class Initial:
 
     def rate(self, q: Array) -> Array:
         """C_t (n_c,)."""
-        x = np.concatenate([q, np.zeros(self.layout.n_v)])
-        return self.kernels.state("velocity_constraints")(x, t=self.t)
+        return self.kernels.velocity_constraints.every(np.concatenate([q, np.zeros(self.layout.n_v)]), t=self.t)
 
     # positions
 
@@ -221,7 +219,7 @@ class Initial:
             return self._solve_rates(q, declared).v
         self._require_motion(q, given)
         rest = {name: value for name, value in declared.items() if name not in given}
-        return self._solve_rates(q, {**given, **self.compatible(q, given, rest, positions=False)}).v
+        return self._solve_rates(q, {**given, **(self.compatible(q, given, rest, positions=False) if rest else {})}).v
 
     def _require_motion(self, q: Array, given: Mapping[str, float]) -> None:
         """Refuse the rate of a coordinate that stands still at q, whatever moves: it would need boundless rates.
@@ -257,6 +255,8 @@ class Initial:
         indices = [layout.v.index(name) for name in held if name in layout.v]
         v[indices] = [held[name] for name in held if name in layout.v]
         others = [name for name in held if name not in layout.v]
+        if not (layout.n_c or others):
+            return Rates(v, 0.0)
         equations = None
         if others:
             y_q, y_t, scales = map(np.array, zip(*(self.rate_equation(q, name) for name in others), strict=True))
@@ -266,9 +266,8 @@ class Initial:
 
     def rate_equation(self, q: Array, name: str) -> tuple[Array, float, float]:
         """y_q (n,), y_t and the typical size of a rate y' = y_q v + y_t that is no velocity of the tree."""
-        layout, zero = self.layout, np.zeros(self.layout.n_v)
-        assert self._loop is not None
-        k, y_t = layout.loop_rates.index(name), self._loop(q, zero, zero, t=self.t)[1]
+        layout, zero, k = self.layout, np.zeros(self.layout.n_v), self.layout.loop_rates.index(name)
+        y_t = self.kernels.motion("loop_coordinates")(q, zero, zero, t=self.t)[1]
         return self.system.cut.evaluate(q, self.t)[1][k], y_t[k], layout.loop_scales[k]
 
     # which values can be held together

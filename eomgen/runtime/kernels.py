@@ -163,9 +163,7 @@ class Rows:
         if not isinstance(rows, str) or rows != "independent":
             raise UsageError(f"rows must be 'independent' or 'all', not {rows!r}")
         result = self.every(q, p=p, u=u, t=t)[self.independent]
-        if out is None:
-            return result
-        return _write(out, result)
+        return result if out is None else _write(out, result)
 
 
 class Projection:
@@ -173,11 +171,6 @@ class Projection:
 
     def __init__(self, kernel: State) -> None:
         self.kernel = kernel
-
-    @property
-    def failure(self) -> tuple[int, float, Array] | None:
-        """Status, time and state of the last failure that was returned as NaN."""
-        return self.kernel.failure
 
     def __call__(
         self,

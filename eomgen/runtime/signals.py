@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite, nextafter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -165,6 +165,12 @@ class Forcing:
         The last value that was not finite at a finite state.  Inside an integration it only shortens the step.
     """
 
+    feedback = foreign = False
+    within: tuple[float, float] | None = None  #: first and last number in the part between two corners
+    span: tuple[float, float] | None = None
+    lapse: Lapse | None = None
+    unsettled: frozenset[str] = frozenset()  #: numbers that are given later, for each run of an ensemble
+
     def __init__(self, layout: Layout, inputs: Mapping[str, Any] | None) -> None:
         given = {} if inputs is None else inputs
         require_mapping("inputs", given)
@@ -173,7 +179,6 @@ class Forcing:
         self.layout = layout
         self.constants: dict[str, float] = {}
         self.varying: dict[int, Callable[[float, Array], float]] = {}
-        self.feedback = self.foreign = False
         self.formulas: dict[int, Expressed] = {}
         values = self.values = {name: self._read(name, value) for name, value in given.items()}
         self.derived = self._derive(layout, values) if layout.input_rates else {}
@@ -197,13 +202,9 @@ class Forcing:
                 if not isinstance(value, Tabulated):
                     self.feedback = self.foreign = True
         #: whether constraints depend on inputs that vary
-        self.constrained = not {*self.varying, *self.formulas}.isdisjoint(layout.constraint_inputs)
-        self.within: tuple[float, float] | None = None  #: first and last number in the part between two corners
-        self.span: tuple[float, float] | None = None
+        self.constrained = bool(values) and not {*self.varying, *self.formulas}.isdisjoint(layout.constraint_inputs)
         self.base, self.parameters = np.zeros(layout.n_u), np.zeros(layout.n_p)
         self.names = layout.u
-        self.lapse: Lapse | None = None
-        self.unsettled: frozenset[str] = frozenset()  #: numbers that are given later, for each run of an ensemble
 
     @staticmethod
     def _derive(layout: Layout, values: Mapping[str, Any]) -> dict[str, tuple[str, int, Any]]:
@@ -380,4 +381,4 @@ class Forcing:
 def _inside(start: float, end: float) -> tuple[float, float] | None:
     """The least and the greatest number between two times; None where they are one."""
     low, high = min(start, end), max(start, end)
-    return None if low == high else (float(np.nextafter(low, np.inf)), float(np.nextafter(high, -np.inf)))
+    return None if low == high else (nextafter(low, inf), nextafter(high, -inf))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -76,10 +77,10 @@ class Trajectory:
         t_events: Sequence[Array] = (),
         x_events: Sequence[Array] = (),
         sample: Callable[[Array], Trajectory] | None = None,
+        described: Callable[[], dict[str, Any]] = dict,
     ) -> None:
         self.t, self.x = t, x
-        self._columns = columns
-        self.metadata = header
+        self._columns, self._header, self._described = columns, header, described
         self.names = columns.names
         self.units: dict[str, str] = header.get("units", {})
         self.residuals = Residuals(**header["residuals"])
@@ -89,6 +90,8 @@ class Trajectory:
         self.nlu = int(header.get("nlu", 0))
         self.status, self.message = int(header.get("status", 0)), str(header.get("message", ""))
         self._sample = sample
+
+    metadata = cached_property[dict[str, Any]](lambda self: {**self._described(), **self._header})
 
     @property
     def name(self) -> str:

@@ -105,7 +105,7 @@ class Expansion:
         while waiting:
             done: Poly = {}
             for given, x in waiting.pop().items():
-                monomial = self.atoms.without_squared_signs(given, "sum")
+                monomial, x = self.atoms.over_roots(self.atoms.without_squared_signs(given, "sum"), x)
                 power = next((f for f in monomial if f[1] >= 1 and self.atoms.table[f[0]].kind == "sum"), None)
                 if power is None:
                     done[monomial] = done.get(monomial, 0) + x

@@ -17,7 +17,7 @@ from ..graph.core import Expr, Graph
 from ..graph.traverse import LEAVES, common_graph, operands, reachable
 from ..operations import CONDITION, operations_with
 from ..records import dataclass
-from .atoms import TURNS, Frozen, Poly, TooLongError, Work, freeze
+from .atoms import ONE, TURNS, Frozen, Poly, TooLongError, Work, freeze, scaled
 from .expansion import Expansion
 from .factoring import Factoring
 from .good_names import GoodNames
@@ -229,11 +229,14 @@ class _Attempt:
         for i in sorted({*cuts, *known}):  # operands have smaller numbers, so do names that stand in them
             of, name = known.get(i, (i, ""))
             poly = self._shortest(of)
+            sign = -1 if not name and len(poly) == 2 and poly.get(ONE, 0) < 0 else 1  # 1 - x^2, not x^2 - 1
+            poly = scaled(poly, sign)
             alike = poly if is_plain(poly, self.expansion.atoms) else same.get(freeze(poly))
             if alike is None:
                 atom = self.expansion.atoms.id("name", name or next(free))
                 alike = same[freeze(poly)] = {((atom, 1),): 1}
                 self.named.append((atom, poly))
+            alike = scaled(alike, sign)
             self.expansion.put(i, alike)
             self.literal.put(i, alike)
         polys = [self._shortest(x.id) for x in exprs]

@@ -42,7 +42,9 @@ class Literal:
             return scaled(parts[0], -1)
         if kind == "mul":
             product = multiply(self._one_term(parts[0]), self._one_term(parts[1]))
-            return {self.atoms.without_squared_signs(m, "factor"): x for m, x in product.items()}
+            return dict(
+                self.atoms.over_roots(self.atoms.without_squared_signs(m, "factor"), x) for m, x in product.items()
+            )
         if kind == "div" and parts[1]:
             ((below, x),) = self._one_term(parts[1]).items()
             return multiply(self._one_term(parts[0]), {inverse(below): Fraction(1) / x})

@@ -37,21 +37,14 @@ class Run:
 
     def watched(self, watch: Progress | None) -> Callable[[float, Array], Array]:
         """f(t, x) for the solver."""
-        kernel, forcing = self.kernel, self.forcing
+        kernel, forcing, varies = self.kernel, self.forcing, bool(self.forcing)
 
-        def plain(t: float, x: Array) -> Array:
-            result = kernel(t, x)
+        def call(t: float, x: Array) -> Array:
+            result = kernel(t, x, u=forcing(t, x) if varies else None)
             if kernel.failure is not None:
                 self.remember("rhs", kernel)
             return result
 
-        def forced(t: float, x: Array) -> Array:
-            result = kernel(t, x, u=forcing(t, x))
-            if kernel.failure is not None:
-                self.remember("rhs", kernel)
-            return result
-
-        call = forced if forcing else plain
         if watch is None:
             return call
 

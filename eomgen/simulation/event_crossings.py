@@ -18,7 +18,7 @@ from ..limits.runs import ASIDE, CROWDED, HALVED, INSTANT, LATE, MOMENTARY, REST
 from ..numeric.roots import Found, Search, search_least, search_root
 from ..numeric.scales import Array
 from .event_values import EventValues
-from .events import GO_ON, RESET, UNWATCHED, WAIT, Events, RunEvent, crowd_of
+from .events import GO_ON, RESET, UNWATCHED, WAIT, Events, RunEvent, crowd_of, instant
 
 
 class Step(NamedTuple):
@@ -76,7 +76,8 @@ class Crossings:
     # -- values ---------------------------------------------------------------------------------------------------
     def _slopes(self, t: float, x: Array, f: Array, g: Array, length: float, way: float = 1.0) -> Array:
         """Rates of the values along the motion, by a short way along x', onward (1) or back (-1)."""
-        h = way * ASIDE * (length or self.forward * max(abs(t), 1.0) * MOMENTARY)
+        least = max(abs(t), 1.0) * MOMENTARY  # a step that ends with a part of the run may be as short as rounding
+        h = way * ASIDE * (length if abs(length) >= least else self.forward * least)
         return (self.values(t + h, x + h * f) - g) / h
 
     def arm(self, t: float, x: Array, length: float = 0.0) -> None:
@@ -177,7 +178,7 @@ class Crossings:
                 return [Bracket(i, t, later, g, value)]
             seen = seen or value * side > 0.0
             t, g = later, value
-        back = not seen and last * side < 0.0  # within the accuracy of the step: resets that die away
+        back = not seen and last * side < 0.0 and abs(step.t - step.t_old) > instant(step.t)  # resets that die away
         self.leaving[i] = 0 if seen or back else side
         event = self.events[i]
         if back and event.direction * side <= 0 and event.action in (RESET, WAIT):

@@ -37,6 +37,11 @@ STOP = 3  #: an integrator stops there and goes on, from another state or the sa
 UNWATCHED = 2  #: a direction
 
 
+def instant(t: float) -> float:
+    """Times this near to t (s) are one time."""
+    return INSTANT * max(abs(t), EARLIEST)
+
+
 class RunEvent:
     """An event with the number of times it may still happen.
 
@@ -82,7 +87,7 @@ class RunEvent:
         if not isfinite(value):
             return nan
         self.known = True
-        if self.left is not None and abs(t - self.left[0]) <= INSTANT * max(abs(t), EARLIEST):
+        if self.left is not None and abs(t - self.left[0]) <= instant(t):
             return self.left[1] * max(abs(value), TINY)
         return value
 

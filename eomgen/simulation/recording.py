@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,12 +35,13 @@ def record(
         A stored state cannot be brought onto the constraints.
     """
     residuals, x = project(module, solution.t, solution.x, forcing)
+    described: Callable[[], dict[str, Any]] = partial(_described, module, forcing, options)
+    if forcing.values or not all(type(value) is float for value in options.values()):  # the user may change them
+        described = described().copy
     header: dict[str, Any] = {
-        **describe(module),
         "method": method,
         "rtol": _plain(options.get("rtol")),
         "atol": _plain(options.get("atol")),
-        **_given(module, forcing, options),
         "span": list(solution.ends),
         "status": solution.status,
         "message": solution.message,
@@ -62,20 +64,20 @@ def record(
 
         def sample(t: Array) -> Trajectory:
             found, states = project(module, t, dense(t), forcing)
-            head = header | {"residuals": found._asdict()}
+            head = described() | header | {"residuals": found._asdict()}
             return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states)), head)
 
-    return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample)
+    return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample, described)
 
 
-def _given(module: BoundModel, forcing: Forcing, options: dict[str, Any]) -> dict[str, Any]:
-    """Options and inputs as they were given; a slim package does not keep them."""
+def _described(module: BoundModel, forcing: Forcing, options: dict[str, Any]) -> dict[str, Any]:
+    """The model, options and inputs as they were given; a slim package does not keep the latter."""
     try:
         from ..runtime.origin import inputs_of, plain
     except UnavailableError:
-        return {}
+        return describe(module)
     given = {name: plain(value) for name, value in options.items() if name != "jac"}
-    return {"options": given, "inputs": inputs_of(module, forcing)}
+    return {**describe(module), "options": given, "inputs": inputs_of(module, forcing)}
 
 
 def _plain(value: Any) -> Any:

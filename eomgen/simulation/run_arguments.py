@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,10 +29,10 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     if span is None:
         return 0.0, declared
     if isinstance(span, (tuple, list)):
-        span = [
-            read_value("span must be (start, end) in seconds: an end", end) if isinstance(end, str) else end
-            for end in span
-        ]
+        what = "span must be (start, end) in seconds: an end"
+        span = [read_value(what, end) if isinstance(end, str) else end for end in span]
+        if len(span) == 2 and all(type(end) is float and isfinite(end) for end in span):
+            return float(span[0]), float(span[1])
     pair = as_real(span)
     if isinstance(span, str) or (pair is not None and not pair.ndim):
         return 0.0, read_value("the end of the span", span)
@@ -89,7 +90,7 @@ def find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | 
 
         return find_led_state(module.layout, forcing, t, lambda u: find_state(module.bind(None, u), initial, t))
     if initial is None:
-        return module.x0(t=t)
+        return module.x0(t=t) if t else module._declared_start.copy()
     if isinstance(initial, Mapping):
         return module.x0(initial, t=t)
     x = np.array(read_numbers("initial", last_state(initial, module.x_names)))

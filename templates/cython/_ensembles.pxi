@@ -115,7 +115,7 @@ cdef class Ensemble:
         nodes, atol = np.array(nodes, dtype=float), np.array(vector(atol, n, "atol", ValueError))
         asked = np.ascontiguousarray(() if t_eval is None else t_eval, dtype=float)
         self.held = [x0, p, u, nodes, atol, asked]
-        all.method, all.model = eomgen_suited(find_method(method), n), MODEL
+        all.method, all.model = find_method(method), MODEL
         all.series = seen_series(SERIES)
         all.rhs, all.n, all.count = MODEL.kernels[index].call, n, count
         if all.method.squares > 0:

@@ -63,6 +63,8 @@ ctypedef const eomgen_method *method_pointer
 cdef method_pointer[6] METHODS
 METHODS[0], METHODS[1], METHODS[2] = &eomgen_dop853, &eomgen_rk45, &eomgen_rk23
 METHODS[3], METHODS[4], METHODS[5] = &eomgen_rk4, &eomgen_radau, &eomgen_taylor
+for _index in range(3 if "rhs" in names else 0):  # once: to ask the processor may take longer than a short run
+    METHODS[_index] = eomgen_suited(METHODS[_index], MODEL.kernels[find("rhs", ValueError)].n_in)
 
 
 cdef method_pointer find_method(str name) except NULL:
@@ -221,7 +223,7 @@ cdef class Stepper:
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, i
-        self.method = eomgen_suited(find_method(method), n)
+        self.method = find_method(method)
         self.context, self.held = context, []
         self.atol = np.array(vector(atol, n, "atol", ValueError))
         cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)

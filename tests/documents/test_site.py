@@ -92,6 +92,7 @@ def test_no_page_asks_a_network_for_anything(site: Site) -> None:
     assert formulas, "no page draws formulas"
 
 
+@pytest.mark.needs("chromium")
 def test_a_browser_draws_all_formulas_without_a_network(site: Site, tmp_path: Path) -> None:
     with Browser(tmp_path) as browser:
         for name in ("theory/index.html", "theory/special_topics.html"):

@@ -390,3 +390,23 @@ def test_functions_of_time_and_state_are_taken_as_they_are(crank, function):
             crank().simulate((0, 0.01), inputs={"tau": function})
         return
     assert crank().simulate((0, 0.01), inputs={"tau": function}).t[-1] == 0.01
+
+
+def test_runs_from_the_declared_start_do_not_share_it(pendulum):
+    """The start is kept between runs; what a run or a user does to a state must not change the next one's."""
+    expected = pendulum.x0()
+    first = pendulum.simulate((0.0, 0.1))
+    first.x[:] = 7.0
+    assert np.array_equal(pendulum.simulate((0.0, 0.1)).x[:, 0], expected)
+    other = pendulum.bind({name: 2.0 * value for name, value in zip(pendulum.p_names, pendulum.p, strict=True)})
+    assert np.array_equal(other.simulate((0.0, 0.1)).x[:, 0], other.x0())
+
+
+def test_what_a_run_tells_of_itself_is_of_the_time_of_the_run(pendulum):
+    """Metadata are put together when asked for: an array of tolerances changed since then must not be told."""
+    atol = np.full(pendulum.n_x, 1e-9)
+    run = pendulum.simulate((0.0, 0.1), atol=atol)
+    atol[:] = 5.0
+    assert run.metadata["options"]["atol"] == [1e-9] * pendulum.n_x
+    assert list(run.metadata)[:2] == ["name", "q_names"]
+    assert run.metadata is run.metadata

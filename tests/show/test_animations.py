@@ -15,7 +15,7 @@ from typing import Any
 import matplotlib.animation
 import numpy as np
 import pytest
-from browser import CHROMIUM, Browser
+from browser import Browser
 from click.testing import CliRunner
 from matplotlib.figure import Figure
 from PIL import Image
@@ -160,7 +160,7 @@ def test_a_page_holds_all_it_needs(run: Any, tmp_path: Path) -> None:
     assert "<title>slider_crank</title>" in text
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")
+@pytest.mark.needs("chromium")
 def test_a_page_plays_and_its_slider_moves_it_without_a_network(run: Any, tmp_path: Path) -> None:
     page = run.animate(tmp_path / "run.html", fps=10, trace="rod.tip", plot=["theta", "energy"], forces=True)
     with Browser(tmp_path / "profile") as browser:
@@ -324,7 +324,7 @@ def test_curves_over_a_range_name_its_unit(module: Any, monkeypatch: pytest.Monk
     assert ax.get_xlabel() == r"$\theta$ (rad)"
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium")
+@pytest.mark.needs("chromium")
 def test_a_page_fits_a_narrow_window(run: Any, tmp_path: Path) -> None:
     pytest.importorskip("k3d")
     file = run.animate(tmp_path / "run.html", names=False)
@@ -340,7 +340,7 @@ def test_a_page_fits_a_narrow_window(run: Any, tmp_path: Path) -> None:
             time.sleep(0.5)
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium")
+@pytest.mark.needs("chromium")
 def test_a_page_says_what_it_lacks(run: Any, tmp_path: Path) -> None:
     pytest.importorskip("k3d")
     file = run.animate(tmp_path / "run.html", names=False)

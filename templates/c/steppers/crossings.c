@@ -32,7 +32,8 @@ static int brackets_after_reset(const eomgen_method *method, eomgen_run *run, eo
         seen = seen || value * ev->leaving[i] > 0.0;
         t = next, g = value;
     }
-    const int side = ev->leaving[i], back = !seen && ev->g_new[i] * side < 0.0;
+    const double moment = RUNS_INSTANT * fmax(fabs(run->t), RUNS_EARLIEST); /* a step this short shows rounding only */
+    const int side = ev->leaving[i], back = !seen && ev->g_new[i] * side < 0.0 && fabs(run->t - run->t_old) > moment;
     ev->leaving[i] = seen || back ? 0 : side;
     if (back && ev->direction[i] * side <= 0 && ev->action[i] != EOMGEN_GO_ON) {
         ev->crowded = ev->crowd;

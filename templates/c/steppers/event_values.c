@@ -43,7 +43,11 @@ static void event_slopes(eomgen_run *run, eomgen_events *ev, const double *g, do
 {
     double length = fabs(run->step) > 0.0 ? run->step : run->direction * run->h_abs;
     if (length == 0.0) { /* at the end of a part, where no step is chosen */
-        length = run->t != run->t_old ? run->t - run->t_old : run->direction * RUNS_MOMENTARY * fmax(fabs(run->t), 1.0);
+        length = run->t - run->t_old;
+    }
+    const double least = RUNS_MOMENTARY * fmax(fabs(run->t), 1.0);
+    if (fabs(length) < least) { /* a step that ends with a part of the run may be as short as rounding */
+        length = run->direction * least;
     }
     const double h = way * RUNS_ASIDE * length;
     for (int i = 0; i < run->n; i++) {

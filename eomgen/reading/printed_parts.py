@@ -1,0 +1,237 @@
+"""Stage reading, printed parts: large equations -> what a display says of them, in order.
+
+Matrices stand with their zeros, and letters for their long entries; what the letters and the named parts are is told in
+groups of one meaning.  Of a mechanism with loops these are the parts of M = B^T M_t B, which are shorter than M.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from ..kinematics.state import acceleration_name
+from ..notation import dotted
+from ..notation.notation import Notation
+from ..printing import text
+from ..printing.formula_tree import Formula, Letter, MatrixOf, Name, NumberPart, Product, SumOf, Words
+from .named_groups import PartMeaning, grouped
+from .printed_equations import PrintedEquations
+
+SHORT = 14  #: characters of an entry that stands in its matrix
+LARGE = 12  #: rows or columns of a matrix that is shown on request
+TITLES = {
+    PartMeaning.CONSTANT: "constants",
+    PartMeaning.TURN: "sines and cosines",
+    PartMeaning.ROTATION: "rotations: from the axes of the joint that holds a body to those of ground",
+    PartMeaning.POSITION: "positions",
+    PartMeaning.INERTIA: "mass matrix",
+    PartMeaning.CONSTRAINT: "Jacobian of the constraints",
+    PartMeaning.ANGULAR_VELOCITY: "angular velocities, along the axes of the joint that holds a body",
+    PartMeaning.VELOCITY: "velocities",
+    PartMeaning.FORCE: "right side",
+    PartMeaning.CONSTRAINT_RATE: "velocity terms of the constraints",
+}
+ZERO = NumberPart("0")
+Piece = str | Formula
+
+
+class PrintedLine(NamedTuple):
+    """A formula and its left side."""
+
+    left: Formula
+    right: Formula
+
+
+class PrintedRow(NamedTuple):
+    """Lines that stand side by side where there is room."""
+
+    lines: tuple[PrintedLine, ...]
+
+
+class PrintedSentence(NamedTuple):
+    """Words, and formulas between them."""
+
+    pieces: tuple[Piece, ...]
+
+
+class PrintedGroup(NamedTuple):
+    """Lines of one meaning, shown on request."""
+
+    title: PrintedSentence
+    lines: list[PrintedLine]
+
+
+class _Matrix(NamedTuple):
+    letter: str  #: in LaTeX
+    entries: list[list[Formula]]
+    meaning: PartMeaning
+    values: Any
+
+    @property
+    def symmetric(self) -> bool:
+        return self.meaning == PartMeaning.INERTIA
+
+    @property
+    def is_column(self) -> bool:
+        return len(self.entries[0]) == 1
+
+    @property
+    def is_large(self) -> bool:
+        return max(len(self.entries), len(self.entries[0])) > LARGE
+
+
+class PrintedParts:
+    """What a display of large equations says.
+
+    Parameters
+    ----------
+    printed : PrintedEquations
+    short : int
+        Characters of an entry that stands in its matrix itself.
+
+    Attributes
+    ----------
+    names : Notation
+        How names are printed, those of the parts too.
+    """
+
+    def __init__(self, printed: PrintedEquations, short: int = SHORT) -> None:
+        self.short = short
+        self.printed, self.equations = printed, printed.equations
+        self.names: Notation = printed.names
+        self._kinematics = self.equations.kinematics
+        self._free = {*self.equations.independent}
+        self._parts = {str(name) for name, _ in printed.named}
+
+    def items(self) -> Iterator[PrintedRow | PrintedSentence | PrintedGroup]:
+        """All of it."""
+        M, v, f = map(Letter, self.printed.letters)
+        rates = self.printed.accelerations
+        column = rates[0] if self.printed.is_one_equation else MatrixOf(tuple((x,) for x in rates))
+        yield PrintedRow((PrintedLine(Product((M, column)), f),))
+        if told := [(Letter(letter), f" is {what}") for letter, what in self.printed.letters_told]:
+            pieces = [x for k, pair in enumerate(told) for x in ((", ", *pair) if k else pair)]
+            yield PrintedSentence((*pieces, "; the usual letters are names of the model."))
+        if self.printed.of_loops:
+            yield from self._embedding(M, v, f)
+        for matrix in self._matrices:
+            if not matrix.is_column and not matrix.is_large:
+                yield PrintedRow((PrintedLine(Letter(matrix.letter), self._pattern(matrix)),))
+        if zeros := self._zeros:
+            names = _listed([Name(name) for name in zeros])
+            yield PrintedSentence((M, " and ", f, " do not depend on ", *names, "; below, 0 stands for them."))
+        if large := [m for m in self._matrices if m.is_large and not m.is_column]:
+            title = PrintedSentence(("matrices ", *_listed([Letter(m.letter) for m in large])))
+            yield PrintedGroup(title, [PrintedLine(Letter(m.letter), self._pattern(m)) for m in large])
+        yield from self._groups()
+
+    # -- mechanisms with loops ----------------------------------------------------------------------------------------
+    def _embedding(self, M: Letter, v: Letter, f: Letter) -> Iterator[PrintedRow | PrintedSentence]:
+        """How M and f follow from the equations of the tree and the constraints."""
+        k = self._kinematics
+        mass, force, C, gamma = (Letter(matrix.letter) for matrix in self._matrices)
+        B, a, w = self._letter("B", "P"), self._letter("a", "b"), self._letter("v_t", "w_t")
+        transposed, rates = Letter(f"{B}^T"), Letter(dotted(w, 1))
+        rest = SumOf(((False, force), (True, Product((mass, Letter(a))))))
+        of_mass, of_force = Product((transposed, mass, Letter(B))), Product((transposed, rest))
+        yield PrintedRow((PrintedLine(M, of_mass), PrintedLine(f, of_force)))
+        every = [Name(acceleration_name(name)) for name in k.velocity_names]
+        free = [x for x, label in zip(every, k.velocity_labels, strict=True) if label in self._free]
+        constrained = SumOf(((False, Product((C, rates))), (False, gamma)))
+        yield PrintedSentence(
+            (
+                *(mass, " and ", force, " are of all accelerations of the tree, ", rates, " = (", *_listed(every)),
+                *("). With the constraints ", constrained, " = 0,"),
+            )
+        )
+        C_d, C_i, B_d, a_d = (Letter(f"{x}_{part}") for x, part in ((C.latex, "d"), (C.latex, "i"), (B, "d"), (a, "d")))
+        inverse, moved = Letter(f"{C_d.latex}^{{-1}}"), SumOf(((False, Product((Letter(B), v))), (False, Letter(a))))
+        solved = (PrintedLine(left, SumOf(((True, Product((inverse, x))),))) for left, x in ((B_d, C_i), (a_d, gamma)))
+        yield PrintedRow((PrintedLine(rates, moved), *solved))
+        of_free = ("where ", C_i, " holds the columns of ", C, " that belong to ", *_listed(free), ", and ", C_d)
+        of_others = (" the others. ", B_d, " and ", a_d, " are the rows of the other accelerations; in the rows of ", v)
+        yield PrintedSentence((*of_free, *of_others, ", ", Letter(B), " is the identity and ", Letter(a), " is 0."))
+
+    @property
+    def _zeros(self) -> tuple[str, ...]:
+        return self.equations.tree_system.zeros if self.printed.of_loops else ()
+
+    # -- matrices -----------------------------------------------------------------------------------------------------
+    def _letter(self, *choice: str) -> str:
+        return self.names.letter(*choice, with_numbers=True)
+
+    @cached_property
+    def _matrices(self) -> list[_Matrix]:
+        eqs, letters = self.equations, self.printed.letters
+        if not self.printed.of_loops:
+            given: list[tuple[str, Any]] = [(letters.mass, eqs.mass_matrix), (letters.force, eqs.force)]
+        else:
+            system = eqs.tree_system
+            choices = ("M_t", "A_t"), ("f_t", "b_t"), ("C", "J"), (r"\gamma", "c")
+            given = [(self._letter(*choice), x) for choice, x in zip(choices, system[:4], strict=True)]
+        meanings = PartMeaning.INERTIA, PartMeaning.FORCE, PartMeaning.CONSTRAINT, PartMeaning.CONSTRAINT_RATE
+        return [
+            _Matrix(letter, [list(map(self.printed.formula, row)) for row in x.tolist()], meaning, x)
+            for (letter, x), meaning in zip(given, meanings, strict=False)
+        ]
+
+    def _place(self, matrix: _Matrix, i: int, j: int) -> Letter:
+        """The letter of an entry."""
+        comma = "," if max(len(matrix.entries), len(matrix.entries[0])) > 9 else ""
+        places = [i] if matrix.is_column else [min(i, j), max(i, j)] if matrix.symmetric else [i, j]
+        place = comma.join(str(k + 1) for k in places)
+        stem = matrix.letter.removesuffix("_t")
+        return Letter(f"{stem}_{{{place}}}" if stem == matrix.letter else f"{stem}_{{t,{place}}}")
+
+    def _stands(self, matrix: _Matrix, entry: Formula) -> bool:
+        """Whether an entry stands in its matrix itself."""
+        if entry == ZERO:
+            return True
+        part = entry.terms[0][1] if isinstance(entry, SumOf) and len(entry.terms) == 1 else entry
+        if isinstance(part, Name) and part.name in self._parts:
+            return False
+        is_sum = isinstance(entry, SumOf) and len(entry.terms) > 1
+        return not matrix.is_column and not is_sum and len(text(entry, self.names)) <= self.short
+
+    def _pattern(self, matrix: _Matrix) -> MatrixOf:
+        """A matrix with letters for its long entries, of a symmetric one the upper half."""
+        rows: list[list[Formula]] = [
+            [x if self._stands(matrix, x) else self._place(matrix, i, j) for j, x in enumerate(row)]
+            for i, row in enumerate(matrix.entries)
+        ]
+        if matrix.symmetric and len(rows) > 1:
+            for i, row in enumerate(rows):
+                row[:i] = [Words("", "")] * i
+            rows[-1][0] = Words("sym.", r"\text{sym.}")
+        return MatrixOf(tuple(map(tuple, rows)))
+
+    def _entries(self, matrix: _Matrix) -> Iterator[PrintedLine]:
+        """What the letters of a matrix stand for."""
+        for i, row in enumerate(matrix.entries):
+            for j, x in enumerate(row):
+                if not self._stands(matrix, x) and not (matrix.symmetric and j < i):
+                    yield PrintedLine(self._place(matrix, i, j), x)
+
+    # -- named parts --------------------------------------------------------------------------------------------------
+    def _groups(self) -> Iterator[PrintedGroup]:
+        k = self._kinematics
+        outputs = {matrix.meaning: list(matrix.values) for matrix in self._matrices}
+        constants = {*k.parameter_names, *self.equations.names_put_in}
+        found = grouped(self.printed.named, outputs, constants, {*k.velocity_names, *k.input_names})
+        matrices = {matrix.meaning: matrix for matrix in self._matrices}
+        for meaning, title in TITLES.items():
+            lines = [PrintedLine(Name(str(name)), self.printed.formula(x)) for name, x in found.get(meaning, ())]
+            words: tuple[Piece, ...] = (title,)
+            if matrix := matrices.get(meaning):
+                lines += self._entries(matrix)
+                words = (f"{title} ", Letter(matrix.letter))
+            if lines:
+                yield PrintedGroup(PrintedSentence((*words, f" ({len(lines)})")), lines)
+
+
+def _listed(formulas: Sequence[Formula]) -> Iterator[Piece]:
+    for k, x in enumerate(formulas):
+        if k:
+            yield ", "
+        yield x

@@ -1,0 +1,172 @@
+"""Stage reading, tree system: equations of mechanisms with loops -> the parts that they are made of, for display.
+
+With the constraints C v' + gamma = 0 on the tree's M_t v' = f_t + C^T lambda, v' = B v_i' + a holds, and M = B^T M_t B,
+f = B^T (f_t - M_t a) (Shabana, Computational Dynamics, sec. 5.7).  The parts are short where M and f written out are
+not.  Long ones stand in names that say what they are: entries of rotations and angular velocities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..graph.core import Expr
+from ..graph.count import count
+from ..graph.rounding_bounds import is_rounding, with_bounds
+from ..graph.substitute import substitute, symbols_of
+from .quantities import Quantities, Row, Rows
+
+LONG = 330  #: operations of M and f from which their parts are shown instead
+SURELY = 1_500  #: operations beyond which nothing that is found equal makes them short
+MANY = 12  #: named parts of M and f more than which are shown in groups
+POINTS = 4  #: random positions at which it is tried whether a coordinate matters
+Named = list[tuple[str, Expr]]
+
+
+class TreeParts(NamedTuple):
+    """M_t (n_v, n_v) and f_t (n_v,) of the tree, C (n_c, n_v) and gamma (n_c,) of the constraints.
+
+    ``given`` are names and values that stand in them, in order; ``zeros`` the coordinates on which M and f do not
+    depend, for which 0 stands in all parts.
+    """
+
+    mass_matrix: Rows
+    force: Row
+    constraint_jacobian: Rows
+    gamma: Row
+    given: Named
+    zeros: tuple[str, ...]
+
+    @property
+    def flat(self) -> list[Expr]:
+        """All entries, matrix by matrix and row by row."""
+        return [*_flat(self.mass_matrix), *self.force, *_flat(self.constraint_jacobian), *self.gamma]
+
+
+class TreeSystem(NamedTuple):
+    """M_t v' = f_t + C^T lambda, C v' + gamma = 0, SymPy matrices.
+
+    Attributes
+    ----------
+    mass_matrix : sympy.Matrix
+        M_t (n_v, n_v)
+    force : sympy.Matrix
+        f_t (n_v, 1)
+    constraint_jacobian : sympy.Matrix
+        C (n_c, n_v)
+    gamma : sympy.Matrix
+        (n_c, 1)
+    zeros : tuple of str
+        Coordinates for which 0 stands, because M and f do not depend on them.
+    """
+
+    mass_matrix: Any
+    force: Any
+    constraint_jacobian: Any
+    gamma: Any
+    zeros: tuple[str, ...]
+
+
+def is_long(quantities: Quantities) -> bool:
+    """Whether M and f of a mechanism with loops are too long to be read in one piece."""
+    if quantities.mobility.n_dof in (0, len(quantities.kinematics.v)):
+        return False
+    if count([*_flat(quantities.mass_matrix), *quantities.force]).total > SURELY:
+        return True
+    whole, given = quantities.motion
+    return count([*whole, *(x for _, x in given)]).total > LONG
+
+
+def tree_parts(quantities: Quantities, short: bool) -> TreeParts:
+    """The parts; on request with names in them, and at 0 of what they do not depend on, which makes them shorter."""
+    n_v, n_c = len(quantities.kinematics.v), len(quantities.rows)
+    force = [-h for h in quantities.equations.bias]
+    flat = [*_flat(quantities.equations.mass_matrix), *force]
+    flat += [*_flat(quantities.constraint_jacobian), *quantities.gamma]
+    given: Named = []
+    zeros: tuple[str, ...] = ()
+    if short:
+        zeros = _idle(quantities, flat)
+        graph = quantities.graph
+        put = {graph.symbol(name): graph.zero for name in zeros}
+        names, values = zip(*_motion_names(quantities), strict=True)
+        flat, given = _with_names(substitute(flat, put), list(zip(names, substitute(values, put), strict=True)))
+    parts = iter(flat)
+    mass, forces, jacobian, gamma = (_rows(parts, m, n) for m in (n_v, n_c) for n in (n_v, 1))
+    return TreeParts(mass, tuple(_flat(forces)), jacobian, tuple(_flat(gamma)), given, zeros)
+
+
+def _flat(rows: Rows) -> list[Expr]:
+    return [x for row in rows for x in row]
+
+
+def _rows(values: Iterator[Expr], rows: int, columns: int) -> Rows:
+    return tuple(tuple(next(values) for _ in range(columns)) for _ in range(rows))
+
+
+def _idle(quantities: Quantities, parts: Sequence[Expr]) -> tuple[str, ...]:
+    """Coordinates on which M and f do not depend, such as the heading of a vehicle on a plane, tried at random.
+
+    The parts have to be finite with 0 in the place of these coordinates.
+    """
+    k, mobility = quantities.kinematics, quantities.mobility
+    whole = [*_flat(quantities.mass_matrix), *quantities.force]
+    random = np.random.default_rng(11)
+    width = POINTS * (1 + len(k.names))
+    at: dict[str, np.ndarray] = {name: np.full(width, x) for name, x in quantities.numbers.items()}
+    for name in sorted(symbols_of([*whole, *parts]).difference(at, k.names)):
+        at[name] = np.tile(random.uniform(-1.0, 1.0, POINTS), width // POINTS)
+    for j, (name, x) in enumerate(zip(k.names, mobility.q_reference, strict=True)):
+        at[name] = np.tile(x + random.uniform(-0.3, 0.3, POINTS), width // POINTS)
+        at[name][POINTS * (j + 1) : POINTS * (j + 2)] += random.uniform(0.1, 0.5, POINTS)
+    values, bounds = with_bounds(whole, at)
+    v, e = (x.reshape(len(whole), 1 + len(k.names), POINTS) for x in (values, bounds))
+    known = np.maximum(e[:, :1] + e[:, 1:], np.abs(v[:, :1]))
+    with np.errstate(all="ignore"):
+        same = np.all(is_rounding(v[:, 1:] - v[:, :1], known), axis=(0, 2))
+    idle = tuple(name for name, alike in zip(k.names, same, strict=True) if alike)
+    if not idle:
+        return ()
+    at |= dict.fromkeys(idle, np.zeros(width))
+    return idle if np.isfinite(with_bounds(list(parts), at)[0]).all() else ()
+
+
+def _motion_names(quantities: Quantities) -> Named:
+    """R_<body>_ij and omega_<body>_x, of the axes in which the joint of the tree holds the body."""
+    k = quantities.kinematics
+    found: Named = []
+    for i, link in enumerate(k.links):
+        rotation = k.poses.link(i).rotation
+        found += [(f"R_{link.name}_{r + 1}{c + 1}", rotation[r][c]) for r in range(3) for c in range(3)]
+        found += [(f"omega_{link.name}_{axis}", x) for axis, x in zip("xyz", k.twists[i][0], strict=True)]
+    return found
+
+
+def _with_names(flat: Sequence[Expr], motion: Named) -> tuple[list[Expr], Named]:
+    """Names for what is more than a symbol, where it stands in the expressions."""
+    graph = flat[0].graph
+    taken = symbols_of(flat)
+    named: dict[Expr, str] = {}
+    for name, x in motion:
+        if x not in named and not _is_plain(x) and name not in taken:
+            named[x] = name
+    symbols = {x: graph.symbol(name) for x, name in named.items()}
+    found = substitute(flat, symbols)
+    used = symbols_of(found)
+    given: Named = []
+    for value, name in reversed(named.items()):
+        if name in used:
+            inner = substitute([value], {x: symbol for x, symbol in symbols.items() if x != value})
+            used |= symbols_of(inner)
+            given.append((name, inner[0]))
+    return found, given[::-1]
+
+
+def _is_plain(x: Expr) -> bool:
+    """A number, a symbol, or a sine or cosine of one, perhaps negative."""
+    kind, *parts = x.node
+    if kind == "neg":
+        kind, *parts = x.graph.nodes[parts[0]]
+    return kind in ("sym", "const", "sin", "cos")

@@ -1,0 +1,174 @@
+/* Model exchange: events, resets, and states that have drifted off the loops. */
+#include <math.h>
+#include <string.h>
+
+#include "eomgen_fmu.h"
+
+int fmu_indicators(fmu_instance *f, double *values)
+{
+#if FMU_N_EVENTS
+    fmu_memory *const m = &f->m;
+    const int status = fmu_constants(f);
+    return status != FMU_OK ? status
+                            : fmu_judge(f, FMU_MODEL(events)(m->t, m->x, m->u, m->c, values, f->w), "the event indicators");
+#else
+    (void)f, (void)values;
+    return FMU_OK;
+#endif
+}
+
+/* Values of events now, and how fast they change along the motion. */
+static int look(fmu_instance *f, double *g, double *slope)
+{
+#if FMU_N_EVENTS
+    fmu_memory *const m = &f->m;
+    int status = fmu_indicators(f, g);
+    status = status == FMU_OK ? fmu_rates(f) : status;
+    if (status != FMU_OK) {
+        return status;
+    }
+    const double h = RUNS_MOMENTARY * fmax(fabs(m->t), 1.0);
+    for (int i = 0; i < FMU_N_X; i++) {
+        f->trial[i] = m->x[i] + h * m->rates[i];
+    }
+    status = fmu_judge(f, FMU_MODEL(events)(m->t + h, f->trial, m->u, m->c, slope, f->w), "the event indicators");
+    for (int i = 0; i < FMU_N_EVENTS; i++) {
+        slope[i] = (slope[i] - g[i]) / h;
+    }
+    return status;
+#else
+    (void)f, (void)g, (void)slope;
+    return FMU_OK;
+#endif
+}
+
+int fmu_arm(fmu_instance *f)
+{
+    fmu_memory *const m = &f->m;
+    double *const g = f->values, *const slope = f->values + FMU_N_EVENTS;
+    const int status = look(f, g, slope);
+    for (int i = 0; i < FMU_N_EVENTS && status == FMU_OK; i++) {
+        m->side[i] = g[i] > 0.0 || (g[i] == 0.0 && FMU_DIRECTION[i] != 1 && slope[i] < 0.0);
+    }
+    m->last_reset = (double)NAN, m->crowded = 0;
+    return status;
+}
+
+int fmu_completed(fmu_instance *f, int *event)
+{
+    fmu_memory *const m = &f->m;
+    *event = 0;
+#if FMU_HAS_PROJECT
+    const int closes = fmu_project(f, m->x, f->closed);
+    if (closes != FMU_OK) {
+        return closes;
+    }
+    for (int i = 0; i < FMU_N_X; i++) {
+        *event = *event || fabs(f->closed[i] - m->x[i]) > m->rtol * fmax(FMU_NOMINAL[i], fabs(m->x[i]));
+    }
+#endif
+    double *const g = f->values, *const slope = f->values + FMU_N_EVENTS;
+    const int status = FMU_N_EVENTS > 0 ? look(f, g, slope) : (int)FMU_OK;
+    for (int i = 0; i < FMU_N_EVENTS && status == FMU_OK; i++) { /* one that nobody has seen change sides */
+        const int way = (g[i] > 0.0) - m->side[i];
+        *event = *event || (way * slope[i] > 0.0 && g[i] != 0.0);
+    }
+    return status;
+}
+
+#if FMU_N_RESETS
+static int reset(fmu_instance *f, const int *fired)
+{
+    fmu_memory *const m = &f->m;
+    double *const new_values = f->trial;
+    const int status = FMU_MODEL(resets)(m->t, m->x, m->u, m->c, new_values, f->w);
+    if (status != 0 && status != EOMGEN_NON_FINITE) {
+        return fmu_judge(f, status, "the new values of states at an event");
+    }
+    for (int k = 0; k < FMU_N_RESETS; k++) {
+        if (fired[FMU_RESET_OF[k]]) {
+            if (!isfinite(new_values[k])) {
+                return fmu_say(f, FMU_ERROR, "an event at t = %.9g s gives a state a value that is not finite", m->t);
+            }
+            m->x[FMU_RESET_X[k]] = new_values[k];
+        }
+    }
+    return FMU_OK;
+}
+#endif
+
+/* The side of zero of a value: 1 above, or the other one where it gets there at this very instant. */
+static int side_of(const fmu_memory *m, double g, double slope, int i)
+{
+    const int side = g > 0.0, coming = side != (slope > 0.0) && slope != 0.0;
+    return side == m->side[i] && coming && fabs(g) <= RUNS_SAME * fmax(fabs(m->t), 1.0) * fabs(slope) ? !side : side;
+}
+
+/* Events whose values have changed sides in their direction: the first FMU_N_EVENTS of fired. */
+static int find_fired(fmu_instance *f, int *fired, int *ended)
+{
+    fmu_memory *const m = &f->m;
+    double *const g = f->values, *const slope = f->values + FMU_N_EVENTS, *const before = slope + FMU_N_EVENTS;
+    int any = 0;
+    for (int i = 0; i < FMU_N_EVENTS; i++) {
+        fired[i] = 0;
+    }
+    if (FMU_N_EVENTS == 0 || look(f, g, slope) != FMU_OK) {
+        return 0;
+    }
+    for (int i = 0; i < FMU_N_EVENTS; i++) {
+        const int side = side_of(m, g[i], slope[i], i), way = side - m->side[i];
+        before[i] = g[i];
+        if (way * slope[i] < 0.0) { /* it leaves for the side that it was sent to, and is not there yet */
+            continue;
+        }
+        fired[i] = way != 0 && FMU_DIRECTION[i] * way >= 0;
+        if (fired[i]) {
+            m->count[i]++;
+            any = any || FMU_RESETS[i];
+            *ended = *ended || (FMU_MOST[i] > 0 && m->count[i] >= FMU_MOST[i]);
+        }
+        m->side[i] = side;
+    }
+    return any;
+}
+
+int fmu_update(fmu_instance *f, int *ended, int *changed)
+{
+    fmu_memory *const m = &f->m;
+    int fired[FMU_N_EVENTS + 1];
+    *ended = 0, *changed = 0;
+    int status = fmu_constants(f);
+    const int resets = status == FMU_OK && find_fired(f, fired, ended);
+    if (status != FMU_OK) {
+        return status;
+    }
+#if FMU_N_RESETS
+    if (resets) {
+        status = reset(f, fired);
+        if (status != FMU_OK) {
+            return status;
+        }
+    }
+#endif
+    status = fmu_project(f, m->x, f->closed);
+    if (status != FMU_OK) {
+        return status;
+    }
+    *changed = resets || memcmp(m->x, f->closed, FMU_N_X * sizeof(double)) != 0;
+    memcpy(m->x, f->closed, FMU_N_X * sizeof(double));
+    m->rates_known = m->rates_known && !*changed;
+    if (resets) {
+        double *const g = f->values, *const slope = f->values + FMU_N_EVENTS, *const before = slope + FMU_N_EVENTS;
+        status = look(f, g, slope);
+        for (int i = 0; i < FMU_N_EVENTS && status == FMU_OK; i++) { /* one that is still beyond zero may leave at once */
+            m->side[i] = fired[i] && fabs(g[i]) <= 2.0 * fabs(before[i]) ? slope[i] > 0.0 : g[i] > 0.0;
+        }
+        m->crowded = fabs(m->t - m->last_reset) < RUNS_CROWDED * fmax(fabs(m->t - m->t_start), 1.0) ? m->crowded + 1 : 0;
+        m->last_reset = m->t;
+        if (m->crowded >= RUNS_CROWD) {
+            return fmu_say(f, FMU_ERROR, "events follow each other ever faster at t = %.9g s (a ball that comes to rest)", m->t);
+        }
+    }
+    return status;
+}
