@@ -207,7 +207,7 @@ def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] 
     if strange:
         limits = Limits(unrolled=0, unrolled_loops=0)  # drivers that look before they divide
     terms = collect_terms(kinematics, mobility, tree, in_c=not row.arrays and not strange)
-    return build_program(terms, metadata, kernels=kernels, limits=limits)
+    return build_program(terms, metadata, kernels=kernels or row.kernels or None, limits=limits)
 
 
 @np.errstate(all="ignore")

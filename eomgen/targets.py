@@ -25,6 +25,13 @@ PRECISIONS = ("double", "float")
 FMI_VERSIONS = ("2.0", "3.0")
 
 
+#: Kernels of targets whose library differentiates by itself.
+TRACED_KERNELS = (
+    "rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "constraints", "constraint_jacobian",
+    "velocity_constraints", "project", "poses", "outputs", "events", "kinematics", "dae_residual",
+)  # fmt: skip
+
+
 class Target(NamedTuple):
     """One target.
 
@@ -41,6 +48,8 @@ class Target(NamedTuple):
         Whether loops over arrays do better than straight-line code.
     precisions : bool
         Whether its numbers may be of single precision.
+    kernels : tuple of str
+        The functions it has, of :data:`~.kernel_table.KERNELS`; all if empty.
     whole : str
         "file.function" of (equations, directory, version) that writes one file instead of a package.
     """
@@ -50,6 +59,7 @@ class Target(NamedTuple):
     module: bool = False
     arrays: bool = False
     precisions: bool = False
+    kernels: tuple[str, ...] = ()
     whole: str = ""
 
     def files(self, program: Any, context: dict[str, Any]) -> Files:
@@ -76,6 +86,10 @@ TARGETS: dict[str, Target] = {
         "Python that imports NumPy alone, no compiler", "emit.package.numpy_package", module=True, arrays=True
     ),
     "c": Target("C library", "emit.c_library.c_library", precisions=True),
+    "casadi": Target(
+        "set of functions of CasADi's SX", "emit.traced.casadi_package", arrays=True, kernels=TRACED_KERNELS
+    ),
+    "jax": Target("set of pure functions of JAX", "emit.traced.jax_package", arrays=True, kernels=TRACED_KERNELS),
     "fmu": Target("functional mock-up unit for other simulators, one file", whole="fmu.generate_fmu"),
 }
 

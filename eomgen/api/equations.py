@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from .. import pipeline
@@ -112,6 +113,42 @@ class Equations(Derivation):
         module = Module(pipeline.compile_core(self, target, kernels, **options))
         module.equations = self
         return module
+
+    def to_casadi(self) -> ModuleType:
+        """The functions of the model in CasADi's SX, for Opti, IPOPT, acados and CasADi's integrators.
+
+        Returns
+        -------
+        module
+            ``rhs(t, x, u, p)`` and others; ``x_names`` and so on; see :func:`eomgen.traced_functions.traced_functions`.
+
+        Examples
+        --------
+        >>> import eomgen as eg
+        >>> m = eg.Model("pendulum", gravity=(0, "-g", 0))
+        >>> g, l = m.parameter("g", 9.81), m.parameter("l", 0.5)
+        >>> hinge = m.revolute("hinge", m.ground, m.body("bob", mass=2, com=(0, -l, 0)), coordinate="theta")
+        >>> model = m.derive().to_casadi()
+        >>> model.rhs(0, [0.1, 0.0], model.u_values, model.p_values)
+        DM([0, -1.95873])
+        """
+        from ..traced_functions import traced_functions
+
+        return traced_functions(self, "casadi")
+
+    def to_jax(self) -> ModuleType:
+        """Pure functions of the model in JAX, in 64 bits: for ``jit``, ``vmap`` and ``grad``.
+
+        Importing them switches JAX to 64 bits in the whole process.
+
+        Returns
+        -------
+        module
+            ``rhs(t, x, u, p)`` and others; ``x_names`` and so on; see :func:`eomgen.traced_functions.traced_functions`.
+        """
+        from ..traced_functions import traced_functions
+
+        return traced_functions(self, "jax")
 
     def write_fmu(self, path: str | Path | None = None, version: str = "2.0") -> Path:
         """Write a functional mock-up unit for other simulators: see :func:`eomgen.fmu.write_fmu`.

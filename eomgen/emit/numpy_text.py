@@ -64,6 +64,31 @@ def _function(name: str, arguments: str, doc: str, lines: Sequence[str]) -> str:
     return f"def {name}({arguments}):\n{body}\n"
 
 
+def print_block_of_lists(program: Program, block: Block, prefix: str = "") -> str:
+    """The functions of a block as those of :func:`print_block`, on lists of numbers of any library that has ``np``.
+
+    The last is ``<prefix><name>(t, x, u, c)`` -> list; where there are checks the text calls ``checked(out, good)``.
+    """
+    pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
+    printer = _NumpyPrinter(program, references(program, block.inputs))
+    start = [f"out = [0.0] * {block.n_out}", *(["good = []"] if block.checks else [])]
+    end = ["return checked(out, good)" if block.checks else "return out"]
+    ports = " ".join(port.name for port in block.ports)
+    doc = f"[{ports}] -> {block.n_out} values"
+    return _print_pieces(printer, prefix + block.name, doc, pieces, start, end, by_entry=True)
+
+
+def print_constants_of_lists(program: Program) -> str:
+    """``constants(p)``: the list c that the blocks of lists read."""
+    graph = program.graph
+    pieces = cut(graph, program.hoisted, (), frozenset(), program.limits.statements)
+    printer = _NumpyPrinter(program, {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)})
+    start = ["t = u = c = None", "x = p", f"out = [0.0] * {len(program.hoisted)}"]
+    doc = "Constants c that follow from the parameters p."
+    text = _print_pieces(printer, "constants", doc, pieces, start, ["return [*p, *out]"], by_entry=True)
+    return text.replace("def constants(t, x, u, c):", "def constants(p):")
+
+
 def print_block(program: Program, block: Block) -> str:
     """The functions of a block, the last of them ``<name>(t, x, u, c)``."""
     pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
@@ -94,9 +119,15 @@ def print_precompute(program: Program) -> str:
 
 
 def _print_pieces(
-    printer: _NumpyPrinter, name: str, doc: str, pieces: Pieces, start: Sequence[str], end: Sequence[str]
+    printer: _NumpyPrinter,
+    name: str,
+    doc: str,
+    pieces: Pieces,
+    start: Sequence[str],
+    end: Sequence[str],
+    by_entry: bool = False,
 ) -> str:
-    main = [*start, *_direct(printer, pieces)]
+    main = [*start, *_direct(printer, pieces, by_entry)]
     main += [f"good.append(np.less(0.0, {printer.operand(i)}))" for i in pieces.checks]
     functions = []
     if len(pieces.pieces) == 1:
@@ -112,7 +143,10 @@ def _print_pieces(
     return "\n\n".join(functions)
 
 
-def _direct(printer: _NumpyPrinter, pieces: Pieces) -> list[str]:
+def _direct(printer: _NumpyPrinter, pieces: Pieces, by_entry: bool) -> list[str]:
+    """Results that need no statement; entries of lists are 0.0 from the beginning."""
     texts = [(k, printer.operand(i)) for k, i in pieces.direct]
     lines = [f"out[{k}] = {text}" for k, text in texts if text != "0.0"]
+    if by_entry:
+        return lines
     return ["out[...] = 0.0", *lines] if len(lines) < len(texts) else lines

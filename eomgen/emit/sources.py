@@ -55,6 +55,7 @@ def environment() -> Environment:
         "toml": texts.toml_text,
         "markdown": texts.markdown_text,
         "code": texts.markdown_code,
+        "listing": lambda names: repr(tuple(names)),
     }
     return made
 

@@ -1,0 +1,185 @@
+"""Stage emit: Program -> functions that another library traces, differentiates and compiles: CasADi, JAX.
+
+One Python file of straight-line functions of lists, the linear algebra that closed loops need, and a few functions in
+which the libraries differ (``templates/casadi``, ``templates/jax``).  Projections take a fixed number of steps.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from ..errors import UsageError
+from ..graph.functions import Function
+from ..kernel_table import NAMED
+from ..limits.constraints import ACCEPTED, TIKHONOV
+from ..numeric.scales import Space
+from ..numeric.user_functions import Curve, Surface
+from ..program import Program
+from ..targets import TRACED_KERNELS
+from .c_functions import used_calls
+from .example_state import example_state
+from .numpy_text import print_block_of_lists, print_constants_of_lists
+from .sources import render
+
+STEPS = 6  #: of Newton's iteration: the error of the position is squared by each, so a tenth of a length is enough
+LIBRARIES = {"casadi": ("CasADi", "casadi>=3.6.5"), "jax": ("JAX", "jax>=0.4.30")}
+OF_LOOPS = {"rhs": "rhs_of_loops", "project": "project_state", "outputs": "outputs_of_loops"}
+
+
+class Traced(NamedTuple):
+    """A public function: the lengths of its arguments between t and u, the shape, what it is, how it is made."""
+
+    name: str
+    arguments: dict[str, int]
+    shape: tuple[int, ...]
+    result: str
+    function: str
+
+
+def casadi_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
+    """Functions of CasADi's SX with named arguments."""
+    return _package(program, context, "casadi")
+
+
+def jax_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
+    """Pure functions of JAX arrays in 64 bits."""
+    return _package(program, context, "jax")
+
+
+def emit_traced(program: Program, library: str, steps: int = STEPS) -> str:
+    """The text of the module ``<name>`` for a library.
+
+    Parameters
+    ----------
+    program : Program
+        With the kernels :data:`~..targets.TRACED_KERNELS`.
+    library : {'casadi', 'jax'}
+    steps : int, optional
+        Newton steps onto the constraints of closed loops, at least 3.
+
+    Raises
+    ------
+    UsageError
+        Something in the model has no form that a library can trace.
+    """
+    return render("traced/__init__.py.j2", _context(program, library, steps))
+
+
+def _package(program: Program, context: dict[str, Any], library: str) -> dict[str, str]:
+    context = _context(program, library, STEPS) | {k: v for k, v in context.items() if k == "description"}
+    return {
+        "py.typed": "",
+        "__init__.py": render("traced/__init__.py.j2", context),
+        "pyproject.toml": render("traced/pyproject.toml.j2", context),
+        "README.md": render("traced/README.md.j2", context),
+    }
+
+
+def _context(program: Program, library: str, steps: int) -> dict[str, Any]:
+    _require_traceable(program, library)
+    metadata, blocks, sizes = program.metadata, program.block_names, program.sizes
+    functions = [f for f, _ in used_calls(program).values()]
+    kinds = {type(f.evaluator) for f in functions}
+    drivers = {d.name for d in program.drivers}
+    has_loops, n_v = program.has_loops, sizes.n_v
+    space = Space.of(n_v, program.quaternion_slots)
+    minimal = has_loops and "kinematics" in drivers
+    public = _public(program, minimal)
+    independent_q = [program.coordinate_of[k] if program.coordinate_of else k for k in program.preferred]
+    if minimal and not program.coordinate_of:
+        inputs = next(d for d in program.drivers if d.name == "kinematics").ports[0].symbols
+        independent_q = [program.coordinates.index(name) for name in inputs]
+    twins = program.twins
+    return {
+        "name": program.name,
+        "doc": str(metadata.get("doc") or "").strip(),
+        "metadata": metadata,
+        "library": library,
+        "library_name": LIBRARIES[library][0],
+        "requirement": LIBRARIES[library][1],
+        "steps": steps,
+        "p_values": _numbers(metadata.get("p_values")),
+        "u_values": _numbers(metadata.get("u_values")),
+        "x0": _numbers(example_state(program)),
+        "curves": Curve in kinds,
+        "surfaces": Surface in kinds,
+        "definitions": [_table(f) for f in functions],
+        "functions": [
+            *(print_block_of_lists(program, b, "block_") for b in program.blocks if b.name not in twins),
+            *(f"block_{name} = block_{first}\n" for name, first in twins.items()),
+            print_constants_of_lists(program),
+        ],
+        "has_loops": has_loops,
+        "n_h": sizes.n_h,
+        "redundant": sizes.n_c > n_v - sizes.n_dof,
+        "passes": 2 if sizes.n_c > n_v - sizes.n_dof else 1,
+        "tikhonov": TIKHONOV,
+        "accepted": ACCEPTED,
+        "composed": not has_loops and "rhs" in drivers,
+        "by_columns": "mass_times" in blocks,
+        "has_outputs": "outputs" in drivers,
+        "outputs_by_acceleration": "outputs" in drivers and metadata["output_accelerations"],
+        "tree_rhs": "rhs_of_tree" if "rhs" in drivers else "straight(block_rhs)",
+        "minimal": minimal,
+        "independent_q": independent_q,
+        "independent_names": [program.velocities[k] for k in program.preferred],
+        "slots": [list(slot) for slot in program.quaternion_slots],
+        "plain": [] if space is None else list(zip(space.plain_q.tolist(), space.plain_v.tolist(), strict=True)),
+        "public": public,
+    }
+
+
+def _public(program: Program, minimal: bool) -> list[Traced]:
+    """The public functions, in the order of the table of kernels."""
+    found, drivers, sizes = [], {d.name for d in program.drivers}, program.sizes
+    for kernel in program.kernels:
+        if kernel.name not in TRACED_KERNELS or kernel.name == "kinematics" or not kernel.n_out:
+            continue
+        ports = {port.name: len(port.symbols) for port in kernel.ports}
+        arguments = {"x": kernel.n_in} if tuple(ports) == ("q", "v") else ports
+        function = f"straight(block_{kernel.name})"
+        if kernel.name in drivers:
+            function = OF_LOOPS[kernel.name] if program.has_loops else f"{kernel.name}_of_tree"
+            function = "tree_mass_matrix" if kernel.name == "mass_matrix" else function
+        found.append(Traced(kernel.name, arguments, kernel.shape, NAMED[kernel.name].result, function))
+    if minimal:
+        given, n = {"z": 2 * sizes.n_dof, "q_guess": sizes.n_q}, 2 * sizes.n_dof
+        if n:
+            found.append(Traced("minimal_rhs", given, (n,), "z' of z = [q_i; v_i], the degrees of freedom", "minimal"))
+        found.append(Traced("full_state", given, (sizes.n_x,), "x = [q; v] that belongs to z", "tree_state"))
+    return found
+
+
+def _require_traceable(program: Program, library: str) -> None:
+    """Refuse what has no form of straight lines and fixed numbers of steps."""
+    problems = []
+    native = [f.name for f, _ in used_calls(program).values() if f.native is not None]
+    if native:
+        problems.append(
+            f"function {', '.join(native)} is C code, which {LIBRARIES[library][0]} cannot differentiate; give a table "
+            "or an expression"
+        )
+    if program.system is not None:
+        problems.append(
+            f"method {program.metadata.get('method')!r} solves a linear system by pivoting; derive by method 'auto'"
+        )
+    if program.given_rates and program.has_loops:
+        problems.append("equations with given rates q' = N v and constraints are projected by pivoting")
+    if problems:
+        raise UsageError(f"target {library!r}: {'; '.join(problems)}")
+
+
+def _numbers(values: Any) -> str:
+    """The text of a tuple of numbers."""
+    texts = ['float("nan")' if x is None or x != x else repr(float(x)) for x in values or ()]
+    return f"({', '.join(texts)}{',' if len(texts) == 1 else ''})"
+
+
+def _table(function: Function) -> str:
+    table = function.evaluator
+    head = f"call_{function.name}"
+    if isinstance(table, Curve):
+        return f"{head} = curve({table.knots.tolist()}, {table.coefficients.tolist()}, {table.period!r})"
+    assert isinstance(table, Surface)
+    nodes = table.nodes.reshape(-1, 4).tolist()
+    return f"{head} = surface({table.x.tolist()}, {table.y.tolist()}, {nodes}, {table.slope!r})"

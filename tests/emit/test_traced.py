@@ -1,0 +1,173 @@
+"""Targets casadi and jax: the values and derivatives of the module, and what the libraries make of them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import jax
+import models
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen.errors import MissingDependencyError, UsageError
+from eomgen.generation import generate
+
+EXAMPLES = sorted(path.stem for path in models.EXAMPLES.glob("*.yaml"))
+TIMED = ("rhs", "bias", "outputs", "events")
+LOOPS = ["slider_crank", "four_bar", "stewart_platform", "rolling_disc"]
+
+
+def example(name: str) -> Any:
+    return eg.load(models.EXAMPLES / f"{name}.yaml").derive()
+
+
+def state_of(module: Any, seed: int = 3) -> np.ndarray:
+    """A state near the start, a little off the constraints too."""
+    x = module.x0()
+    random = np.random.default_rng(seed)
+    return module.project(x + 0.01 * random.normal(size=x.size)) + 1e-7 * random.normal(size=x.size)
+
+
+def compare(functions: Any, module: Any, names: Any) -> None:
+    x = state_of(module)
+    for name in names:
+        arguments, shape, _ = functions.EQUATIONS[name]
+        given = x if "x" in arguments else x[: module.n_q]
+        call = getattr(module, name)
+        call = call.every if name in ("constraints", "constraint_jacobian") else call
+        expected = np.ravel(call(0.0, given) if name in TIMED else call(given))
+        found = np.asarray(getattr(functions, name)(0.0, given, module.u, module.p)).reshape(shape).ravel()
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * max(1.0, np.abs(expected).max(initial=0.0)))
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_casadi_equals_the_module(name: str) -> None:
+    equations = example(name)
+    functions = equations.to_casadi()
+    values = {"rhs", "mass_matrix", "bias", "energy", "project", "poses", "outputs", "constraints"}
+    compare(functions, equations.compile(target="numpy"), sorted(values & functions.EQUATIONS.keys()))
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_jax_equals_the_module(name: str) -> None:
+    equations = example(name)
+    compare(equations.to_jax(), equations.compile(target="numpy"), ["rhs"])
+
+
+@pytest.mark.parametrize("name", ["double_pendulum", "quadrotor_load", "engine", *LOOPS])
+def test_derivatives_are_the_modules_jacobians(name: str) -> None:
+    equations = example(name)
+    module, functions = equations.compile(target="numpy"), equations.to_casadi()
+    x = module.project(state_of(module))
+    symbols = [ca.SX.sym(label, n) for label, n in (("x", module.n_x), ("u", module.n_u), ("p", module.n_p))]
+    slopes = ca.Function("f", symbols, [ca.jacobian(functions.rhs(0.0, *symbols), s) for s in symbols])
+    by_x, by_u, by_p = map(np.asarray, slopes(x, module.u, module.p))
+    expected = [(by_x, module.jacobian(0.0, x)), (by_p, module.parameter_jacobian(0.0, x))]
+    expected += [(by_u, module.input_jacobian(0.0, x))] if module.n_u else []
+    for found, wanted in expected:
+        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-9 * max(1.0, np.abs(wanted).max(initial=0.0)))
+
+
+@pytest.mark.parametrize("name", ["double_pendulum", "slider_crank"])
+def test_jax_differentiates_closed_loops_too(name: str) -> None:
+    equations = example(name)
+    module, functions = equations.compile(target="numpy"), equations.to_jax()
+    x = module.project(state_of(module))
+    found = jax.jit(jax.jacfwd(functions.rhs, argnums=1))(0.0, x, module.u, module.p)
+    expected = module.jacobian(0.0, x)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+    back = jax.jit(jax.grad(lambda x: functions.rhs(0.0, x, module.u, module.p)[-1]))(x)
+    np.testing.assert_allclose(back, expected[-1], rtol=0.0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_ten_thousand_pendulums_at_once() -> None:
+    equations = example("double_pendulum")
+    module, functions = equations.compile(target="numpy"), equations.to_jax()
+    states = np.random.default_rng(1).normal(size=(10_000, module.n_x))
+    found = jax.jit(jax.vmap(functions.rhs, in_axes=(None, 0)))(0.0, states)
+    expected = np.array([module.rhs(0.0, x) for x in states[:50]])
+    np.testing.assert_allclose(found[:50], expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
+    assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "four_bar", "stewart_platform"])
+def test_minimal_form_of_loops(name: str) -> None:
+    """z of the degrees of freedom gives the whole state and its rates."""
+    equations = example(name)
+    module, functions = equations.compile(target="numpy"), equations.to_casadi()
+    x = module.project(state_of(module))
+    q, v = x[: module.n_q], x[module.n_q :]
+    places = functions.INDEPENDENT
+    z = np.concatenate([q[functions.INDEPENDENT_Q], v[places]])
+    guess = q + 0.01 * np.random.default_rng(2).normal(size=q.size)
+    found = np.asarray(functions.full_state(0.0, z, guess, module.u, module.p)).ravel()
+    np.testing.assert_allclose(found, x, atol=1e-10 * max(1.0, np.abs(x).max()))
+    rates = np.asarray(functions.minimal_rhs(0.0, z, guess, module.u, module.p)).ravel()
+    expected = np.concatenate([v[places], module.rhs(0.0, x)[module.n_q :][places]])
+    np.testing.assert_allclose(rates, expected, atol=1e-9 * max(1.0, np.abs(expected).max()))
+
+
+def test_a_state_far_from_the_loops_is_no_number() -> None:
+    equations = example("slider_crank")
+    functions = equations.to_casadi()
+    x = np.array(functions.x0)
+    x[0] += 1.5
+    x[2] += 5.0
+    assert np.isnan(np.asarray(functions.rhs(0.0, x, functions.u_values, functions.p_values))).all()
+
+
+def test_casadi_integrates_a_closed_loop() -> None:
+    equations = example("slider_crank")
+    functions = equations.to_casadi()
+    x = ca.SX.sym("x", 6)
+    slopes = functions.rhs(0.0, x, functions.u_values, functions.p_values)
+    options = {"abstol": 1e-12, "reltol": 1e-10}
+    step = ca.integrator("step", "cvodes", {"x": x, "ode": slopes}, 0.0, 0.1, options)
+    module = equations.compile(target="numpy")
+    end = np.asarray(step(x0=module.x0())["xf"]).ravel()
+    expected = module.simulate(0.1, rtol=1e-11, atol=1e-12).x[:, -1]
+    np.testing.assert_allclose(end, expected, atol=1e-6)
+
+
+PROGRAM = """
+import sys
+sys.modules["eomgen"] = sys.modules["sympy"] = None
+import {name} as model
+x_dot = model.rhs(0.0, model.x0, model.u_values, model.p_values)
+print(float(x_dot[3]))
+"""
+
+
+@pytest.mark.parametrize("target", ["casadi", "jax"])
+def test_a_package_needs_the_library_alone(target: str, tmp_path: Path) -> None:
+    folder = generate(models.build("double_pendulum"), tmp_path, target=target)
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM.format(name=folder.name)],
+        cwd=tmp_path,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    functions = example("double_pendulum").to_casadi()
+    expected = functions.rhs(0.0, functions.x0, functions.u_values, functions.p_values)[3]
+    assert float(done.stdout) == pytest.approx(float(expected), rel=1e-12)
+    assert "model.rhs" in (folder / "README.md").read_text()
+
+
+def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    m = models.build("pendulum")
+    m.parameter("unused", 1.0)
+    with pytest.raises(MissingDependencyError, match=r"CasADi is not installed; pip install 'casadi>=3\.6\.5'"):
+        m.derive().to_casadi()
+
+
+def test_methods_that_pivot_are_refused() -> None:
+    equations = eg.load(models.EXAMPLES / "slider_crank.yaml").derive("augmented")
+    with pytest.raises(UsageError, match="target 'casadi': method 'augmented' solves a linear system by pivoting"):
+        equations.to_casadi()
