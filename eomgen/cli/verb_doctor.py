@@ -33,6 +33,8 @@ EXTRAS = {
     "plot": ("plots and pictures", ("matplotlib",)),
     "viz": ("animations as a page", ("matplotlib", "k3d")),
     "results": ("tables of results", ("pandas",)),
+    "casadi": ("functions for optimal control", ("casadi",)),
+    "jax": ("functions for arrays and learning", ("jax",)),
     "compiler": ("a C compiler from pip", ("ziglang",)),
     "notebook": ("Jupyter notebooks", ("jupyterlab", "ipywidgets", "matplotlib", "k3d", "pandas", "control")),
 }
