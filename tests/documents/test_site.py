@@ -124,7 +124,7 @@ def test_everything_public_is_documented(site: Site) -> None:
     for path in CLASSES:
         module, _, name = path.rpartition(".")
         found = getattr(import_module(module), name)
-        own = parameters_in(inspect.getdoc(found) or "")
+        own = {word for base in found.__mro__ for word in parameters_in(inspect.getdoc(base) or "")}
         for word in dir(found):
             if word.startswith("_") or word in own or hasattr(tuple, word):
                 continue
