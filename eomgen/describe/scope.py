@@ -159,7 +159,7 @@ class Scope:
             self._refuse(name, "name")
         elif kind is None and name in ENERGIES and self.level >= OUTPUT:
             return self.graph.symbol(f"{name}()")
-        elif kind is None and name in TOTALS and self.level >= OUTPUT:
+        elif kind is None and name in TOTALS and self.level >= LAW:
             self.quantities[f"{name}()"] = Quantity(None, *TOTALS[name])
             return self.graph.symbol(f"{name}()")
         elif kind is None:

@@ -79,7 +79,7 @@ def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
         "law": Field(
             "expression",
             f"{unit}: a positive value increases the coordinate or pushes the markers apart; an expression of {of}, "
-            "``rate``, t, parameters, inputs, coordinates and velocities",
+            "``rate``, t, parameters, inputs, coordinates, velocities, the motion of markers and outputs",
             level=LAW,
             dimension=push,
             local=names,

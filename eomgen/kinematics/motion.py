@@ -175,6 +175,12 @@ class MarkerMotion:
             found = vec.transpose_times(self.rotation(quantity.axes), found)
         return found[quantity.axis]
 
+    def may_wrap(self, quantity: Quantity) -> bool:
+        """Whether it is an angle between axes that do not stay in line, which is not defined everywhere."""
+        if quantity.axis != 3 or quantity.level > 0 or quantity.marker is None:
+            return False
+        return not self.turn(quantity.origin or self._ground, quantity.marker)[2]
+
     def _vector(self, level: int, marker: Marker | None) -> Vec3:
         """The motion of a marker's origin, its angular motion, or the motion of the centre of mass of all bodies."""
         if marker is None:
