@@ -40,3 +40,4 @@ ROUNDED = 1e-14
 #: earlier leaves the square root of its tolerance, squared; and in terms of what a change by a few roundings changes,
 #: for a thousand operations in another order.
 BUILDS, SPREAD_OF_ROUNDING = 1e-9, 1e3
+ZERO = 1e-11  #: and what one build may make of a zero (SI units): a sum of some terms of size 1e4 that cancel

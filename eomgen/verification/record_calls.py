@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import EomgenError
 from ..limits.rounding import EPS
-from ..limits.verification import BUILDS, SPREAD_OF_ROUNDING
+from ..limits.verification import BUILDS, SPREAD_OF_ROUNDING, ZERO
 from ..numeric.scales import Array
 from .cases import Case, random_cases
 
@@ -44,7 +44,7 @@ def record_calls(module: BoundModel | None) -> str:
     """The text of ``tests/recorded.json``: calls, their arguments, results, and the most by which a result may differ.
 
     The bound is :data:`~..limits.verification.SPREAD_OF_ROUNDING` times what a change of the state by a few roundings
-    changes, and :data:`~..limits.verification.BUILDS` of the largest number.
+    changes, :data:`~..limits.verification.BUILDS` of the largest number, and :data:`~..limits.verification.ZERO`.
 
     Parameters
     ----------
@@ -60,11 +60,13 @@ def record_calls(module: BoundModel | None) -> str:
             cases = [start, *random_cases(module, STATES - 1, SEED)] if module.n_x else [start]
         except EomgenError:  # no state can be assembled: the package says so when it is called
             cases = []
-        found += [one for case in cases for call in CALLS if (one := _record(module, call, case)) is not None]
+        for number, case in enumerate(cases):
+            tried = [_record(module, call, case, number) for call in CALLS]
+            found += [one for one in tried if one is not None]
     return json.dumps({"cases": found}, separators=(",", ":"), allow_nan=False) + "\n"
 
 
-def _record(module: BoundModel, call: str, case: Case) -> dict[str, Any] | None:
+def _record(module: BoundModel, call: str, case: Case, number: int) -> dict[str, Any] | None:
     """One call at one state; None where the model has no such result, or none that is finite."""
     given: dict[str, Any] = {"p": case.p, "u": case.u} | ({} if call in TIMED else {"t": case.t})
     rng = np.random.default_rng(SEED)
@@ -79,7 +81,7 @@ def _record(module: BoundModel, call: str, case: Case) -> dict[str, Any] | None:
         return None
     arguments = [value.tolist() if isinstance(value, np.ndarray) else float(value) for value in CALLS[call](case)]
     plain = {key: np.asarray(value).tolist() for key, value in given.items()}
-    named = {"id": f"{call}-{case.number}", "call": call, "arguments": arguments, "given": plain}
+    named = {"id": f"{call}-{number}", "call": call, "arguments": arguments, "given": plain}
     return named | _judged(values[0], values[1:])
 
 
@@ -91,4 +93,4 @@ def _nudge(values: Array, rng: np.random.Generator) -> Array:
 def _judged(value: Array, beside: list[Array]) -> dict[str, Any]:
     spread = max((float(np.abs(other - value).max()) for other in beside), default=0.0)
     size = float(np.abs(value).max(initial=0.0))
-    return {"value": value.tolist(), "bound": SPREAD_OF_ROUNDING * spread + BUILDS * max(size, EPS)}
+    return {"value": value.tolist(), "bound": SPREAD_OF_ROUNDING * spread + BUILDS * size + ZERO}
