@@ -58,11 +58,14 @@ class Wheel(NamedTuple):
 
 
 def require_wheel(target: str) -> None:
-    """Refuse targets of which no wheel is built.
+    """Refuse what would end without a wheel, before any work is done.
 
     Raises
     ------
     UsageError
+        A target of which no wheel is built; a flag compiles for this very processor.
+    MissingDependencyError
+        setuptools is not installed, or too old.
     """
     able = [name for name, row in TARGETS.items() if row.module]
     if target not in able:
@@ -70,6 +73,9 @@ def require_wheel(target: str) -> None:
         raise UsageError(
             f"--wheel is for target {' or '.join(able)}; target {target} makes a {about}: generate it without --wheel"
         )
+    _require_setuptools()
+    if target == "cython":
+        _refuse_native()
 
 
 def build_wheel(folder: Path, directory: Path | None = None) -> Wheel:
@@ -101,10 +107,8 @@ def build_wheel(folder: Path, directory: Path | None = None) -> Wheel:
     """
     files, target = _read(folder)
     require_wheel(target)
-    _require_setuptools()
     variables = {"SOURCE_DATE_EPOCH": os.environ.get("SOURCE_DATE_EPOCH") or EPOCH}
     if target == "cython":
-        _refuse_native()
         find_python_headers()
         compiler = find_compiler()
         words = [os.environ.get("CFLAGS") or OPTIMIZED, *machine_flags(Options(), compiler)]
