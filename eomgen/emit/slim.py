@@ -75,6 +75,6 @@ def carry_slim(package: Mapping[str, str], signals: bool) -> dict[str, str]:
     return texts | {f"{name}/__init__.py": describe_folder(name) for name in folders}
 
 
-_REFUSAL = '''from ..errors import left_out
+_REFUSAL = """from ..errors import left_out
 raise left_out("{}")
-'''
+"""

@@ -150,13 +150,17 @@ def test_one_of_numpy_is_for_every_computer(tmp_path: Path) -> None:
     made = build_wheel(generate(m, tmp_path, target="numpy", slim=True), tmp_path / "wheels")
     assert made == Wheel(tmp_path / "wheels" / "class-0.1.0-py3-none-any.whl", "")
     unpacked(made, tmp_path / "there")
-    script = "import json, sys; sys.modules['eomgen'] = None; import class_ as c; print(json.dumps({'x': list(c.x0())}))"
+    script = (
+        "import json, sys; sys.modules['eomgen'] = None; import class_ as c; print(json.dumps({'x': list(c.x0())}))"
+    )
     assert run_alone(tmp_path / "there", script)["x"] == [0.5, 0.0]
 
 
 @pytest.mark.parametrize("target", ["c", "fmu", "casadi", "jax"])
 def test_other_targets_are_refused(target: str) -> None:
-    with pytest.raises(UsageError, match=rf"for target cython or numpy; target {target} makes a .*: generate it without"):
+    with pytest.raises(
+        UsageError, match=rf"for target cython or numpy; target {target} makes a .*: generate")
+    ):
         require_wheel(target)
 
 
@@ -183,6 +187,11 @@ def test_a_folder_of_others_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="is not a generated package"):
         build_wheel(tmp_path)
     folder = generate(models.build("pendulum"), tmp_path, target="numpy", slim=True)
+    (tmp_path / "elsewhere").write_text("kept")
+    (tmp_path / "pendulum-0.1.0-py3-none-any.whl").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(UsageError, match="symbolic link"):
+        build_wheel(str(folder))
+    assert (tmp_path / "elsewhere").read_text() == "kept"
     (folder / "errors.py").unlink()
     with pytest.raises(UsageError, match=r"lacks files that were generated: errors\.py"):
         build_wheel(folder)
