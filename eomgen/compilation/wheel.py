@@ -45,7 +45,7 @@ print(name)
 """
 
 
-class Wheel(NamedTuple):
+class BuiltWheel(NamedTuple):
     """A wheel that was built.
 
     Attributes
@@ -80,7 +80,7 @@ def require_wheel(target: str) -> None:
         _refuse_native()
 
 
-def build_wheel(folder: Path | str, directory: Path | str | None = None) -> Wheel:
+def build_wheel(folder: Path | str, directory: Path | str | None = None) -> BuiltWheel:
     """Build the wheel of a generated package by setuptools, as ``pip wheel`` does, with what is installed here.
 
     The same package, compiler and versions give the same bytes (SOURCE_DATE_EPOCH sets the time of its files).
@@ -94,7 +94,7 @@ def build_wheel(folder: Path | str, directory: Path | str | None = None) -> Whee
 
     Returns
     -------
-    Wheel
+    BuiltWheel
         Of ``cython`` one for all CPythons from 3.11 on (abi3), and for all Linux systems with the C library that
         auditwheel finds sufficient, where that is installed; of ``numpy`` one for every computer.
 
@@ -134,7 +134,7 @@ def build_wheel(folder: Path | str, directory: Path | str | None = None) -> Whee
         if target == "cython":
             built, note = _audit(built, Path(private, "audited"), variables["SOURCE_DATE_EPOCH"])
         write_whole(directory / built.name, built.read_bytes())
-    return Wheel(directory / built.name, note)
+    return BuiltWheel(directory / built.name, note)
 
 
 def _read(folder: Path) -> tuple[list[str], str]:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen.compilation.wheel import Wheel, build_wheel, require_wheel
+from eomgen.compilation.wheel import BuiltWheel, build_wheel, require_wheel
 from eomgen.errors import MissingDependencyError, UsageError
 from eomgen.generation import generate
 
@@ -47,7 +47,7 @@ print("\\n" + json.dumps({"found": found, **facts}))
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> list[Wheel]:
+def built(tmp_path_factory: pytest.TempPathFactory) -> list[BuiltWheel]:
     """The same wheel, built in two folders of different names."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CFLAGS", "-O0")
@@ -56,7 +56,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> list[Wheel]:
         return [build_wheel(generate(models.build("pendulum"), folder)) for folder in folders]
 
 
-def unpacked(wheel: Wheel, folder: Path) -> Path:
+def unpacked(wheel: BuiltWheel, folder: Path) -> Path:
     with zipfile.ZipFile(wheel.path) as file:
         file.extractall(folder)
     return folder
@@ -73,7 +73,7 @@ def run_alone(folder: Path, script: str) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_its_tags_say_where_it_runs(built: list[Wheel]) -> None:
+def test_its_tags_say_where_it_runs(built: list[BuiltWheel]) -> None:
     name = built[0].path.name
     assert name.startswith("pendulum-0.1.0-cp311-abi3-")
     if sys.platform.startswith("linux"):
@@ -95,7 +95,7 @@ def test_its_tags_say_where_it_runs(built: list[Wheel]) -> None:
 
 
 @pytest.mark.slow
-def test_two_builds_give_the_same_bytes(built: list[Wheel]) -> None:
+def test_two_builds_give_the_same_bytes(built: list[BuiltWheel]) -> None:
     one, other = built
     assert one.path.parent != other.path.parent
     assert one.path.name == other.path.name
@@ -103,7 +103,7 @@ def test_two_builds_give_the_same_bytes(built: list[Wheel]) -> None:
 
 
 @pytest.mark.slow
-def test_it_has_the_bits_of_the_module_here(built: list[Wheel], tmp_path: Path) -> None:
+def test_it_has_the_bits_of_the_module_here(built: list[BuiltWheel], tmp_path: Path) -> None:
     there = run_alone(unpacked(built[0], tmp_path), ALONE)
     assert there["code"] == 0  # its own tests
     assert abs(there["refs"]) < 10  # kernels that are gone leave their type alone
@@ -148,7 +148,7 @@ def test_one_of_numpy_is_for_every_computer(tmp_path: Path) -> None:
     m.revolute("A", m.ground, m.body("rod", mass=1.0, com=(0, -1, 0)), coordinate="theta")
     m.initial(theta=0.5)
     made = build_wheel(generate(m, tmp_path, target="numpy", slim=True), tmp_path / "wheels")
-    assert made == Wheel(tmp_path / "wheels" / "class-0.1.0-py3-none-any.whl", "")
+    assert made == BuiltWheel(tmp_path / "wheels" / "class-0.1.0-py3-none-any.whl", "")
     unpacked(made, tmp_path / "there")
     script = (
         "import json, sys; sys.modules['eomgen'] = None; import class_ as c; print(json.dumps({'x': list(c.x0())}))"
@@ -158,9 +158,7 @@ def test_one_of_numpy_is_for_every_computer(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("target", ["c", "fmu", "casadi", "jax"])
 def test_other_targets_are_refused(target: str) -> None:
-    with pytest.raises(
-        UsageError, match=rf"for target cython or numpy; target {target} makes a .*: generate")
-    ):
+    with pytest.raises(UsageError, match=rf"for target cython or numpy; target {target} makes a .*: generate it"):
         require_wheel(target)
 
 
