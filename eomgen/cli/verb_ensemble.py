@@ -15,6 +15,7 @@ from ..files.reading import open_plain
 from ..files.writing import save_figure, write_whole
 from ..runtime.near_names import require
 from ..runtime.room import require_room
+from ..runtime.storage import write_netcdf
 from .analysis import Prepared, analysis_options
 from .number_option import Number, NumberRange
 from .screen import finite, print_heading, print_json, print_table, say, stage
@@ -63,7 +64,7 @@ MOST_WORKERS = 4096  #: processes of a local cluster
     help="Keep finished runs in DIR, and continue from there.",
 )
 @click.option("--plot", nargs=2, metavar="NAME FILE", help="Draw column NAME to the picture FILE.")
-@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write results to FILE.npz or FILE.csv.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write results to FILE.npz, .csv or .nc.")
 def ensemble(
     work: Prepared, cases: Path | None, vary: tuple[str, ...], grid: tuple[str, ...], count: int | None,
     seed: int, end: float | None,
@@ -72,12 +73,14 @@ def ensemble(
     plot: tuple[str, str] | None, out: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Run a model many times: for a table of cases, for random values, or over a grid of values."""
-    if out is not None and out.suffix not in (".npz", ".csv"):
-        raise UsageError(f"--out {out}: ensembles are written as .npz or .csv")
+    if out is not None and out.suffix not in (".npz", ".csv", ".nc"):
+        raise UsageError(f"--out {out}: ensembles are written as .npz, .csv or .nc")
     for word, path in (("--out", out), ("--plot", None if plot is None else Path(plot[1]))):
         require_folder(word, path)
     if out is not None and out.suffix == ".csv":
         require("pandas", "pandas", "--out FILE.csv")
+    if out is not None and out.suffix == ".nc":
+        require("xarray", "xarray h5netcdf h5py", "--out FILE.nc")
     if cases is not None and count is not None:
         raise UsageError("--count is for values drawn by --vary; --cases has as many runs as rows")
     module = work.module
@@ -107,6 +110,8 @@ def ensemble(
     if out is not None:
         if out.suffix == ".csv":
             write_whole(out, found.to_pandas(samples=times is not None and not statistics).to_csv(index=False))
+        elif out.suffix == ".nc":
+            write_netcdf(found.to_xarray(), out)
         else:
             found.save(out)
     if plot is not None:

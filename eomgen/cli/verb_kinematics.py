@@ -11,6 +11,7 @@ import numpy as np
 
 from ..analysis.tables import without_noise
 from ..errors import UsageError
+from ..runtime.storage import RUNS
 from .failures import reports_failures
 from .plot import Picture, check_columns, check_picture, find_paths, picture_options, plot_run
 from .screen import finite, print_heading, print_json, print_rows, print_table, say, stage
@@ -28,7 +29,7 @@ from .shared_options import (
     target_option,
 )
 from .verb_derive import summary
-from .verb_run import TABLES, complete_parameters, final_names, sort_settings
+from .verb_run import complete_parameters, final_names, sort_settings
 from .workspace_request import read_grid, workspace_to_dict, write_workspace
 
 if TYPE_CHECKING:
@@ -62,7 +63,12 @@ SHOWN = 9  #: of them on the screen
 @click.option("--within-limits", is_flag=True, help="Restrict the workspace to the limits of the joints.")
 @click.option("--partial", is_flag=True, help="If the range cannot be reached completely, give the part that can.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, or start position.")
-@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write all columns to FILE.npz or .csv.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write all columns to FILE.npz, .csv, .nc or .parquet.",
+)
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw them, e.g. to FILE.png.")
 @picture_options
 @json_option
@@ -92,8 +98,8 @@ def kinematics(
     chosen = parse_settings(settings)
     asked = [read_range(words) for words in ranges]
     grid = read_grid(over, of, within_limits, bool(ranges))
-    if out is not None and out.suffix not in TABLES:
-        raise UsageError(f"--out {out}: the motion is written as {' or '.join(TABLES)}")
+    if out is not None and out.suffix not in RUNS:
+        raise UsageError(f"--out {out}: the motion is written as {' or '.join(RUNS)}")
     check_picture(plot, picture)
     require_folder("--out", out)
     require_folder("--plot", plot)

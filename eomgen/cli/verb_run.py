@@ -13,6 +13,7 @@ from ..analysis.tables import without_noise
 from ..errors import UsageError
 from ..limits.descriptions import RESTING
 from ..runtime.near_names import place_of_marker
+from ..runtime.storage import RUNS
 from .failures import after_integration, reports_failures
 from .number_option import NumberRange
 from .plot import Picture, check_columns, check_picture, find_paths, picture_options, plot_run
@@ -42,8 +43,6 @@ if TYPE_CHECKING:
     from ..runtime import Trajectory
     from .energy import EnergyBalance
 
-TABLES = (".npz", ".csv")
-
 
 POINTS = 5  #: change points listed
 
@@ -63,7 +62,12 @@ POINTS = 5  #: change points listed
     metavar="NAME=VALUE",
     help="Value of a parameter, an input or an initial value; repeat it for more.",
 )
-@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write the run to FILE.npz or FILE.csv.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write the run to FILE.npz, .csv, .nc or .parquet.",
+)
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the run, e.g. to FILE.png.")
 @click.option(
     "--animate",
@@ -118,8 +122,8 @@ def run(
     Integrator, tolerances, end time and initial values are those of the model file where no option gives others.
     """
     chosen = parse_settings(settings)
-    if out is not None and out.suffix not in TABLES:
-        raise UsageError(f"--out {out}: a run is written as {' or '.join(TABLES)}")
+    if out is not None and out.suffix not in RUNS:
+        raise UsageError(f"--out {out}: a run is written as {' or '.join(RUNS)}")
     check_picture(plot, picture)
     if animate is not None:
         from ..show.writers import require_kind

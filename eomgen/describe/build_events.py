@@ -12,13 +12,10 @@ from .checks import check_keys
 from .description import DescribedEntry
 from .fields import EVENT, OUTPUT
 from .mechanism import Event
-from .names import QUANTITIES, nearest
-from .scope import quantity_of
+from .names import nearest
+from .scope import late_names
 from .sympy_face import in_order
 from .values import Reader, is_number
-
-_LATE = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
-_ACCELERATIONS = (2, 9, 10)  #: levels of QUANTITIES
 
 
 def build_events(reader: Reader, entries: list[DescribedEntry]) -> tuple[Event, ...]:
@@ -70,13 +67,9 @@ def _times(reader: Reader, path: str, value: Any) -> int:
 def _instant(reader: Reader, path: str, value: Any) -> Expr:
     """An expression of what is known of a state without solving for accelerations."""
     expression = reader.expression(path, value, OUTPUT)
-    for name in sorted(symbols_of([expression])):
-        what, found = _LATE.get(reader.names.kinds.get(name, "")), quantity_of(name)
-        if found is not None and QUANTITIES[found[0]][0] in _ACCELERATIONS:
-            what = "acceleration"
-        if what is not None:
-            remedy = "allowed are t, parameters, inputs, coordinates, velocities, positions and velocities of markers"
-            reader.faults.add(path, f"the {what} {name!r} cannot be used in an event", remedy)
+    for name, what in late_names(reader.names, symbols_of([expression])):
+        remedy = "allowed are t, parameters, inputs, coordinates, velocities, positions and velocities of markers"
+        reader.faults.add(path, f"the {what} {name!r} cannot be used in an event", remedy)
     return expression
 
 

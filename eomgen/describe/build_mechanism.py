@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import math
-import sys
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from ..constraints import CONSTRAINTS
-from ..elements.dimensions import NONE
 from ..errors import ModelError
 from ..forces import FORCES
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.shown import quoted, shown
-from ..graph.substitute import symbols_of
-from ..graph.traverse import LEAVES, reachable
-from ..operations import OPERATIONS
 from .body_shapes import read_shapes
 from .build_cam_points import declare_contacts
 from .build_elements import build_elements
@@ -27,24 +20,23 @@ from .build_events import build_events
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
+from .build_quantities import Outputs, read_input, read_parameter, with_signal
 from .cam_turns import check_turns
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
 from .dotted_names import undotted
 from .element_entry import Surroundings
-from .fields import BODY, INPUT, MODEL, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
+from .fields import BODY, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
 from .joint_data import check_display
 from .mass_properties import read_body
-from .mechanism import SUMS, Body, Input, Mechanism, Output, Parameter, Simulation
+from .mechanism import SUMS, Body, Mechanism, Simulation
 from .names import fault_of_model_name, nearest
 from .physical import check_bodies
-from .printed_names import take_latex
 from .scope import Namespace
 from .sympy_face import in_order, name_of
-from .units import Unit, UnitError, read_unit
 from .values import Reader
 
 
@@ -81,8 +73,8 @@ def build(description: Description) -> Mechanism:
     if values.get("attachments"):
         remedy = "add this model to that one as a component, which gives a marker for each attachment"
         faults.add("attachments", "attachments stand for markers of another model", remedy)
-    parameters = tuple(_parameter(reader, entry) for entry in sections["parameters"])
-    inputs = tuple(_input(reader, entry) for entry in sections["inputs"])
+    parameters = tuple(read_parameter(reader, entry) for entry in sections["parameters"])
+    inputs = tuple(read_input(reader, entry) for entry in sections["inputs"])
     numbers = reader.numbers = {p.name: p.value for p in parameters if p.value is not None}
     build_functions(reader, sections["functions"])
     specs = declare_coordinates(reader, sections["joints"])
@@ -94,7 +86,8 @@ def build(description: Description) -> Mechanism:
         reader, values.get("equations"), lagrangian_values is not None or bool(sections["bodies"] or sections["joints"])
     )
 
-    inputs = tuple(_with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
+    read_outputs = Outputs(reader, sections["outputs"]).all
+    inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     bodies = _bodies(reader, sections["bodies"])
     joints = build_joints(reader, specs)
     around = Surroundings(reader, specs, joints, bodies, contacts)
@@ -103,7 +96,7 @@ def build(description: Description) -> Mechanism:
     given = build_equations(reader, given_values)
     constraints = build_elements(around, "constraint", sections["constraints"], CONSTRAINTS)
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
-    outputs = _outputs(reader, sections["outputs"])
+    outputs = read_outputs()
     events = build_events(reader, sections["events"])
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
     initial = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity"))
@@ -168,65 +161,6 @@ def _limits_told(reader: Reader, given: Any) -> bool:
     return given is None or reader.choice("limits", given, MODEL["limits"]) != "off"
 
 
-def _described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[Unit, str]:
-    """Unit and doc of an entry, its keys checked."""
-    check_keys(entry.path, entry.values, fields, reader.faults)
-    text, doc = (reader.text(f"{entry.path}.{key}", entry.values.get(key, "")) for key in ("unit", "doc"))
-    take_latex(reader, f"{entry.path}.latex", entry.name, entry.values.get("latex", ""))
-    try:
-        unit = read_unit(text)
-    except UnitError as error:
-        reader.faults.add(f"{entry.path}.unit", str(error), error.remedy)
-        return Unit(NONE), doc
-    if text:
-        reader.units[entry.path] = unit
-    return unit, doc
-
-
-def _in_si(reader: Reader, path: str, value: float | None, unit: Unit) -> float | None:
-    """A value in SI units; one that no double holds there is a fault."""
-    if value is None or unit.size == 1.0:
-        return value
-    found = value * unit.size
-    if not math.isfinite(found) or (value != 0.0 and abs(found) < sys.float_info.min):
-        remedy = "check the value and its unit"
-        reader.faults.add(path, f"{value:g} {unit.text} in {unit.si} is outside the range of double precision", remedy)
-        return None
-    return found
-
-
-def _parameter(reader: Reader, entry: DescribedEntry) -> Parameter:
-    reader.names.declare("parameter", entry.name, entry.path)
-    unit, doc = _described(reader, entry, PARAMETER)
-    given = entry.values.get("value")
-    value = None if given is None else reader.number(f"{entry.path}.value", given)
-    return Parameter(str(entry.name), _in_si(reader, f"{entry.path}.value", value, unit), unit.si, doc)
-
-
-def _input(reader: Reader, entry: DescribedEntry) -> Input:
-    reader.names.declare("input", entry.name, entry.path)
-    unit, doc = _described(reader, entry, INPUT)
-    given = entry.values.get("value")
-    value = 0.0 if given is None else reader.number(f"{entry.path}.value", given)
-    return Input(str(entry.name), _in_si(reader, f"{entry.path}.value", value, unit) or 0.0, unit.si, doc)
-
-
-def _with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:
-    """The input with its expression over time, read when all coordinates are known."""
-    if entry.values.get("signal") is None:
-        return given
-    path = f"{entry.path}.signal"
-    expression = reader.expression(path, entry.values["signal"], MOTION)
-    for name in sorted(symbols_of([expression])):
-        if reader.names.kinds.get(name) == "input":
-            reader.faults.add(
-                path, f"the input {name!r} cannot be used here", "allowed are t, coordinates, velocities and parameters"
-            )
-    if any(reader.graph.nodes[i][0] not in (*OPERATIONS, *LEAVES) for i in reachable(reader.graph, [expression.id])):
-        reader.faults.add(path, "a function of the model cannot be used here", "write out its expression")
-    return replace(given, signal=expression)
-
-
 def _bodies(reader: Reader, entries: list[DescribedEntry]) -> tuple[Body, ...]:
     """Bodies, with all markers taken in before anything refers to them."""
     faults, graph = reader.faults, reader.graph
@@ -270,38 +204,6 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
         what = ", ".join(name.removesuffix("()") for name in asked)
         message = f"{what}: {'no body has a mass' if bodies else 'the model has no bodies'}"
         reader.faults.add("outputs", message, "a centre of mass and a momentum need mass")
-
-
-def _outputs(reader: Reader, entries: list[DescribedEntry]) -> tuple[Output, ...]:
-    made = [_output(reader, entry) for entry in entries]
-    seen: set[str] = set()
-    for entry, output in zip(entries, made, strict=True):
-        if output.name in seen:
-            reader.faults.add(entry.path, "the name is given to two outputs", "rename one")
-        seen.add(output.name)
-    return tuple(made)
-
-
-def _output(reader: Reader, entry: DescribedEntry) -> Output:
-    faults, path = reader.faults, entry.path
-    unit, doc = _described(reader, entry, OUTPUT_FIELDS)
-    expression: Expr = reader.stand_in
-    if "expression" in entry.values:
-        expression = reader.expression(f"{path}.expression", entry.values["expression"], OUTPUT)
-    if unit.size != 1.0 and expression.value is not None:
-        faults.add(f"{path}.unit", "the expression is a number whose unit is not known", "use a parameter with a unit")
-    kind = reader.names.kinds.get(entry.name) if isinstance(entry.name, str) else None
-    if kind in ("coordinate", "velocity", "acceleration", "multiplier"):
-        if expression != reader.graph.symbol(entry.name):
-            faults.add(path, f"{entry.name!r} is a {kind}", f"an output of that name must be {entry.name} itself")
-        elif unit.size != 1.0:
-            remedy = f"leave the unit out, or give the output in {unit.text} another name"
-            faults.add(f"{path}.unit", f"{entry.name!r} is a {kind}, which is in SI units", remedy)
-    elif kind != "output":
-        reader.names.declare("output", entry.name, path)
-    if unit.size != 1.0:
-        expression = expression / unit.size
-    return Output(str(entry.name), expression, unit.text, doc)
 
 
 def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -> dict[str, Expr]:

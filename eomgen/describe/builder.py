@@ -144,7 +144,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         name : str
             Identifier; it may repeat a coordinate if the expression is that coordinate.
         expression : number, str or SymPy expression
-            In t, parameters, inputs, coordinates, their rates and the motion of markers.
+            In t, parameters, inputs, coordinates, their rates, the motion of markers and other outputs.
         unit : str, optional
             Unit in which the result is given; without one it is in SI units.
         doc : str, optional
@@ -171,7 +171,8 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         name : str
             Identifier, for ``Trajectory.t_events[name]``.
         expression : number, str or SymPy expression
-            In t, parameters, inputs, coordinates, velocities, and the position and velocity of markers.
+            In t, parameters, inputs, coordinates, velocities, the position and velocity of markers, and outputs that
+            need no accelerations.
         terminal : bool or int
             End the run there; a number: when it has happened so often.
         direction : {0, 1, -1}

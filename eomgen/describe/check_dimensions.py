@@ -19,7 +19,7 @@ from ..graph.traverse import reachable
 from ..operations import OPERATIONS
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MODEL, Field, acts_on_length, fields_of, part_fields
-from .mechanism import LEVEL_DIMENSIONS, TURNING, JointSpec, Output
+from .mechanism import TURNING, JointSpec, Output
 from .scope import ENERGIES, RATES
 from .units import Unit, si_text
 from .values import Reader
@@ -102,7 +102,7 @@ def with_units(reader: Reader, joints: tuple[JointSpec, ...], outputs: tuple[Out
     names = _names(reader, reader.units, joints)
     turned = {c for j in joints for c, k in zip(j.coordinates, j.joint.coordinates, strict=True) if k.kind == "angle"}
     angles = {name + suffix for name in turned for suffix in RATES}
-    turns = {name: q.level in TURNING or (q.level == 0 and q.axis == 3) for name, q in reader.quantities.items()}
+    turns = {name: q.level in TURNING or (q.level < 2 and q.axis == 3) for name, q in reader.quantities.items()}
     angles |= {name for name, turn in turns.items() if turn}
     check = _Check(reader.graph, names)
     found = []
@@ -143,7 +143,7 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
                 own = SPEED if velocity.kind == "length" else SPIN
                 found |= {name: Known(own), f"{name}_dot": Known(own.times(TIME, -1))}
     for name, quantity in reader.quantities.items():
-        found[name] = Known(NONE if quantity.axis == 3 and quantity.level == 0 else LEVEL_DIMENSIONS[quantity.level])
+        found[name] = Known(quantity.dimension)
     return found | {f"{name}()": Known(ENERGY) for name in ENERGIES}
 
 

@@ -11,6 +11,7 @@ from ..notation import with_instance
 from .build_cam_points import needs_point
 from .build_joints import coordinate_names, sketch
 from .description import GROUND_NAME, Description
+from .marker_quantities import MarkerQuantity
 from .names import COM, QUANTITIES, TOTALS, function_words
 from .placed_on import placed_on
 from .rewritten_texts import in_brackets, rewritten
@@ -107,11 +108,14 @@ class Renaming(Visitor):
     def scalar(self, value: Any, slot: Slot) -> Any:
         hidden = slot.field.local if slot.field else ()
 
-        def locate(quantity: str, marker: str) -> str:
+        def locate(quantity: MarkerQuantity) -> str:
+            return str(quantity.renamed(place))
+
+        def place(marker: str) -> str:
             if marker == COM and COM not in self.own.bodies:
-                return f"{quantity}({marker})"
+                return marker
             found = self.marker(marker, slot)
-            return f"{quantity}({found if isinstance(found, str) else self._named(marker, found)})"
+            return found if isinstance(found, str) else self._named(marker, found)
 
         return rewritten(value, lambda name: name if name in hidden else self.word(name, slot), locate)
 

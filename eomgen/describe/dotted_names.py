@@ -35,7 +35,7 @@ class Undotted(Visitor):
     def scalar(self, value: Any, slot: Slot) -> Any:
         if not isinstance(value, str) or "." not in value:
             return value
-        return rewritten(value, self.coordinate, lambda quantity, marker: f"{quantity}({self.coordinate(marker)})")
+        return rewritten(value, self.coordinate, lambda quantity: str(quantity.renamed(self.coordinate)))
 
     def marker(self, reference: Any, slot: Slot) -> Any:
         return self.coordinate(reference) if isinstance(reference, str) else super().marker(reference, slot)

@@ -17,6 +17,7 @@ from ..errors import ExpressionError
 from ..graph.core import Expr, Graph
 from ..operations import OPERATIONS
 from ..syntax_trees import parse_statement
+from .marker_quantities import MarkerQuantity
 from .names import QUANTITIES, function_words, nearest
 
 LENGTH = 4000  #: characters of one expression
@@ -26,14 +27,17 @@ EXPONENT = 1000.0  #: size of a numeric exponent
 
 #: A name -> its expression; may raise :class:`ExpressionError` or note the fault and return a placeholder.
 Resolve = Callable[[str], Expr]
-#: A quantity (``vx``) and a marker (``rod.tip``) -> its expression.
-Locate = Callable[[str, str], Expr]
+#: The motion of a marker, such as ``vx(rod.tip)``, -> its expression.
+Locate = Callable[[MarkerQuantity], Expr]
 
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/()<>=! \t\r\n]")
 #: A number that runs into a word: Python reads it as two, with a warning of its own.
 _JOINED = re.compile(r"(?<![A-Za-z0-9_])[0-9.][0-9A-Za-z_.]*?(and|or|not|if|is|in|else)")
 #: A number with a unit: ``150 mm``, ``5cm``, ``30°``.
 _WITH_UNIT = re.compile(r"\s*([0-9.]+(?:e[+-]?[0-9]+)?)\s*(°|%|[A-Za-zµμ][A-Za-z0-9µμ*/^²³·-]*)\s*")
+#: Keywords of motions that Python does not allow as such, and what stands for them in its tree.
+_KEYWORDS = {"in": "_n", "from": "_rom"}
+_KEYWORD = re.compile(r"\b(in|from)(?=\s*=(?!=))")
 _HINTS = {
     "^": "write ** for powers",
     "%": "there is no remainder operator",
@@ -55,7 +59,7 @@ _COMPARISONS: dict[type[ast.cmpop], tuple[str, bool, bool]] = {  # operation, op
     ast.NotEq: ("eq", False, True),
 }
 _REFUSED: dict[type[ast.AST], str] = {
-    ast.Attribute: "a dot can be used only for markers inside x(...), vx(...) and the like, in outputs",
+    ast.Attribute: "a dot can be used only for markers inside x(...), vx(...) and the like",
     ast.Tuple: "one expression is expected, not several",
     ast.Starred: "'*' cannot be used before a name",
     ast.Await: "'await' is not allowed in an expression",
@@ -114,7 +118,7 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         raise ExpressionError(
             f"a number is followed directly by {word!r}", joined.start(1) + 1, "write a space between them", text
         )
-    line = re.sub(r"\s", " ", text)
+    line = _KEYWORD.sub(lambda found: _KEYWORDS[found[1]], re.sub(r"\s", " ", text))
     start = len(line) - len(line.lstrip())
     try:
         tree = parse_statement(line[start:].rstrip() + "\n")
@@ -254,10 +258,10 @@ class _Walker:
         if not isinstance(node.func, ast.Name):
             raise self.fault(node, "only the listed functions can be called")
         name = node.func.id
-        if node.keywords:
-            raise self.fault(node, f"{name}() takes no keywords")
         if name in QUANTITIES and name not in self.words:
             return self.quantity(node, name)
+        if node.keywords:
+            raise self.fault(node, f"{name}() takes no keywords")
         declared = self.graph.functions.get(name)
         if self.any_function and (name == "diff" or (name not in self.words and declared is None)):
             for argument in node.args:
@@ -305,18 +309,27 @@ class _Walker:
 
     def quantity(self, node: ast.Call, name: str) -> Expr:
         if self.locate is None:
-            raise self.fault(node, f"{name}(...) of a marker cannot be used here", "use it in outputs only")
-        argument = node.args[0] if len(node.args) == 1 else None
-        if isinstance(argument, ast.Name):
-            marker = argument.id
-        elif isinstance(argument, ast.Attribute) and isinstance(argument.value, ast.Name):
-            marker = f"{argument.value.id}.{argument.attr}"
-        else:
-            raise self.fault(node, f"{name}() takes one marker", f"write {name}(body) or {name}(body.marker)")
+            remedy = "use it in outputs, events and the laws of force elements"
+            raise self.fault(node, f"{name}(...) of a marker cannot be used here", remedy)
+        words = {word: key for key, word in _KEYWORDS.items()}
+        parts = [self.marker(argument, name) for argument in node.args]
+        for keyword in node.keywords:
+            if keyword.arg not in words:
+                raise self.fault(node, f"{name}() takes no {keyword.arg or '**'}=", "from= and in= take a marker")
+            parts.append(f"{words[keyword.arg]}={self.marker(keyword.value, name)}")
         try:
-            return self.locate(name, marker)
+            return self.locate(MarkerQuantity.of(name, ", ".join(parts)))
         except ExpressionError as error:
-            raise self.fault(argument, error.message, error.remedy) from None
+            raise self.fault(node.args[0] if node.args else node, error.message, error.remedy) from None
+
+    def marker(self, argument: ast.expr, quantity: str) -> str:
+        """The label of a marker, ``rod`` or ``rod.tip``."""
+        if isinstance(argument, ast.Name):
+            return argument.id
+        if isinstance(argument, ast.Attribute) and isinstance(argument.value, ast.Name):
+            return f"{argument.value.id}.{argument.attr}"
+        remedy = f"write {quantity}(body) or {quantity}(body.marker)"
+        raise self.fault(argument, f"{quantity}() takes markers, not expressions", remedy)
 
     def fold(self, node: ast.expr, operation: str, values: list[Expr]) -> Expr:
         result = values[0]

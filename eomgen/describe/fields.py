@@ -15,6 +15,7 @@ from ..elements.dimensions import ACCELERATION, ENERGY, LENGTH, MASS, NONE, REAC
 from ..elements.dimensions import INERTIA as MOMENT_OF_INERTIA
 from ..elements.element_type import ElementType
 from ..elements.field import CONSTANT as CONSTANT
+from ..elements.field import LAW as LAW
 from ..elements.field import MOTION as MOTION
 from ..elements.field import NUMBER as NUMBER
 from ..elements.field import OUTPUT as OUTPUT

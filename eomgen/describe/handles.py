@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import UsageError
 from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
 from .described import Described
 from .description import GROUND_NAME, DescribedEntry, is_zero, items, label_of
+from .marker_quantities import MarkerQuantity
 from .mechanism import velocity_names
 from .scope import RATES
 from .sympy_face import symbol
@@ -39,53 +40,131 @@ class MarkerHandle:
 
     @property
     def position(self) -> Triple:
-        """Position of the origin in ground axes (m), as SymPy symbols for use in outputs."""
-        return self._motion("")
+        """Position of the origin in ground axes (m), as SymPy symbols for outputs, events and force laws."""
+        return self.seen().position
 
     @property
     def velocity(self) -> Triple:
-        """Velocity of the origin in ground axes (m/s), as SymPy symbols for use in outputs."""
-        return self._motion("v")
+        """Velocity of the origin in ground axes (m/s), as SymPy symbols for outputs, events and force laws."""
+        return self.seen().velocity
 
     @property
     def acceleration(self) -> Triple:
-        """Acceleration of the origin in ground axes (m/s^2), as SymPy symbols for use in outputs."""
-        return self._motion("a")
+        """Acceleration of the origin in ground axes (m/s^2), as SymPy symbols for outputs."""
+        return self.seen().acceleration
 
     @property
     def angular_velocity(self) -> Triple:
-        """Angular velocity of the body in ground axes (rad/s), as SymPy symbols for use in outputs."""
-        return self._motion("w")
+        """Angular velocity of the body in ground axes (rad/s), as SymPy symbols for outputs, events and force laws."""
+        return self.seen().angular_velocity
 
     @property
     def angular_acceleration(self) -> Triple:
-        """Angular acceleration of the body in ground axes (rad/s^2), as SymPy symbols for use in outputs."""
-        return self._motion("w", "_dot")
+        """Angular acceleration of the body in ground axes (rad/s^2), as SymPy symbols for outputs."""
+        return self.seen().angular_acceleration
 
     @property
     def body_angular_velocity(self) -> Triple:
-        """Angular velocity of the body in the marker's own axes (rad/s), as SymPy symbols for use in outputs."""
-        return self._motion("w", "_body")
+        """Angular velocity in the marker's own axes (rad/s), as SymPy symbols for outputs, events and force laws."""
+        return self._triple("w", "_body")
 
     @property
     def body_angular_acceleration(self) -> Triple:
-        """Angular acceleration of the body in the marker's own axes (rad/s^2), as SymPy symbols for use in outputs."""
-        return self._motion("w", "_body_dot")
+        """Angular acceleration of the body in the marker's own axes (rad/s^2), as SymPy symbols for outputs."""
+        return self._triple("w", "_body_dot")
 
     @property
     def angle(self) -> Any:
-        """Turn of the marker about the z axis of ground (rad), as a SymPy symbol for use in outputs."""
+        """Turn of the marker about the z axis of ground (rad), as a SymPy symbol."""
+        return self._symbol(MarkerQuantity("angle", self.label))
+
+    def seen(self, origin: MarkerHandle | None = None, axes: MarkerHandle | None = None) -> SeenMotion:
+        """The motion of this marker as seen from another marker, in the axes of a third.
+
+        Parameters
+        ----------
+        origin : marker, optional
+            Marker whose position, velocity or angular velocity is subtracted; ground unless given.  The rates are
+            those of vectors as seen from ground, whatever the axes.
+        axes : marker, optional
+            Marker in whose axes the components are; those of ground unless given.
+
+        Returns
+        -------
+        SeenMotion
+        """
+        for other in (origin, axes):
+            if other is not None:
+                other.note()
         self.note()
-        return symbol(f"angle({self.label})")
+        return SeenMotion(self.label, *("" if end is None else end.label for end in (origin, axes)))
+
+    def distance(self, other: MarkerHandle) -> Any:
+        """Distance from the origin of another marker (m), as a SymPy symbol."""
+        other.note()
+        return self._symbol(MarkerQuantity("distance", self.label, other.label))
+
+    def distance_rate(self, other: MarkerHandle) -> Any:
+        """Rate of the distance from the origin of another marker (m/s), as a SymPy symbol."""
+        other.note()
+        return self._symbol(MarkerQuantity("distance_rate", self.label, other.label))
+
+    def angle_from(self, other: MarkerHandle) -> Any:
+        """Turn of this marker about the z axis of another (rad), as a SymPy symbol."""
+        other.note()
+        return self._symbol(MarkerQuantity("angle", self.label, other.label))
 
     def note(self) -> None:
         """Store an unnamed marker in the description, because an expression uses its motion."""
         if not isinstance(self.reference, str):
             self.model.description.motions[self.label] = self.reference
 
-    def _motion(self, prefix: str, suffix: str = "") -> Triple:
+    def _symbol(self, quantity: MarkerQuantity) -> Any:
         self.note()
-        x, y, z = (symbol(f"{prefix}{axis}{suffix}({self.label})") for axis in "xyz")
+        return symbol(str(quantity))
+
+    def _triple(self, prefix: str, suffix: str) -> Triple:
+        x, y, z = (self._symbol(MarkerQuantity(f"{prefix}{axis}{suffix}", self.label)) for axis in "xyz")
+        return (x, y, z)
+
+
+class SeenMotion(NamedTuple):
+    """The motion of a marker as seen from another, in the axes of a third, as SymPy symbols (SI units).
+
+    ``origin`` and ``axes`` are labels of markers, empty for ground.
+    """
+
+    marker: str
+    origin: str = ""
+    axes: str = ""
+
+    @property
+    def position(self) -> Triple:
+        """Position of the origin (m)."""
+        return self._triple("")
+
+    @property
+    def velocity(self) -> Triple:
+        """Velocity of the origin (m/s)."""
+        return self._triple("v")
+
+    @property
+    def acceleration(self) -> Triple:
+        """Acceleration of the origin (m/s^2), for outputs."""
+        return self._triple("a")
+
+    @property
+    def angular_velocity(self) -> Triple:
+        """Angular velocity (rad/s)."""
+        return self._triple("w")
+
+    @property
+    def angular_acceleration(self) -> Triple:
+        """Angular acceleration (rad/s^2), for outputs."""
+        return self._triple("w", "_dot")
+
+    def _triple(self, prefix: str, suffix: str = "") -> Triple:
+        x, y, z = (symbol(str(MarkerQuantity(f"{prefix}{axis}{suffix}", *self))) for axis in "xyz")
         return (x, y, z)
 
 

@@ -120,7 +120,7 @@ class BodyShape(NamedTuple):
 ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
 SUMS = (ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS)
 TURNING = (7, 8, 9, 10)  #: angular velocity in ground axes and in the marker's own, then their rates
-#: Level of a Quantity -> its dimension, save for an angle (axis 3).
+#: Level of a Quantity -> its dimension, save for angles (axis 3).
 LEVEL_DIMENSIONS = (
     *(dimensions.LENGTH, dimensions.SPEED, dimensions.ACCELERATION),
     *(dimensions.INERTIA.times(dimensions.TIME, -1), dimensions.INERTIA),
@@ -131,8 +131,10 @@ LEVEL_DIMENSIONS = (
 
 @dataclass(frozen=True)
 class Quantity:
-    """Motion of a marker in ground axes: ``level`` 0 position, 1 velocity, 2 acceleration; ``axis`` 0, 1, 2,
-    or 3 for its angle about the z axis of ground.
+    """Motion of a marker: ``level`` 0 position, 1 velocity, 2 acceleration; ``axis`` 0, 1, 2, or 3 for its angle about
+    the z axis of the origin, 4 for its distance from the origin.
+
+    ``origin`` is the marker that it is seen from and ``axes`` the marker whose axes count; None stands for ground.
 
     Levels of :data:`TURNING` are the angular velocity and acceleration of the marker's body.
 
@@ -144,6 +146,20 @@ class Quantity:
     marker: Marker | None
     level: int
     axis: int
+    origin: Marker | None = None
+    axes: Marker | None = None
+
+    @property
+    def dimension(self) -> dimensions.Dimension:
+        """What it is measured in."""
+        return dimension_of(self.level, self.axis)
+
+
+def dimension_of(level: int, axis: int) -> dimensions.Dimension:
+    """The dimension of a quantity."""
+    if axis == 3 and level < 2:
+        return dimensions.SPIN if level else dimensions.NONE
+    return LEVEL_DIMENSIONS[level]
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,8 @@ def function_words() -> dict[str, tuple[int, int]]:
 QUANTITIES: dict[str, tuple[int, int]] = {
     prefix + axis: (level, k) for level, prefix in enumerate(("", "v", "a")) for k, axis in enumerate("xyz")
 }
-QUANTITIES["angle"] = (0, 3)  # turn about the z axis of ground
+QUANTITIES |= {"angle": (0, 3), "angle_rate": (1, 3)}  # turn about the z axis of another marker, or of ground
+QUANTITIES |= {"distance": (0, 4), "distance_rate": (1, 4)}
 # angular velocity and acceleration of the marker's body, in ground axes and in the marker's own
 QUANTITIES |= {
     f"w{axis}{suffix}": (level, k)
@@ -36,6 +37,12 @@ QUANTITIES |= {
 # sums over all bodies about the marker's origin, ground axes: angular momentum, inertia (levels of mechanism.Quantity)
 QUANTITIES |= {f"angular_momentum_{axis}": (3, k) for k, axis in enumerate("xyz")}
 QUANTITIES |= {f"inertia_{entry}": (4, k) for k, entry in enumerate(("xx", "yy", "zz", "xy", "xz", "yz"))}
+#: Quantities between two markers.
+PAIRS = ("angle", "angle_rate", "distance", "distance_rate")
+#: Quantities that can be seen from another marker, and resolved in the axes of another.
+RESOLVED = tuple(name for name, (level, axis) in QUANTITIES.items() if axis < 3 and level in (0, 1, 2, 7, 9))
+#: Levels of what only the accelerations tell.
+ACCELERATIONS = (2, 9, 10)
 #: Sums over all bodies that need no marker, in outputs; a name of the model's own comes first.
 TOTALS: dict[str, tuple[int, int]] = {f"momentum_{axis}": (5, k) for k, axis in enumerate("xyz")} | {
     "total_mass": (6, 0)

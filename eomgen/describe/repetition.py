@@ -77,7 +77,7 @@ def put_in(value: Any, variables: Round) -> Any:
     if isinstance(value, str):
         if value.strip() in variables:
             return variables[value.strip()]
-        return rewritten(value, lambda name: _text(name, variables), lambda quantity, marker: f"{quantity}({marker})")
+        return rewritten(value, lambda name: _text(name, variables), str)
     if isinstance(value, Mapping):
         return {key: part if key == "body" else put_in(part, variables) for key, part in value.items()}
     if isinstance(value, list | tuple):

@@ -9,22 +9,25 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from ..errors import ExpressionError
 from ..graph.core import Graph
 from ..graph.evaluate import evaluate
 from .expressions import parse
+from .marker_quantities import MarkerQuantity
 from .names import QUANTITIES
 
+_MARKER = r"[A-Za-z]\w*(?:\.\w+)*"
 _TOKEN = re.compile(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
     rf"|\b(?P<quantity>{'|'.join(sorted(QUANTITIES, key=len, reverse=True))})"
-    r"\(\s*(?P<marker>[A-Za-z]\w*(?:\.\w+)*)\s*\)"
+    rf"\(\s*(?P<arguments>{_MARKER}(?:\s*,\s*(?:(?:in|from)\s*=\s*)?{_MARKER})*)\s*\)"
     r"|(?P<name>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)"
 )
 
 _ATOM = re.compile(r"[A-Za-z0-9_.]+\Z")
 
 Rename = Callable[[str], str]
-Locate = Callable[[str, str], str]
+Locate = Callable[[MarkerQuantity], str]
 
 
 def rewritten(value: Any, name: Rename, locate: Locate) -> Any:
@@ -36,7 +39,10 @@ def rewritten(value: Any, name: Rename, locate: Locate) -> Any:
         if found["number"] is not None:
             return found[0]
         if found["quantity"] is not None:
-            return locate(found["quantity"], found["marker"])
+            try:
+                return locate(MarkerQuantity.of(found["quantity"], found["arguments"]))
+            except ExpressionError:  # told where the text is read
+                return found[0]
         return name(found[0])
 
     return _TOKEN.sub(one, value)
@@ -55,17 +61,17 @@ def names_of(value: Any) -> set[str]:
         found.add(name)
         return name
 
-    rewritten(value, note, lambda quantity, marker: f"{quantity}({marker})")
+    rewritten(value, note, str)
     return found
 
 
-def markers_of(value: Any) -> set[tuple[str, str]]:
-    """Quantity and marker of every motion in a text."""
-    found: set[tuple[str, str]] = set()
+def motions_of(value: Any) -> set[MarkerQuantity]:
+    """Every motion of a marker in a text."""
+    found: set[MarkerQuantity] = set()
 
-    def note(quantity: str, marker: str) -> str:
-        found.add((quantity, marker))
-        return f"{quantity}({marker})"
+    def note(quantity: MarkerQuantity) -> str:
+        found.add(quantity)
+        return str(quantity)
 
     rewritten(value, lambda name: name, note)
     return found

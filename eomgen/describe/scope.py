@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import keyword
-import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from ..errors import ExpressionError
 from ..frames import Marker
 from ..graph.core import Expr, Graph
+from ..graph.substitute import symbols_of
 from .description import Faults
-from .fields import CONSTANT, MOTION, NUMBER, OUTPUT
+from .fields import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
+from .marker_quantities import MarkerQuantity, marker_quantity
 from .mechanism import TURNING, Quantity
-from .names import COM, QUANTITIES, TOTALS, fault_of_name, nearest
+from .names import ACCELERATIONS, COM, QUANTITIES, TOTALS, fault_of_name, nearest
 
 #: Kind of name -> the least level of a field in which it may stand.
 LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": MOTION, "velocity": MOTION}
 LEVELS |= {"rate": MOTION, "rate of rate": OUTPUT}  # of Euler parameters, which no velocity is
 LEVELS |= {"multiplier": OUTPUT}  # of the constraints of given equations
-LEVELS |= {"acceleration": OUTPUT, "output": OUTPUT + 1}  # an output is for reading results only
+LEVELS |= {"acceleration": OUTPUT, "output": LAW}
 LEVELS |= {"event": OUTPUT + 1}
 LEVELS |= {"function": OUTPUT + 1}  # by itself; calls are not looked up here
 
@@ -26,9 +27,10 @@ _LEVEL_REMEDY = {
     NUMBER: "allowed are numbers and pi",
     CONSTANT: "allowed are numbers, parameters and pi",
     MOTION: "allowed are t, parameters, inputs, coordinates and their velocities",
+    LAW: "allowed are t, parameters, inputs, coordinates and their velocities, positions and velocities of markers, "
+    "and outputs of these",
     OUTPUT: "allowed are t, parameters, inputs, coordinates, their rates, motion of markers and energies",
 }
-_QUANTITY = re.compile(rf"({'|'.join(QUANTITIES)})\((.+)\)\Z", re.DOTALL)
 RATES = ("", "_dot", "_ddot")
 #: Kind declared -> kinds of the name, its ``_dot`` and its ``_ddot``.
 _RATES_OF = {
@@ -40,10 +42,15 @@ _RATES_OF = {
 ENERGIES = ("kinetic_energy", "potential_energy", "total_energy")
 
 
-def quantity_of(name: str) -> tuple[str, str] | None:
-    """``("vx", "rod.tip")`` of the symbol name ``vx(rod.tip)``; None for other names."""
-    found = _QUANTITY.match(name)
-    return (found.group(1), found.group(2)) if found else None
+def late_names(names: Namespace, used: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Those of the symbols ``used`` that are known only when accelerations are, and what they are."""
+    late = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
+    for name in sorted(used):
+        what, found = late.get(names.kinds.get(name, "")), marker_quantity(name)
+        if found is not None and QUANTITIES[found.name][0] in ACCELERATIONS:
+            what = "acceleration"
+        if what is not None:
+            yield name, what
 
 
 class Namespace:
@@ -118,36 +125,41 @@ class Scope:
         level: int,
         marker: Callable[[str], Marker],
         quantities: dict[str, Quantity],
+        output: Callable[[str], Expr],
         local: Mapping[str, Expr] | None = None,
         exclusive: bool = False,
     ) -> None:
         self.graph, self.names, self.path, self.level = graph, names, path, level
-        self.marker, self.quantities = marker, quantities
+        self.marker, self.quantities, self.output = marker, quantities, output
         self.local, self.exclusive = local or {}, exclusive
 
     def resolve(self, name: str) -> Expr:
         """The expression of a name."""
         if name in self.local:
             kind = self.names.kinds.get(name) if self.exclusive else None
-            if kind is not None:
+            if kind not in (None, "output"):
                 message = (
                     f"{name!r} is a variable of the element and also the {kind} at {self.names.places.get(name, '?')}"
                 )
                 self.names.faults.add(self.path, message, f"rename the {kind}")
             return self.local[name]
-        quantity = quantity_of(name)
-        if quantity is not None:
+        quantity = None
+        if "(" in name:
             try:
-                return self.locate(*quantity)
+                quantity = marker_quantity(name)
+                if quantity is not None:
+                    return self.locate(quantity)
             except ExpressionError as error:
                 self.names.faults.add(self.path, error.message, error.remedy)
                 return self.graph.symbol(name)
         kind = self.names.kinds.get(name)
+        if kind == "output" and name in (*ENERGIES, *TOTALS) and self.path == f"{self.names.places[name]}.expression":
+            kind = None  # an output of that very sum
         if self.level == NUMBER:
             self._refuse(name, "name")
         elif kind is None and name in ENERGIES and self.level >= OUTPUT:
             return self.graph.symbol(f"{name}()")
-        elif kind is None and name in TOTALS and self.level >= OUTPUT:
+        elif kind is None and name in TOTALS and self.level >= LAW:
             self.quantities[f"{name}()"] = Quantity(None, *TOTALS[name])
             return self.graph.symbol(f"{name}()")
         elif kind is None:
@@ -156,26 +168,51 @@ class Scope:
             self.names.faults.add(self.path, f"unknown name {name!r}", remedy)
         elif LEVELS[kind] > self.level:
             self._refuse(name, kind)
+        elif kind == "output":
+            return self._read(name)
         return self.graph.symbol(name)
 
-    def locate(self, quantity: str, marker: str) -> Expr:
+    def _read(self, output: str) -> Expr:
+        """The expression of an output."""
+        found = self.output(output)
+        for name, what in late_names(self.names, symbols_of([found])) if self.level < OUTPUT else ():
+            message = f"the output {output!r} depends on the {what} {name!r}, which cannot be used here"
+            self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}")
+        energies = {f"{energy}()" for energy in ENERGIES} & symbols_of([found])
+        for name in sorted(energies) if self.level < OUTPUT else ():
+            message = f"the output {output!r} depends on {name.removesuffix('()')!r}, which cannot be used here"
+            self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}")
+        return found
+
+    def locate(self, found: MarkerQuantity) -> Expr:
         """The symbol of a marker's motion, e.g. ``vx(rod.tip)``; raises ExpressionError for an unknown marker."""
-        name = f"{quantity}({marker})"
-        if self.level < OUTPUT:
-            self._refuse(name, "motion of a marker")
-            return self.graph.symbol(name)
-        level, axis = QUANTITIES[quantity]
-        self.quantities[name] = Quantity(self._point(quantity, marker), level, axis)
-        return self.graph.symbol(name)
+        level, axis = QUANTITIES[found.name]
+        if self.level < LAW or (self.level < OUTPUT and level in ACCELERATIONS):
+            self._refuse(str(found), "motion of a marker" if self.level < LAW else "acceleration of a marker")
+            return self.graph.symbol(str(found))
+        point = self._point(level, axis, found.marker)
+        origin, axes = (self._fixed(label) if label else None for label in (found.origin, found.axes))
+        self.quantities[str(found)] = Quantity(point, level, axis, origin, axes)
+        return self.graph.symbol(str(found))
 
-    def _point(self, quantity: str, marker: str) -> Marker | None:
+    def _fixed(self, label: str) -> Marker:
+        """The marker of a label that is not a centre of mass."""
+        try:
+            return self.marker(label)
+        except ExpressionError:
+            if label == COM:
+                remedy = "give a marker of a body here; com can be the last marker of distance() and the first of x()"
+                raise ExpressionError("the centre of mass of all bodies is no marker", 0, remedy) from None
+            raise
+
+    def _point(self, level: int, axis: int, label: str) -> Marker | None:
         """The marker of a label; None for the centre of mass of all bodies."""
         try:
-            return self.marker(marker)
+            return self.marker(label)
         except ExpressionError:
-            if marker != COM:
+            if label != COM:
                 raise
-        if quantity == "angle" or QUANTITIES[quantity][0] in TURNING:
+        if axis == 3 or level in TURNING:
             raise ExpressionError("the centre of mass of all bodies has no rotation", 0, "give a marker of a body")
         return None
 

@@ -11,6 +11,7 @@ from ..graph.core import Expr, Graph
 from ..graph.functions import Function
 from ..operations import OPERATIONS
 from .expressions import parse
+from .marker_quantities import MarkerQuantity
 from .scope import RATES
 from .sympy_face import free_names, function_name, function_names
 
@@ -126,8 +127,8 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
             raise ExpressionError(f"{name} is not a real number")
         return graph.symbol(name)
 
-    def locate(quantity: str, marker: str) -> Expr:
-        return resolve(f"{quantity}({marker})")
+    def locate(quantity: MarkerQuantity) -> Expr:
+        return resolve(str(quantity))
 
     try:
         parse(text, graph, resolve, locate)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import numbers
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,7 @@ from ..texts import WHOLE, join_surrogates, lone_surrogate
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
-from .fields import CONSTANT, INERTIA, KINDS, MARKER, NUMBER, OUTPUT, PLACED, Field
+from .fields import CONSTANT, INERTIA, KINDS, LAW, MARKER, NUMBER, PLACED, Field
 from .mechanism import Quantity
 from .names import nearest
 from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
@@ -63,6 +63,7 @@ class Reader:
         self.bodies: dict[str, int] = {GROUND_NAME: GROUND}
         self.markers: dict[str, Marker] = {}
         self.quantities: dict[str, Quantity] = {}
+        self.output: Callable[[str], Expr] = graph.symbol  # the expression of an output
         self.stand_in = graph.symbol("?")
         self.numbers: dict[str, float] = {}  # declared values of parameters
         self.units: dict[str, Unit] = {}  # by path of the parameter, input or output
@@ -102,10 +103,10 @@ class Reader:
         return found
 
     def _expression(self, path: str, value: Any, level: int, local: Mapping[str, Expr] | None, exclusive: bool) -> Expr:
-        scope = Scope(self.graph, self.names, path, level, self.moving, self.quantities, local, exclusive)
+        scope = Scope(self.graph, self.names, path, level, self.moving, self.quantities, self.output, local, exclusive)
         try:
             if isinstance(value, str):
-                return parse(value, self.graph, scope.resolve, scope.locate if level >= OUTPUT else None)
+                return parse(value, self.graph, scope.resolve, scope.locate if level >= LAW else None)
             if is_sympy(value):
                 return lower_sympy(self.graph, value, scope.resolve)
             if is_number(value):

@@ -5,14 +5,12 @@ In Python ``rod.at(l, 0, 0).position`` speaks of a marker that has no name; a mo
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, items
+from .marker_quantities import marker_quantity
 from .sympy_face import free_names, is_sympy, symbol
-
-_MOTION = re.compile(r"(\w+)\((.*)\)\Z", re.DOTALL)
 
 
 def with_named_markers(description: Description) -> Description:
@@ -32,13 +30,18 @@ def with_named_markers(description: Description) -> Description:
     if not description.motions:
         return description
     parts = [description.values, *(entry.values for part in description.sections.values() for entry in part)]
-    uses = {name: found for name in sorted(_names(parts)) if (found := _MOTION.match(name))}
-    labels = list(dict.fromkeys(label for label in description.motions for u in uses.values() if u[2] == label))
+    uses = {name: found for name in sorted(_names(parts)) if (found := marker_quantity(name))}
+    spoken = {label for quantity in uses.values() for label in quantity.markers}
+    labels = [label for label in description.motions if label in spoken]
     if not labels:
         return description
     sections = {name: list(description.sections[name]) for name in SECTIONS}
     named = {label: _name(sections["bodies"], description.motions[label]) for label in labels}
-    named_symbols = {symbol(name): symbol(f"{u[1]}({named[u[2]]})") for name, u in uses.items() if u[2] in named}
+    named_symbols = {
+        symbol(name): symbol(str(quantity.renamed(lambda label: named.get(label, label))))
+        for name, quantity in uses.items()
+        if not named.keys().isdisjoint(quantity.markers)
+    }
     for name, entries in sections.items():
         sections[name] = [
             DescribedEntry(entry.name, _replaced(entry.values, named_symbols), entry.path, entry.trusted, entry.folder)

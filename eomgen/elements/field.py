@@ -11,7 +11,8 @@ from .dimensions import LENGTH, Dimension
 NUMBER = -1  #: numbers, pi
 CONSTANT = 0  #: parameters
 MOTION = 1  #: t, inputs, coordinates and their velocities
-OUTPUT = 2  #: accelerations, and the motion of markers
+LAW = 2  #: positions and velocities of markers, and outputs that need no accelerations
+OUTPUT = 3  #: accelerations and energies
 
 EXPONENT = 1.5  #: of the penetration in the law of a contact (Hertz), unless given
 

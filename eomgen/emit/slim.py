@@ -28,7 +28,7 @@ LEFT_OUT = {
     "runtime/pickling": "pickling",
     "runtime/moving": "animate",
     "runtime/plotting": "plot",
-    "runtime/storage": "save and pickles",
+    "runtime/storage": "save, to_xarray and pickles",
     "simulation/checkpoint": "checkpoint=",
     "simulation/driven": "mechanisms that drivers move entirely",
     "simulation/solver_state": "checkpoint=",

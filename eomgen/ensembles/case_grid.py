@@ -10,6 +10,7 @@ import numpy as np
 
 from ..analysis.workspace_grid import read_axis
 from ..errors import UsageError
+from ..numeric.scales import Array
 from ..runtime.near_names import check_names, require_mapping, without_dots
 from ..runtime.room import require_room
 
@@ -47,12 +48,17 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
             raise UsageError(f"{what} must be given by name beside a grid")
         if twice := sorted({*grid} & {*without_dots(given or {})}):
             raise UsageError(f"grid: {', '.join(twice)} is given in {what} too; give it once")
-    axes = [read_axis(f"grid {name}", values) for name, values in grid.items()]
-    count = math.prod(map(len, axes))
+    axes = grid_axes(grid)
+    count = math.prod(map(len, axes.values()))
     require_room(f"a grid of {count} runs", float(count) * len(axes), "give fewer values")
-    columns = [column.ravel() for column in np.meshgrid(*axes, indexing="ij")]
+    columns = [column.ravel() for column in np.meshgrid(*axes.values(), indexing="ij")]
     initial, parameters, inputs = (dict(given or {}) for given in groups)
     for name, column in zip(grid, columns, strict=True):
         home = parameters if name in module.p_names else inputs if name in module.u_names else initial
         home[name] = column
     return initial, parameters, inputs
+
+
+def grid_axes(grid: Mapping[str, Any]) -> dict[str, Array]:
+    """The values of each name of a grid."""
+    return {name: np.asarray(read_axis(f"grid {name}", values)) for name, values in without_dots(grid).items()}

@@ -22,6 +22,7 @@ from .reductions import KeptStates, Reduction, Statistics, names_of, summarise, 
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
 
     from ..runtime.bound_model import BoundModel
     from ..runtime.trajectory import Trajectory
@@ -65,6 +66,9 @@ class Ensemble:
         statistics, in the order of ``names``; lists of arrays, one a block, of a function.
     names : tuple of str
         Names of states and outputs.
+    grid : dict of str to array
+        Values of each name of a grid, of which there was a run for every combination, the last name fastest; else
+        empty.
     """
 
     def __init__(
@@ -80,6 +84,7 @@ class Ensemble:
         self._module, self._cases, self._plan, self._words = module, cases, plan, words
         self.count = cases.count
         self.names = names_of(module)
+        self.grid: dict[str, Array] = {}
         self.t = np.array([plan.span[1]]) if plan.t_eval is None else plan.t_eval
         self.t_end, self.status = runs["t"], runs["status"]
         self.steps, self.rejected, self.evaluations = runs["steps"], runs["rejected"], runs["evaluations"]
@@ -209,7 +214,7 @@ class Ensemble:
             ``samples`` of an ensemble that kept none: it had no ``t_eval``, or a reduction.
         """
         pd = require("pandas", "pandas", "to_pandas")
-        columns: dict[str, Any] = {"status": self.status, "t_end": self.t_end, "steps": self.steps} | self._varied()
+        columns: dict[str, Any] = {"status": self.status, "t_end": self.t_end, "steps": self.steps} | self.varied()
         if samples:
             if self.samples is None:
                 raise UsageError("this ensemble kept no samples; give t_eval (on the command line --samples)")
@@ -223,7 +228,24 @@ class Ensemble:
             columns |= dict(zip(self.names, end, strict=True))
         return pd.DataFrame(columns)
 
-    def _varied(self) -> dict[str, Array]:
+    def to_xarray(self) -> xarray.Dataset:
+        """The runs as one Dataset: dimensions ``run``, or those of the grid, and ``t`` where times were kept.
+
+        Columns are variables; parameters, inputs and initial values that vary are coordinates of the runs, initial
+        values as ``initial_theta``.  Statistics are over ``statistic`` and ``t``; a variance has the squared unit.
+
+        Raises
+        ------
+        UsageError
+            A reduction kept neither states nor statistics.
+        MissingDependencyError
+            xarray is not installed.
+        """
+        from .labelled_runs import dataset_of_runs
+
+        return dataset_of_runs(self)
+
+    def varied(self) -> dict[str, Array]:
         """The parameters, inputs and initial values (k,) that differ between the runs."""
         cases, module = self._cases, self._module
         found: dict[str, Array] = {}
@@ -286,6 +308,16 @@ class Ensemble:
     def unit(self, name: str) -> str:
         """The unit of a column."""
         return self._module.layout.unit(name)
+
+    @property
+    def model_metadata(self) -> dict[str, Any]:
+        """Metadata of the module."""
+        return self._module.metadata
+
+    @property
+    def parameters_and_inputs(self) -> tuple[str, ...]:
+        """Names of the module's parameters and inputs."""
+        return (*self._module.p_names, *self._module.u_names)
 
     @property
     def notation(self) -> Notation:

@@ -23,7 +23,7 @@ from ..simulation.progress import Progress, wanted
 from ..simulation.run_arguments import check_method, declare, find_span, ordered_times, own_step
 from ..simulation.tolerances import check_tolerances
 from .block import LOST, Plan, find_events
-from .case_grid import spread_grid
+from .case_grid import grid_axes, spread_grid
 from .ensemble import Ensemble
 from .given_cases import Cases, collect_cases
 from .reductions import GRAIN, Reduction, choose_reduction
@@ -169,7 +169,9 @@ def simulate_many(
             if store_of is not None and not (value[0]["runs_status"] == LOST).any():
                 store_of.save(index, *value)
     try:
-        return _gather(module, cases, plan, reduction, parts, kept)
+        ensemble = _gather(module, cases, plan, reduction, parts, kept)
+        ensemble.grid = {} if grid is None else grid_axes(grid)
+        return ensemble
     except (KeyError, ValueError, TypeError, IndexError) as error:
         if store_of is None:
             raise

@@ -7,7 +7,7 @@ from typing import ClassVar
 from ..elements.dimensions import FORCE, PUSH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import MOTION, Field
+from ..elements.field import LAW, Field
 from ..elements.looks import CYLINDER, ROUND_ARROW, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
@@ -100,7 +100,7 @@ TYPES = table(
         "a force on a body, at the origin of a marker.",
         {
             "marker": Field("marker", "marker at whose origin the force acts", required=True),
-            "value": Field("vector", "force (N)", required=True, level=MOTION, dimension=FORCE),
+            "value": Field("vector", "force (N)", required=True, level=LAW, dimension=FORCE),
             "axes": _AXES,
         },
         _force,
@@ -118,7 +118,7 @@ TYPES = table(
                 "value",
                 "torque (N m): one value on a joint (a force in N if its coordinate is a length), three on a body",
                 required=True,
-                level=MOTION,
+                level=LAW,
                 dimension=PUSH,
             ),
             "axes": _AXES,
@@ -136,7 +136,7 @@ TYPES = table(
                 "expression",
                 "force (N or N m); a positive value increases the coordinate, or pushes the markers apart",
                 required=True,
-                level=MOTION,
+                level=LAW,
                 dimension=PUSH,
             ),
             "via": VIA,

@@ -9,7 +9,7 @@ from typing import ClassVar, cast
 from ..elements.dimensions import ENERGY, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import MOTION, Field
+from ..elements.field import LAW, Field
 from ..elements.looks import RUBBER, Drawn, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
@@ -163,7 +163,7 @@ TYPES = table(
                 "matrix6",
                 "the same form, for the velocity of the displacement (N s/m, N s, N m s/rad)",
                 default=(0,) * 6,
-                level=MOTION,
+                level=LAW,
                 dimension=ENERGY.times(TIME),
             ),
         },

@@ -7,7 +7,7 @@ from typing import ClassVar
 from ..elements.dimensions import DAMPING, NONE, PUSH, RATE
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import MOTION, Field, Fields
+from ..elements.field import LAW, Field, Fields
 from ..graph.core import Expr
 from ..records import dataclass
 from .force import Force, Load, View
@@ -73,11 +73,11 @@ class JointFriction(Force):
 
 #: Of contacts, as parts of the normal force.
 FRICTION: Fields = {
-    "friction": Field("expression", "coefficient of sliding friction", level=MOTION, dimension=NONE),
+    "friction": Field("expression", "coefficient of sliding friction", level=LAW, dimension=NONE),
     "static_friction": Field(
         "expression",
         "coefficient of static friction, at the onset of sliding; give stribeck too",
-        level=MOTION,
+        level=LAW,
         dimension=NONE,
     ),
     "stribeck": Field(
@@ -90,7 +90,7 @@ FRICTION: Fields = {
         "expression",
         "viscous friction coefficient per normal force and velocity (s/m)",
         default=0,
-        level=MOTION,
+        level=LAW,
         dimension=NONE.times(RATE, -1),
     ),
     "smoothing": Field("expression", "sliding velocity (m/s) below which friction is smoothed", dimension=RATE),
@@ -141,12 +141,12 @@ TYPES = table(
         "friction on a joint's coordinate: viscous, Coulomb (with the Stribeck effect if wanted), or both.",
         {
             "joint": ON_JOINT._replace(required=True),
-            "viscous": Field("expression", "viscous coefficient (N m s/rad or N s/m)", level=MOTION, dimension=DAMPING),
-            "coulomb": Field("expression", "Coulomb friction (N m or N)", level=MOTION, dimension=PUSH),
+            "viscous": Field("expression", "viscous coefficient (N m s/rad or N s/m)", level=LAW, dimension=DAMPING),
+            "coulomb": Field("expression", "Coulomb friction (N m or N)", level=LAW, dimension=PUSH),
             "static": Field(
                 "expression",
                 "static friction, at the onset of sliding (N m or N); give stribeck too",
-                level=MOTION,
+                level=LAW,
                 dimension=PUSH,
             ),
             "stribeck": Field(

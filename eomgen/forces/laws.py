@@ -8,7 +8,7 @@ from typing import ClassVar
 from ..elements.dimensions import ENERGY, LENGTH, NONE, PUSH, RATE, SPIN, Dimension
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import MOTION, Field, Fields
+from ..elements.field import LAW, Field, Fields
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.substitute import substitute
@@ -79,8 +79,8 @@ def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
         "law": Field(
             "expression",
             f"{unit}: a positive value increases the coordinate or pushes the markers apart; an expression of {of}, "
-            "``rate``, t, parameters, inputs, coordinates and velocities",
-            level=MOTION,
+            "``rate``, t, parameters, inputs, coordinates, velocities, the motion of markers and outputs",
+            level=LAW,
             dimension=push,
             local=names,
         ),

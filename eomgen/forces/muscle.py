@@ -7,7 +7,7 @@ from typing import ClassVar
 from ..elements.dimensions import FORCE, LENGTH, NONE, SPEED
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import MOTION, Field
+from ..elements.field import LAW, Field
 from ..elements.looks import Seen
 from ..graph.core import Expr, sin, sqrt
 from ..records import dataclass
@@ -119,7 +119,7 @@ TYPES = table(
         {
             "between": BETWEEN._replace(required=True),
             "activation": Field(
-                "expression", "activation of the muscle, 0 to 1", required=True, level=MOTION, dimension=NONE
+                "expression", "activation of the muscle, 0 to 1", required=True, level=LAW, dimension=NONE
             ),
             "force_max": Field("expression", "largest active force (N)", required=True, dimension=FORCE),
             "fiber_length": Field("expression", "optimal length of the fibres (m)", required=True, dimension=LENGTH),

@@ -8,7 +8,7 @@ from typing import ClassVar
 from ..elements.dimensions import DAMPING, ENERGY, LENGTH, NONE, REACH, STIFFNESS, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
-from ..elements.field import MOTION, Field
+from ..elements.field import LAW, Field
 from ..elements.looks import COIL, DASHPOT, SPIRAL, TURNING_DASHPOT, Seen
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -84,7 +84,7 @@ class Damper(Force):
 
 _STIFFNESS = Field("expression", "stiffness (N/m or N m/rad)", required=True, dimension=STIFFNESS)
 _TURNING_STIFFNESS = _STIFFNESS._replace(dimension=ENERGY)
-_DAMPING = Field("expression", "damping (N s/m or N m s/rad)", required=True, level=MOTION, dimension=DAMPING)
+_DAMPING = Field("expression", "damping (N s/m or N m s/rad)", required=True, level=LAW, dimension=DAMPING)
 _TURNING_DAMPING = _DAMPING._replace(dimension=ENERGY.times(TIME))
 _MARKERS = BETWEEN._replace(required=True)
 _COORDINATE = ON_JOINT._replace(required=True)

@@ -285,6 +285,11 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: MarkerMotion, wrappin
             message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
             remedy = "turn the markers (rpy) until z is the axis of the joint between them, or give joint="
             problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
+        for name in sorted(used & mechanism.quantities.keys()):
+            if motion.may_wrap(mechanism.quantities[name]):
+                message = f"the z axes of the two markers of {name} do not stay in line, so the angle is not defined"
+                remedy = "turn the markers (rpy) until z is the axis of the joint between them, or use a coordinate"
+                problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
         if force.uses_value and isinstance(path, JointCoordinate):
             used.add(path.name)
         for name in wrapping:

@@ -8,7 +8,7 @@ from functools import cached_property
 from ..describe.mechanism import ANGULAR_MOMENTUM, INERTIA, MASS, MOMENTUM, TURNING, Mechanism, Quantity
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr, atan2
+from ..graph.core import Expr, atan2, sqrt
 from ..graph.differentiate import jvp
 from ..graph.spatial import Twist
 from ..graph.vectors import Mat3, Vec3
@@ -113,10 +113,9 @@ class MarkerMotion:
         value, rate, _ = self.coordinates[name]
         return value, rate
 
-    def _angle(self, marker: Marker) -> Expr:
-        """Turn about the z axis of ground, wrapping only where the motion is not plane."""
-        ground = Marker(GROUND, Frame(vec.identity(self.graph), vec.zero(self.graph)), "ground")
-        return self.turn(ground, marker)[0]
+    @cached_property
+    def _ground(self) -> Marker:
+        return Marker(GROUND, Frame(vec.identity(self.graph), vec.zero(self.graph)), "ground")
 
     @cached_property
     def momentum(self) -> Momentum:
@@ -161,12 +160,40 @@ class MarkerMotion:
 
     def _quantity(self, quantity: Quantity) -> Expr:
         """Motion of a marker, or a sum over all bodies."""
-        marker, level = quantity.marker, quantity.level
-        if marker is not None and level in TURNING:
-            own_axes, rate = level in TURNING[1::2], level in TURNING[2:]
-            return self.turning_of(marker, own_axes, rate)[quantity.axis]
-        if marker is None or level > 2:
+        if quantity.axis == 4:
+            return self._distance(quantity)
+        if quantity.axis == 3 and quantity.marker is not None:
+            # it wraps only where the motion is not plane
+            angle, rate, _ = self.turn(quantity.origin or self._ground, quantity.marker)
+            return rate if quantity.level else angle
+        if quantity.level not in (0, 1, 2, *TURNING):
             return self._sum(quantity)
-        if quantity.axis == 3:
-            return self._angle(marker)
-        return (self.position, self.velocity, self.acceleration)[level](marker)[quantity.axis]
+        found = self._vector(quantity.level, quantity.marker)
+        if quantity.origin is not None:
+            found = vec.sub(found, self._vector(quantity.level, quantity.origin))
+        if quantity.axes is not None:
+            found = vec.transpose_times(self.rotation(quantity.axes), found)
+        return found[quantity.axis]
+
+    def may_wrap(self, quantity: Quantity) -> bool:
+        """Whether it is an angle between axes that do not stay in line, which is not defined everywhere."""
+        if quantity.axis != 3 or quantity.level > 0 or quantity.marker is None:
+            return False
+        return not self.turn(quantity.origin or self._ground, quantity.marker)[2]
+
+    def _vector(self, level: int, marker: Marker | None) -> Vec3:
+        """The motion of a marker's origin, its angular motion, or the motion of the centre of mass of all bodies."""
+        if marker is None:
+            x, y, z = (self._sum(Quantity(None, level, k)) for k in range(3))
+            return (x, y, z)
+        if level in TURNING:
+            return self.turning_of(marker, level in TURNING[1::2], level in TURNING[2:])
+        return (self.position, self.velocity, self.acceleration)[level](marker)
+
+    def _distance(self, quantity: Quantity) -> Expr:
+        """The distance of two markers, or its rate."""
+        start = quantity.origin or self._ground
+        place, velocity = (self._vector(level, quantity.marker) for level in (0, 1))
+        reach = vec.sub(place, self.position(start))
+        length = sqrt(vec.dot(reach, reach))
+        return vec.dot(reach, vec.sub(velocity, self.velocity(start))) / length if quantity.level else length

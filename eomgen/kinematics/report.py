@@ -242,8 +242,9 @@ def _touched(kinematics: Kinematics, element: object) -> list[int]:
             for name in symbols_of([value]):
                 if name in moves:
                     found.update(moves[name][1:])
-                elif name in m.quantities and (marker := m.quantities[name].marker) is not None:
-                    found.add(marker.body)
+                elif name in m.quantities:
+                    seen = m.quantities[name]
+                    found.update(end.body for end in (seen.marker, seen.origin, seen.axes) if end is not None)
         elif isinstance(value, tuple):
             for item in value:
                 visit(item)

@@ -75,7 +75,7 @@ def read_values(given: Any, allowed: Sequence[str], what: str, plain: Callable[[
 def _without_dots(value: Any, plain: Callable[[str], str]) -> Any:
     """A value whose names of instances have no dots."""
     if isinstance(value, str):
-        return rewritten(value, plain, lambda quantity, marker: f"{quantity}({marker})")
+        return rewritten(value, plain, str)
     if not is_sympy(value):
         return value
     return value.xreplace({symbol(name): symbol(plain(name)) for name in free_names([value]) if "." in name})

@@ -62,22 +62,17 @@ class Layout:
         #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
         self.given_rates = coordinate_of is not None and coordinate_of != list(range(self.n_q))
         self.energy_known: bool = data.get("energy_known", True)
-        self.n_coordinate_slopes: int = data.get("n_coordinate_slopes", 0)
-        self.n_wrenches: int = data.get("n_wrenches", 0)
-        self.n_wrench_geometry: int = data.get("n_wrench_geometry", 0)
         #: rates of Euler parameters, which are in q' but not in v
         self.parameter_rates = tuple(f"{name}_dot" for i, _ in self.quaternion_slots for name in self.q[i : i + 4])
         if coordinate_of is not None:
             self.parameter_rates = tuple(f"{name}_dot" for name in self.q if f"{name}_dot" not in self.v)
         self.n_dof: int = data.get("n_dof", self.n_v)
-        self.n_com: int = data.get("n_com", 0)
-        self.n_momenta: int = data.get("n_momenta", 0)
-        self.n_dae: int = data.get("n_dae", 0)
+        of_outputs = ("n_coordinate_slopes", "n_wrenches", "n_wrench_geometry", "n_com", "n_momenta")
+        counts: list[int] = [data.get(name, 0) for name in (*of_outputs, "n_dae", "n_events", "n_resets", "n_strike")]
+        self.n_coordinate_slopes, self.n_wrenches, self.n_wrench_geometry, self.n_com, self.n_momenta = counts[:5]
+        self.n_dae, self.n_events, self.n_resets, self.n_strike = counts[5:]
         self.n_bodies, self.n_loop_coordinates = len(self.bodies), len(self.loops)
         self.n_alignments = len(self.alignment_labels)
-        self.n_events: int = data.get("n_events", 0)
-        self.n_resets: int = data.get("n_resets", 0)
-        self.n_strike: int = data.get("n_strike", 0)
         self.n_finite_forces = len(self.fragile_forces)
         #: what has rates among the inputs: name -> (rate, how many times it is derived), in order.  It is an input
         #: itself, or stands in the equations by its rates only.
@@ -91,13 +86,12 @@ class Layout:
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
         self.rank = self.n_v - self.n_dof
         self.projects = data.get("baumgarte") is None  #: whether rhs takes the projected state
-        kinds: Sequence[str] = data.get("velocity_kinds") or data["coordinate_kinds"]
         self.coordinate_kinds: tuple[str, ...] = tuple(data["coordinate_kinds"])
-        self.velocity_kinds = tuple(kinds)
-        self.velocity_lengths = np.array([kind == "length" for kind in kinds], dtype=bool)
+        self.velocity_kinds: tuple[str, ...] = tuple(data.get("velocity_kinds") or data["coordinate_kinds"])
+        self.velocity_lengths = np.array([kind == "length" for kind in self.velocity_kinds], dtype=bool)
         self.length: float = float(data.get("length_scale") or 1.0)
         rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
-        self.scales = Scales.of_kinds(kinds, rows, self.length, self.space)
+        self.scales = Scales.of_kinds(self.velocity_kinds, rows, self.length, self.space)
         self.row_lengths = np.array([kind == "length" for kind in data.get("constraint_kinds", ())], dtype=bool)
         #: coordinates of the independent velocities, where each is the rate of one
         self.independent_q = self.scales.coordinates(self.independent)
@@ -106,12 +100,11 @@ class Layout:
             Scales.of_kinds(self.coordinate_kinds, rows[: self.n_h], self.length) if self.given_rates else self.scales
         )
         self.units: dict[str, str] = data.get("units", {})
-        loop_kinds: Sequence[str] = data.get("loop_kinds") or [
-            "length" if self.units.get(name) == "m" else "angle" for name in self.loops
-        ]
-        self.loop_kinds = tuple(loop_kinds)
-        self.loop_angles = np.array([kind == "angle" for kind in loop_kinds], dtype=bool)
-        self.loop_lengths = np.array([kind == "length" for kind in loop_kinds], dtype=bool)
+        self.loop_kinds: tuple[str, ...] = tuple(
+            data.get("loop_kinds") or ("length" if self.units.get(name) == "m" else "angle" for name in self.loops)
+        )
+        self.loop_angles = np.array([kind == "angle" for kind in self.loop_kinds], dtype=bool)
+        self.loop_lengths = np.array([kind == "length" for kind in self.loop_kinds], dtype=bool)
         self.loop_scales = np.where(self.loop_lengths, self.length, 1.0)
         self.initial: dict[str, float] = {k: float(v) for k, v in data.get("initial", {}).items() if v is not None}
         self.guess: dict[str, float] = {k: float(v) for k, v in data.get("guess", {}).items() if v is not None}
@@ -191,9 +184,8 @@ class Layout:
             result = np.array(current, dtype=float)
             for name, value in given.items():
                 result[names.index(name)] = read_value(f"{what} {name}", value)
-            self._check_masses(what, names, result)
-            return result
-        result = read_numbers(f"the {what}s", given)
+        else:
+            result = read_numbers(f"the {what}s", given)
         if result.shape != (len(names),):
             raise UsageError(f"the {what}s must have shape ({len(names)},) ({', '.join(names)}), not {result.shape}")
         self._check_masses(what, names, result)

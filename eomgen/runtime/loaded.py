@@ -9,7 +9,7 @@ from ..errors import UsageError
 from ..files.path_names import as_path
 from .arrays import BROKEN, read_arrays
 from .run_parts import Residuals
-from .storage import FORMAT, Stored
+from .storage import FORMAT, RUNS, Stored
 from .trajectory import Trajectory
 
 
@@ -46,7 +46,8 @@ def load_trajectory(path: str | Path) -> Trajectory:
     except FileNotFoundError:
         raise
     except (*BROKEN, RecursionError) as error:
-        told = "a .csv is for other programs; load the .npz of the run" if str(source).endswith(".csv") else error
+        told = f"a {source.suffix} is for other programs; load the .npz of the run"
+        told = told if source.suffix in RUNS[1:] else str(error)
         raise UsageError(f"{source} is not a trajectory saved by eomgen: {told}") from None
     count = sum(key.startswith("t_events_") for key in arrays)
     return Trajectory(

@@ -1,9 +1,11 @@
-"""Stage runtime: Trajectory <-> a file that needs only NumPy to be read."""
+"""Stage runtime: Trajectory <-> a file that needs only NumPy to be read; files and Datasets for other programs."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,10 +14,15 @@ from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..numeric.scales import Array
+from .near_names import require
 
 if TYPE_CHECKING:
+    import xarray
+
     from .protocols import TrajectoryLike
 
+TABLES = (".npz", ".csv")
+RUNS = (".npz", ".csv", ".nc", ".parquet")  #: endings of files of a run
 FORMAT = "eomgen trajectory 1"
 
 
@@ -45,24 +52,26 @@ class Stored:
         return self._energies
 
 
-def table_path(path: str | Path, what: str) -> Path:
+def table_path(path: str | Path, what: str, endings: tuple[str, ...] = TABLES) -> Path:
     """Where a table is written: an ending of ``.npz`` is added if there is none.
 
     Raises
     ------
     UsageError
-        Another ending than ``.npz`` or ``.csv``.
+        Another ending than those allowed.
     """
     target = as_path("path", path)
     target = target if target.suffix else target.with_suffix(".npz")
-    if target.suffix not in (".npz", ".csv"):
-        raise UsageError(f"{target}: {what} written as .npz or .csv, not {target.suffix!r}")
+    if target.suffix not in endings:
+        raise UsageError(f"{target}: {what} written as {' or '.join(endings)}, not {target.suffix!r}")
     return target
 
 
 def save(trajectory: TrajectoryLike, path: str | Path) -> Path:
     """Write a trajectory; see :meth:`.trajectory.Trajectory.save`."""
-    target = table_path(path, "a trajectory is")
+    target = table_path(path, "a trajectory is", RUNS)
+    if target.suffix in (".nc", ".parquet"):
+        return _write_for_others(trajectory, target)
     names = trajectory.names
     values = trajectory.to_numpy()
     if target.suffix == ".csv":
@@ -90,3 +99,60 @@ def save(trajectory: TrajectoryLike, path: str | Path) -> Path:
 def _head(trajectory: TrajectoryLike, name: str) -> str:
     unit = trajectory.units.get(name, "")
     return f"{name} [{unit}]" if unit else name
+
+
+def dataset(trajectory: TrajectoryLike) -> xarray.Dataset:
+    """The columns of a trajectory over the dimension ``t``; see :meth:`.trajectory.Trajectory.to_xarray`."""
+    xr = require("xarray", "xarray", "to_xarray")
+    metadata = trajectory.metadata
+    variables: dict[str, Any] = {
+        name: ("t", np.asarray(trajectory[name]), attributes(name, trajectory.units, metadata))
+        for name in trajectory.names
+    }
+    coordinates: dict[str, Any] = {"t": ("t", trajectory.t, {"units": "s", "long_name": "time"})}
+    named = zip(metadata.get("event_names") or (), trajectory.t_events, trajectory.x_events, strict=False)
+    for name, t, x in named:
+        times, states = (free(f"{part}_events_{name}", variables) for part in "tx")
+        state, each = free("state", trajectory.names), free(f"event_{name}", trajectory.names)
+        variables[times] = (each, t, {"units": "s", "long_name": f"times of {name}"})
+        of = np.reshape(x, (len(metadata["x_names"]), -1))
+        variables[states] = ((state, each), of, {"long_name": f"states at {name}"})
+        coordinates[state] = (state, np.array(metadata["x_names"], dtype=object))
+    words = {"model": trajectory.name, "metadata": json.dumps(metadata)}
+    made: xarray.Dataset = xr.Dataset(variables, coordinates, words)
+    return made
+
+
+def attributes(name: str, units: Mapping[str, str], metadata: Mapping[str, Any]) -> dict[str, str]:
+    """Unit and meaning of a column, as the CF conventions for climate and forecast data call them."""
+    doc = metadata.get("docs", {}).get(name, "")
+    return {"units": units.get(name, ""), **({"long_name": doc} if doc else {})}
+
+
+def free(name: str, taken: Iterable[str]) -> str:
+    """The name, with underscores after it until nothing else has it."""
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _write_for_others(trajectory: TrajectoryLike, target: Path) -> Path:
+    """Write a trajectory as netCDF (``.nc``) by xarray, or as Parquet by pandas."""
+    if target.suffix == ".nc":
+        return write_netcdf(dataset(trajectory), target)
+    require("pyarrow", "pyarrow", "a .parquet file")
+    frame: Any = trajectory.to_pandas()
+    frame.attrs = {"units": dict(trajectory.units), "metadata": json.dumps(trajectory.metadata)}
+    with whole_file(target) as file:
+        frame.to_parquet(file)
+    return target
+
+
+def write_netcdf(made: xarray.Dataset, target: Path) -> Path:
+    """Write a Dataset to a file that is there whole, or not at all."""
+    require("h5netcdf", "h5netcdf h5py", "a .nc file")
+    with TemporaryDirectory() as folder, whole_file(target) as file:
+        part = Path(folder, "part.nc")
+        made.to_netcdf(part, engine="h5netcdf")
+        file.write(part.read_bytes())
+    return target

@@ -18,6 +18,7 @@ from .run_parts import Named, Residuals
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
 
     from .bound_model import BoundModel
     from .change_points import ChangePoint
@@ -205,6 +206,18 @@ class Trajectory:
         frame: pandas.DataFrame = module.DataFrame(data, index=module.Index(self.t, name="t"))
         return frame
 
+    def to_xarray(self) -> xarray.Dataset:
+        """All columns over the dimension ``t``, with their units, and the times and states of events.
+
+        Raises
+        ------
+        MissingDependencyError
+            xarray is not installed.
+        """
+        from .storage import dataset
+
+        return dataset(self)
+
     @property
     def has_energies(self) -> bool:
         """Whether the energy of the model is known; given equations of motion can lack it."""
@@ -251,7 +264,8 @@ class Trajectory:
         Parameters
         ----------
         path : str or Path
-            Ends in ``.npz`` (added if there is no ending), or in ``.csv`` for a plain table.
+            Ends in ``.npz`` (added if there is no ending).  Other programs read ``.csv``, a plain table, ``.nc``,
+            which is :meth:`to_xarray` as netCDF, and ``.parquet``, which is :meth:`to_pandas` as Parquet.
 
         Returns
         -------

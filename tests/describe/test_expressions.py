@@ -15,6 +15,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from eomgen.describe.expressions import DEPTH, LENGTH, names_in, parse
+from eomgen.describe.marker_quantities import MarkerQuantity
 from eomgen.errors import ExpressionError
 from eomgen.graph import Graph, evaluate
 
@@ -304,7 +305,7 @@ def test_hostile_text_is_refused_and_nothing_runs(text: str, tmp_path: Path) -> 
         ("a + foo(b)", 5, "unknown function 'foo'"),
         ("2*sine(a)", 3, "did you mean 'sin'?"),
         ("a + (b, c)", 5, "one expression"),
-        ("a + x(rod.tip)", 5, "outputs only"),
+        ("a + x(rod.tip)", 5, "in outputs, events and the laws of force elements"),
         ("1 + cos(a, b)", 5, "takes 1 argument, not 2"),
         ("a +", 4, "not a valid expression"),
     ],
@@ -320,13 +321,13 @@ def test_markers_only_where_they_can_be_located() -> None:
     graph = Graph()
     seen = []
 
-    def locate(quantity: str, marker: str):
-        seen.append((quantity, marker))
-        return graph.symbol(f"{quantity}({marker})")
+    def locate(quantity: MarkerQuantity):
+        seen.append(quantity)
+        return graph.symbol(str(quantity))
 
     parse("vx(rod.tip) + z(slider) - x", graph, graph.symbol, locate)
-    assert seen == [("vx", "rod.tip"), ("z", "slider")]
-    for text in ("x(rod.tip.end)", "x(1)", "x()", "x(a, b)", "x(sin(a))", "rod.tip"):
+    assert seen == [MarkerQuantity("vx", "rod.tip"), MarkerQuantity("z", "slider")]
+    for text in ("x(rod.tip.end)", "x(1)", "x()", "x(a, b)", "x(sin(a))", "rod.tip", "x(a, at=b)", "sin(a, in=b)"):
         with pytest.raises(ExpressionError):
             parse(text, graph, graph.symbol, locate)
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from ...describe.description import GROUND_NAME, DescribedEntry, Description, items
 from ...describe.fields import INERTIA
-from ...describe.rewritten_texts import is_zero, markers_of, number_of, product, rewritten, scaled, total
+from ...describe.marker_quantities import MarkerQuantity
+from ...describe.rewritten_texts import is_zero, motions_of, number_of, product, rewritten, scaled, total
 from ...describe.visit import Slot, Visitor, bodies_of, copied, visit
 from ...numeric.rotation_matrices import from_quaternion, from_roll_pitch_yaw, roll_pitch_yaw
 from .plain import values_of
@@ -70,14 +71,15 @@ class _Moved(Visitor):
         self.places = places
 
     def scalar(self, value: Any, slot: Slot) -> Any:
-        def locate(quantity: str, marker: str) -> str:
-            return f"{quantity}({marker}.{WAS})" if marker in self.places else f"{quantity}({marker})"
+        return rewritten(value, lambda name: name, lambda quantity: str(quantity.renamed(self.moved)))
 
-        return rewritten(value, lambda name: name, locate)
+    def moved(self, label: str) -> str:
+        """The marker that is where a body's own frame was."""
+        return f"{label}.{WAS}" if label in self.places else label
 
     def marker(self, reference: Any, slot: Slot) -> Any:
         if isinstance(reference, str):
-            return f"{reference}.{WAS}" if reference in self.places else reference
+            return self.moved(reference)
         return super().marker(reference, slot)
 
     def placement(self, body: str, placed: Mapping[str, Any], slot: Slot) -> dict[str, Any]:
@@ -157,16 +159,16 @@ def turn_ground(description: Description, random: Any) -> Variant:
     Where an angle about z of ground is measured, ground is shifted only.
     """
     _require_bodies(description)
-    texts: set[tuple[str, str]] = set()
+    texts: set[MarkerQuantity] = set()
 
     class Seen(Visitor):
         def scalar(self, value: Any, slot: Slot) -> Any:
             if isinstance(value, str):
-                texts.update(markers_of(value))
+                texts.update(motions_of(value))
             return value
 
     visit(description, Seen())
-    angles = any(quantity == "angle" for quantity, _ in texts)
+    angles = any(q.name in ("angle", "angle_rate") and not q.origin for q in texts)
     turn = np.eye(3) if angles else random_turn(random)
     place = MovedBodyFrame(turn, length_of(description) * random.uniform(-0.5, 0.5, 3), values_of(description))
     made = visit(copied(description), _Ground(place))
@@ -193,15 +195,20 @@ class _Ground(_Moved):
         return self.place.vector(result) if slot.key == "gravity" else result
 
     def scalar(self, value: Any, slot: Slot) -> Any:
-        def locate(quantity: str, marker: str) -> str:
-            marker = f"{marker}.{WAS}" if marker == GROUND_NAME else marker
+        def locate(given: MarkerQuantity) -> str:
+            quantity = given.renamed(self.moved)
+            if quantity.axes:
+                return str(quantity if quantity.origin else quantity._replace(origin=f"{GROUND_NAME}.{WAS}"))
             for names in _KINDS:
-                if quantity in names:
-                    column = self.place.turn[:, names.index(quantity)]
-                    shift = self.place.shift if quantity in _KINDS[0] else np.zeros(3)
-                    parts = [scaled(f"{q}({marker})", float(c)) for q, c in zip(names, column, strict=True)]
+                if quantity.name in names:
+                    column = self.place.turn[:, names.index(quantity.name)]
+                    shift = self.place.shift if quantity.name in _KINDS[0] and not quantity.origin else np.zeros(3)
+                    parts = [
+                        scaled(str(quantity._replace(name=name)), float(c))
+                        for name, c in zip(names, column, strict=True)
+                    ]
                     return "(" + " + ".join([*parts, repr(-float(column @ shift))]) + ")"
-            return f"{quantity}({marker})"
+            return str(quantity)
 
         return rewritten(value, lambda name: name, locate)
 

@@ -64,7 +64,7 @@ def cut_another(description: Description, random: Any) -> Variant:
             return rates.get(name, name)
 
         def scalar(self, value: Any, slot: Slot) -> Any:
-            return rewritten(value, lambda name: rates.get(name, name), lambda q, marker: f"{q}({marker})")
+            return rewritten(value, lambda name: rates.get(name, name), str)
 
     made = visit(description, Renamed())
     for entry in made.sections["joints"]:

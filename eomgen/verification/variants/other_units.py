@@ -9,7 +9,8 @@ from typing import Any
 
 from ...describe.description import Description
 from ...describe.fields import MODEL, Field, acts_on_length, fields_of, part_fields
-from ...describe.mechanism import LEVEL_DIMENSIONS, MOMENTUM
+from ...describe.marker_quantities import MarkerQuantity
+from ...describe.mechanism import LEVEL_DIMENSIONS, MOMENTUM, dimension_of
 from ...describe.mechanism import MASS as TOTAL_MASS
 from ...describe.names import QUANTITIES
 from ...describe.rewritten_texts import rewritten, scaled
@@ -109,10 +110,8 @@ class _Scaled(Visitor):
             factor = local[word] if word in local else self.names.get(word, (1.0, ""))[0]
             return word if factor == 1.0 else f"({word}/{factor!r})"
 
-        def locate(quantity: str, marker: str) -> str:
-            level = QUANTITIES[quantity][0]
-            own = NONE if quantity == "angle" else LEVEL_DIMENSIONS[level]
-            return f"({quantity}({marker})/{self.scales.of(own)!r})"
+        def locate(quantity: MarkerQuantity) -> str:
+            return f"({quantity}/{self.scales.of(dimension_of(*QUANTITIES[quantity.name]))!r})"
 
         return rewritten(value, name, locate)
 

@@ -13,10 +13,11 @@ from ...describe.builder import Builder
 from ...describe.description import GROUND_NAME, DescribedEntry, Description
 from ...describe.placed_on import with_rpy
 from ...describe.plain_form import plain_description
-from ...describe.rewritten_texts import number_of
+from ...describe.rewritten_texts import number_of, rewritten
 from ...describe.units import read_unit
-from ...describe.visit import Visitor, visit
+from ...describe.visit import Slot, Visitor, visit
 from ...forces.muscle import SHORTENING
+from .variant import coordinates_of, kinds_of
 
 #: Type of constraint -> the key whose marker is ground unless given.
 _ON_GROUND = {"rolling": "plane", "knife_edge": "on", "driver": "on"}
@@ -44,6 +45,7 @@ def plain(model: Builder | Description) -> Description:
     for section in ("lagrangian", "equations"):
         if result.values.get(section) is not None:
             result.values[section].pop("latex", None)
+    result = visit(result, _WithoutOutputs(result))
     for section in ("parameters", "inputs"):
         for entry in result.sections[section]:
             _convert_to_si(entry)
@@ -85,6 +87,26 @@ def _write_placements(entry: DescribedEntry) -> None:
     }
     for solid in entry.values.get("solids", ()):
         solid.setdefault("at", [0, 0, 0])
+
+
+class _WithoutOutputs(Visitor):
+    """Writes out what outputs are, where laws, events and other outputs use them by name."""
+
+    def __init__(self, description: Description) -> None:
+        own = {name for names in coordinates_of(description).values() for name in names} | {*kinds_of(description)}
+        self.given = {
+            entry.name: entry.values["expression"]
+            for entry in description.sections["outputs"]
+            if entry.values["expression"] != entry.name and entry.name not in own
+        }
+
+    def scalar(self, value: Any, slot: Slot) -> Any:
+        local = slot.field.local if slot.field else ()
+
+        def name(word: str) -> str:
+            return f"({self.scalar(self.given[word], slot)})" if word in self.given and word not in local else word
+
+        return rewritten(value, name, str)
 
 
 class _Placed(Visitor):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import GROUND_NAME, Description
+from ...describe.marker_quantities import MarkerQuantity
+from ...describe.names import COM
 from ...describe.rewritten_texts import rewritten
 from ...describe.visit import Slot, Visitor, visit
 from .body_frames import WAS
@@ -114,9 +116,10 @@ class _Renamed(Visitor):
         def name(word: str) -> str:
             return word if word in hidden else self.word(word)
 
-        def locate(quantity: str, marker: str) -> str:
-            if marker == "com" and "com" not in self.bodies:
-                return f"{quantity}(com)"
-            return f"{quantity}({self.marker(marker, slot)})"
+        def locate(quantity: MarkerQuantity) -> str:
+            return str(quantity.renamed(place))
+
+        def place(marker: str) -> str:
+            return marker if marker == COM and COM not in self.bodies else str(self.marker(marker, slot))
 
         return rewritten(value, name, locate)

@@ -87,9 +87,7 @@ class _Signed(Visitor):
         self.signs, self.joints = signs, joints
 
     def scalar(self, value: Any, slot: Slot) -> Any:
-        changed = rewritten(
-            value, lambda name: f"(-{name})" if name in self.signs else name, lambda q, marker: f"{q}({marker})"
-        )
+        changed = rewritten(value, lambda name: f"(-{name})" if name in self.signs else name, str)
         if slot.key in ("initial", "guess"):
             return negative(changed) if slot.place[0] in self.signs else changed
         if slot.type == "coupling" and slot.key == "coordinates":

@@ -1,0 +1,98 @@
+"""Stage describe, motion of markers in expressions: ``vx(hub, from=road, in=road)`` -> quantity, markers and axes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import NamedTuple
+
+from ..errors import ExpressionError
+from .names import PAIRS, QUANTITIES, RESOLVED
+
+_KEYWORD = re.compile(r"(from|in)\s*=\s*", re.ASCII)
+_CALL = re.compile(rf"({'|'.join(QUANTITIES)})\((.+)\)\Z", re.DOTALL)
+
+
+class MarkerQuantity(NamedTuple):
+    """A quantity of a marker as a text has it.
+
+    ``marker`` is what moves, ``origin`` the marker it is seen from (none: the ground), ``axes`` the marker whose axes
+    count (none: those of ground).  ``distance(a, b)`` has the marker b and the origin a.
+    """
+
+    name: str
+    marker: str
+    origin: str = ""
+    axes: str = ""
+
+    @classmethod
+    def of(cls, name: str, arguments: str) -> MarkerQuantity:
+        """Read what stands between the brackets.
+
+        Raises
+        ------
+        ExpressionError
+            The quantity takes other arguments.
+        """
+        markers, given = list[str](), dict[str, str]()
+        for part in _split(arguments):
+            key = _KEYWORD.match(part)
+            if key is None:
+                markers.append(part)
+            elif key[1] in given:
+                raise ExpressionError(f"{name}() is given {key[1]}= twice", 0, "leave one out")
+            else:
+                given[key[1]] = part[key.end() :]
+        pair = name in PAIRS and (name not in ONE_OR_TWO or len(markers) == 2)
+        if given and (pair or name not in RESOLVED):
+            remedy = f"write {name}(a, b)" if name in PAIRS else f"it is known of {', '.join(RESOLVED)}"
+            raise ExpressionError(f"{name}() takes no {next(iter(given))}=", 0, remedy)
+        if len(markers) != (2 if pair else 1) or not all(markers):
+            if name in ONE_OR_TWO:
+                raise ExpressionError(f"{name}() takes one or two markers", 0, f"write {name}(b) or {name}(a, b)")
+            if pair:
+                raise ExpressionError(f"{name}() takes two markers", 0, f"write {name}(a, b)")
+            raise ExpressionError(f"{name}() takes one marker", 0, f"write {name}(body) or {name}(body.marker)")
+        return cls(name, markers[-1], markers[0] if pair else given.get("from", ""), given.get("in", ""))
+
+    @property
+    def arguments(self) -> str:
+        """What stands between the brackets, always written in one way."""
+        if self.name in PAIRS:
+            return f"{self.origin}, {self.marker}" if self.origin else self.marker
+        origin = f", from={self.origin}" if self.origin else ""
+        return f"{self.marker}{origin}{f', in={self.axes}' if self.axes else ''}"
+
+    def __str__(self) -> str:
+        return f"{self.name}({self.arguments})"
+
+    @property
+    def markers(self) -> tuple[str, ...]:
+        """All markers that it speaks of."""
+        return tuple(label for label in self[1:] if label)
+
+    def renamed(self, rename: Callable[[str], str]) -> MarkerQuantity:
+        """The same of other markers."""
+        return MarkerQuantity(self.name, *(rename(label) if label else "" for label in self[1:]))
+
+
+#: Quantities of two markers, of which the first may be left out: it is the ground then.
+ONE_OR_TWO = ("angle", "angle_rate")
+
+
+def marker_quantity(symbol: str) -> MarkerQuantity | None:
+    """The quantity that a symbol's name, such as ``vx(rod.tip)``, speaks of; None for other names."""
+    found = _CALL.match(symbol)
+    return MarkerQuantity.of(found[1], found[2]) if found else None
+
+
+def _split(arguments: str) -> list[str]:
+    """Arguments between commas; labels of unnamed markers have commas and brackets of their own."""
+    parts, depth = [""], 0
+    for character in arguments:
+        depth += (character in "([{") - (character in ")]}")
+        if character == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return [part.strip() for part in parts]
