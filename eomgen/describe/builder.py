@@ -243,6 +243,15 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
 
     # -- settings -------------------------------------------------------------------------------------------------
     @property
+    def gravity(self) -> Any:
+        """Acceleration of gravity in ground axes (m/s^2), three values; assign others to change it."""
+        return self._description.values.get("gravity", (0, 0, 0))
+
+    @gravity.setter
+    def gravity(self, acceleration: Vector) -> None:
+        self._description.values["gravity"] = acceleration
+
+    @property
     def initial(self) -> Any:
         """Initial values by coordinate or ``<coordinate>_dot``: ``m.initial(theta=0.3)``, ``m.initial["theta"]``."""
         return self._description.values["initial"]
@@ -321,11 +330,20 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
             method = self._method(name)
             if method is not None:
                 return method
+        raise AttributeError(f"a Model has no attribute {name!r}; {self._near(name)}")
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set what a Model knows; another name would be set without any effect, so it is refused."""
+        if not name.startswith("_") and not isinstance(getattr(type(self), name, None), property):
+            raise AttributeError(f"a Model has no attribute {name!r} to set; {self._near(name)}")
+        super().__setattr__(name, value)
+
+    def _near(self, name: str) -> str:
+        """What may be meant by a name that is not there."""
         known = (*dir(type(self)), *JOINTS, *FORCES, *CONSTRAINTS)
-        near = hint(name, [n for n in known if not n.startswith("_")]) or (
+        return hint(name, [n for n in known if not n.startswith("_")]) or (
             f"joints: {', '.join(JOINTS)}; forces: {', '.join(FORCES)}; constraints: {', '.join(CONSTRAINTS)}"
         )
-        raise AttributeError(f"a Model has no attribute {name!r}; {near}")
 
     def _counts(self) -> str:
         counts = ((section, len(self._description.sections[section])) for section in SECTIONS)

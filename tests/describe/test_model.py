@@ -338,3 +338,16 @@ def test_markers_that_cannot_be_are_told_with_their_place(markers: object, place
     m.revolute("A", m.ground, m.body("arm", mass=1, inertia={"zz": 1}, markers=markers))
     with pytest.raises(ModelError, match=place):
         m.check()
+
+
+def test_gravity_can_be_set_later_and_other_names_are_refused() -> None:
+    """An attribute that a Model does not have would be set without any effect."""
+    m = Model("falling")
+    m.prismatic("J", m.ground, m.body("stone", mass=2.0), axis="z", coordinate="h")
+    m.gravity = (0, 0, -1.625)
+    assert m.gravity == (0, 0, -1.625)
+    assert m.compile(target="numpy").rhs(0.0, [0.0, 0.0]) == pytest.approx([0.0, -1.625], rel=1e-15)
+    with pytest.raises(AttributeError, match="no attribute 'gravty' to set; did you mean 'gravity'"):
+        m.gravty = (0, 0, 0)
+    with pytest.raises(AttributeError):
+        m.bodies = {}
