@@ -1,4 +1,4 @@
-"""A reset within rounding of a corner of an input: the step that is left is as short as rounding, and no accumulation."""
+"""A reset within rounding of a corner of an input: a step as short as rounding is no accumulation of resets."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def pushed(request: pytest.FixtureRequest) -> Any:
 @pytest.mark.parametrize("bounce", [0, 1])
 @pytest.mark.parametrize("method", ["DOP853", "RK45", "Radau"])
 def test_a_reset_beside_a_corner_of_an_input_is_one_reset(pushed: Any, method: str, bounce: int) -> None:
-    """Truth: times of bounces in closed form; the corner is units in the last place away from where a bounce is found."""
+    """Truth: the closed form; the corner is units in the last place away from where a bounce is found."""
     for height in np.linspace(0.8, 1.2, 6):
         first = np.sqrt(2.0 * height / G)
         bounces = first * np.array([1.0, 1.0 + 2.0 * E])
