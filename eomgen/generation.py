@@ -10,14 +10,17 @@ import numpy as np
 
 from .emit import emit_package
 from .emit.write import write_package
-from .errors import UsageError
+from .errors import EomgenError, UsageError
 from .files.path_names import as_path
-from .pipeline import build, derive
+from .pipeline import build, compile_core, derive
+from .runtime.bound_model import BoundModel
 from .targets import find_target
 from .verification.record import record
+from .verification.record_calls import RECORDED, record_calls
 from .verification.recorded import FILE
 
 if TYPE_CHECKING:
+    from .derivation import Derivation
     from .describe.builder import Builder
 
 
@@ -65,7 +68,19 @@ def generate(
             raise UsageError(f"slim and precision are for packages; target {target} makes one file")
         return row.write(equations, folder, fmi)
     program = build(equations, target)
-    sources = dict(emit_package(program, target, slim, precision))
-    if row.module and not slim:
-        sources[FILE] = record(program)
+    asked = {"independent": list(independent or ()) or None, "baumgarte": baumgarte, "precision": precision}
+    told = {name: value for name, value in asked.items() if value not in (None, "double")}
+    sources = dict(emit_package(program, target, slim, precision, told))
+    if row.module:
+        sources[RECORDED] = record_calls(_evaluated(equations))
+        if not slim:
+            sources[FILE] = record(program)
     return write_package(sources, folder / equations.name)
+
+
+def _evaluated(equations: Derivation) -> BoundModel | None:
+    """The model without a compiler; None where it calls functions that are in C alone."""
+    try:
+        return BoundModel(compile_core(equations, "numpy"))
+    except EomgenError:
+        return None

@@ -54,6 +54,11 @@ from .shared_options import (
     show_default=True,
     help="Version of FMI, the standard of functional mock-up units, for target fmu.",
 )
+@click.option(
+    "--wheel",
+    is_flag=True,
+    help="Also build a wheel, DIR/<name>-...whl, which pip installs elsewhere without a compiler (cython, numpy).",
+)
 @json_option
 @robot_options
 @reports_failures
@@ -68,6 +73,7 @@ def generate(
     slim: bool,
     precision: str,
     fmi: str,
+    wheel: bool,
     as_json: bool,
     robot: dict[str, Any],
 ) -> None:
@@ -75,15 +81,27 @@ def generate(
 
     Target fmu is one file, DIR/<name>.fmu.
     """
+    from ..compilation.wheel import build_wheel, require_wheel
     from ..generation import generate as write_out
 
+    if wheel:
+        require_wheel(target)
     with blaming_option(independent), stage("generate"):
         described = load_model(model, allow_native, robot)
         folder = write_out(described, out, method, target, independent or None, baumgarte, slim, precision, fmi)
+    built = None
+    if wheel:
+        with stage("wheel"):
+            built = build_wheel(folder)
+        if built.note:
+            say(f"note: {built.path.name} {built.note}", err=True)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     if as_json:
-        print_json({"name": folder.stem, "target": target, "slim": slim, "folder": str(folder), "files": files})
+        found = {"name": folder.stem, "target": target, "slim": slim, "folder": str(folder), "files": files}
+        print_json(found | ({"wheel": str(built.path), "note": built.note} if built else {}))
         return
     say(str(folder))
     for name in files:
         say(f"  {name}")
+    if built:
+        say(str(built.path))

@@ -16,6 +16,7 @@ from .c import emit_c
 from .carried import carry
 from .layouts import describe_layouts
 from .numpy import emit_numpy
+from .provenance import trace_provenance
 from .python_calls import describe_calls
 from .slim import carry_slim
 from .sources import SourceSet, metadata_json, number_texts, render
@@ -43,7 +44,13 @@ METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", 
 SLIM_METHODS = ("x0", "assemble", "bind", "simulate")
 
 
-def emit_package(program: Program, target: str, slim: bool = False, precision: str = "double") -> SourceSet:
+#: Files of every package.
+ABOUT = ("LICENSE.txt", "PROVENANCE.md")
+
+
+def emit_package(
+    program: Program, target: str, slim: bool = False, precision: str = "double", asked: Mapping[str, Any] | None = None
+) -> SourceSet:
     """All files of an exported package, relative to its own folder.
 
     Parameters
@@ -54,6 +61,8 @@ def emit_package(program: Program, target: str, slim: bool = False, precision: s
         Only calls and runs, as ``cython`` or ``numpy``; everything else refuses by name.
     precision : {'double', 'float'}, optional
         Of the numbers of a ``c`` library.
+    asked : mapping of str to object, optional
+        Further options of the generation, for the provenance.
 
     Returns
     -------
@@ -77,9 +86,11 @@ def emit_package(program: Program, target: str, slim: bool = False, precision: s
         raise UsageError(f"no precision {precision!r}; there are {', '.join(PRECISIONS)}")
     if precision != "double" and not row.precisions:
         raise UsageError(f"precision={precision!r} is for target c; packages of target {target} compute in double")
-    program = replace(program, metadata={**program.metadata, "target": target})
+    made = {"target": target, "provenance": trace_provenance(program, target, asked or {})}
+    program = replace(program, metadata={**program.metadata, **made})
     context = _context(program, slim) | {"precision": precision}
-    return SourceSet({"model.json": metadata_json(program), **row.files(program, context)})
+    about = {name: render(f"python/{name}.j2", context) for name in ABOUT}
+    return SourceSet({"model.json": metadata_json(program), **about, **row.files(program, context)})
 
 
 def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
@@ -112,7 +123,8 @@ def _python_files(context: dict[str, Any], core: Mapping[str, str]) -> dict[str,
     signals = bool(context["metadata"].get("signals"))
     found = carry_slim({**core, **own}, signals) if slim else carry({**core, **own})
     context = context | {"folders": sorted({name.partition("/")[0] for name in found if "/" in name})}
-    about = {name: render(f"python/{name}.j2", context) for name in ("pyproject.toml", "README.md")}
+    names = ("pyproject.toml", "README.md", "tests/test_recorded.py")
+    about = {name: render(f"python/{name}.j2", context) for name in names}
     return {"py.typed": "", **own, **about, **found}
 
 
@@ -130,6 +142,7 @@ def _context(program: Program, slim: bool) -> dict[str, Any]:
         "target": metadata["target"],
         "compiled": metadata["target"] == "cython",
         "metadata": metadata,
+        "provenance": metadata["provenance"],
         "layouts": describe_layouts(program),
         "calls": [call for call in calls if not slim or call.text.partition("(")[0] in attributes],
         "attributes": attributes,

@@ -75,7 +75,6 @@ def carry_slim(package: Mapping[str, str], signals: bool) -> dict[str, str]:
     return texts | {f"{name}/__init__.py": describe_folder(name) for name in folders}
 
 
-_REFUSAL = '''"""Left out of this package, which was generated slim."""
-from ..errors import left_out
+_REFUSAL = """from ..errors import left_out
 raise left_out("{}")
-'''
+"""

@@ -14,14 +14,12 @@ from ..runtime.storage import attributes, free
 if TYPE_CHECKING:
     import xarray
 
-    from .ensemble import Ensemble
-
 STATISTICS = ("count", "mean", "variance", "least", "greatest")
 #: Of each run, and what it is.
 TOLD = {"status": "0 where the end was reached", "t_end": "how far the run came (s)", "steps": "steps that were taken"}
 
 
-def dataset_of_runs(ensemble: Ensemble) -> xarray.Dataset:
+def dataset_of_runs(ensemble: Any) -> xarray.Dataset:
     """The Dataset of :meth:`.ensemble.Ensemble.to_xarray`."""
     xr = require("xarray", "xarray", "to_xarray")
     variables, coordinates = (_statistics if "variance" in ensemble.reduced else _runs)(ensemble)
@@ -32,7 +30,7 @@ def dataset_of_runs(ensemble: Ensemble) -> xarray.Dataset:
     return made
 
 
-def _statistics(ensemble: Ensemble) -> tuple[dict[str, Any], dict[str, Any]]:
+def _statistics(ensemble: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Variables over statistics and times."""
     variables = {
         name: (
@@ -45,7 +43,7 @@ def _statistics(ensemble: Ensemble) -> tuple[dict[str, Any], dict[str, Any]]:
     return variables, {"statistic": ("statistic", list(STATISTICS))}
 
 
-def _runs(ensemble: Ensemble) -> tuple[dict[str, Any], dict[str, Any]]:
+def _runs(ensemble: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Variables over the runs, and times where some were kept; coordinates of the runs."""
     if ensemble.x is None:
         kept = f"this ensemble kept only the results of its reduction ({', '.join(ensemble.reduced)})"
@@ -75,5 +73,5 @@ def _runs(ensemble: Ensemble) -> tuple[dict[str, Any], dict[str, Any]]:
     return variables, coordinates
 
 
-def _words(ensemble: Ensemble, name: str) -> dict[str, str]:
+def _words(ensemble: Any, name: str) -> dict[str, str]:
     return attributes(name, {name: ensemble.unit(name)}, ensemble.model_metadata)

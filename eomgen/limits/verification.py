@@ -34,3 +34,10 @@ REGULAR = 1e-3
 DEPENDENT = 1e-9  #: part of the largest below which a singular value is that of a redundant row
 #: Rounding of a result over its size, at least: 45 eps.
 ROUNDED = 1e-14
+
+# -- figures that come with a package ----------------------------------------------------------------------------------
+#: By how much results of two builds may differ, relative to the largest number: a projection that ends one Newton step
+#: earlier leaves the square root of its tolerance, squared; and in terms of what a change by a few roundings changes,
+#: for a thousand operations in another order.
+BUILDS, SPREAD_OF_ROUNDING = 1e-9, 1e3
+ZERO = 1e-11  #: and what one build may make of a zero (SI units): a sum of some terms of size 1e4 that cancel

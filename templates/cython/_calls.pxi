@@ -1,16 +1,49 @@
 # Calls: what Python hands over -> the arguments of a kernel. Keyword arguments of a plain call would go into a dict first,
 # which takes longer than small kernels do; CPython's vectorcall hands them over as they are.
 
+cdef extern from *:
+    """
+    #include <structmember.h>
+    /* A type of kernel whose instances keep their quick call at an offset: the type itself, or where CPython's types are
+       closed to us (the limited API) one derived from it. */
+    static PyObject *eomgen_quick_type(PyObject *type, const char *name, Py_ssize_t offset)
+    {
+    #ifdef Py_LIMITED_API
+        PyMemberDef members[] = {{"__vectorcalloffset__", T_PYSSIZET, offset, READONLY, NULL}, {NULL, 0, 0, 0, NULL}};
+        PyType_Slot slots[] = {{Py_tp_members, members}, {0, NULL}};
+        PyType_Spec spec = {name, 0, 0, Py_TPFLAGS_DEFAULT | 1UL << 11 /* Py_TPFLAGS_HAVE_VECTORCALL */, slots};
+        PyObject *bases = PyTuple_Pack(1, type), *made = bases == NULL ? NULL : PyType_FromSpecWithBases(&spec, bases);
+        Py_XDECREF(bases);
+        return made;
+    #else
+        (void)name;
+        ((PyTypeObject *)type)->tp_vectorcall_offset = offset;
+        ((PyTypeObject *)type)->tp_flags |= Py_TPFLAGS_HAVE_VECTORCALL;
+        Py_INCREF(type);
+        return type;
+    #endif
+    }
+    #ifdef Py_LIMITED_API
+    #define EOMGEN_LENGTH PyTuple_Size
+    #define EOMGEN_ITEM PyTuple_GetItem
+    #else /* 3 ns of a call with keywords less */
+    #define EOMGEN_LENGTH PyTuple_GET_SIZE
+    #define EOMGEN_ITEM PyTuple_GET_ITEM
+    #endif
+    #define EOMGEN_COUNT_OF(flagged) ((Py_ssize_t)((flagged) & ~((size_t)1 << (8 * sizeof(size_t) - 1))))
+    """
+    object quick_type "eomgen_quick_type"(object, const char *, Py_ssize_t)
+    Py_ssize_t length_of "EOMGEN_LENGTH"(PyObject *)
+    PyObject *item_of "EOMGEN_ITEM"(PyObject *, Py_ssize_t)
+    Py_ssize_t count_of "EOMGEN_COUNT_OF"(size_t)  # what PyVectorcall_NARGS does
+
 cdef extern from "Python.h":
-    ctypedef struct PyTypeObject:
-        Py_ssize_t tp_vectorcall_offset
-        unsigned long tp_flags
-        object (*tp_call)(object, object, object)
-    const unsigned long Py_TPFLAGS_HAVE_VECTORCALL
-    Py_ssize_t PyVectorcall_NARGS(size_t)
+    ctypedef struct PyTypeObject
+    void *PyType_GetSlot(PyTypeObject *, int)
+    const int Py_tp_call
     PyTypeObject *Py_TYPE(object)
-    Py_ssize_t PyTuple_GET_SIZE(PyObject *)
-    PyObject *PyTuple_GET_ITEM(PyObject *, Py_ssize_t)
+
+ctypedef object (*ternary)(object, object, object)
 
 
 cdef class Timed(Kernel):
@@ -59,9 +92,9 @@ cdef inline bint sort_arguments(tuple order, PyObject *const *given, Py_ssize_t 
     for i in range(MOST):
         sorted[i] = given[i] if i < n else NULL
     if names != NULL:
-        for i in range(PyTuple_GET_SIZE(names)):
-            name, k = PyTuple_GET_ITEM(names, i), 0
-            while k < MOST and PyTuple_GET_ITEM(<PyObject *>order, k) != name:  # names in a program are interned
+        for i in range(length_of(names)):
+            name, k = item_of(names, i), 0
+            while k < MOST and item_of(<PyObject *>order, k) != name:  # names in a program are interned
                 k += 1
             if k == MOST or sorted[k] != NULL:
                 return False
@@ -75,44 +108,42 @@ cdef inline object given_or_none(PyObject *value):
 
 cdef object call_timed(object kernel, PyObject *const *given, size_t flagged, PyObject *names):
     cdef PyObject *a[MOST]
-    if sort_arguments(OF_TIMED, given, PyVectorcall_NARGS(flagged), names, a) and a[0] != NULL and a[1] != NULL:
+    if sort_arguments(OF_TIMED, given, count_of(flagged), names, a) and a[0] != NULL and a[1] != NULL:
         return (<Timed>kernel).evaluate(
             <object>a[0], <object>a[1], given_or_none(a[2]), given_or_none(a[3]), given_or_none(a[4]))
-    return call_plainly(kernel, given, PyVectorcall_NARGS(flagged), names)
+    return call_plainly(kernel, given, count_of(flagged), names)
 
 
 cdef object call_state(object kernel, PyObject *const *given, size_t flagged, PyObject *names):
     cdef PyObject *a[MOST]
-    if sort_arguments(OF_STATE, given, PyVectorcall_NARGS(flagged), names, a) and a[0] != NULL:
+    if sort_arguments(OF_STATE, given, count_of(flagged), names, a) and a[0] != NULL:
         return (<State>kernel).evaluate(
             0.0 if a[4] == NULL else <object>a[4], <object>a[0], given_or_none(a[1]), given_or_none(a[2]),
             given_or_none(a[3]))
-    return call_plainly(kernel, given, PyVectorcall_NARGS(flagged), names)
+    return call_plainly(kernel, given, count_of(flagged), names)
 
 
 cdef object call_plainly(object kernel, PyObject *const *given, Py_ssize_t n, PyObject *names):
     """By ``__call__``, which says what is wrong with the arguments."""
     cdef Py_ssize_t i
     cdef tuple words = () if names == NULL else <tuple>names
-    return Py_TYPE(kernel).tp_call(
+    return (<ternary>PyType_GetSlot(Py_TYPE(kernel), Py_tp_call))(
         kernel, tuple([<object>given[i] for i in range(n)]),
         {words[i]: <object>given[n + i] for i in range(len(words))})
 
 
-cdef int enable_quick_calls(Kernel kernel) except -1:
-    """Let CPython find a kernel's quick call; its type learns where that is kept from the first kernel."""
-    cdef PyTypeObject *kind
-    if type(kernel) is Timed:
-        kernel.quick, kind = call_timed, <PyTypeObject *>Timed
-    elif type(kernel) is State:
-        kernel.quick, kind = call_state, <PyTypeObject *>State
-    else:
-        kernel.quick = NULL
-        return 0
-    if kind.tp_vectorcall_offset == 0:
-        kind.tp_vectorcall_offset = <char *>&kernel.quick - <char *><PyObject *>kernel
-        kind.tp_flags |= Py_TPFLAGS_HAVE_VECTORCALL
-    return 0
+cdef int set_quick_call(Kernel kernel) except -1:
+    """What CPython calls in place of ``__call__``."""
+    kernel.quick = NULL
+    if isinstance(kernel, Timed):
+        kernel.quick = call_timed
+    elif isinstance(kernel, State):
+        kernel.quick = call_state
+
+
+cdef Py_ssize_t offset_of_quick(object any):
+    """Where in a kernel its quick call is kept; of the object nothing is read."""
+    return <char *>&(<Kernel>any).quick - <char *><PyObject *>any
 
 
 def address(str name not None):

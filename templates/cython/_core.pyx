@@ -184,7 +184,7 @@ cdef class Kernel:
     cdef object last_failure
 
     def __cinit__(self, str name not None, Context context not None, shape, fail, nan=False, error=ValueError):
-        enable_quick_calls(self)
+        set_quick_call(self)
         self.index = find(name, error)
         self.name, self.context, self.fail, self.nan, self.error = name, context, fail, bool(nan), error
         self.call = MODEL.kernels[self.index].call
@@ -379,7 +379,9 @@ cdef class Kernel:
 
 include "_calls.pxi"
 
-context, timed, state, motion = Context, Timed, State, Motion
+context, motion = Context, Motion
+timed = quick_type(Timed, b"_core.Timed", offset_of_quick(Timed))
+state = quick_type(State, b"_core.State", offset_of_quick(State))
 
 include "_steppers.pxi"
 include "_ensembles.pxi"

@@ -115,6 +115,23 @@ def test_generate_json(call: Call, tmp_path: Path) -> None:
     assert all((tmp_path / "out" / "pendulum" / name).is_file() for name in written["files"])
 
 
+def test_generate_a_wheel(call: Call, tmp_path: Path) -> None:
+    words = ("generate", EXAMPLES / "pendulum.yaml", "--out", "out", "--slim", "--wheel")
+    written = call(*words, "--target", "numpy", "--json").json
+    assert set(written) == {"name", "target", "slim", "folder", "files", "wheel", "note"}
+    assert Path(written["wheel"]) == Path("out", "pendulum-0.1.0-py3-none-any.whl")
+    assert Path(written["wheel"]).is_file()
+    assert written["note"] == ""
+    assert call(*words, "--target", "numpy").out.splitlines()[-1] == written["wheel"]
+
+
+def test_generate_a_wheel_of_another_target_writes_nothing(call: Call, tmp_path: Path) -> None:
+    result = call("generate", EXAMPLES / "pendulum.yaml", "--out", "out", "--target", "fmu", "--wheel")
+    assert result.code == 2
+    assert "--wheel is for target cython or numpy; target fmu makes a functional mock-up unit" in result.err
+    assert not (tmp_path / "out").exists()
+
+
 def test_generate_again_for_another_target_leaves_nothing_stale(call: Call, tmp_path: Path) -> None:
     for target in ("cython", "numpy", "c"):
         words = ("generate", EXAMPLES / "pendulum.yaml", "--target", target, "--json", "--out")

@@ -46,7 +46,7 @@ def test_every_file_can_be_reached(target: str, tmp_path: Path) -> None:
             todo += imports_of(folder, file)
     folders = {file for file in every if file.name == "__init__.py" and file.parent != folder}
     assert len(reached) > 100
-    assert {str(one.relative_to(folder)) for one in every - reached - folders} == set()
+    assert {str(one.relative_to(folder)) for one in every - reached - folders} == {"tests/test_recorded.py"}
     numpy = {"runtime/numpy_core.py", "numeric/embedded.py"}
     assert (numpy <= {str(file.relative_to(folder)) for file in reached}) == (target == "numpy")
     project = (folder / "pyproject.toml").read_text()

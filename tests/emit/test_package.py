@@ -8,6 +8,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import models
 import numpy as np
 import pytest
 
@@ -83,7 +84,8 @@ def test_the_files_of_each_target(packages):
     }
     c_files |= {"crank_lanes.h", *(f"crank_lanes{width}.c" for width in (2, 4, 8))}
     built = {"Makefile", "CMakeLists.txt", "crank.pc.in", "crank_real_time.c"}
-    assert files["c"] == c_files | built | {"model.json", "README.md"}
+    about = {"model.json", "README.md", "PROVENANCE.md", "LICENSE.txt"}
+    assert files["c"] == c_files | built | about
     copied = {
         n for n in files["cython"] if n.endswith(".py") and n.removesuffix(".py").partition("/")[0] in carried.ALONE
     }
@@ -91,7 +93,8 @@ def test_the_files_of_each_target(packages):
     in_python = {"runtime/numpy_core.py", "runtime/numpy_drivers.py"}
     in_python |= {n for n in files["numpy"] - copied if n.startswith(("numeric/", "limits/"))}
     assert "numeric/embedded.py" in in_python
-    python = {"__init__.py", "__init__.pyi", "selftest.py", "model.json", "pyproject.toml", "README.md", "py.typed"}
+    python = about | {"__init__.py", "__init__.pyi", "selftest.py", "pyproject.toml", "py.typed"}
+    python |= {"tests/test_recorded.py"}
     assert files["numpy"] == copied | in_python | python | {"_core.py"}
     assert files["cython"] == copied | python | set(LAYER) | {"setup.py"} | c_files
     for name in copied - {n for n in copied if n.endswith("/__init__.py")}:
@@ -200,3 +203,33 @@ def test_sources_are_a_frozen_mapping(systems):
 def test_an_unknown_target_is_refused_with_those_there_are(systems):
     with pytest.raises(eomgen.errors.UsageError, match="cython, numpy, c"):
         emit_package(systems.chain(1).program(), "fortran")
+
+
+def test_packages_tell_whence_they_are_and_whose(packages):
+    licence = (ROOT.parent / "LICENSE").read_text()
+    for target, folder in packages.items():
+        facts = json.loads((folder / "crank" / "model.json").read_text())
+        found = facts["provenance"]
+        assert (found["model"], found["options"]["target"]) == ("crank", target)
+        assert found["versions"]["numpy"] == np.__version__
+        assert {"python", "sympy", "eomgen"} <= found["versions"].keys()
+        text = (folder / "crank" / "PROVENANCE.md").read_text()
+        assert f"| method | `{found['options']['method']}` |" in text
+        assert f"| version of numpy | `{np.__version__}` |" in text
+        assert ("| slim |" in text) == (target != "c")
+        told = (folder / "crank" / "LICENSE.txt").read_text()
+        assert told.endswith(licence)
+        assert "eomgen claims no right in them" in told
+
+
+def test_options_are_in_the_provenance(tmp_path):
+    from eomgen.generation import generate
+
+    folder = generate(models.build("slider_crank"), tmp_path, "augmented", "numpy", ["theta"], (5.0, 5.0), slim=True)
+    facts = json.loads((folder / "model.json").read_text())
+    options = {"method": "augmented", "target": "numpy", "independent": ["theta"], "baumgarte": [5.0, 5.0]}
+    assert facts["provenance"]["options"] == options
+    assert facts["provenance"]["model_digest"] == facts["model_digest"]
+    text = (folder / "PROVENANCE.md").read_text()
+    assert facts["model_digest"] in text
+    assert "| slim | `True` |" in text

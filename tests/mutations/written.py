@@ -47,4 +47,25 @@ FAULTS = (
         "sources depend on what was read before",
         ("tests/acceptance/test_canonical_sources.py::test_reading_changes_neither_sources_nor_key",),
     ),
+    Fault(
+        "wheel-native", "eomgen/compilation/wheel.py",
+        "    if target == \"cython\":\n        _refuse_native()",
+        "    if target == \"numpy\":\n        _refuse_native()",
+        "a wheel for others is compiled for the processor of this computer",
+        ("tests/compilation/test_wheel.py::test_flags_for_this_processor_alone_are_refused",),
+    ),
+    Fault(
+        "recorded-zero", "eomgen/verification/record_calls.py",
+        "+ BUILDS * size + ZERO}",
+        "+ BUILDS * size}",
+        "the tests of a package ask for the rounding of another build where a result is zero",
+        ("tests/verification/test_record_calls.py::test_c_is_within_the_bounds",),
+    ),
+    Fault(
+        "recorded-inputs", "eomgen/verification/record_calls.py",
+        '"p": case.p, "u": case.u}',
+        '"p": module.p, "u": case.u}',
+        "packages are tested at the declared parameters alone",
+        ("tests/verification/test_record_calls.py::test_figures_are_those_of_the_pendulum",),
+    ),
 )  # fmt: skip
