@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import SimulationError, UsageError
 from ..limits.identification import MEASURED, ROUNDS
+from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array
 from ..runtime.near_names import check_names, read_names, require, require_mapping, unknown
 from ..runtime.room import read_value
@@ -39,8 +40,8 @@ def fit(
     sigma: Any = None,
     derivatives: str = "exact",
     method: Any = "DOP853",
-    rtol: float = 1e-8,
-    atol: float = 1e-10,
+    rtol: float = SENSITIVITY_RTOL,
+    atol: float = SENSITIVITY_ATOL,
     **options: Any,
 ) -> Fit:
     """Find the values at which runs agree best with measured ones.

@@ -83,7 +83,7 @@ def test_estimates_and_covariance_are_those_of_curve_fit(module: eg.Module) -> N
 
     y, spread = np.concatenate([data[n] for n in sigma]), np.repeat(list(sigma.values()), len(TIMES))
     expected, covariance = curve_fit(
-        runs, None, y, [1.2, 0.05, 0.15], spread, absolute_sigma=True, xtol=1e-12, ftol=1e-12, x_scale=[1.0, 0.1, 0.1]
+        runs, None, y, [1.2, 0.05, 0.15], spread, absolute_sigma=True, xtol=1e-12, ftol=1e-12, epsfcn=1e-9
     )
     assert list(fit.values.values()) == pytest.approx(expected, rel=1e-5)
     assert fit.covariance == pytest.approx(covariance, rel=1e-3)
