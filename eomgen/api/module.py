@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from ..analysis.reactions import undetermined_reactions as _undetermined_reactions
     from ..analysis.workspace import workspace as _workspace
     from ..ensembles.simulate_many import simulate_many as _simulate_many
+    from ..identification.fit import fit as _fit
     from ..runtime.canonical import Canonical
     from ..runtime.drawing import draw as _draw
     from ..runtime.drawing import draw_branches as _draw_branches
@@ -56,6 +57,7 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "modes": "analysis.modes",
     "equilibrium": "analysis.equilibrium",
     "sensitivities": "simulation.sensitivities",
+    "fit": "identification.fit",
     "multipliers": "analysis.constrained",
     "reactions": "analysis.reactions",
     "undetermined_reactions": "analysis.reactions",
@@ -189,6 +191,7 @@ class Module(BoundModel):
         modes = _modes
         equilibrium = _equilibrium
         sensitivities = _sensitivities
+        fit = _fit
         multipliers = _multipliers
         reactions = _reactions
         undetermined_reactions = _undetermined_reactions

@@ -56,7 +56,9 @@ CLASSES = (
     "eomgen.analysis.impact.Impact",
     "eomgen.analysis.drive.ActuatorForces",
     "eomgen.verification.finding.Verification",
+    "eomgen.identification.fit_result.Fit",
     "eomgen.describe.handles.BodyHandle",
+    "eomgen.describe.handles.SeenMotion",
     "eomgen.describe.handles.MarkerHandle",
     "eomgen.describe.handles.JointHandle",
 )

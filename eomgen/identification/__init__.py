@@ -1,0 +1,1 @@
+"""Stage identification: measured motions -> parameters of a module."""
