@@ -7,7 +7,7 @@ from typing import Any
 
 from ..constraints import CONSTRAINTS
 from ..errors import ModelError
-from ..forces import FORCES
+from ..forces import FORCES, Force
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -111,6 +111,7 @@ def build(description: Description) -> Mechanism:
     negative, inertia_notes = check_bodies(bodies, joints, numbers, faults)
     check_turns(constraints, numbers, faults)
     check_energies(given, outputs, faults)
+    _check_asked(reader, forces)
     if not faults:
         check_dimensions(reader, joints)
     if len(joints) == len(sections["joints"]):
@@ -132,6 +133,7 @@ def build(description: Description) -> Mechanism:
         outputs=outputs,
         events=events,
         quantities=dict(reader.quantities),
+        element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked},
         initial=initial,
         guess=guess,
         independent=independent,
@@ -204,6 +206,15 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
         what = ", ".join(name.removesuffix("()") for name in asked)
         message = f"{what}: {'no body has a mass' if bodies else 'the model has no bodies'}"
         reader.faults.add("outputs", message, "a centre of mass and a momentum need mass")
+
+
+def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
+    """Note quantities asked of force elements that do not act along a path."""
+    known = {force.name: force for force in forces}
+    for (quantity, name), path in reader.asked.items():
+        if quantity != "power" and name in known and not known[name].acts_along:
+            remedy = f"power({name}) is known of every element; force, length and rate of elements along a path "
+            reader.faults.add(path, f"{name!r} does not act along a path", remedy + "or a coordinate, and of contacts")
 
 
 def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -> dict[str, Expr]:

@@ -144,6 +144,7 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
                 found |= {name: Known(own), f"{name}_dot": Known(own.times(TIME, -1))}
     for name, quantity in reader.quantities.items():
         found[name] = Known(quantity.dimension)
+    found |= {str(asked): Known(ENERGY.times(TIME, -1)) for asked in reader.asked if asked.name == "power"}
     return found | {f"{name}()": Known(ENERGY) for name in ENERGIES}
 
 

@@ -11,7 +11,7 @@ from ..notation import with_instance
 from .build_cam_points import needs_point
 from .build_joints import coordinate_names, sketch
 from .description import GROUND_NAME, Description
-from .marker_quantities import MarkerQuantity
+from .marker_quantities import ElementQuantity, MarkerQuantity
 from .names import COM, QUANTITIES, TOTALS, function_words
 from .placed_on import placed_on
 from .rewritten_texts import in_brackets, rewritten
@@ -111,13 +111,16 @@ class Renaming(Visitor):
         def locate(quantity: MarkerQuantity) -> str:
             return str(quantity.renamed(place))
 
+        def element(quantity: ElementQuantity) -> str:
+            return str(quantity.renamed(lambda name: self.prefix + name))
+
         def place(marker: str) -> str:
             if marker == COM and COM not in self.own.bodies:
                 return marker
             found = self.marker(marker, slot)
             return found if isinstance(found, str) else self._named(marker, found)
 
-        return rewritten(value, lambda name: name if name in hidden else self.word(name, slot), locate)
+        return rewritten(value, lambda name: name if name in hidden else self.word(name, slot), locate, element)
 
     def coordinate(self, name: str) -> str:
         known = name in self.own.joints or self.own.has_symbol(name)

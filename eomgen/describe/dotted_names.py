@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .description import Description
+from .marker_quantities import ElementQuantity, MarkerQuantity
 from .rewritten_texts import rewritten
 from .visit import Slot, Visitor, visit
 
@@ -35,7 +36,10 @@ class Undotted(Visitor):
     def scalar(self, value: Any, slot: Slot) -> Any:
         if not isinstance(value, str) or "." not in value:
             return value
-        return rewritten(value, self.coordinate, lambda quantity: str(quantity.renamed(self.coordinate)))
+        return rewritten(value, self.coordinate, self._renamed, self._renamed)
+
+    def _renamed(self, quantity: MarkerQuantity | ElementQuantity) -> str:
+        return str(quantity.renamed(self.coordinate))
 
     def marker(self, reference: Any, slot: Slot) -> Any:
         return self.coordinate(reference) if isinstance(reference, str) else super().marker(reference, slot)

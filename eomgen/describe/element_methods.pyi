@@ -5,7 +5,7 @@ from typing import Any
 
 from ..elements.element_type import ElementType
 from .described import Described
-from .handles import JointHandle
+from .handles import ForceHandle, JointHandle
 
 Value = Any  # a number, a text or a SymPy expression
 
@@ -115,68 +115,68 @@ class ElementMethods(Described):
     def orientation(self, name: str, predecessor: Any, successor: Any) -> JointHandle:
         """Add a joint of type orientation: S does not turn against P: all axes stay parallel, and the origins move
         freely."""
-    def force(self, name: str, marker: Any, value: Sequence[Value], axes: str | None = None) -> None:
+    def force(self, name: str, marker: Any, value: Sequence[Value], axes: str | None = None) -> ForceHandle:
         """Add a force on a body, at the origin of a marker."""
-    def torque(self, name: str, on: Any, value: Value | Sequence[Value], axes: str | None = None) -> None:
+    def torque(self, name: str, on: Any, value: Value | Sequence[Value], axes: str | None = None) -> ForceHandle:
         """Add a torque on a joint's coordinate (one value) or on a body (three values)."""
     def actuator(self, name: str, *between: Any, joint: Any = None, value: Value = None,
-        via: Sequence[Any] | None = None) -> None:
+        via: Sequence[Any] | None = None) -> ForceHandle:
         """Add an actuator with a given force: on a joint's coordinate, or along the line or a path between two
         markers."""
     def spring(self, name: str, a: Any, b: Any, stiffness: Value, length: Value = 0,
-        via: Sequence[Any] | None = None) -> None:
+        via: Sequence[Any] | None = None) -> ForceHandle:
         """Add a linear spring between two markers, or along a path over markers and cylinders."""
-    def damper(self, name: str, a: Any, b: Any, damping: Value, via: Sequence[Any] | None = None) -> None:
+    def damper(self, name: str, a: Any, b: Any, damping: Value, via: Sequence[Any] | None = None) -> ForceHandle:
         """Add a viscous damper between two markers, or along a path over markers and cylinders."""
     def torsional_spring(self, name: str, *between: Any, joint: Any = None, stiffness: Value = None,
-        angle: Value = 0) -> None:
+        angle: Value = 0) -> ForceHandle:
         """Add a linear torsional spring on an angle: of a joint, or of the second marker about the z axis of the
         first."""
-    def torsional_damper(self, name: str, *between: Any, joint: Any = None, damping: Value = None) -> None:
+    def torsional_damper(self, name: str, *between: Any, joint: Any = None, damping: Value = None) -> ForceHandle:
         """Add a viscous torsional damper on an angle: of a joint, or of the second marker about the z axis of the
         first."""
-    def joint_spring(self, name: str, joint: Any, stiffness: Value, rest: Value = 0) -> None:
+    def joint_spring(self, name: str, joint: Any, stiffness: Value, rest: Value = 0) -> ForceHandle:
         """Add a linear spring on one coordinate of a joint, an angle or a length."""
-    def joint_damper(self, name: str, joint: Any, damping: Value) -> None:
+    def joint_damper(self, name: str, joint: Any, damping: Value) -> ForceHandle:
         """Add a viscous damper on one coordinate of a joint, an angle or a length."""
     def element(self, name: str, *between: Any, joint: Any = None, law: Value = None, potential: Value = None,
-        via: Sequence[Any] | None = None) -> None:
+        via: Sequence[Any] | None = None) -> ForceHandle:
         """Add a force with a law of your own: along a joint's coordinate, the line between two markers, or a path."""
     def torsional_element(self, name: str, *between: Any, joint: Any = None, law: Value = None,
-        potential: Value = None) -> None:
+        potential: Value = None) -> ForceHandle:
         """Add a torque with a law of your own on an angle: of a joint, or of the second marker about z of the first."""
     def bushing(self, name: str, a: Any, b: Any, stiffness: Sequence[Any],
-        damping: Sequence[Any] | None = None) -> None:
+        damping: Sequence[Any] | None = None) -> ForceHandle:
         """Add a bushing: force and torque are matrices times the displacement of the second marker in axes of the
         first."""
-    def point_gravity(self, name: str, center: Any, body: Any, mu: Value, extent: str | None = None) -> None:
+    def point_gravity(self, name: str, center: Any, body: Any, mu: Value, extent: str | None = None) -> ForceHandle:
         """Add the gravity that a point exerts on a body; the reaction acts at the point."""
     def friction(self, name: str, joint: Any, viscous: Value = None, coulomb: Value = None, static: Value = None,
-        stribeck: Value = None, smoothing: Value = None) -> None:
+        stribeck: Value = None, smoothing: Value = None) -> ForceHandle:
         """Add friction on a joint's coordinate: viscous, Coulomb (with the Stribeck effect if wanted), or both."""
     def stop(self, name: str, joint: Any, stiffness: Value, lower: Value = None, upper: Value = None,
         exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None, velocity: Value = None,
-        formula: str | None = None) -> None:
+        formula: str | None = None) -> ForceHandle:
         """Add elastic stops of a joint's coordinate: below ``lower``, above ``upper`` or both."""
     def point_plane(self, name: str, a: Any, b: Any, stiffness: Value, exponent: Value = 1.5, dissipation: Value = None,
         restitution: Value = None, velocity: Value = None, formula: str | None = None, friction: Value = None,
         static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0,
-        smoothing: Value = None) -> None:
+        smoothing: Value = None) -> ForceHandle:
         """Add contact of a point (the second marker) with a plane (x-y of the first marker, z out of the solid)."""
     def sphere_plane(self, name: str, a: Any, b: Any, radius: Value, stiffness: Value, exponent: Value = 1.5,
         dissipation: Value = None, restitution: Value = None, velocity: Value = None, formula: str | None = None,
         friction: Value = None, static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0,
-        smoothing: Value = None) -> None:
+        smoothing: Value = None) -> ForceHandle:
         """Add contact of a sphere (about the second marker) with a plane (x-y of the first marker, z out of the
         solid)."""
     def sphere_sphere(self, name: str, a: Any, b: Any, radii: Sequence[Value], stiffness: Value, exponent: Value = 1.5,
         dissipation: Value = None, restitution: Value = None, velocity: Value = None, formula: str | None = None,
         friction: Value = None, static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0,
-        smoothing: Value = None) -> None:
+        smoothing: Value = None) -> ForceHandle:
         """Add contact of two spheres, each centred at a marker."""
     def muscle(self, name: str, a: Any, b: Any, activation: Value, force_max: Value, fiber_length: Value,
         slack_length: Value, velocity_max: Value = None, pennation: Value = 0, damping: Value = 0.1,
-        via: Sequence[Any] | None = None) -> None:
+        via: Sequence[Any] | None = None) -> ForceHandle:
         """Add a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion."""
     def coupling(self, name: str, coordinates: Mapping[Any, Value] | None = None, offset: Value = 0,
         equation: Value = None) -> None:

@@ -17,8 +17,8 @@ from ..errors import ExpressionError
 from ..graph.core import Expr, Graph
 from ..operations import OPERATIONS
 from ..syntax_trees import parse_statement
-from .marker_quantities import MarkerQuantity
-from .names import QUANTITIES, function_words, nearest
+from .marker_quantities import ElementQuantity, MarkerQuantity
+from .names import OF_ELEMENTS, QUANTITIES, function_words, nearest
 
 LENGTH = 4000  #: characters of one expression
 DEPTH = 60  #: nesting
@@ -27,8 +27,8 @@ EXPONENT = 1000.0  #: size of a numeric exponent
 
 #: A name -> its expression; may raise :class:`ExpressionError` or note the fault and return a placeholder.
 Resolve = Callable[[str], Expr]
-#: The motion of a marker, such as ``vx(rod.tip)``, -> its expression.
-Locate = Callable[[MarkerQuantity], Expr]
+#: The motion of a marker, such as ``vx(rod.tip)``, or what an element does, as ``force(k1)``, -> its expression.
+Locate = Callable[[MarkerQuantity | ElementQuantity], Expr]
 
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/()<>=! \t\r\n]")
 #: A number that runs into a word: Python reads it as two, with a warning of its own.
@@ -260,6 +260,8 @@ class _Walker:
         name = node.func.id
         if name in QUANTITIES and name not in self.words:
             return self.quantity(node, name)
+        if name in OF_ELEMENTS and name not in self.graph.functions and not node.keywords:
+            return self.element(node, name)
         if node.keywords:
             raise self.fault(node, f"{name}() takes no keywords")
         declared = self.graph.functions.get(name)
@@ -268,7 +270,7 @@ class _Walker:
                 self.walk(argument, depth + 1)
             return self.graph.symbol("?")
         if name not in self.words and declared is None:
-            known = [*self.words, *self.graph.functions, *(QUANTITIES if self.locate else ())]
+            known = [*self.words, *self.graph.functions, *((*QUANTITIES, *OF_ELEMENTS) if self.locate else ())]
             raise self.fault(node, f"unknown function {name!r}", nearest(name, known, "functions"))
         least, most = self.words[name] if declared is None else (declared.arity, declared.arity)
         if not least <= len(node.args) <= most:
@@ -321,6 +323,19 @@ class _Walker:
             return self.locate(MarkerQuantity.of(name, ", ".join(parts)))
         except ExpressionError as error:
             raise self.fault(node.args[0] if node.args else node, error.message, error.remedy) from None
+
+    def element(self, node: ast.Call, name: str) -> Expr:
+        """What a force element does."""
+        if self.locate is None:
+            remedy = "use it in outputs, events and the laws of force elements"
+            raise self.fault(node, f"{name}(...) of an element cannot be used here", remedy)
+        argument = node.args[0] if len(node.args) == 1 else None
+        if not isinstance(argument, ast.Name):
+            raise self.fault(node, f"{name}() takes the name of one force element", f"write {name}(spring_1)")
+        try:
+            return self.locate(ElementQuantity(name, argument.id))
+        except ExpressionError as error:
+            raise self.fault(argument, error.message, error.remedy) from None
 
     def marker(self, argument: ast.expr, quantity: str) -> str:
         """The label of a marker, ``rod`` or ``rod.tip``."""

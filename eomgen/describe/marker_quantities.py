@@ -1,4 +1,4 @@
-"""Stage describe, motion of markers in expressions: ``vx(hub, from=road, in=road)`` -> quantity, markers and axes."""
+"""Stage describe, calls of names in expressions: ``vx(hub, in=road)`` -> quantity, markers, axes; ``force(k1)``."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ..errors import ExpressionError
-from .names import PAIRS, QUANTITIES, RESOLVED
+from .names import OF_ELEMENTS, PAIRS, QUANTITIES, RESOLVED
 
 _KEYWORD = re.compile(r"(from|in)\s*=\s*", re.ASCII)
+_OF_ELEMENT = re.compile(rf"({'|'.join(OF_ELEMENTS)})\((\w+)\)\Z", re.ASCII)
 _CALL = re.compile(rf"({'|'.join(QUANTITIES)})\((.+)\)\Z", re.DOTALL)
 
 
@@ -76,6 +77,20 @@ class MarkerQuantity(NamedTuple):
         return MarkerQuantity(self.name, *(rename(label) if label else "" for label in self[1:]))
 
 
+class ElementQuantity(NamedTuple):
+    """What a force element does, as ``force(k1)``; see :class:`~eomgen.forces.force.Measured`."""
+
+    name: str
+    element: str
+
+    def __str__(self) -> str:
+        return f"{self.name}({self.element})"
+
+    def renamed(self, rename: Callable[[str], str]) -> ElementQuantity:
+        """The same of another element."""
+        return ElementQuantity(self.name, rename(self.element))
+
+
 #: Quantities of two markers, of which the first may be left out: it is the ground then.
 ONE_OR_TWO = ("angle", "angle_rate")
 
@@ -84,6 +99,12 @@ def marker_quantity(symbol: str) -> MarkerQuantity | None:
     """The quantity that a symbol's name, such as ``vx(rod.tip)``, speaks of; None for other names."""
     found = _CALL.match(symbol)
     return MarkerQuantity.of(found[1], found[2]) if found else None
+
+
+def element_quantity(symbol: str) -> ElementQuantity | None:
+    """What a symbol's name such as ``force(k1)`` speaks of; None for other names."""
+    found = _OF_ELEMENT.match(symbol)
+    return ElementQuantity(found[1], found[2]) if found else None
 
 
 def _split(arguments: str) -> list[str]:

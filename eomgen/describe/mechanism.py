@@ -244,6 +244,7 @@ class Mechanism:
     outputs: tuple[Output, ...]
     events: tuple[Event, ...] = ()
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
+    element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element
     initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate or ``<coordinate>_dot``
     guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts
     independent: tuple[str, ...] = ()

@@ -15,7 +15,7 @@ from ..elements.field import Field
 from ..errors import UsageError
 from .described import Described
 from .description import items
-from .handles import JointHandle, MarkerHandle
+from .handles import ForceHandle, JointHandle, MarkerHandle
 from .keywords import check_keywords
 from .references import joint_reference, marker_reference
 
@@ -46,6 +46,8 @@ ARGUMENTS = {
     "axis": ("str or three floats", "str | Sequence[float]"),
 }
 _SCALAR = ("scalar", "Value")
+#: Section -> what its methods return.
+_HANDLES: dict[str, Any] = {"joints": JointHandle, "forces": ForceHandle}
 _WIDTH = 108  #: of the text of a method's documentation
 
 
@@ -138,7 +140,7 @@ def documentation_of(section: str, found: ElementType) -> str:
         needed = found.keys[one.key].required or one.name in ("on", "*between")
         lines.append(f"{names} : {one.kind}{'' if needed else ', optional'}")
         lines += textwrap.wrap(one.doc, _WIDTH, initial_indent="    ", subsequent_indent="    ")
-    return "\n".join(lines + (["", "Returns", "-------", "JointHandle"] if section == "joints" else []))
+    return "\n".join(lines + (["", "Returns", "-------", _HANDLES[section].__name__] if section in _HANDLES else []))
 
 
 def method_of(section: str, found: ElementType) -> Callable[..., Any]:
@@ -160,7 +162,8 @@ def method_of(section: str, found: ElementType) -> Callable[..., Any]:
         given = {key: value for key, value in kept.items() if key not in ("self", "name")}
         values = {"type": found.name, **_entry(self, found, bound["name"], given)}
         entry = self._description.add(section, bound["name"], values)
-        return JointHandle(self, entry) if section == "joints" else None
+        handle = _HANDLES.get(section)
+        return None if handle is None else handle(self, entry)
 
     add.__name__, add.__qualname__, add.__module__ = found.name, f"Model.{found.name}", "eomgen.api.model"
     add.__doc__ = documentation_of(section, found)

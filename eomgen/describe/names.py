@@ -41,6 +41,8 @@ QUANTITIES |= {f"inertia_{entry}": (4, k) for k, entry in enumerate(("xx", "yy",
 PAIRS = ("angle", "angle_rate", "distance", "distance_rate")
 #: Quantities that can be seen from another marker, and resolved in the axes of another.
 RESOLVED = tuple(name for name, (level, axis) in QUANTITIES.items() if axis < 3 and level in (0, 1, 2, 7, 9))
+#: Quantities of a force element: generalized force along its path, the path's length or angle and its rate, power.
+OF_ELEMENTS = ("force", "length", "rate", "power")
 #: Levels of what only the accelerations tell.
 ACCELERATIONS = (2, 9, 10)
 #: Sums over all bodies that need no marker, in outputs; a name of the model's own comes first.

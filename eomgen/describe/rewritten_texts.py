@@ -13,14 +13,15 @@ from ..errors import ExpressionError
 from ..graph.core import Graph
 from ..graph.evaluate import evaluate
 from .expressions import parse
-from .marker_quantities import MarkerQuantity
-from .names import QUANTITIES
+from .marker_quantities import ElementQuantity, MarkerQuantity
+from .names import OF_ELEMENTS, QUANTITIES
 
 _MARKER = r"[A-Za-z]\w*(?:\.\w+)*"
 _TOKEN = re.compile(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
     rf"|\b(?P<quantity>{'|'.join(sorted(QUANTITIES, key=len, reverse=True))})"
     rf"\(\s*(?P<arguments>{_MARKER}(?:\s*,\s*(?:(?:in|from)\s*=\s*)?{_MARKER})*)\s*\)"
+    rf"|\b(?P<what>{'|'.join(OF_ELEMENTS)})\(\s*(?P<element>[A-Za-z]\w*(?:\.\w+)*)\s*\)"
     r"|(?P<name>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)"
 )
 
@@ -30,8 +31,11 @@ Rename = Callable[[str], str]
 Locate = Callable[[MarkerQuantity], str]
 
 
-def rewritten(value: Any, name: Rename, locate: Locate) -> Any:
-    """A value with every name, and every motion of a marker such as ``vx(rod.tip)``, replaced; numbers stay."""
+def rewritten(value: Any, name: Rename, locate: Locate, element: Callable[[ElementQuantity], str] | None = None) -> Any:
+    """A value with every name, motion of a marker (``vx(rod.tip)``) and element (``force(k1)``) replaced.
+
+    Numbers stay, and without ``element`` so do the elements.
+    """
     if not isinstance(value, str):
         return value
 
@@ -43,6 +47,8 @@ def rewritten(value: Any, name: Rename, locate: Locate) -> Any:
                 return locate(MarkerQuantity.of(found["quantity"], found["arguments"]))
             except ExpressionError:  # told where the text is read
                 return found[0]
+        if found["what"] is not None:
+            return found[0] if element is None else element(ElementQuantity(found["what"], found["element"]))
         return name(found[0])
 
     return _TOKEN.sub(one, value)

@@ -11,7 +11,7 @@ from ..graph.core import Expr, Graph
 from ..graph.substitute import symbols_of
 from .description import Faults
 from .fields import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
-from .marker_quantities import MarkerQuantity, marker_quantity
+from .marker_quantities import ElementQuantity, MarkerQuantity, element_quantity, marker_quantity
 from .mechanism import TURNING, Quantity
 from .names import ACCELERATIONS, COM, QUANTITIES, TOTALS, fault_of_name, nearest
 
@@ -126,11 +126,12 @@ class Scope:
         marker: Callable[[str], Marker],
         quantities: dict[str, Quantity],
         output: Callable[[str], Expr],
+        ask: Callable[[ElementQuantity, str], None],
         local: Mapping[str, Expr] | None = None,
         exclusive: bool = False,
     ) -> None:
         self.graph, self.names, self.path, self.level = graph, names, path, level
-        self.marker, self.quantities, self.output = marker, quantities, output
+        self.marker, self.quantities, self.output, self.ask = marker, quantities, output, ask
         self.local, self.exclusive = local or {}, exclusive
 
     def resolve(self, name: str) -> Expr:
@@ -143,10 +144,10 @@ class Scope:
                 )
                 self.names.faults.add(self.path, message, f"rename the {kind}")
             return self.local[name]
-        quantity = None
+        quantity: MarkerQuantity | ElementQuantity | None = None
         if "(" in name:
             try:
-                quantity = marker_quantity(name)
+                quantity = marker_quantity(name) or element_quantity(name)
                 if quantity is not None:
                     return self.locate(quantity)
             except ExpressionError as error:
@@ -184,8 +185,14 @@ class Scope:
             self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}")
         return found
 
-    def locate(self, found: MarkerQuantity) -> Expr:
-        """The symbol of a marker's motion, e.g. ``vx(rod.tip)``; raises ExpressionError for an unknown marker."""
+    def locate(self, found: MarkerQuantity | ElementQuantity) -> Expr:
+        """The symbol of ``vx(rod.tip)`` or ``force(k1)``; raises ExpressionError for an unknown marker or element."""
+        if isinstance(found, ElementQuantity):
+            if self.level < LAW:
+                self._refuse(str(found), "quantity of a force element")
+            else:
+                self.ask(found, self.path)
+            return self.graph.symbol(str(found))
         level, axis = QUANTITIES[found.name]
         if self.level < LAW or (self.level < OUTPUT and level in ACCELERATIONS):
             self._refuse(str(found), "motion of a marker" if self.level < LAW else "acceleration of a marker")

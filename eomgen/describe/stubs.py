@@ -22,7 +22,7 @@ from typing import Any
 
 from ..elements.element_type import ElementType
 from .described import Described
-from .handles import JointHandle
+from .handles import ForceHandle, JointHandle
 
 Value = Any  # a number, a text or a SymPy expression
 
@@ -57,7 +57,7 @@ def _method(section: str, found: ElementType) -> str:
             default = f" = {plain!r}"
             annotation += " | None" if plain is None and annotation not in ("Any", "Value") else ""
         listed.append(f"{one.name}: {annotation}{default}")
-    result = "JointHandle" if section == "joints" else "None"
+    result = {"joints": "JointHandle", "forces": "ForceHandle"}.get(section, "None")
     parts = [f"{part},".replace(" ", "\0") for part in listed]  # no line ends within an argument
     parts[-1] = parts[-1].removesuffix(",") + f")\0->\0{result}:"
     text = f"def\0{found.name}({' '.join(parts)}"

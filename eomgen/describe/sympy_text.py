@@ -11,7 +11,7 @@ from ..graph.core import Expr, Graph
 from ..graph.functions import Function
 from ..operations import OPERATIONS
 from .expressions import parse
-from .marker_quantities import MarkerQuantity
+from .marker_quantities import ElementQuantity, MarkerQuantity
 from .scope import RATES
 from .sympy_face import free_names, function_name, function_names
 
@@ -127,7 +127,7 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
             raise ExpressionError(f"{name} is not a real number")
         return graph.symbol(name)
 
-    def locate(quantity: MarkerQuantity) -> Expr:
+    def locate(quantity: MarkerQuantity | ElementQuantity) -> Expr:
         return resolve(str(quantity))
 
     try:

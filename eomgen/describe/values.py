@@ -31,6 +31,7 @@ from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
 from .fields import CONSTANT, INERTIA, KINDS, LAW, MARKER, NUMBER, PLACED, Field
+from .marker_quantities import ElementQuantity
 from .mechanism import Quantity
 from .names import nearest
 from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
@@ -63,12 +64,22 @@ class Reader:
         self.bodies: dict[str, int] = {GROUND_NAME: GROUND}
         self.markers: dict[str, Marker] = {}
         self.quantities: dict[str, Quantity] = {}
+        self.asked: dict[ElementQuantity, str] = {}  # what force elements do, and where that is used first
         self.output: Callable[[str], Expr] = graph.symbol  # the expression of an output
         self.stand_in = graph.symbol("?")
         self.numbers: dict[str, float] = {}  # declared values of parameters
         self.units: dict[str, Unit] = {}  # by path of the parameter, input or output
         self.latex: dict[str, str] = {}  # by name, where it is given
         self.expressions: list[tuple[str, Expr, Mapping[str, Expr]]] = []  # path, expression, names of its own
+
+    def ask(self, quantity: ElementQuantity, path: str) -> None:
+        """Note that an expression uses what a force element does; ExpressionError if there is none of that name."""
+        names = [str(entry.name) for entry in self.description.sections["forces"]]
+        if quantity.element not in names:
+            raise ExpressionError(
+                f"no force element {quantity.element!r}", 0, nearest(quantity.element, names, "elements")
+            )
+        self.asked.setdefault(quantity, path)
 
     def known(self, expression: Expr) -> float | None:
         """The value of an expression at the declared values of parameters, None if they do not tell."""
@@ -103,7 +114,8 @@ class Reader:
         return found
 
     def _expression(self, path: str, value: Any, level: int, local: Mapping[str, Expr] | None, exclusive: bool) -> Expr:
-        scope = Scope(self.graph, self.names, path, level, self.moving, self.quantities, self.output, local, exclusive)
+        asked = (self.moving, self.quantities, self.output, self.ask)
+        scope = Scope(self.graph, self.names, path, level, *asked, local, exclusive)
         try:
             if isinstance(value, str):
                 return parse(value, self.graph, scope.resolve, scope.locate if level >= LAW else None)

@@ -31,6 +31,9 @@ class Actuator(Force):
     def loads(self, view: View) -> list[Load]:
         return self.path.loads(view, self.value)
 
+    def along(self, value: Expr, rate: Expr) -> Expr:
+        return self.value
+
     def drawn(self) -> list[Seen]:
         seen = self.path.drawn(CYLINDER, ROUND_ARROW)
         return [seen._replace(along=()) if seen.coordinate else seen]  # a slide's own symbol says that it moves

@@ -15,7 +15,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .force import Force, Load, MarkerLoad, View
+from .force import Force, Load, MarkerLoad, Measured, View
 from .friction import FRICTION, Friction, read_friction
 from .normal_laws import NORMAL, HuntCrossley, read_normal_law
 
@@ -59,6 +59,14 @@ class Contact(Force):
         push = self.normal_law.force(depth, rate)
         lost = push - self.normal_law.elastic(depth)
         return self._pair(arms, vec.add(vec.scale(lost, normal), self._drag(push, sliding)))
+
+    @property
+    def acts_along(self) -> bool:
+        return True
+
+    def measured(self, view: View) -> Measured:
+        _, depth, _, _, rate = self._motion(view)
+        return Measured(depth, rate, self.normal_law.force(depth, rate))
 
     def _motion(self, view: View) -> tuple[Vec3, Expr, tuple[Vec3, Vec3], Vec3, Expr]:
         """Normal, penetration, arms, sliding velocity and the rate of penetration."""

@@ -6,10 +6,11 @@ A force element sees the mechanism's motion through a :class:`View`, which the k
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from ..elements.looks import Seen
 from ..frames import Marker
+from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
@@ -51,6 +52,17 @@ class CoordinateLoad(NamedTuple):
 Load = MarkerLoad | CoordinateLoad
 
 
+class Measured(NamedTuple):
+    """An element along its path: length or angle, its rate, and the generalized force that increases it.
+
+    Of a contact: penetration, its rate, and the normal force.
+    """
+
+    value: Expr
+    rate: Expr
+    force: Expr
+
+
 @dataclass(frozen=True)
 class Force(ABC):
     """A force element.  ``name`` is the user's; a subclass adds its markers and laws.
@@ -78,6 +90,35 @@ class Force(ABC):
     def push(self, value: Expr, rate: Expr) -> Expr | None:
         """The force along its path at a value and a rate of it, for pictures; None of a type that has no such law."""
         return None
+
+    @property
+    def acts_along(self) -> bool:
+        """Whether it acts along a path, so that :meth:`measured` is something."""
+        return hasattr(self, "path")
+
+    def along(self, value: Expr, rate: Expr) -> Expr | None:
+        """The force along its path at a value and a rate of it; None of an element that has no path."""
+        return self.push(value, rate)
+
+    def measured(self, view: View) -> Measured | None:
+        """What it does along its path, for outputs and laws; None of an element that has no path."""
+        path: Any = getattr(self, "path", None)
+        if path is None:
+            return None
+        value, rate = path.measure(view)
+        force = self.along(value, rate)
+        return None if force is None else Measured(value, rate, force)
+
+    def power(self, view: View) -> Expr:
+        """Power of its loads (W): positive where it drives the mechanism."""
+        total = view.graph.zero
+        for load in self.loads(view):
+            if isinstance(load, MarkerLoad):
+                total = total + vec.dot(load.force, view.velocity(load.marker))
+                total = total + vec.dot(load.torque, view.angular_velocity(load.marker))
+            else:
+                total = total + load.value * view.coordinate(load.coordinate)[1]
+        return total
 
     def remainder(self, view: View) -> list[Load]:
         """What the loads are beyond the slope of the potential, where there is one: friction, damping."""

@@ -66,9 +66,11 @@ class JointFriction(Force):
     path: Path
     law: Friction
 
+    def along(self, value: Expr, rate: Expr) -> Expr:
+        return -self.law.along(rate)
+
     def loads(self, view: View) -> list[Load]:
-        _, rate = self.path.measure(view)
-        return self.path.loads(view, -self.law.along(rate))
+        return self.path.loads(view, self.along(*self.path.measure(view)))
 
 
 #: Of contacts, as parts of the normal force.

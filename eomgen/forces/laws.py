@@ -38,12 +38,16 @@ class GeneralElement(Force):
     energy: Expr
 
     def _here(self, view: View, expression: Expr) -> Expr:
-        value, rate = self.path.measure(view)
+        return self._at(*self.path.measure(view), expression)
+
+    def _at(self, value: Expr, rate: Expr, expression: Expr) -> Expr:
         return substitute([expression], {self.value: value, self.rate: rate})[0]
 
+    def along(self, value: Expr, rate: Expr) -> Expr:
+        return self._at(value, rate, self.law - gradient(self.energy, [self.value])[0])
+
     def loads(self, view: View) -> list[Load]:
-        pull = gradient(self.energy, [self.value])[0]
-        return self.path.loads(view, self._here(view, self.law - pull))
+        return self.path.loads(view, self.along(*self.path.measure(view)))
 
     def potential(self, view: View) -> Expr | None:
         if self.energy.is_zero or not self.path.is_exact(view):

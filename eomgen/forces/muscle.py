@@ -91,9 +91,11 @@ class Muscle(Force):
     def drawn(self) -> list[Seen]:
         return [self.path.drawn()]
 
+    def along(self, value: Expr, rate: Expr) -> Expr:
+        return -self.tension(value, rate)
+
     def loads(self, view: View) -> list[Load]:
-        length, rate = self.path.measure(view)
-        return self.path.loads(view, -self.tension(length, rate))
+        return self.path.loads(view, self.along(*self.path.measure(view)))
 
 
 #: Optimal lengths of the fibres in which they shorten in a second, at most: De Groote and others (2016).

@@ -32,9 +32,8 @@ class JointStop(Force):
     upper: Expr | None
     law: HuntCrossley
 
-    def _depths(self, view: View) -> list[tuple[Expr, Expr, float]]:
+    def _depths(self, value: Expr, rate: Expr) -> list[tuple[Expr, Expr, float]]:
         """Penetration, its rate and the sense of the force, of each stop."""
-        value, rate = self.path.measure(view)
         found = []
         if self.lower is not None:
             found.append((self.lower - value, -rate, 1.0))
@@ -42,21 +41,24 @@ class JointStop(Force):
             found.append((value - self.upper, rate, -1.0))
         return found
 
+    def along(self, value: Expr, rate: Expr) -> Expr:
+        total = value.graph.zero
+        for depth, change, sense in self._depths(value, rate):
+            total = total + sense * self.law.force(depth, change)
+        return total
+
     def loads(self, view: View) -> list[Load]:
-        total = view.graph.zero
-        for depth, rate, sense in self._depths(view):
-            total = total + sense * self.law.force(depth, rate)
-        return self.path.loads(view, total)
+        return self.path.loads(view, self.along(*self.path.measure(view)))
 
     def potential(self, view: View) -> Expr | None:
         total = view.graph.zero
-        for depth, _, _ in self._depths(view):
+        for depth, _, _ in self._depths(*self.path.measure(view)):
             total = total + self.law.energy(depth)
         return total
 
     def remainder(self, view: View) -> list[Load]:
         total = view.graph.zero
-        for depth, rate, sense in self._depths(view):
+        for depth, rate, sense in self._depths(*self.path.measure(view)):
             total = total + sense * (self.law.force(depth, rate) - self.law.elastic(depth))
         return self.path.loads(view, total)
 

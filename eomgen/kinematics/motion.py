@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 from ..describe.mechanism import ANGULAR_MOMENTUM, INERTIA, MASS, MOMENTUM, TURNING, Mechanism, Quantity
+from ..errors import ModelError
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2, sqrt
 from ..graph.differentiate import jvp
 from ..graph.spatial import Twist
+from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Mat3, Vec3
 from .angle_sums import sum_of_turns
 from .momentum import Momentum
@@ -45,6 +47,7 @@ class MarkerMotion:
         self.coordinates = coordinates
         self.state = state
         self.turning = turning or {}
+        self._open: list[str] = []  # quantities of elements being resolved, each asked for by the one before
 
     def relative(self, start: Marker, end: Marker) -> Frame:
         """Placement of marker ``end`` in the axes of marker ``start``."""
@@ -156,7 +159,34 @@ class MarkerMotion:
         for name, quantity in mechanism.quantities.items():
             if name in used:
                 mapping[self.graph.symbol(name)] = self._quantity(quantity)
+        for name in mechanism.element_quantities.keys() & used:
+            mapping[self.graph.symbol(name)] = self._of_element(mechanism, name)
         return mapping
+
+    def _of_element(self, mechanism: Mechanism, name: str) -> Expr:
+        """What a force element does, in terms of the tree.
+
+        Raises
+        ------
+        ModelError
+            It depends on itself.
+        """
+        quantity, element = mechanism.element_quantities[name]
+        if name in self._open:
+            way = " -> ".join([*self._open[self._open.index(name) :], name])
+            remedy = "let one of the laws depend on positions and velocities instead"
+            raise ModelError([mechanism.problem(f"forces.{element}", f"algebraic loop between laws: {way}", remedy)])
+        force = next(force for force in mechanism.forces if force.name == element)
+        measured = force.measured(self)
+        found = (
+            force.power(self)
+            if quantity == "power" or measured is None
+            else {"length": measured.value, "rate": measured.rate, "force": measured.force}[quantity]
+        )
+        self._open.append(name)
+        mapping = self.derived_symbols(mechanism, symbols_of([found]))
+        self._open.pop()
+        return substitute([found], mapping)[0] if mapping else found
 
     def _quantity(self, quantity: Quantity) -> Expr:
         """Motion of a marker, or a sum over all bodies."""

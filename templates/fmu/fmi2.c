@@ -301,7 +301,7 @@ FMU_EXPORT fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
 
 #define REQUIRE_LENGTH(given, length, array) \
     if ((given) != (size_t)(length)) { \
-        return fail(INSTANCE, fmu_say(INSTANCE, FMU_ERROR, "%s: the array has %d entries, not %d", __func__, (int)(length), (int)(given))); \
+        return fail(INSTANCE, fmu_say(INSTANCE, FMU_ERROR, "%s: the array has %d entries, not %d", __func__, (int)(given), (int)(length))); \
     } \
     REQUIRE_ARRAY(given, array)
 

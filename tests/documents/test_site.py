@@ -59,6 +59,7 @@ CLASSES = (
     "eomgen.identification.fit_result.Fit",
     "eomgen.describe.handles.BodyHandle",
     "eomgen.describe.handles.SeenMotion",
+    "eomgen.describe.handles.ForceHandle",
     "eomgen.describe.handles.MarkerHandle",
     "eomgen.describe.handles.JointHandle",
 )

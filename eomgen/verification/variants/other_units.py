@@ -9,7 +9,7 @@ from typing import Any
 
 from ...describe.description import Description
 from ...describe.fields import MODEL, Field, acts_on_length, fields_of, part_fields
-from ...describe.marker_quantities import MarkerQuantity
+from ...describe.marker_quantities import ElementQuantity, MarkerQuantity
 from ...describe.mechanism import LEVEL_DIMENSIONS, MOMENTUM, dimension_of
 from ...describe.mechanism import MASS as TOTAL_MASS
 from ...describe.names import QUANTITIES
@@ -113,7 +113,10 @@ class _Scaled(Visitor):
         def locate(quantity: MarkerQuantity) -> str:
             return f"({quantity}/{self.scales.of(dimension_of(*QUANTITIES[quantity.name]))!r})"
 
-        return rewritten(value, name, locate)
+        def element(quantity: ElementQuantity) -> str:
+            raise NotApplicable(f"the dimension of {quantity} is not known")
+
+        return rewritten(value, name, locate, element)
 
     def _locals(self, slot: Slot) -> dict[str, float]:
         """Names that only a law or a profile knows, and their scales."""

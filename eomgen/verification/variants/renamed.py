@@ -122,4 +122,4 @@ class _Renamed(Visitor):
         def place(marker: str) -> str:
             return marker if marker == COM and COM not in self.bodies else str(self.marker(marker, slot))
 
-        return rewritten(value, name, locate)
+        return rewritten(value, name, locate, lambda quantity: str(quantity.renamed(self.word)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import DescribedEntry, Description
+from ...describe.marker_quantities import ElementQuantity
 from ...describe.rewritten_texts import negative, rewritten
 from ...describe.visit import Slot, Visitor, copied, visit
 from .variant import NotApplicable, Variant, coordinates_of
@@ -87,7 +88,10 @@ class _Signed(Visitor):
         self.signs, self.joints = signs, joints
 
     def scalar(self, value: Any, slot: Slot) -> Any:
-        changed = rewritten(value, lambda name: f"(-{name})" if name in self.signs else name, str)
+        def element(quantity: ElementQuantity) -> str:
+            raise NotApplicable(f"{quantity} can change its sign")
+
+        changed = rewritten(value, lambda name: f"(-{name})" if name in self.signs else name, str, element)
         if slot.key in ("initial", "guess"):
             return negative(changed) if slot.place[0] in self.signs else changed
         if slot.type == "coupling" and slot.key == "coordinates":
