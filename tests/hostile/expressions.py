@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from eomgen.describe.expressions import parse
-from eomgen.describe.names import QUANTITIES, function_words
+from eomgen.describe.marker_quantities import ElementQuantity, MarkerQuantity
+from eomgen.describe.names import OF_ELEMENTS, QUANTITIES, function_words
 from eomgen.errors import ExpressionError
 from eomgen.graph.core import Expr, Graph
 from eomgen.graph.differentiate import jacobian
@@ -53,7 +54,7 @@ WRAPS = (
     "diff(f({}), {})",
     "-{}",
 )
-CALLED = (*function_words(), *QUANTITIES, "f", "g", "foo", "open", "exec", "gamma", "Sum", "sympify")
+CALLED = (*function_words(), *QUANTITIES, *OF_ELEMENTS, "f", "g", "foo", "open", "exec", "gamma", "Sum", "sympify")
 MARKERS = ("rod", "rod.tip", "com", "ground", "rod.tip.x", "1", "a b", "")
 
 
@@ -80,7 +81,7 @@ class Expressions:
         graph = Graph()
         graph.declare(Function("f", 1, None))
         graph.declare(Function("g", 2, None))
-        value = parse(case, graph, lambda name: known(graph, name), lambda *of: located(graph, *of))
+        value = parse(case, graph, lambda name: known(graph, name), lambda of: located(graph, of))
         if value.value is None:
             jacobian([value], [graph.symbol("a"), graph.symbol("q")])
         return "fine"
@@ -95,10 +96,12 @@ def known(graph: Graph, name: str) -> Expr:
     return graph.symbol(name)
 
 
-def located(graph: Graph, quantity: str, marker: str) -> Expr:
-    if marker not in MARKERS:
-        raise ExpressionError(f"no body {marker!r}")
-    return graph.symbol(f"{quantity}({marker})")
+def located(graph: Graph, quantity: MarkerQuantity | ElementQuantity) -> Expr:
+    if isinstance(quantity, MarkerQuantity) and not set(quantity.markers) <= set(MARKERS):
+        raise ExpressionError(f"no body {quantity.marker!r}")
+    if isinstance(quantity, ElementQuantity) and quantity.element.startswith("unknown"):
+        raise ExpressionError(f"no force element {quantity.element!r}")
+    return graph.symbol(str(quantity))
 
 
 def expression(r: random.Random, depth: int) -> str:
@@ -116,7 +119,9 @@ def expression(r: random.Random, depth: int) -> str:
     if k < 0.72:
         name = r.choice(CALLED)
         if name in QUANTITIES and r.random() < 0.8:
-            return f"{name}({r.choice(MARKERS)})"
+            return f"{name}({seen(r)})"
+        if name in OF_ELEMENTS and r.random() < 0.8:
+            return f"{name}({r.choice(NAMES)})"
         least = function_words().get(name, (1, 1))[0]
         count = least if r.random() < 0.93 else r.choice((0, 1, 2, 3, 65))
         if name == "diff" and r.random() < 0.7:
@@ -131,6 +136,13 @@ def expression(r: random.Random, depth: int) -> str:
     if k < 0.935:
         return long(r)
     return f"({inner()})"
+
+
+def seen(r: random.Random) -> str:
+    """One marker, or two, or one as others see it."""
+    markers = [r.choice(MARKERS) for _ in range(r.choice((1, 1, 1, 2, 3)))]
+    keys = [f"{r.choice(('from', 'in', 'at', ''))}={r.choice(MARKERS)}" for _ in range(r.choice((0, 0, 0, 1, 2)))]
+    return ", ".join(markers + keys)
 
 
 def number(r: random.Random) -> str:
