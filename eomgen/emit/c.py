@@ -147,6 +147,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
                 "name": k.name,
                 "call": f"{twins.get(k.name, k.name)}_block" if isinstance(k, Block) else f"{k.name}_driver",
                 "lanes": k.name in in_lanes,
+                "driver": not isinstance(k, Block),
                 "n_in": k.n_in,
                 "n_out": k.n_out,
                 "ports": [port.name for port in k.ports],

@@ -58,6 +58,13 @@ def rhs_files(program: Program) -> tuple[str, ...]:
     return (*here, *(PASSING if passes(program) else ()))
 
 
+def space_file(program: Program) -> str:
+    """The file that says how coordinates move with velocities."""
+    if program.given_rates:
+        return "space_given"
+    return "space_quaternions" if program.quaternion_slots else "space_plain"
+
+
 def driver_files(program: Program) -> list[str]:
     """Names of the files in templates/c/drivers that hold this program's drivers, callees first."""
     direct = "residuals_along" if "residual_tangent" in program.block_names else "residuals_direct"
@@ -67,10 +74,9 @@ def driver_files(program: Program) -> list[str]:
     if program.composes_terms:
         files |= {"terms": None, "terms_loops" if program.has_loops else "terms_tree": None}
     if program.drivers:
-        space = ("space_quaternions", "space_quaternions_more") if program.has_loops else ("space_quaternions",)
-        if program.given_rates:
-            space = ("space_given", "space_given_more") if program.has_loops else ("space_given",)
-        files.update(dict.fromkeys(space if program.quaternion_slots or program.given_rates else ("space_plain",)))
+        space = space_file(program)
+        further = (f"{space}_more",) if program.has_loops or space == "space_plain" else ()
+        files.update(dict.fromkeys((space, *further)))
     for driver in program.drivers:
         if driver.name == "dae_jacobian":
             needed: tuple[str, ...] = ("dae_jacobian",)

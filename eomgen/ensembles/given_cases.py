@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import EomgenError, UsageError
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
+from ..runtime.assembled import initial_of
 from ..runtime.given_start import last_state
 from ..runtime.near_names import check_names, place_of_marker
 from ..runtime.room import read_numbers, require_room
@@ -159,7 +160,30 @@ def assemble_states(
     if cases.states is not None and cases.alike:
         with suppress(EomgenError):  # some cannot be: find out which
             return module.project(cases.states, t=t, **cases.column(0)), failed, words
+    if cases.states is None and cases.alike:
+        with suppress(EomgenError):  # some cannot be: find out which
+            return _assemble_alike(module, cases, t), failed, words
     return _assemble_each(module, cases, lambda k: _assemble_one(module, cases, k, t))
+
+
+@np.errstate(all="ignore")
+def _assemble_alike(module: BoundModel, cases: Cases, t: float) -> Array:
+    """The initial states of runs that differ in their named values alone; each position is found once."""
+    initial = initial_of(module.bind(**cases.column(0)).kernels, t, cases.values)
+    given = [initial.sort({name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()})
+             for k in range(cases.count)]  # fmt: skip
+    alike: dict[tuple[float, ...], list[int]] = {}
+    for k, one in enumerate(given):
+        alike.setdefault(tuple(one.positions.values()), []).append(k)
+    x = np.empty((module.n_x, cases.count))
+    for columns in alike.values():
+        first = given[columns[0]]
+        q = initial.assembled(first.positions)
+        rates = {name: np.array([given[k].rates[name] for k in columns]) for name in first.rates}
+        v = initial.velocities(q, rates if first.positions or rates else None)
+        x[: module.n_q, columns] = q[:, None]
+        x[module.n_q :, columns] = v if v.ndim > 1 else v[:, None]
+    return x
 
 
 def _assemble_each(module: BoundModel, cases: Cases, assemble: Callable[[int], Array]) -> tuple[Array, Mask, list[str]]:

@@ -152,7 +152,7 @@ def simulate_many(
             workers = count_workers(client)
         length = choose_size(cases.count, size, workers or 1) if block is None else read_count("block", block, 1)
         if store is not None and block is None:
-            lanes = WIDEST if module.layout.rank == 0 and not find_events(module, plan).names else 1
+            lanes = 1 if find_events(module, plan).names else WIDEST
             length = stored_length(store) or min(length, max(lanes * threads, -(-cases.count // STORED)))
         if reduce == "statistics":  # whole grains, so that rounding does not depend on blocks
             length = -(-length // GRAIN) * GRAIN

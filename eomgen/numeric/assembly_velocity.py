@@ -19,7 +19,7 @@ class VelocityEquations(NamedTuple):
 
     y_q: Array  #: (k, n)
     y_t: Array  #: (k,)
-    values: Array  #: (k,) wanted
+    values: Array  #: (k,) or (k, m) wanted
     scales: Array  #: (k,)
     names: Sequence[str]  #: (k,) for messages
 
@@ -27,7 +27,7 @@ class VelocityEquations(NamedTuple):
 class Rates(NamedTuple):
     """Assembled velocities."""
 
-    v: Array  #: (n,)
+    v: Array  #: (n,) or (n, m)
     residual: float  #: largest scaled residual
 
 
@@ -50,8 +50,8 @@ def assemble_velocity(
         Constraint Jacobian at the assembled position, all rows.
     C_t : (m,) array
     scales : Scales
-    guess : (n,) array, optional
-        Zero by default; the held velocities have their exact values here.
+    guess : (n,) or (n, m) array, optional
+        Zero by default; the held velocities have their exact values here.  m columns are m motions at this position.
     held : sequence of int
         Velocities that are held exactly.
     equations : VelocityEquations, optional
@@ -72,22 +72,31 @@ def assemble_velocity(
     held = np.asarray(held, dtype=np.intp)
     free = np.ones(len(v), dtype=bool)
     free[held] = False
-    J, row_scales, offset = scales.jacobian(C_q), scales.c, C_t
+    column = (slice(None), *[None] * (v.ndim - 1))
+    J, row_scales, offset = scales.jacobian(C_q), scales.c, C_t[column]
     all_labels = list(labels) or [f"C[{i}]" for i in range(len(C_t))]
     if equations is not None:
         J = np.vstack([J, equations.y_q * scales.q / equations.scales[:, None]])
         row_scales = np.concatenate([row_scales, equations.scales])
-        offset = np.concatenate([C_t, equations.y_t - equations.values])
+        wanted = equations.y_t[column] - equations.values
+        offset = np.concatenate([np.broadcast_to(offset, (len(C_t), *v.shape[1:])), wanted])
         all_labels += list(equations.names)
+    size, row_size = scales.q[column], row_scales[column]
     inverse = algebra.pinv(J[:, free], rcond=GIVEN)
     for _ in range(2):
-        e = J @ (v / scales.q) + offset / row_scales
-        v[free] -= scales.q[free] * (inverse @ e)
-    e = J @ (v / scales.q) + offset / row_scales
-    worst = float(np.abs(e).max()) if e.size else 0.0
-    speed = max([1.0, *np.abs(v / scales.q), *np.abs(offset / row_scales)])
-    if worst <= CONTRADICTION * speed:
-        return Rates(v, worst)
+        e = J @ (v / size) + offset / row_size
+        v[free] -= size[free] * (inverse @ e)
+    e = J @ (v / size) + offset / row_size
+    rates = np.concatenate([v / size, np.broadcast_to(offset / row_size, e.shape)])
+    worst = np.abs(e).max(axis=0, initial=0.0)
+    speed = np.abs(rates).max(axis=0, initial=1.0)
+    bad = ~(worst <= CONTRADICTION * speed)
+    if not bad.any():
+        return Rates(v, float(worst.max(initial=0.0)))
+    if v.ndim > 1:  # the first that cannot be says why
+        k = int(np.argmax(bad))
+        one = None if equations is None else equations._replace(values=equations.values[:, k])
+        return assemble_velocity(C_q, C_t, scales, v[:, k], held, one, names, labels)
     velocity_names = names or [f"v[{i}]" for i in range(len(v))]
     given = [f"{velocity_names[i]} = {v[i]:.6g}" for i in held]
     if equations is not None:

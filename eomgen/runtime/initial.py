@@ -210,8 +210,11 @@ class Initial:
 
     # velocities
 
-    def velocities(self, q: Array, given: Mapping[str, float] | None) -> Array:
-        """Velocities with the given rates exact, and the declared ones where they leave room; None: declared exact."""
+    def velocities(self, q: Array, given: Mapping[str, float | Array] | None) -> Array:
+        """Velocities with the given rates exact, and the declared ones where they leave room; None: declared exact.
+
+        Rates of shape (m,) give m motions at this position, velocities (n, m).
+        """
         if self.layout.n_c:
             require_rank(self.kernels, self.scales.jacobian(self._C_q(q, t=self.t)))
         declared = self.sort(self.layout.initial).rates
@@ -221,7 +224,7 @@ class Initial:
         rest = {name: value for name, value in declared.items() if name not in given}
         return self._solve_rates(q, {**given, **(self.compatible(q, given, rest, positions=False) if rest else {})}).v
 
-    def _require_motion(self, q: Array, given: Mapping[str, float]) -> None:
+    def _require_motion(self, q: Array, given: Mapping[str, float | Array]) -> None:
         """Refuse the rate of a coordinate that stands still at q, whatever moves: it would need boundless rates.
 
         Raises
@@ -234,7 +237,8 @@ class Initial:
         J = self.scales.jacobian(self._C_q(q, t=self.t))
         basis = algebra.svd(J)[2][rank(J).rank :]
         driven = self._solve_rates(q, {}).v / self.scales.q  # what driven constraints impose
-        for name, value in given.items():
+        for name, values in given.items():
+            value = max(np.ravel(values).tolist(), key=abs)
             scale = self.scales.q[layout.v.index(name)] if name in layout.v else self.rate_equation(q, name)[2]
             row = self.gradients(q, name)[0]
             still = np.linalg.norm(basis @ row) < STILL * max(1.0, float(np.linalg.norm(row)))
@@ -249,18 +253,20 @@ class Initial:
                     f"at a dead centre or across a blade{place(layout.q, q)}; {remedy}"
                 )
 
-    def _solve_rates(self, q: Array, held: Mapping[str, float]) -> Rates:
+    def _solve_rates(self, q: Array, held: Mapping[str, float | Array]) -> Rates:
         layout = self.layout
-        v = np.zeros(layout.n_v)
+        columns = np.broadcast_shapes(*map(np.shape, held.values()))
+        v = np.zeros((layout.n_v, *columns))
         indices = [layout.v.index(name) for name in held if name in layout.v]
-        v[indices] = [held[name] for name in held if name in layout.v]
+        v[indices] = [np.broadcast_to(held[name], columns) for name in held if name in layout.v]
         others = [name for name in held if name not in layout.v]
         if not (layout.n_c or others):
             return Rates(v, 0.0)
         equations = None
         if others:
             y_q, y_t, scales = map(np.array, zip(*(self.rate_equation(q, name) for name in others), strict=True))
-            equations = VelocityEquations(y_q, y_t, np.array([held[name] for name in others]), scales, others)
+            wanted = np.array([np.broadcast_to(held[name], columns) for name in others])
+            equations = VelocityEquations(y_q, y_t, wanted, scales, others)
         C_q, labels = self._C_q(q, t=self.t), layout.constraint_labels
         return assemble_velocity(C_q, self.rate(q), self.scales, v, indices, equations, layout.v, labels)
 

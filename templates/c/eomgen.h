@@ -17,7 +17,8 @@ enum {
     EOMGEN_SINGULAR_MASS_MATRIX = 2, /* a motion has no inertia behind it */
     EOMGEN_PROJECTION_FAILED = 3,    /* the state could not be brought onto the constraints */
     EOMGEN_PARTITION_BAD = 4,        /* the independent coordinates cannot move the mechanism here */
-    EOMGEN_UNSOLVED = 5              /* rounding leaves the linear system of the accelerations unsolved */
+    EOMGEN_UNSOLVED = 5,             /* rounding leaves the linear system of the accelerations unsolved */
+    EOMGEN_LEFT_ALONE = 6            /* of a lane: call the function of one state for it */
 };
 
 /* t: time; x: the inputs one after the other; u: inputs over time; c: constants made by precompute;
@@ -34,7 +35,9 @@ typedef struct {
 /* The same for several states at a time, number k of each in lane k: all arrays hold `width` doubles for every one of
    eomgen_function's, side by side, and begin at a multiple of their 8*width bytes; c too may differ from lane to lane.
    status: the status of every lane; what a lane with another than 0 has in out means nothing, but for finite entries
-   with EOMGEN_NON_FINITE; the others are not affected. Returns 0 if all are 0. A lane's results have the same bits whatever the others hold. */
+   with EOMGEN_NON_FINITE; the others are not affected. Returns 0 if all are 0. A lane's results have the same bits whatever the
+   others hold. The right-hand side of closed loops leaves lanes that need pivoting, or many Newton steps, to the function
+   of one state: EOMGEN_LEFT_ALONE. */
 typedef int (*eomgen_lane_function)(const double *t, const double *x, const double *u, const double *c, double *out,
     double *w, int *status);
 

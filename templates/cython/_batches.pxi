@@ -47,19 +47,26 @@ cdef double load(const Batch *batch, cnp.npy_intp column) noexcept nogil:
     return t
 
 
+cdef int call_one(const Batch *batch, cnp.npy_intp column, double *result) noexcept nogil:
+    """Evaluate one column into the (n_out, columns) result; returns its status."""
+    cdef double t = load(batch, column)
+    cdef cnp.npy_intp i
+    cdef int code
+    if batch.nan:
+        for i in range(batch.n_out):
+            batch.y[i] = NAN
+    code = batch.call(t, batch.x, batch.u, batch.c, batch.y, batch.w)
+    for i in range(batch.n_out):
+        result[i * batch.columns + column] = entry(batch.y[i], code)
+    return code
+
+
 cdef cnp.npy_intp sweep(const Batch *batch, double *result, int *status) noexcept nogil:
     """Evaluate all columns into the (n_out, columns) result; returns the first column that failed, or -1."""
-    cdef cnp.npy_intp failed = -1, i, j
+    cdef cnp.npy_intp failed = -1, j
     cdef int code
-    cdef double t
     for j in range(batch.columns):
-        t = load(batch, j)
-        if batch.nan:
-            for i in range(batch.n_out):
-                batch.y[i] = NAN
-        code = batch.call(t, batch.x, batch.u, batch.c, batch.y, batch.w)
-        for i in range(batch.n_out):
-            result[i * batch.columns + j] = entry(batch.y[i], code)
+        code = call_one(batch, j, result)
         if code != 0 and (failed < 0 or code < 0):
             failed, status[0] = j, code
         if code < 0 or (code != 0 and not batch.nan):

@@ -30,6 +30,7 @@ cnp.import_array()
 
 cdef extern from "eomgen.h" nogil:
     enum: EOMGEN_NON_FINITE
+    enum: EOMGEN_LEFT_ALONE
     ctypedef int (*eomgen_function)(double, const double *, const double *, const double *,
                                     double *, double *) noexcept nogil
     ctypedef struct eomgen_kernel:

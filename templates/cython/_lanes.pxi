@@ -136,8 +136,11 @@ cdef cnp.npy_intp sweep_lanes(const Batch *batch, double *result, int *status) n
                 memcpy(result + i * batch.columns + first, y + i * width, (last - first + 1) * sizeof(double))
         else:
             for k in range(last - first + 1):
-                for i in range(batch.n_out):
-                    result[i * batch.columns + first + k] = entry(y[i * width + k], codes[k])
+                if codes[k] == EOMGEN_LEFT_ALONE:
+                    codes[k] = call_one(batch, first + k, result)
+                else:
+                    for i in range(batch.n_out):
+                        result[i * batch.columns + first + k] = entry(y[i * width + k], codes[k])
                 if codes[k] != 0 and failed < 0:
                     failed, status[0] = first + k, codes[k]
         first += width

@@ -81,7 +81,7 @@ def test_an_ensemble_brings_the_lanes(write: Any) -> None:
     np.testing.assert_array_equal(at_once.simulate_many(0.5, states(20), rtol=1e-8).x, runs.x)
 
 
-def test_many_small_batches_bring_them_and_loops_have_none(write: Any, cache: Cache) -> None:
+def test_many_small_batches_bring_them_and_loops_that_pivot_have_none(write: Any, cache: Cache) -> None:
     module = eg.load(write("small")).compile()
     core, x = eager(module.core), states(50)
     for _ in range(81):  # 4,050 columns
@@ -92,9 +92,10 @@ def test_many_small_batches_bring_them_and_loops_have_none(write: Any, cache: Ca
     assert core.lane_width > 1
     file = write("crank")
     file.write_text(EXAMPLE.with_name("slider_crank.yaml").read_text().replace("slider_crank", "late_crank"))
-    crank = eg.load(file).compile()
-    crank.rhs(0.0, np.repeat(crank.x0()[:, None], 5000, axis=1))
-    assert eager(crank.core).lane_width == 1
+    for method, lanes in (("augmented", False), ("embedding", True)):
+        crank = eg.load(file).compile(method=method)
+        crank.rhs(0.0, np.repeat(crank.x0()[:, None], 5000, axis=1))
+        assert (eager(crank.core).lane_width > 1) == lanes
 
 
 def test_threads_wait_for_one_build(write: Any, cache: Cache) -> None:

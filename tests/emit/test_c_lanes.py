@@ -10,6 +10,7 @@ import pytest
 from eomgen.emit import emit_c
 from eomgen.emit.c_lanes import LANES
 
+LEFT_ALONE = 6  # EOMGEN_LEFT_ALONE
 ALL = ("-UEOMGEN_LANES", "-O2")  # every width that the machine has
 
 
@@ -114,6 +115,53 @@ def test_a_lane_that_fails_leaves_the_others_alone(systems, compiled):
     codes = [plain(library, "rhs", t[j], x[:, j], u[:, j], c[:, j])[0] for j in range(8)]
     assert codes == [0, 0, 1, 0, 0, 1, 2, 0]
     compare_lanes(library, "rhs", t, x, u, c)
+
+
+def compare_loops(library, x, t, u, c):
+    """All widths; returns how many states were left to the plain function."""
+    left = 0
+    expected = [plain(library, "rhs", t[j], x[:, j], u[:, j], c[:, j]) for j in range(x.shape[1])]
+    for width in library.lanes:
+        for first in range(0, x.shape[1] - width + 1, width):
+            here = slice(first, first + width)
+            status, out = library.side_by_side(width, "rhs", t[here], x[:, here], u[:, here], c[:, here])
+            for lane, (code, single) in enumerate(expected[here]):
+                left += status[lane] == LEFT_ALONE
+                if status[lane] != LEFT_ALONE:
+                    assert status[lane] == code
+                    np.testing.assert_array_equal(bits(out[:, lane]), bits(single), err_msg=f"{width}")
+    return left
+
+
+@pytest.mark.parametrize("far", [0.0, 1e-9, 1e-3, 0.02])
+def test_loops_have_the_bits_of_the_plain_function_and_leave_what_needs_pivoting(systems, compiled, far):
+    """States on the constraints, off them, far away, not finite and at a dead centre of the preferred coordinate."""
+    rng = np.random.default_rng(4)
+    for system in (systems.slider_crank(), systems.slider_crank(copies=2, name="crank_2")):
+        library = compiled(system, *ALL)
+        n, k = system.n, 24
+        closed = library.fine("project", np.concatenate([system.q, np.ones(n)]))
+        x = closed[:, None] + far * rng.standard_normal((2 * n, k))
+        t, u = np.zeros(k), np.tile(system.u[:, None], k)
+        c = constants(library, np.tile(system.p[:, None], k))
+        assert compare_loops(library, x, t, u, c) == 0
+        x[0, 3], x[n, 10], x[0, 17] = np.nan, np.inf, 40.0
+        assert compare_loops(library, x, t, u, c) >= len(library.lanes)
+
+
+def test_a_loop_at_a_dead_centre_is_left_to_the_plain_function(systems, compiled):
+    """The slider is preferred, and stands still where crank and rod are in line."""
+    system = systems.slider_crank(preferred=(2,), name="crank_s")
+    library = compiled(system, *ALL)
+    n = system.n
+    r, l = (float(system.values()[name]) for name in ("l1", "l2"))
+    dead = library.fine("project", np.array([0.0, 0.0, r + l, 5.0, -5.0 * r / l, 0.0]))
+    other = library.fine("project", np.concatenate([system.q, np.ones(n)]))
+    x = np.tile(other[:, None], 8)
+    x[:, 5] = dead
+    t, u = np.zeros(8), np.tile(system.u[:, None], 8)
+    c = constants(library, np.tile(system.p[:, None], 8))
+    assert compare_loops(library, x, t, u, c) == len(library.lanes)
 
 
 MAIN = """

@@ -82,7 +82,10 @@ def test_the_files_of_each_target(packages):
         "eomgen_processor.h",
         "eomgen_contraction.h",
     }
-    c_files |= {"crank_lanes.h", *(f"crank_lanes{width}.c" for width in (2, 4, 8))}
+    c_files |= {
+        "crank_lanes.h",
+        *(f"crank_{kind}{width}.c" for kind in ("lanes", "contracted_lanes") for width in (2, 4, 8)),
+    }
     built = {"Makefile", "CMakeLists.txt", "crank.pc.in", "crank_real_time.c"}
     about = {"model.json", "README.md", "PROVENANCE.md", "LICENSE.txt"}
     assert files["c"] == c_files | built | about

@@ -157,8 +157,8 @@ FAULTS = (
     ),
     Fault(
         "c-ball-factor", "templates/c/drivers/space_quaternions.c",
-        "const double x = 0.5 * factor * w[0]",
-        "const double x = 1.0 * factor * w[0]",
+        "const real x = 0.5 * factor * w[0]",
+        "const real x = 1.0 * factor * w[0]",
         "rates of Euler parameters: a factor 1/2",
         ("tests/emit/test_c_models.py::test_accelerations_are_those_of_a_solve_with_multipliers[balls]",),
     ),

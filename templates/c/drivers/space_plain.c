@@ -1,44 +1,15 @@
-/* q' = v: coordinates move as velocities say. */
-EOMGEN_SHARED void move(double *restrict q, const double *restrict d)
+/* q' = v: coordinates move as velocities say. Over `real`, because lanes of closed loops take this text too. */
+EOMGEN_SHARED void move(real *restrict q, const real *restrict d)
 {
     for (int k = 0; k < N; k++) {
         q[k] += d[k];
     }
 }
 
-EOMGEN_SHARED void form_rates(const double *restrict q, const double *restrict v, double *restrict rates)
+EOMGEN_SHARED void form_rates(const real *restrict q, const real *restrict v, real *restrict rates)
 {
     (void)q;
     for (int k = 0; k < N; k++) {
         rates[k] = v[k];
     }
-}
-
-/* The coordinate whose rate is velocity k; 0 if there is none. */
-#define coordinate_of(q, k) ((q)[k])
-
-/* The change of q' where q and v change by dq and dv. */
-EOMGEN_SHARED void change_rates(const double *restrict x, const double *restrict dq, const double *restrict dv,
-                                double *restrict change)
-{
-    (void)x, (void)dq;
-    for (int k = 0; k < N; k++) {
-        change[k] = dv[k];
-    }
-}
-
-/* The velocities of a change of q, and the change of q of velocities d near the change dq. */
-EOMGEN_SHARED void find_velocities(const double *restrict q, const double *restrict dq, double *restrict d)
-{
-    form_rates(q, dq, d);
-}
-
-EOMGEN_SHARED void spread(const double *restrict q, const double *restrict d, double *restrict dq)
-{
-    form_rates(q, d, dq);
-}
-
-EOMGEN_SHARED void normalise(double *restrict q)
-{
-    (void)q;
 }

@@ -1,15 +1,20 @@
 /* q' = N(q) v: e' = E^T w / 2 for Euler parameters e in q and angular velocities w in v (A. A. Shabana, Computational
-   Dynamics, chapter 7); QUATERNION has their places. The length of e is kept by every step and means nothing. */
-static void turn(const double *restrict e, const double *restrict w, double factor, double *restrict rates)
+   Dynamics, chapter 7); QUATERNION has their places. The length of e is kept by every step and means nothing. Over `real`,
+   because lanes of closed loops take this text too. */
+EOMGEN_EACH(root_of_each, sqrt)
+EOMGEN_EACH(sine_of_each, sin)
+EOMGEN_EACH(cosine_of_each, cos)
+
+static void turn(const real *restrict e, const real *restrict w, real factor, real *restrict rates)
 {
-    const double x = 0.5 * factor * w[0], y = 0.5 * factor * w[1], z = 0.5 * factor * w[2];
+    const real x = 0.5 * factor * w[0], y = 0.5 * factor * w[1], z = 0.5 * factor * w[2];
     rates[0] -= e[1] * x + e[2] * y + e[3] * z;
     rates[1] += e[0] * x - e[3] * y + e[2] * z;
     rates[2] += e[3] * x + e[0] * y - e[1] * z;
     rates[3] += e[1] * y - e[2] * x + e[0] * z;
 }
 
-EOMGEN_SHARED void move(double *restrict q, const double *restrict d)
+EOMGEN_SHARED void move(real *restrict q, const real *restrict d)
 {
     for (int k = 0; k < N; k++) {
         if (COORDINATE[k] >= 0) {
@@ -17,20 +22,21 @@ EOMGEN_SHARED void move(double *restrict q, const double *restrict d)
         }
     }
     for (int b = 0; b < QUATERNIONS; b++) {
-        double *const e = q + QUATERNION[b][0];
-        const double *const w = d + QUATERNION[b][1], old[4] = {e[0], e[1], e[2], e[3]};
-        const double half = 0.5 * sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+        real *const e = q + QUATERNION[b][0];
+        const real *const w = d + QUATERNION[b][1], old[4] = {e[0], e[1], e[2], e[3]};
+        const real half = 0.5 * root_of_each(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+        const real shrunk = cosine_of_each(half), ratio = sine_of_each(half) / half;
         for (int i = 0; i < 4; i++) {
-            e[i] = cos(half) * old[i];
+            e[i] = shrunk * old[i];
         }
-        turn(old, w, half > 0.0 ? sin(half) / half : 1.0, e);
+        turn(old, w, choose(half > 0.0, ratio, same(1.0)), e);
     }
 }
 
-EOMGEN_SHARED void form_rates(const double *restrict q, const double *restrict v, double *restrict rates)
+EOMGEN_SHARED void form_rates(const real *restrict q, const real *restrict v, real *restrict rates)
 {
     for (int k = 0; k < NQ; k++) {
-        rates[k] = 0.0;
+        rates[k] = same(0.0);
     }
     for (int k = 0; k < N; k++) {
         if (COORDINATE[k] >= 0) {
@@ -38,7 +44,7 @@ EOMGEN_SHARED void form_rates(const double *restrict q, const double *restrict v
         }
     }
     for (int b = 0; b < QUATERNIONS; b++) {
-        turn(q + QUATERNION[b][0], v + QUATERNION[b][1], 1.0, rates + QUATERNION[b][0]);
+        turn(q + QUATERNION[b][0], v + QUATERNION[b][1], same(1.0), rates + QUATERNION[b][0]);
     }
 }
 
@@ -46,11 +52,11 @@ EOMGEN_SHARED void form_rates(const double *restrict q, const double *restrict v
 #define coordinate_of(q, k) (COORDINATE[k] >= 0 ? (q)[COORDINATE[k]] : 0.0)
 
 /* The change of q' where q and v change by dq and dv. */
-EOMGEN_SHARED void change_rates(const double *restrict x, const double *restrict dq, const double *restrict dv,
-                                double *restrict change)
+EOMGEN_SHARED void change_rates(const real *restrict x, const real *restrict dq, const real *restrict dv,
+                                real *restrict change)
 {
     form_rates(x, dv, change);
     for (int b = 0; b < QUATERNIONS; b++) {
-        turn(dq + QUATERNION[b][0], x + NQ + QUATERNION[b][1], 1.0, change + QUATERNION[b][0]);
+        turn(dq + QUATERNION[b][0], x + NQ + QUATERNION[b][1], same(1.0), change + QUATERNION[b][0]);
     }
 }

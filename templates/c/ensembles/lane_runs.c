@@ -195,8 +195,9 @@ static int takes(const eomgen_ensemble *e, const eomgen_thread *own)
 static ptrdiff_t lane_memory(const eomgen_ensemble *e)
 {
     const lane_method *const method = find_method(e->method->name);
-    const ptrdiff_t rows = 4 + method->rows_K + method->rows_F, further = eomgen_further(e->method, e->n, e->series);
-    return e->model->n_const + W * (1 + e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n + further);
+    const ptrdiff_t rows = 5 + method->rows_K + method->rows_F, further = eomgen_further(e->method, e->n, e->series);
+    const ptrdiff_t each = e->model->n_work + e->model->n_u + e->model->n_const; /* alone, and in every lane */
+    return e->model->n_const + each + 2 * e->n + W * (1 + each + rows * e->n + further);
 }
 
 static void lay_out(lane_run *run, const eomgen_ensemble *e, const eomgen_thread *own, const lane_method *method, real *memory)
@@ -209,8 +210,10 @@ static void lay_out(lane_run *run, const eomgen_ensemble *e, const eomgen_thread
     run->u = run->c + e->model->n_const;
     run->w = run->u + e->model->n_u;
     run->y = run->w + e->model->n_work;
-    run->y_old = run->y + n, run->f = run->y_old + n, run->z = run->f + n;
-    run->K = run->z + n;
+    run->y_old = run->y + n, run->f = run->y_old + n, run->z = run->f + n, run->next = run->z + n;
+    run->K = run->next + n;
+    run->closed = e->model->closed_at && method != &lane_taylor ? run->w + e->model->closed_at : NULL;
+    run->all = e, run->alone = own->memory + e->model->n_const;
     run->after = run->K + (TAYLOR_MOST + 1) * n, run->series_work = run->K + method->rows_K * n;
     run->F = run->series_work + eomgen_further(e->method, n, e->series);
     run->expand = (lane_series)e->lane_series;
@@ -240,6 +243,9 @@ static void prepare_round(eomgen_ensemble *e, const lane_method *method, lane_ru
     }
     choose_steps(e, run, direction, constants);
     memcpy(run->y_old, run->y, size);
+    for (int i = 0; i < run->n && run->closed != NULL; i++) { /* E. Eich, as in eomgen_step */
+        run->y_old[i] = choose(run->awake, run->next[i], run->y[i]);
+    }
     if (!taylor) {
         memcpy(run->K, run->f, size);
     }
@@ -250,6 +256,7 @@ static void finish_round(eomgen_ensemble *e, const lane_method *method, lane_run
 {
     run->evaluations += run->awake & run->calls;
     const flag moved = accept_steps(run, method->error(run, run->step), method->error_order);
+    keep_closed_lanes(run, moved);
     if (e->n_eval > 0) {
         sample_lanes(e, method, run, moved, direction);
     }
@@ -261,6 +268,7 @@ static void work_in_lanes(eomgen_ensemble *e, const eomgen_thread *own)
     const lane_method *const method = find_method(e->method->name);
     const double direction = e->nodes[e->n_nodes - 1] < e->nodes[0] ? -1.0 : 1.0;
     double *const constants = own->memory, *memory = constants + e->model->n_const;
+    memory += e->model->n_work + e->model->n_u + e->model->n_const + 2 * e->n; /* of lanes that are evaluated alone */
     memory += (W - ((uintptr_t)memory / sizeof(double)) % W) % W; /* vectors lie at multiples of their size */
     lane_run run;
     lay_out(&run, e, own, method, (real *)memory);

@@ -9,7 +9,7 @@
 
 enum { W = EOMGEN_WIDTH };
 
-/* The right-hand side in lanes, which may contract: returns the lanes that fail. */
+/* The right-hand side in lanes, which may contract: returns the lanes that fail or are left to the function of one state. */
 typedef flag (*lane_function)(real t, const real *x, const real *u, const real *c, real *out, real *w);
 
 /* Taylor coefficients likewise. */
@@ -26,6 +26,9 @@ typedef struct {
     real t, t_old, step, hold; /* hold: as in eomgen_run */
     real *c, *u, *w, *y, *y_old, *f, *K, *F, *z; /* constants, inputs, work; states as in eomgen_run; a state between */
     real *after, *series_work; /* of Taylor: coefficients at the ends of the steps, and the series' work */
+    real *closed, *next; /* in w and beside: as in eomgen_run, or NULL */
+    const eomgen_ensemble *all;
+    double *alone; /* room of the function of one state: x, x', u, c, w */
     int calls;
     flag active, begins, awake, again; /* has a trajectory; needs x' and a first step; evaluations count; was rejected */
     real size, size_before, t_new, t_bound; /* size_before: as it was before the last step */
@@ -45,8 +48,32 @@ typedef struct {
     void (*interpolate)(const lane_run *run, real t, real *y);
 } lane_method;
 
-/* Mark what failed in lanes that count, and keep those lanes from going on. */
-static EOMGEN_APART void note_failures(lane_run *run, real t, const real *y, real *k, flag failed, flag bad)
+/* x' of one lane by the function of one state, into k; its status. */
+static int evaluate_alone(lane_run *run, int l, real t, const real *y, real *k)
+{
+    const eomgen_model *const model = run->all->model;
+    double *const x = run->alone, *const out = x + run->n, *const u = out + run->n, *const c = u + run->n_u, *const w = c + model->n_const;
+    for (int i = 0; i < run->n; i++) {
+        x[i] = y[i][l];
+    }
+    for (int i = 0; i < run->n_u; i++) {
+        u[i] = run->u[i][l];
+    }
+    for (int i = 0; i < model->n_const; i++) {
+        c[i] = run->c[i][l];
+    }
+    const int status = run->all->rhs(t[l], x, u, c, out, w);
+    for (int i = 0; i < run->n; i++) {
+        k[i][l] = out[i];
+        if (run->closed != NULL) {
+            run->closed[i][l] = w[model->closed_at + i];
+        }
+    }
+    return status;
+}
+
+/* Mark what failed in lanes that count, and keep those lanes from going on; codes: of lanes that failed, NULL: singular. */
+static EOMGEN_APART void note_failures(lane_run *run, real t, const real *y, real *k, flag failed, flag bad, const int *codes)
 {
     for (int l = 0; l < W; l++) {
         int finite = 1;
@@ -55,9 +82,21 @@ static EOMGEN_APART void note_failures(lane_run *run, real t, const real *y, rea
             k[i][l] = (double)NAN;
         }
         if (bad[l] && run->awake[l] && (finite || run->failure[l] == 0)) {
-            run->failure[l] = failed[l] ? EOMGEN_SINGULAR_MASS_MATRIX : EOMGEN_NON_FINITE, run->failure_time[l] = t[l];
+            const int code = codes != NULL ? codes[l] : EOMGEN_SINGULAR_MASS_MATRIX;
+            run->failure[l] = failed[l] ? code : EOMGEN_NON_FINITE, run->failure_time[l] = t[l];
         }
     }
+}
+
+/* Evaluate lanes that count and were not done side by side; returns those that fail, with their codes. */
+static EOMGEN_APART flag complete_lanes(lane_run *run, real t, const real *y, real *k, flag left, int *codes)
+{
+    flag failed = { 0 };
+    for (int l = 0; l < W; l++) {
+        codes[l] = left[l] ? evaluate_alone(run, l, t, y, k) : 0;
+        failed[l] = codes[l] != 0 ? -1 : 0;
+    }
+    return failed;
 }
 
 static EOMGEN_APART void read_tables(lane_run *run, real t)
@@ -75,14 +114,26 @@ static inline void evaluate_lanes(lane_run *run, real t, const real *y, real *k)
         read_tables(run, t);
     }
     run->calls++;
-    const flag failed = run->rhs(t, y, run->u, run->c, k, run->w);
+    int codes[W];
+    flag failed = run->rhs(t, y, run->u, run->c, k, run->w) & run->awake;
+    if (any_of(failed)) {
+        failed = complete_lanes(run, t, y, k, failed, codes);
+    }
     real sum = same(0.0); /* NaN where a result is not finite */
     for (int i = 0; i < run->n; i++) {
         sum += k[i] * 0.0;
     }
     const flag bad = failed | (sum != 0.0);
     if (any_of(bad & run->awake)) {
-        note_failures(run, t, y, k, failed, bad);
+        note_failures(run, t, y, k, failed, bad, codes);
+    }
+}
+
+/* Where the next steps of these lanes start: the states just evaluated, on the constraints. */
+static inline void keep_closed_lanes(lane_run *run, flag chosen)
+{
+    for (int i = 0; i < run->n && run->closed != NULL; i++) {
+        run->next[i] = choose(chosen, run->closed[i], run->next[i]);
     }
 }
 
@@ -128,6 +179,7 @@ static EOMGEN_APART void begin_lanes(const eomgen_ensemble *e, const lane_method
     const flag begins = run->begins & run->active;
     run->awake = begins;
     evaluate_lanes(run, run->t, run->y, f1);
+    keep_closed_lanes(run, begins);
     run->evaluations -= begins;
     for (int i = 0; i < n; i++) {
         run->f[i] = choose(begins, f1[i], run->f[i]);

@@ -14,7 +14,7 @@ static void expand_lanes(lane_run *run, real t, const real *y, flag wanted)
     const flag bad = failed | (sum != 0.0);
     if (any_of(bad & wanted)) {
         run->awake = wanted;
-        note_failures(run, t, y, rows + run->n, failed, bad);
+        note_failures(run, t, y, rows + run->n, failed, bad, NULL);
     }
 }
 
