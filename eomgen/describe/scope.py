@@ -11,7 +11,7 @@ from ..graph.core import Expr, Graph
 from ..graph.substitute import symbols_of
 from .description import Faults
 from .fields import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
-from .marker_quantities import ElementQuantity, MarkerQuantity, element_quantity, marker_quantity
+from .marker_quantities import ONE_OR_TWO, ElementQuantity, MarkerQuantity, element_quantity, marker_quantity
 from .mechanism import TURNING, Quantity
 from .names import ACCELERATIONS, COM, QUANTITIES, TOTALS, fault_of_name, nearest
 
@@ -197,7 +197,7 @@ class Scope:
         if self.level < LAW or (self.level < OUTPUT and level in ACCELERATIONS):
             self._refuse(str(found), "motion of a marker" if self.level < LAW else "acceleration of a marker")
             return self.graph.symbol(str(found))
-        point = self._point(level, axis, found.marker)
+        point = self._point(found)
         origin, axes = (self._fixed(label) if label else None for label in (found.origin, found.axes))
         self.quantities[str(found)] = Quantity(point, level, axis, origin, axes)
         return self.graph.symbol(str(found))
@@ -212,14 +212,14 @@ class Scope:
                 raise ExpressionError("the centre of mass of all bodies is no marker", 0, remedy) from None
             raise
 
-    def _point(self, level: int, axis: int, label: str) -> Marker | None:
-        """The marker of a label; None for the centre of mass of all bodies."""
+    def _point(self, found: MarkerQuantity) -> Marker | None:
+        """The marker of a quantity; None for the centre of mass of all bodies."""
         try:
-            return self.marker(label)
+            return self.marker(found.marker)
         except ExpressionError:
-            if label != COM:
+            if found.marker != COM:
                 raise
-        if axis == 3 or level in TURNING:
+        if found.name in ONE_OR_TWO or QUANTITIES[found.name][0] in TURNING:
             raise ExpressionError("the centre of mass of all bodies has no rotation", 0, "give a marker of a body")
         return None
 

@@ -190,14 +190,14 @@ class MarkerMotion:
 
     def _quantity(self, quantity: Quantity) -> Expr:
         """Motion of a marker, or a sum over all bodies."""
+        if quantity.level not in (0, 1, 2, *TURNING):
+            return self._sum(quantity)
         if quantity.axis == 4:
             return self._distance(quantity)
         if quantity.axis == 3 and quantity.marker is not None:
             # it wraps only where the motion is not plane
             angle, rate, _ = self.turn(quantity.origin or self._ground, quantity.marker)
             return rate if quantity.level else angle
-        if quantity.level not in (0, 1, 2, *TURNING):
-            return self._sum(quantity)
         found = self._vector(quantity.level, quantity.marker)
         if quantity.origin is not None:
             found = vec.sub(found, self._vector(quantity.level, quantity.origin))

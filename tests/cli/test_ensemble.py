@@ -15,7 +15,7 @@ PENDULUM, CRANK = EXAMPLES / "double_pendulum.yaml", EXAMPLES / "slider_crank.ya
 def test_a_table_of_cases(call: Call, tmp_path: Path) -> None:
     cases, ends = tmp_path / "cases.csv", tmp_path / "ends.csv"
     cases.write_text("r, theta\n0.1,0.3\n0.5,1.2\n0.12,0.3\n")
-    result = call("ensemble", CRANK, "--cases", cases, "--end", "0.5", "--out", ends, "--json")
+    result = call("ensemble", CRANK, "--cases", cases, "--end", "0.5", "--rtol", "1e-12", "--out", ends, "--json")
     assert result.code == 0, result.err
     found = result.json
     assert set(found) == {"name", "method", "origin", "t", "count", "varied", "steps", "failures", "files", "summary"}
@@ -25,7 +25,7 @@ def test_a_table_of_cases(call: Call, tmp_path: Path) -> None:
     import pandas
 
     table = pandas.read_csv(ends)
-    alone = call("run", CRANK, "--set", "r=0.12", "--set", "theta=0.3", "--end", "0.5", "--json").json
+    alone = call("run", CRANK, "--set", "r=0.12", "--set", "theta=0.3", "--end", "0.5", "--rtol", "1e-12", "--json").json
     assert table["theta"][2] == pytest.approx(alone["final"]["theta"], abs=1e-12)
     assert found["summary"]["theta"]["greatest"] == pytest.approx(table["theta"].max())
 
@@ -74,7 +74,7 @@ def test_values_are_drawn_between_expressions(call: Call) -> None:
         ((), "nothing differs between the runs"),
         (("--vary", "r=1"), "--vary r=1: write NAME=LOW:HIGH"),
         (("--vary", "radius=1:2"), "no coordinate or rate 'radius'"),
-        (("--vary", "r=0.1:0.2", "--out", "a.txt"), "written as .npz or .csv"),
+        (("--vary", "r=0.1:0.2", "--out", "a.txt"), "written as .npz, .csv or .nc"),
     ],
 )
 def test_wrong_words(call: Call, words: tuple[str, ...], message: str) -> None:
