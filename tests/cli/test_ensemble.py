@@ -25,7 +25,9 @@ def test_a_table_of_cases(call: Call, tmp_path: Path) -> None:
     import pandas
 
     table = pandas.read_csv(ends)
-    alone = call("run", CRANK, "--set", "r=0.12", "--set", "theta=0.3", "--end", "0.5", "--rtol", "1e-12", "--json").json
+    alone = call(
+        "run", CRANK, "--set", "r=0.12", "--set", "theta=0.3", "--end", "0.5", "--rtol", "1e-12", "--json"
+    ).json
     assert table["theta"][2] == pytest.approx(alone["final"]["theta"], abs=1e-12)
     assert found["summary"]["theta"]["greatest"] == pytest.approx(table["theta"].max())
 
