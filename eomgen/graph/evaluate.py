@@ -73,9 +73,9 @@ class Evaluator:
             if len(node) == 3:  # most of them
                 operation, k, j = node
                 a, b = slots[k], slots[j]
-                last[a] = last[b] = place_of = len(steps)
+                last[a] = last[b] = step = len(steps)
                 steps.append((operation, a, b, -1))
-                slots[i] = first + place_of
+                slots[i] = first + step
             else:
                 slots[i] = self._add_step(node[0], [slots[j] for j in node[1:]], first, last)
         self._outputs = [slots[y.id] for y in outputs]
