@@ -20,6 +20,7 @@ from .cython_layer import HEADERS, build_layer, describe_interpreter, describe_l
 from .options import Options, compile_flags, link_flags, machine_flags
 from .processor import choose_lanes, late_files
 from .products import require_library, require_object, stamp, write_stamp
+from .shared_objects import is_shared, shared_objects
 
 Progress = Callable[[str], None]
 
@@ -116,7 +117,7 @@ def compile_c_library(
     """Compile a model into a plain shared library for C programs or ctypes; needs neither Python.h nor Cython.
 
     Parameters and errors are those of :func:`compile_sources`. Every function that is not static can be called.
-    With ``steppers`` the files of the layer that are among the sources are compiled too.
+    With ``steppers`` the files of the layer that are among the sources are compiled too, once for all models.
     """
     start = time.perf_counter()
     options = options or Options()
@@ -134,7 +135,12 @@ def compile_c_library(
     if entry is not None:
         return _artifact(entry, start, from_cache=True)
     product = f"lib{name}.dylib" if sys.platform == "darwin" else f"lib{name}.so"
-    entry = _build(cache, key, "library", name, sources, flags, product, list, options, compiler, progress)
+    own = {file: words for file, words in flags.items() if not is_shared(file)}
+
+    def objects() -> list[str]:
+        return list(map(str, shared_objects(cache, sources, flags, compiler, progress)))
+
+    entry = _build(cache, key, "library", name, sources, own, product, objects, options, compiler, progress)
     return _artifact(entry, start, from_cache=False)
 
 

@@ -67,9 +67,17 @@ class Evaluator:
             implementation = function.implementation(orders)
             self._functions[operation] = (implementation, implementation)
         last: dict[int, int] = {}
+        steps = self._steps
         for i in rest:
-            operation, *args = nodes[i]
-            slots[i] = self._add_step(operation, [slots[j] for j in args], first, last)
+            node = nodes[i]
+            if len(node) == 3:  # most of them
+                operation, k, j = node
+                a, b = slots[k], slots[j]
+                last[a] = last[b] = step = len(steps)
+                steps.append((operation, a, b, -1))
+                slots[i] = first + step
+            else:
+                slots[i] = self._add_step(node[0], [slots[j] for j in node[1:]], first, last)
         self._outputs = [slots[y.id] for y in outputs]
         keep = {*self._outputs, -1, *range(first)}
         self._dead: list[tuple[int, ...]] = [()] * len(self._steps)  # slots not needed after each step

@@ -62,14 +62,18 @@ def _spread(
             if operation == "sym":
                 bounds[i] = given.get(operands[0], 0.0)
                 continue
+            if operation == "const":
+                bounds[i] = 0.0 if given else abs(found[i])
+                continue
             y, row = found[i], OPERATIONS.get(operation)
             bound = 0.0 if given or (row is not None and row.exact) else abs(y)
             if row is not None and row.rates:  # a table or a function in C knows its value
                 try:
                     x = [found[k] for k in operands]
                     for rate, k in zip(row.rates, operands, strict=True):
-                        if np.any(bounds[k]):
-                            bound += bounds[k] if rate is unit else rate(y, *x) * bounds[k]
+                        e = bounds[k]
+                        if e if type(e) is float else np.any(e):
+                            bound += e if rate is unit else rate(y, *x) * e
                 except (ValueError, ArithmeticError):
                     bound = math.inf
             bounds[i] = bound

@@ -22,17 +22,26 @@ def reachable(graph: Graph, roots: Iterable[int], stop: Container[int] = ()) -> 
     nodes in ``stop`` are not entered.
     """
     nodes = graph.nodes
-    stack = list(roots)
-    seen = set(stack)
+    seen = set(roots)
+    stack = list(seen)
     while stack:
         i = stack.pop()
-        node = nodes[i]
-        if node[0] in LEAVES or i in stop:
+        if stop and i in stop:
             continue
-        for k in node[1:]:
-            if k not in seen:
-                seen.add(k)
-                stack.append(k)
+        node = nodes[i]
+        if len(node) == 3:  # most nodes: two operands, without a loop
+            _, a, b = node
+            if a not in seen:
+                seen.add(a)
+                stack.append(a)
+            if b not in seen:
+                seen.add(b)
+                stack.append(b)
+        elif node[0] not in LEAVES:
+            for k in node[1:]:
+                if k not in seen:
+                    seen.add(k)
+                    stack.append(k)
     return sorted(seen)
 
 

@@ -35,13 +35,18 @@ class Length(NamedTuple):
 
 
 def row_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
-    """The size of each row (m,), an expression of parameters."""
+    """The size of each row (m,), an expression of parameters; found once for each Kinematics."""
+    kept: dict[str, tuple[Expr, ...]] = vars(kinematics)
+    if "_row_scales" not in kept:
+        kept["_row_scales"] = _find_scales(kinematics)
+    return kept["_row_scales"]
+
+
+def _find_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
     graph, c = kinematics.graph, kinematics.constraints
     sizes = {"length": kinematics.length_scale, "angle": graph.one}
     found = [sizes[kind] for kind in c.kinds]
-    places: list[dict[Expr, Expr]] = []
-    numbers: list[dict[str, float]] = []
-    usual = 0.0
+    measured: dict[int, list[Expr]] = {}  # gradients whose lengths are looked at, by row
     for i, row in enumerate(c.jacobian):
         gradient = [x * sizes[kind] for x, kind in zip(row, kinematics.velocity_kinds, strict=True) if not x.is_zero]
         written = c.written[i]
@@ -52,18 +57,21 @@ def row_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
         if written and not _moves(kinematics, row):
             found[i] = _coefficient_size(gradient)
             continue
-        if not places:
-            places = _places(kinematics)
-            numbers = [_numbers(kinematics, place) for place in places]
-            usual = _length_at([kinematics.length_scale], numbers[0]).value
-        first, second = (_length_at(gradient, known) for known in numbers)
+        measured[i] = gradient
+    if not measured:
+        return tuple(found)
+    places = _places(kinematics)
+    gradients = [[kinematics.length_scale], *measured.values()]
+    (usual, *at_first), (_, *at_second) = (_lengths_at(gradients, _numbers(kinematics, place)) for place in places)
+    for (i, gradient), first, second in zip(measured.items(), at_first, at_second, strict=True):
+        written = c.written[i]
         largest = max(first.value, second.value)
         terms = max(first.terms, second.terms)
         if written and largest <= TINY_ROOT and terms > 0.0:
             found[i] = graph.constant(terms)
         elif written and largest <= TINY_ROOT:  # nothing at the declared values of its factors
             found[i] = _length(substitute(gradient, places[1]))
-        elif written or TINY_ROOT < largest < SMALL_LOOP * usual:
+        elif written or TINY_ROOT < largest < SMALL_LOOP * usual.value:
             place = places[first.value < BY_CHANCE * second.value]
             found[i] = _length(substitute(gradient, place))
     return tuple(found)
@@ -120,8 +128,14 @@ def _numbers(kinematics: Kinematics, place: Mapping[Expr, Expr]) -> dict[str, fl
     return numbers | dict(zip((x.node[1] for x in place), with_bounds(list(place.values()), numbers)[0], strict=True))
 
 
-def _length_at(gradient: Sequence[Expr], numbers: Mapping[str, float]) -> Length:
-    values, bounds = with_bounds(gradient, numbers)
+def _lengths_at(gradients: Sequence[Sequence[Expr]], numbers: Mapping[str, float]) -> list[Length]:
+    """The lengths of some gradients at one place; what they share is evaluated once."""
+    values, bounds = with_bounds([x for gradient in gradients for x in gradient], numbers)
+    ends = np.cumsum([len(gradient) for gradient in gradients])[:-1]
+    return [_length_of(*parts) for parts in zip(np.split(values, ends), np.split(bounds, ends), strict=True)]
+
+
+def _length_of(values: np.ndarray, bounds: np.ndarray) -> Length:
     nothing = not np.isfinite(values).all() or bool(is_rounding(values, bounds).all())
     terms = float(np.linalg.norm(bounds)) if np.isfinite(bounds).all() else 0.0
     return Length(0.0 if nothing else float(np.linalg.norm(values)), terms)

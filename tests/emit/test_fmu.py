@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import zipfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -63,16 +64,27 @@ def simulated(path: Path, kind: str, end: float, names: list[str], rtol: float |
     return rows["time"], {name: np.asarray(rows[name]) for name in names}
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_every_example_validates_and_moves_like_simulate(name: str, version: str, tmp_path: Path) -> None:
-    equations = derive(models.build(name), "auto")
-    path = write_fmu(equations, tmp_path / f"{name}.fmu", version)
-    assert validate_fmu(str(path)) == []
+@cache
+def derived(name: str) -> Any:
+    """The equations of an example, for the units of both versions."""
+    return derive(models.build(name), "auto")
+
+
+@cache
+def moved(name: str) -> tuple[list[str], float, Any]:
+    """Names of its states and outputs, the end of a run, and the run by the module."""
     module = models.build(name).compile(target="numpy")
     end = min(float(module.metadata["simulation"]["end"]), 0.2)
     names = [*module.x_names, *(y for y in module.y_names if y not in module.x_names)]
-    expected = module.simulate(end, t_eval=np.linspace(0.0, end, POINTS))
+    return names, end, module.simulate(end, t_eval=np.linspace(0.0, end, POINTS))
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_every_example_validates_and_moves_like_simulate(name: str, version: str, tmp_path: Path) -> None:
+    path = write_fmu(derived(name), tmp_path / f"{name}.fmu", version)
+    assert validate_fmu(str(path)) == []
+    names, end, expected = moved(name)
     for kind, rtol, bound in (("CoSimulation", None, 2e-7), ("ModelExchange", 1e-8, 2e-5)):
         times, found = simulated(path, kind, end, names, rtol)
         np.testing.assert_allclose(times, expected.t, atol=1e-12)

@@ -12,7 +12,7 @@ from ...kinematics.idle_rows import IDLE
 from ...limits.rounding import EPS
 from ..comparison import NO_LIMIT
 from ..finding import Finding
-from .probe_states import ROUNDINGS, Original, compiled, reactions_of
+from .probe_states import OBSERVED, ROUNDINGS, Original, compiled, reactions_of
 from .variant import NotApplicable, Variant
 
 #: Names whose constant is free: it changes where ground is shifted.
@@ -26,7 +26,8 @@ def compare(check: str, original: Original, make: Any, random: Any, reactions: b
     except NotApplicable as why:
         return Finding.skipped(check, str(why))
     try:
-        return compare_module(check, original, variant, compiled(variant.description), reactions)
+        module = compiled(variant.description, kernels=None if reactions else OBSERVED)
+        return compare_module(check, original, variant, module, reactions)
     except EomgenError as error:
         if isinstance(error, ModelError) and all(IDLE in problem.message for problem in error.problems):
             return Finding.skipped(

@@ -15,7 +15,7 @@ from ...limits.verification import ATOL, RTOL, RUNS
 from ...simulation.simulate import simulate
 from ..finding import Finding
 from .compare import compare_module
-from .probe_states import Original, compiled
+from .probe_states import OBSERVED, Original, compiled
 from .variant import Variant
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def _as_parameters(check: str, original: Original) -> Finding:
         value = number_of(entry.values.get("value", 0.0), {})
         made.add("parameters", entry.name, {"value": value})
     made.sections["inputs"] = []
-    return compare_module(check, original, Variant(made), compiled(made))
+    return compare_module(check, original, Variant(made), compiled(made, kernels=OBSERVED))
 
 
 def duration(original: Original) -> float:

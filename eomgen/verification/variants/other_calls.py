@@ -26,7 +26,7 @@ from .compare import Worst, compare_module, refused, states_of
 from .geometry import parameters_of_geometry
 from .inputs import input_findings
 from .plain import values_of
-from .probe_states import Original, compiled, compiled_model
+from .probe_states import OBSERVED, Original, compiled, compiled_model
 from .variant import Variant
 
 Call = Callable[[str, Builder, Original, Any], Finding]
@@ -80,7 +80,7 @@ def _independent(check: str, model: Builder, original: Original, random: Any) ->
     if best < REGULAR:
         return Finding.skipped(check, "no other coordinates are independent here")
     names = [own.q_names[k] for k in chosen]
-    module = compiled(original.description, independent=names)
+    module = compiled(original.description, independent=names, kernels=OBSERVED)
     return compare_module(check, original, Variant(original.description), module)
 
 
@@ -97,7 +97,7 @@ def _parameters(check: str, model: Builder, original: Original, random: Any) -> 
     for entry in made.sections["parameters"]:
         if entry.name in wrong:
             entry.values["value"] = wrong[entry.name]
-    module = compiled(made)
+    module = compiled(made, kernels=OBSERVED)
     p = np.array([right[name] for name in module.p_names])
     return compare_module(check, original, Variant(made), module, p=p)
 

@@ -31,6 +31,7 @@ from .variant import kinds_of, velocities_of
 
 #: Roundings of the size of the result that a calculation may collect; the largest ratio seen stands in docs.
 ROUNDINGS = 200.0
+OBSERVED = ("outputs",)  #: kernels of a variant whose outputs alone are compared: making all takes five times as long
 STATES = 3
 
 
@@ -82,10 +83,11 @@ def compiled(description: Description, **options: Any) -> BoundModel:
 
 
 def compiled_model(
-    model: Builder, method: str = "auto", independent: Sequence[str] | None = None, target: str = "numpy"
-) -> BoundModel:
-    """A module of a model, by default of the target that needs no compiler."""
-    return BoundModel(pipeline.compile_core(pipeline.derive(model, method, independent), target))
+    model: Builder, method: str = "auto", independent: Sequence[str] | None = None, target: str = "numpy",
+    kernels: Sequence[str] | None = None,
+) -> BoundModel:  # fmt: skip
+    """A module of a model, by default of the target that needs no compiler and with all kernels."""
+    return BoundModel(pipeline.compile_core(pipeline.derive(model, method, independent), target, kernels))
 
 
 def observe(
