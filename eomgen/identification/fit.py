@@ -104,7 +104,7 @@ def fit(
         jac = problem.jacobian if derivatives == "exact" else "2-point"
         found = least_squares(problem.residuals, values, jac=jac, bounds=limits, x_scale="jac", **options)
         values, runs = found.x, runs + int(found.nfev)
-    if options.get("loss", "linear") != "linear":  # SciPy's derivatives are weighted by what the loss takes off outliers
+    if options.get("loss", "linear") != "linear":  # SciPy weights its derivatives by what the loss takes off
         return Fit(problem, values, np.asarray(found.jac), limits, found, known is not None)
     if not known:
         problem.sigma = {name: problem.noise(values, name) for name in columns}

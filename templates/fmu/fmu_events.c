@@ -8,7 +8,8 @@ int fmu_indicators(fmu_instance *f, double *values)
 {
 #if FMU_N_EVENTS
     fmu_memory *const m = &f->m;
-    const int status = fmu_constants(f);
+    int status = fmu_ready(f);
+    status = status == FMU_OK ? fmu_constants(f) : status;
     return status != FMU_OK ? status
                             : fmu_judge(f, FMU_MODEL(events)(m->t, m->x, m->u, m->c, values, f->w), "the event indicators");
 #else

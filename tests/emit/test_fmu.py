@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import subprocess
 import zipfile
@@ -178,6 +179,25 @@ def test_loops_follow_start_values_and_parameters(crank: tuple[Path, Any]) -> No
     instance.reset()
     initialized(instance)
     np.testing.assert_allclose(instance.getReal([at[name] for name in module.x_names]), module.x0(), atol=0.0)
+    instance.freeInstance()
+
+
+def test_all_ways_to_read_tell_the_same_during_initialization(crank: tuple[Path, Any]) -> None:
+    """States and their derivatives by reference and as a whole, right after a start value was set."""
+    path, module = crank
+    instance, of = opened(path)
+    instance.setupExperiment(startTime=0.0)
+    instance.enterInitializationMode()
+    instance.setReal([of["theta"]], [0.9])
+    read = {name: (ctypes.c_double * module.n_x)() for name in ("rates", "x")}
+    instance.fmi2GetDerivatives(instance.component, read["rates"], module.n_x)
+    instance.setReal([of["theta"]], [0.8])
+    instance.fmi2GetContinuousStates(instance.component, read["x"], module.n_x)
+    assert list(read["x"]) == instance.getReal([of[name] for name in module.x_names])
+    instance.setReal([of["theta"]], [0.9])
+    assert list(read["rates"]) == instance.getReal([of[f"der({name})"] for name in module.x_names])
+    instance.exitInitializationMode()
+    instance.terminate()
     instance.freeInstance()
 
 
