@@ -95,7 +95,8 @@ def fit(
     count = sum(int(np.isfinite(values).sum()) for one in experiments for values in one.columns.values())
     if count <= len(problem.names):
         raise UsageError(f"there are {count} measured values, and {len(problem.names)} unknowns; give more data")
-    values, found, runs = problem.start, None, 0
+    values: Array = problem.start
+    found: Any = None
     problem.sigma = known or {name: problem.spread(name) for name in columns}
     problem.residuals(values, told=True)
     for _ in range(1 if known else ROUNDS):
@@ -103,7 +104,7 @@ def fit(
             problem.sigma = {name: problem.noise(values, name) for name in columns}
         jac = problem.jacobian if derivatives == "exact" else "2-point"
         found = least_squares(problem.residuals, values, jac=jac, bounds=limits, x_scale="jac", **options)
-        values, runs = found.x, runs + int(found.nfev)
+        values = found.x
     if options.get("loss", "linear") != "linear":  # SciPy weights its derivatives by what the loss takes off
         return Fit(problem, values, np.asarray(found.jac), limits, found, known is not None)
     if not known:
@@ -130,7 +131,6 @@ class _Problem:
             raise UsageError("parameters must name what is to be found, each once")
         self.initial_names = tuple(name for name in self.names if name in self.states)
         self.sigma: dict[str, float] = {}
-        self.runs = 0
         self._check_starts()
         self.start = np.array([read_value(name, start[name]) if start else self._bound(name) for name in self.names])
 
@@ -180,7 +180,6 @@ class _Problem:
         """The run of an experiment."""
         from ..simulation.simulate import simulate
 
-        self.runs += 1
         return simulate(self.module, **self.arguments(values, one))
 
     def residuals(self, values: Array, told: bool = False) -> Array:
