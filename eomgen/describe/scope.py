@@ -197,8 +197,11 @@ class Scope:
         if self.level < LAW or (self.level < OUTPUT and level in ACCELERATIONS):
             self._refuse(str(found), "motion of a marker" if self.level < LAW else "acceleration of a marker")
             return self.graph.symbol(str(found))
-        point = self._point(found)
-        origin, axes = (self._fixed(label) if label else None for label in (found.origin, found.axes))
+        seen = found
+        if axis == 4 and found.origin == COM:  # a distance is the same from either end
+            seen = found._replace(marker=found.origin, origin=found.marker)
+        point = self._point(seen)
+        origin, axes = (self._fixed(label) if label else None for label in (seen.origin, seen.axes))
         self.quantities[str(found)] = Quantity(point, level, axis, origin, axes)
         return self.graph.symbol(str(found))
 
@@ -208,7 +211,7 @@ class Scope:
             return self.marker(label)
         except ExpressionError:
             if label == COM:
-                remedy = "give a marker of a body here; com can be the last marker of distance() and the first of x()"
+                remedy = "give a marker of a body here; com can be a marker of distance() and the first of x()"
                 raise ExpressionError("the centre of mass of all bodies is no marker", 0, remedy) from None
             raise
 

@@ -259,7 +259,8 @@ class Ensemble:
     def metadata(self) -> dict[str, Any]:
         """Metadata of all runs, as in a trajectory's ``metadata``; ``values`` is a digest of what differs."""
         plan, cases = self._plan, self._cases
-        shared = zip(self._module.p_names, np.reshape(cases.p, (self._module.n_p, -1)), strict=True)
+        rows = cases.p if cases.p.ndim > 1 else cases.p[:, None]
+        shared = zip(self._module.p_names, rows, strict=True)
         return {
             "name": self._module.name,
             "model_method": self._module.metadata.get("method"),

@@ -1,4 +1,4 @@
-"""Stage runtime: Ensemble -> an xarray Dataset whose dimensions are the runs, or their grid, and the times."""
+"""Stage ensembles: Ensemble -> an xarray Dataset whose dimensions are the runs, or their grid, and the times."""
 
 from __future__ import annotations
 
@@ -32,15 +32,16 @@ def dataset_of_runs(ensemble: Any) -> xarray.Dataset:
 
 def _statistics(ensemble: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Variables over statistics and times."""
+    label = free("statistic", set(ensemble.names))
     variables = {
         name: (
-            ("statistic", "t"),
+            (label, "t"),
             np.array([ensemble.reduced[key][row] for key in STATISTICS], dtype=float),
             _words(ensemble, name),
         )
         for row, name in enumerate(ensemble.names)
     }
-    return variables, {"statistic": ("statistic", list(STATISTICS))}
+    return variables, {label: (label, list(STATISTICS))}
 
 
 def _runs(ensemble: Any) -> tuple[dict[str, Any], dict[str, Any]]:

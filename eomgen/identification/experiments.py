@@ -113,21 +113,58 @@ def _columns(data: Any, where: str, module: BoundModel, problems: list[str]) -> 
     """Columns by name, ``t`` among them, of a trajectory, a table of pandas or xarray, or a mapping."""
     if hasattr(data, "x_names") and hasattr(data, "t"):  # a Trajectory: only what can be measured
         return {TIME: np.asarray(data.t), **{name: np.asarray(data[name]) for name in data.x_names}}
+    units: dict[str, Any] = {}
     if hasattr(data, "to_dataframe"):  # an xarray Dataset
-        return {str(name): np.asarray(data[name].values, dtype=float) for name in (*data.coords, *data.data_vars)}
-    if hasattr(data, "columns") and hasattr(data, "index"):  # a pandas DataFrame
-        table = {str(name): np.asarray(data[name], dtype=float) for name in data.columns}
-        return table if TIME in table else {TIME: np.asarray(data.index, dtype=float), **table}
-    if isinstance(data, Mapping):
-        found = {}
-        for name, values in data.items():
-            try:
-                found[str(name)] = np.asarray(values, dtype=float)
-            except (TypeError, ValueError):
-                problems.append(f"{where}: {name} is not a list of numbers")
-        return found
-    problems.append(f"{where} must be a trajectory, a table or a mapping of names to values, not {shown(data)}")
-    return None
+        given = {str(name): data[name].values for name in (*data.coords, *data.data_vars)}
+        units = {str(name): data[name].attrs.get("units") for name in given}
+    elif hasattr(data, "columns") and hasattr(data, "index"):  # a pandas DataFrame
+        given = {str(name): data[name] for name in data.columns}
+        given = given if TIME in given else {TIME: data.index, **given}
+        told = data.attrs.get("units")
+        units = dict(told) if isinstance(told, Mapping) else {}
+    elif isinstance(data, Mapping):
+        given = {str(name): values for name, values in data.items()}
+    else:
+        problems.append(f"{where} must be a trajectory, a table or a mapping of names to values, not {shown(data)}")
+        return None
+    states = [name for name in module.x_names if name in given]
+    if states and getattr(data, "attrs", {}).get("model") == module.name:  # the table of a run: as of the run itself
+        given = {name: values for name, values in given.items() if name in (TIME, *states)}
+    found = {}
+    for name, values in given.items():
+        try:
+            found[name] = _numbers(values) * _in_own_unit(units.get(name), module.layout.unit(name))
+        except (TypeError, ValueError) as error:
+            problems.append(f"{where}: {name} {error}")
+    return found
+
+
+def _numbers(values: Any) -> Array:
+    """The numbers of a column, durations in seconds; ValueError if it has none."""
+    array = np.asarray(values)
+    if array.dtype.kind == "m":
+        return np.asarray(array / np.timedelta64(1, "s"), dtype=float)
+    if array.dtype.kind == "M":
+        raise ValueError("holds dates; give seconds from the start of the run")
+    try:
+        return np.asarray(array, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError("is not a list of numbers") from None
+
+
+def _in_own_unit(given: Any, own: str) -> float:
+    """What values in the unit that a table tells are multiplied by; 1 where it tells none."""
+    if not given or given == own:
+        return 1.0
+    from ..describe.units import UnitError, read_unit
+
+    try:
+        unit, wanted = read_unit(str(given)), read_unit(own)
+    except UnitError as error:
+        raise ValueError(f"is in {given!r}: {error}; {error.remedy}") from None
+    if own and unit.dimension != wanted.dimension:
+        raise ValueError(f"is in {given!r}, which cannot be turned into {own!r}")
+    return unit.size / wanted.size
 
 
 def read_sigma(given: Any, names: Sequence[str]) -> dict[str, float] | None:

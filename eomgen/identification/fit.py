@@ -50,14 +50,15 @@ def fit(
     ----------
     data : Trajectory, DataFrame, Dataset, mapping, or list of these
         Measured states and outputs by name, over the times ``t`` (a DataFrame may have them as its index); NaN where
-        nothing was measured.  A list holds several experiments.  Runs start at the first time.
+        nothing was measured.  Units that a Dataset tells (``attrs["units"]``) are converted.  Of runs, and of tables
+        of runs, the states are taken.  A list holds several experiments.  Runs start at the first time.
     parameters : sequence of str, or mapping of str to float
         What to find: parameters, inputs (a constant) and initial values; with values to start from, which otherwise
         are those bound here.
     initial, inputs : optional
         As for ``simulate``; of several experiments a list with one of each, or one for all.
     bounds : mapping of str to (low, high), optional
-        Limits of the values.
+        Limits of the values; parameters that are the mass of a body are at least 0 without them.
     sigma : float or mapping of str to float, optional
         Standard deviation of the noise of each column.  By default it is found from the residuals, and the fit is
         repeated with it, so that units do not matter.
@@ -94,7 +95,8 @@ def fit(
     count = sum(int(np.isfinite(values).sum()) for one in experiments for values in one.columns.values())
     if count <= len(problem.names):
         raise UsageError(f"there are {count} measured values, and {len(problem.names)} unknowns; give more data")
-    values, found, runs = problem.start, None, 0
+    values: Array = problem.start
+    found: Any = None
     problem.sigma = known or {name: problem.spread(name) for name in columns}
     problem.residuals(values, told=True)
     for _ in range(1 if known else ROUNDS):
@@ -102,7 +104,9 @@ def fit(
             problem.sigma = {name: problem.noise(values, name) for name in columns}
         jac = problem.jacobian if derivatives == "exact" else "2-point"
         found = least_squares(problem.residuals, values, jac=jac, bounds=limits, x_scale="jac", **options)
-        values, runs = found.x, runs + int(found.nfev)
+        values = found.x
+    if options.get("loss", "linear") != "linear":  # SciPy weights its derivatives by what the loss takes off
+        return Fit(problem, values, np.asarray(found.jac), limits, found, known is not None)
     if not known:
         problem.sigma = {name: problem.noise(values, name) for name in columns}
     return Fit(problem, values, problem.jacobian(values), limits, found, known is not None)
@@ -127,7 +131,6 @@ class _Problem:
             raise UsageError("parameters must name what is to be found, each once")
         self.initial_names = tuple(name for name in self.names if name in self.states)
         self.sigma: dict[str, float] = {}
-        self.runs = 0
         self._check_starts()
         self.start = np.array([read_value(name, start[name]) if start else self._bound(name) for name in self.names])
 
@@ -177,7 +180,6 @@ class _Problem:
         """The run of an experiment."""
         from ..simulation.simulate import simulate
 
-        self.runs += 1
         return simulate(self.module, **self.arguments(values, one))
 
     def residuals(self, values: Array, told: bool = False) -> Array:
@@ -236,7 +238,9 @@ class _Problem:
 
 
 def _bounds(problem: _Problem, given: Mapping[str, Any] | None) -> tuple[Array, Array]:
-    low, high = np.full(len(problem.names), -np.inf), np.full(len(problem.names), np.inf)
+    masses = problem.module.metadata.get("masses", {})  # no run has a negative one
+    low = np.array([0.0 if name in masses else -np.inf for name in problem.names])
+    high = np.full(len(problem.names), np.inf)
     if given is not None:
         require_mapping("bounds", given)
     for name, pair in (given or {}).items():

@@ -142,7 +142,7 @@ def _write_for_others(trajectory: TrajectoryLike, target: Path) -> Path:
         return write_netcdf(dataset(trajectory), target)
     require("pyarrow", "pyarrow", "a .parquet file")
     frame: Any = trajectory.to_pandas()
-    frame.attrs = {"units": dict(trajectory.units), "metadata": json.dumps(trajectory.metadata)}
+    frame.attrs["metadata"] = json.dumps(trajectory.metadata)
     with whole_file(target) as file:
         frame.to_parquet(file)
     return target

@@ -204,6 +204,7 @@ class Trajectory:
         module = require("pandas", "pandas", "to_pandas")
         data = {name: self[name] for name in names or self.names}
         frame: pandas.DataFrame = module.DataFrame(data, index=module.Index(self.t, name="t"))
+        frame.attrs = {"model": self.name, "units": dict(self.units)}
         return frame
 
     def to_xarray(self) -> xarray.Dataset:

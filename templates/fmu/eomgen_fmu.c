@@ -102,10 +102,16 @@ int fmu_constants(fmu_instance *f)
     return FMU_OK;
 }
 
+int fmu_ready(fmu_instance *f)
+{
+    return f->m.phase == FMU_INITIALIZING && !f->m.assembled ? fmu_assemble(f) : (int)FMU_OK;
+}
+
 int fmu_rates(fmu_instance *f)
 {
     fmu_memory *const m = &f->m;
-    int status = fmu_constants(f);
+    int status = fmu_ready(f);
+    status = status == FMU_OK ? fmu_constants(f) : status;
     if (status == FMU_OK && !m->rates_known) {
         status = fmu_judge(f, FMU_MODEL(rhs)(m->t, m->x, m->u, m->c, m->rates, f->w), "the derivatives of the states");
         m->rates_known = status == FMU_OK;
@@ -127,7 +133,7 @@ int fmu_outputs(fmu_instance *f, double *y)
 int fmu_get(fmu_instance *f, const unsigned *references, size_t n, double *values)
 {
     const fmu_memory *const m = &f->m;
-    int outputs = 0, rates = 0, events = 0, status = FMU_OK;
+    int outputs = 0, rates = 0, events = 0;
     for (size_t i = 0; i < n; i++) {
         if (references[i] >= (unsigned)FMU_N_VARIABLES) {
             return fmu_say(f, FMU_ERROR, "value reference %u is none of this model's, which are 0 to %d", references[i],
@@ -137,9 +143,7 @@ int fmu_get(fmu_instance *f, const unsigned *references, size_t n, double *value
         events |= references[i] >= (unsigned)FMU_AT_EVENTS;
         rates |= references[i] >= (unsigned)FMU_AT_RATES && references[i] < (unsigned)FMU_AT_U;
     }
-    if (m->phase == FMU_INITIALIZING && !m->assembled) {
-        status = fmu_assemble(f);
-    }
+    int status = fmu_ready(f);
     status = status == FMU_OK && rates ? fmu_rates(f) : status;
     status = status == FMU_OK && outputs ? fmu_outputs(f, f->values) : status;
     status = status == FMU_OK && events ? fmu_indicators(f, f->values + FMU_N_Y) : status;

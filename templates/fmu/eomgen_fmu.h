@@ -66,6 +66,8 @@ int fmu_set(fmu_instance *f, const unsigned *references, size_t n, const double 
 int fmu_directional(fmu_instance *f, const unsigned *unknowns, size_t n_unknowns, const unsigned *knowns, size_t n_knowns,
     const double *seed, double *result);
 
+/* Closes the loops where values were set during initialization. */
+int fmu_ready(fmu_instance *f);
 /* Evaluation: constants of the parameters; x' at the present time and state. */
 int fmu_constants(fmu_instance *f);
 int fmu_rates(fmu_instance *f);

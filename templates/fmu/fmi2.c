@@ -334,8 +334,9 @@ FMU_EXPORT fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], siz
 {
     REQUIRE(LIVING & ~FMU_INSTANTIATED)
     REQUIRE_LENGTH(n, FMU_N_X, x)
+    const int status = fmu_ready(INSTANCE);
     memcpy(x, INSTANCE->m.x, n * sizeof(double));
-    return FMU_OK;
+    return fail(INSTANCE, status);
 }
 
 FMU_EXPORT fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nominal[], size_t n)

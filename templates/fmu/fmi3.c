@@ -384,8 +384,9 @@ FMU_EXPORT fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], s
 {
     REQUIRE(LIVING & ~FMU_INSTANTIATED)
     REQUIRE_LENGTH(n, FMU_N_X, x)
+    const int status = fmu_ready(INSTANCE);
     memcpy(x, INSTANCE->m.x, n * sizeof(double));
-    return FMU_OK;
+    return fail(INSTANCE, status);
 }
 
 FMU_EXPORT fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 nominal[], size_t n)

@@ -138,7 +138,7 @@ int fmu_directional(fmu_instance *f, const unsigned *unknowns, size_t n_unknowns
         }
         outputs = outputs || k >= FMU_AT_Y;
     }
-    int status = f->m.phase == FMU_INITIALIZING && !f->m.assembled ? fmu_assemble(f) : (int)FMU_OK;
+    int status = fmu_ready(f);
     status = status == FMU_OK ? fmu_constants(f) : status;
     status = status == FMU_OK ? of_rates(f, dx, du, dp, of_x) : status;
 #if FMU_HAS_OUTPUTS

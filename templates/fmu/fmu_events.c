@@ -8,7 +8,8 @@ int fmu_indicators(fmu_instance *f, double *values)
 {
 #if FMU_N_EVENTS
     fmu_memory *const m = &f->m;
-    const int status = fmu_constants(f);
+    int status = fmu_ready(f);
+    status = status == FMU_OK ? fmu_constants(f) : status;
     return status != FMU_OK ? status
                             : fmu_judge(f, FMU_MODEL(events)(m->t, m->x, m->u, m->c, values, f->w), "the event indicators");
 #else
@@ -162,7 +163,8 @@ int fmu_update(fmu_instance *f, int *ended, int *changed)
         double *const g = f->values, *const slope = f->values + FMU_N_EVENTS, *const before = slope + FMU_N_EVENTS;
         status = look(f, g, slope);
         for (int i = 0; i < FMU_N_EVENTS && status == FMU_OK; i++) { /* one that is still beyond zero may leave at once */
-            m->side[i] = fired[i] && fabs(g[i]) <= 2.0 * fabs(before[i]) ? slope[i] > 0.0 : g[i] > 0.0;
+            const int leaves = fired[i] && fabs(g[i]) <= 2.0 * fabs(before[i]) && slope[i] != 0.0;
+            m->side[i] = leaves ? slope[i] > 0.0 : g[i] > 0.0;
         }
         m->crowded = fabs(m->t - m->last_reset) < RUNS_CROWDED * fmax(fabs(m->t - m->t_start), 1.0) ? m->crowded + 1 : 0;
         m->last_reset = m->t;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import subprocess
 import zipfile
@@ -109,6 +110,21 @@ def test_events_and_resets(model: Any, version: str, tmp_path: Path) -> None:
         np.testing.assert_allclose(found, expected[name], atol=1e-6)
 
 
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_an_input_that_jumps_over_an_event_resets_once(version: str, tmp_path: Path) -> None:
+    """A push of 0.25 m/s when the lever goes from 0 to 1, in either kind of unit and in the closed form."""
+    m = eg.Model("switched")
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    m.torque("nothing", "J", 0 * m.input("lever"))
+    m.event("on", "lever - 0.5", direction=1, reset={"s_dot": "s_dot + 0.25"})
+    path = write_fmu(derive(m, "auto"), tmp_path / "m.fmu", version)
+    jump = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 1.0), (2.0, 1.0)], dtype=[("time", float), ("lever", float)])
+    for kind in ("CoSimulation", "ModelExchange"):
+        rows = simulate_fmu(str(path), fmi_type=kind, stop_time=2.0, output_interval=0.1, input=jump, output=["s"])
+        found = np.interp([0.5, 1.0, 2.0], rows["time"], np.asarray(rows["s"]))
+        np.testing.assert_allclose(found, [0.0, 0.125, 0.375], atol=1e-6)
+
+
 def test_a_terminal_event_ends_the_run(tmp_path: Path) -> None:
     """Seven ways through the centre, 2 s apart, the first at 1.5 s: 13.5 s."""
     path = write_fmu(derive(between_walls(), "auto"), tmp_path / "m.fmu", "3.0")
@@ -175,6 +191,25 @@ def test_loops_follow_start_values_and_parameters(crank: tuple[Path, Any]) -> No
     instance.reset()
     initialized(instance)
     np.testing.assert_allclose(instance.getReal([at[name] for name in module.x_names]), module.x0(), atol=0.0)
+    instance.freeInstance()
+
+
+def test_all_ways_to_read_tell_the_same_during_initialization(crank: tuple[Path, Any]) -> None:
+    """States and their derivatives by reference and as a whole, right after a start value was set."""
+    path, module = crank
+    instance, of = opened(path)
+    instance.setupExperiment(startTime=0.0)
+    instance.enterInitializationMode()
+    instance.setReal([of["theta"]], [0.9])
+    read = {name: (ctypes.c_double * module.n_x)() for name in ("rates", "x")}
+    instance.fmi2GetDerivatives(instance.component, read["rates"], module.n_x)
+    instance.setReal([of["theta"]], [0.8])
+    instance.fmi2GetContinuousStates(instance.component, read["x"], module.n_x)
+    assert list(read["x"]) == instance.getReal([of[name] for name in module.x_names])
+    instance.setReal([of["theta"]], [0.9])
+    assert list(read["rates"]) == instance.getReal([of[f"der({name})"] for name in module.x_names])
+    instance.exitInitializationMode()
+    instance.terminate()
     instance.freeInstance()
 
 

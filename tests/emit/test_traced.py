@@ -59,6 +59,20 @@ def test_jax_equals_the_module(name: str) -> None:
     compare(equations.to_jax(), equations.compile(target="numpy"), ["rhs"])
 
 
+@pytest.mark.parametrize("name", ["slider_crank", "four_bar", "stewart_platform"])
+def test_a_state_off_the_loops_comes_to_the_modules_state(name: str) -> None:
+    """The steps of the projection are the module's own, so that both come to the same one of all closed states."""
+    equations = example(name)
+    module, functions = equations.compile(target="numpy"), equations.to_casadi()
+    random = np.random.default_rng(5)
+    for size in (0.003, 0.03):
+        x = module.x0() + size * random.normal(size=module.n_x)
+        expected = module.project(x), module.rhs(0.0, x)
+        for name_of, wanted in zip(("project", "rhs"), expected, strict=True):
+            found = np.asarray(getattr(functions, name_of)(0.0, x, module.u, module.p)).ravel()
+            np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-11 * max(1.0, np.abs(wanted).max()))
+
+
 @pytest.mark.parametrize("name", ["double_pendulum", "quadrotor_load", "engine", *LOOPS])
 def test_derivatives_are_the_modules_jacobians(name: str) -> None:
     equations = example(name)

@@ -63,6 +63,7 @@ def test_quantities_are_those_of_the_poses() -> None:
     texts = {
         "d": "distance(ground.road, b.tip)",
         "d_com": "distance(a.tip, com)",
+        "from_com": "distance(com, a.tip) + distance_rate(com, a.tip) - distance_rate(a.tip, com)",
         "d_rate": "distance_rate(a, b.tip)",
         **{f"p{k}": f"{k}(b.tip, from=a.tip, in=ground.road)" for k in "xyz"},
         **{f"v{k}": f"v{k}(b.tip, in=a.tip, from=ground.road)" for k in "xyz"},
@@ -88,6 +89,7 @@ def test_quantities_are_those_of_the_poses() -> None:
     com = [poses[k][:3, :3] @ [0.2, 0, 0] + poses[k][:3, 3] for k in (0, 1)]
     assert y["d"] == pytest.approx(np.linalg.norm(b_tip[0] - road[0]), rel=1e-14)
     assert y["d_com"] == pytest.approx(np.linalg.norm(np.average(com, 0, [1.2, 0.7]) - a_tip[0]), rel=1e-14)
+    assert y["from_com"] == pytest.approx(y["d_com"], rel=1e-14)
     assert y["d_rate"] == pytest.approx(along(mod, x, gap), rel=1e-9)
     velocity = along(mod, x, place(B_TIP))
     spin = turning(mod, x, B_TIP) - turning(mod, x, A_TIP)

@@ -8,6 +8,7 @@ import models
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from scipy.optimize import curve_fit
 
 import eomgen as eg
@@ -204,3 +205,54 @@ def test_bad_calls_say_what_is_wrong(module: eg.Module, change: dict[str, Any], 
     with pytest.raises(UsageError) as told:
         module.fit(**call)
     assert message in str(told.value)
+
+
+def test_tables_of_runs_and_units_that_tables_tell(module: eg.Module) -> None:
+    """A run, its Dataset, its DataFrame, and one in degrees and milliseconds say the same."""
+    run = module.simulate(2.0, initial=START, inputs=DRIVE, t_eval=TIMES)
+    given = run.to_xarray()
+    degrees = xr.Dataset(
+        {name: ("t", np.degrees(run[name]), {"units": unit}) for name, unit in (("a", "deg"), ("b_dot", "deg/s"))},
+        {"t": ("t", 1000.0 * TIMES, {"units": "ms"})},
+    )
+    later = run.to_pandas().set_index(pd.to_timedelta(TIMES, unit="s"))
+    for data in (run, given, run.to_pandas(), degrees, later):
+        fit = module.fit(data, {"m3": 1.5, "d1": 0.1}, initial=START, inputs=DRIVE, derivatives="differences")
+        assert list(fit.values.values()) == pytest.approx([1.2, 0.15], rel=1e-6)
+    wrong = given[["a"]].assign(a=given["a"].assign_attrs(units="kg"))
+    dates = run.to_pandas().set_index(pd.to_datetime(TIMES, unit="s"))
+    for data, message in ((wrong, "a is in 'kg', which cannot be turned into 'rad'"), (dates, "t holds dates")):
+        with pytest.raises(UsageError, match=message):
+            module.fit(data, ["m3"], initial=START, inputs=DRIVE)
+
+
+def test_errors_with_a_robust_loss_are_those_of_curve_fit(module: eg.Module) -> None:
+    data = measured(module, 5)
+    column = data["a"].copy()
+    column[::9] += 0.03
+
+    def motion(t: np.ndarray, m3: float, d1: float) -> np.ndarray:
+        values = {"m3": m3, "d1": d1}
+        return module.simulate(2.0, START, values, DRIVE, rtol=1e-11, atol=1e-13, t_eval=t)["a"]
+
+    sigma = np.full(len(TIMES), 0.002)
+    values, covariance = curve_fit(
+        motion, TIMES, column, (1.3, 0.1), sigma, True, bounds=([0, -1], [9, 9]), loss="soft_l1", x_scale="jac"
+    )
+    start = {"m3": 1.3, "d1": 0.1}
+    fit = module.fit({"t": TIMES, "a": column}, start, initial=START, inputs=DRIVE, sigma=0.002, loss="soft_l1")
+    assert [fit.values[name] for name in start] == pytest.approx(values, rel=1e-4)
+    assert fit.covariance == pytest.approx(covariance, rel=1e-2)
+
+
+def test_a_mass_stays_positive_on_the_way() -> None:
+    """From 4 kg the first step goes to a negative mass, which runs refuse."""
+    m = eg.Model("pushed")
+    m.parameter("w", 1.0)
+    m.parameter("k", 5.0)
+    m.prismatic("J", m.ground, m.body("b", mass="w"), axis="x", coordinate="s")
+    m.torque("push", "J", "1 - k*s")
+    pushed = m.compile(target="numpy")
+    run = pushed.simulate(2.0, parameters={"w": 0.125, "k": 4.0}, t_eval=np.linspace(0.0, 2.0, 20))
+    fit = pushed.fit({"t": run.t, "s": run["s"]}, {"w": 4.0, "k": 100.0}, sigma=1e-4)
+    assert fit.values == pytest.approx({"w": 0.125, "k": 4.0}, rel=1e-6)

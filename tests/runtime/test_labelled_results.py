@@ -130,6 +130,19 @@ def test_statistics_are_a_dataset_and_other_reductions_are_refused(ball: eg.Modu
         ball.simulate_many(1.0, {"s": starts}, reduce="events").to_xarray()
 
 
+def test_runs_of_a_model_without_parameters_and_with_a_column_of_the_dimensions_name(tmp_path: Path) -> None:
+    m = eg.Model("bare")
+    m.prismatic("J", m.ground, m.body("ball", mass=1.0), axis="x", coordinate="s")
+    m.output("statistic", "2*s")
+    bare = m.compile(target="numpy")
+    starts = {"s": np.linspace(-1.0, 1.0, 5), "s_dot": 0.5}
+    runs = bare.simulate_many((0, 1), starts, t_eval=[0.0, 1.0])
+    assert np.allclose(runs.to_xarray()["s"][:, 1], starts["s"] + 0.5, atol=1e-8)
+    assert runs.save(tmp_path / "bare.npz").exists()
+    told = bare.simulate_many((0, 1), starts, t_eval=[0.0, 1.0], reduce="statistics").to_xarray()
+    assert np.allclose(told["statistic"].sel(statistic_="mean"), [0.0, 1.0], atol=1e-8)
+
+
 def test_a_linearization_is_a_system_of_python_control() -> None:
     """Names; poles against eigenvalues; a step response against the run of the nonlinear module."""
     m = models.build("furuta_pendulum")
