@@ -48,15 +48,16 @@ class Kernel(NamedTuple):
         Sizes -> shape of the result for one state.
     result : str
         What the result is, one line for headers and documentation.
-    late : bool
-        Of analyses: left out of a module made in this process until it is first called; never out of an export.
+    late : str
+        Not empty: left out of a module made in this process until it, or another one of the same name here, is first
+        called; never out of an export.
     """
 
     name: str
     inputs: tuple[str, ...]
     shape: Callable[[Sizes], tuple[int, ...]]
     result: str
-    late: bool = False
+    late: str = ""
 
     def length(self, sizes: Sizes) -> int:
         """How many numbers ``x`` has."""
@@ -64,6 +65,8 @@ class Kernel(NamedTuple):
         each |= dict.fromkeys(("q_i", "v_i", "a_i"), sizes.n_dof) | {"impulses": sizes.n_events}
         each |= dict.fromkeys(("multipliers", "multiplier_rates"), sizes.n_c)
         each |= dict.fromkeys(("corrections", "correction_rates"), sizes.n_h)
+        each |= {"weights": sizes.n_v, "rate_weights": sizes.n_x}
+        each |= {"dq": sizes.n_q, "dv": sizes.n_v, "da": sizes.n_v, "du": sizes.n_u}
         return sum(each[port] for port in self.inputs)
 
 
@@ -83,8 +86,29 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("embedded_mass_matrix", ("q",), lambda s: (s.n_dof, s.n_dof), "M of the independent coordinates, row-major"),
     Kernel("bias", ("q", "v"), lambda s: (s.n_v,), "h in M v' + h = generalized forces not in the model"),
     Kernel("inverse_dynamics", ("q", "v", "a"), lambda s: (s.n_v,), "M a + h, the generalized forces to add"),
+    Kernel(
+        "inverse_dynamics_derivatives",
+        ("q", "v", "a"),
+        lambda s: (s.n_v, s.n_q + 2 * s.n_v),
+        "M a + h by [q, v, a], each at fixed others, row-major; by a it is M",
+        late="inverse dynamics",
+    ),
+    Kernel(
+        "inverse_dynamics_hessian_product",
+        ("q", "v", "a", "weights", "dq", "dv", "da"),
+        lambda s: (s.n_q + 2 * s.n_v,),
+        "sum of weights times Hessians of M a + h by [q, v, a], times the direction",
+        late="second order",
+    ),
+    Kernel(
+        "rhs_hessian_product",
+        ("q", "v", "rate_weights", "dq", "dv", "du"),
+        lambda s: (0 if s.n_c else s.n_x + s.n_u,),
+        "of a tree: sum of weights times Hessians of x' by [x, u], times the direction",
+        late="second order",
+    ),
     Kernel("energy", ("q", "v"), lambda s: (2,), "kinetic and potential energy (J)"),
-    Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, late=True),
+    Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, late="analyses"),
     Kernel("constraints", ("q",), lambda s: (s.n_h,), "residuals C of the holonomic rows (m, rad)"),
     Kernel("constraint_jacobian", ("q",), lambda s: (s.n_c, s.n_v), "C_q, all rows, row-major"),
     Kernel(
@@ -101,20 +125,20 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel(
         "resets", ("q", "v"), lambda s: (s.n_resets,), "new values of states after events, in the order of `resets`"
     ),
-    Kernel("event_slopes", ("q", "v"), lambda s: (s.n_events, s.n_x), "d(events)/dx, row-major", late=True),
+    Kernel("event_slopes", ("q", "v"), lambda s: (s.n_events, s.n_x), "d(events)/dx, row-major", late="analyses"),
     Kernel(
         "event_derivatives",
         ("q", "v"),
         lambda s: ((s.n_events + s.n_resets), s.n_x + 1 + s.n_u + s.n_p) if s.n_events else (0, 0),
         "[events, resets] by [q, v, t, u, p]",
-        late=True,
+        late="analyses",
     ),
     Kernel(
         "strike_derivatives",
         STRIKE,
         lambda s: (s.n_strike, s.n_x + 1 + s.n_u + s.n_p),
         "[M a + C_q^T l - n^T g, a/s^2 + C_q^T l, C_q v + C_t, rates of events] by [q, v, t, u, p]",
-        late=True,
+        late="analyses",
     ),
     Kernel(
         "kinematics", ("q_i", "v_i", "a_i", "q_guess"), lambda s: (s.n_q + 2 * s.n_v,), "[q; v; a] of the whole tree"
@@ -124,43 +148,61 @@ KERNELS: tuple[Kernel, ...] = (
     ),
     Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_loop_coordinates, s.n_v), "dy/dq, row-major"),
     Kernel("alignment", ("q",), lambda s: (s.n_alignments,), "positive unless an axis of a cut joint is flipped"),
-    Kernel("motion_outputs", ("q", "v", "a"), lambda s: (s.n_y,), "the outputs at any accelerations", late=True),
+    Kernel("motion_outputs", ("q", "v", "a"), lambda s: (s.n_y,), "the outputs at any accelerations", late="analyses"),
     Kernel("finite_forces", ("q", "v"), lambda s: (s.n_finite_forces,), "1 where a force element's loads are finite"),
-    Kernel("input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", late=True),
     Kernel(
-        "parameter_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_p), "dx'/dp of the complete rhs, row-major", late=True
+        "input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", late="analyses"
+    ),
+    Kernel(
+        "parameter_jacobian",
+        ("q", "v"),
+        lambda s: (s.n_x, s.n_p),
+        "dx'/dp of the complete rhs, row-major",
+        late="analyses",
     ),
     Kernel(
         "assembly_jacobian",
         ("q", "v"),
         lambda s: (s.n_h + s.n_c + 2 * s.n_loop_coordinates, s.n_x + s.n_u + s.n_p),
         "[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]",
-        late=True,
+        late="analyses",
     ),
     Kernel(
         "output_derivatives",
         ("q", "v", "a"),
         lambda s: (s.n_y, s.n_q + 2 * s.n_v + s.n_u + s.n_p),
         "outputs by [q, v, a, u, p], each at fixed others",
-        late=True,
+        late="analyses",
     ),
     Kernel(
         "needed_wrenches",
         ("q", "v", "a"),
         lambda s: (s.n_wrenches,),
         "wrench that joints and constraints exert on each body (6, about its origin), loads of cut joints (6)",
-        late=True,
+        late="analyses",
     ),
     Kernel(
         "wrench_geometry",
         ("q",),
         lambda s: (s.n_wrench_geometry,),
         "constraint rows by displacements of bodies (n_c, n_bodies, 6), joints' points (3), their free directions (6)",
-        late=True,
+        late="analyses",
     ),
-    Kernel("canonical", ("q", "v"), lambda s: (2, s.n_momenta), "momenta dT/dv, and their rates -dH/dq + Q", late=True),
-    Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
-    Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
+    Kernel(
+        "canonical",
+        ("q", "v"),
+        lambda s: (2, s.n_momenta),
+        "momenta dT/dv, and their rates -dH/dq + Q",
+        late="analyses",
+    ),
+    Kernel(
+        "dae_residual",
+        DAE,
+        lambda s: (s.n_dae,),
+        "F(t, y, y') of y = [q; v; multipliers; corrections]",
+        late="analyses",
+    ),
+    Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late="analyses"),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..program import Program
-from ..program.blocks import SHIFTS
+from ..program.blocks import ALONG, SHIFTS
 
 CLOSE = ("scaled", "cholesky", "residual_sizes", "correct", "project", "close")
 PIVOT = ("eliminate", "pivots", "partition")
@@ -72,8 +72,8 @@ def driver_files(program: Program) -> list[str]:
             space = ("space_given", "space_given_more") if program.has_loops else ("space_given",)
         files.update(dict.fromkeys(space if program.quaternion_slots or program.given_rates else ("space_plain",)))
     for driver in program.drivers:
-        if driver.name == "dae_jacobian":
-            needed: tuple[str, ...] = ("dae_jacobian",)
+        if driver.name in ALONG:
+            needed: tuple[str, ...] = (driver.name,)
         elif driver.name in SHIFTS:
             needed = shift_files(program, driver.name, direct)
         elif passes(program) and driver.name in ("rhs", "project", "outputs", "jacobian"):
@@ -214,6 +214,8 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
         ]
     if "dae_tangent" in names:
         lengths += [("DAE", 4 * program.sizes.n_dae), ("SLOPE", program.sizes.n_dae)]  # y, y', dy, dy'; dF
+    if "inverse_tangent" in names:
+        lengths.append(("INVERSE", 2 * (n_q + 2 * n) + n))  # q, v, a, dq, dv, da; d(M a + h)
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area
     for name, length in lengths:
         areas.append((name, start, length))

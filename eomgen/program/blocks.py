@@ -12,12 +12,16 @@ from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from ..kernel_table import DAE, NAMED, Sizes
 from .body_loops import BodyLoops
+from .dae_rows import dae_kinematics
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
 from .embedded_loops import EmbeddedLoops
 from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
+from .inverse_slopes import inverse_slopes
 from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .loop_blocks import LoopBlocks, estimate
+from .port_symbols import port_symbols
 from .program import Block, Limits, Port
+from .second_order import TreeHessian, hessian_product
 from .terms import Row, SystemTerms
 
 COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h, C_q and gamma are put together from
@@ -25,6 +29,10 @@ RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q'
 
 #: Kernels that are derivatives by something other than the state -> what.
 SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}
+
+
+#: Kernels whose columns are derivatives along directions where they are not written out -> the block of one.
+ALONG = {"dae_jacobian": "dae_tangent", "inverse_dynamics_derivatives": "inverse_tangent"}
 
 
 def flat(rows: Sequence[Row]) -> Row:
@@ -143,16 +151,8 @@ class BlockMaker:
 
     @cached_property
     def _dae_residual(self) -> list[Expr]:
-        """F: kinematics with corrections (C. W. Gear, B. Leimkuhler, G. K. Gupta, 1985), forces, positions, rates."""
-        terms = self.terms
-        v = self._symbols(terms.v)
-        moved = list(v)
-        for row, mu in zip(terms.constraint_jacobian, self._symbols(self.port("corrections").symbols), strict=False):
-            moved = [x - s * s * c * mu for x, s, c in zip(moved, terms.coordinate_scales, row, strict=True)]
-        flow = substitute(terms.rates or v, dict(zip(v, moved, strict=True)))
-        rates = self._symbols(self.port("q_rate").symbols)
-        kinematic = [r - f for r, f in zip(rates, flow, strict=True)]
-        return [*kinematic, *self._force_residual, *terms.constraints, *terms.velocity_constraints]
+        rest = [*self._force_residual, *self.terms.constraints, *self.terms.velocity_constraints]
+        return [*dae_kinematics(self.terms, self.port("q_rate").symbols, self.port("corrections").symbols), *rest]
 
     def _dae_tangent(self) -> Block:
         given = [self.port(name) for name in DAE]
@@ -161,6 +161,20 @@ class BlockMaker:
         seeds = dict(zip(self._symbols(y), self._symbols(along.symbols), strict=True))
         outputs = tuple(jvp(self._dae_residual, seeds))
         return Block("dae_tangent", (*given, along), outputs, (len(outputs),), public=False)
+
+    def _curvature(self, rows: Sequence[Expr]) -> list[Expr]:
+        """Of the inverse dynamics by q, v, a."""
+        z, along = (self._through(names) for names in ("q v a", "dq dv da"))
+        return hessian_product(rows, self._through("weights"), z, along)
+
+    def _tree_curvature(self) -> tuple[list[Expr], list[Expr]]:
+        """Of the right-hand side by q, v, u, and checks of the mass matrix."""
+        accelerations, checks = self._accelerations
+        given = self._through("rate_weights"), self._through("dq dv du")
+        return TreeHessian(self.terms, accelerations, *given).shortest(), checks
+
+    def _through(self, ports: str) -> list[Expr]:
+        return self._symbols([symbol for name in ports.split() for symbol in self.port(name).symbols])
 
     def _normalised(self) -> list[Expr]:
         """q with Euler parameters of length 1."""
@@ -173,30 +187,11 @@ class BlockMaker:
     # -- blocks ---------------------------------------------------------------------------------------------------
     def port(self, name: str) -> Port:
         """The symbols behind the name of a port."""
-        terms = self.terms
-        independent = terms.preferred
-        symbols: Mapping[str, tuple[str, ...]] = {
-            "q": terms.q,
-            "v": terms.v,
-            "a": terms.a,
-            "q_i": tuple(terms.q[terms.coordinate_of[i]] for i in independent),
-            "v_i": tuple(terms.v[i] for i in independent),
-            "a_i": tuple(terms.a[i] for i in independent),
-            "q_guess": tuple(f"guess({q})" for q in terms.q),
-            "multipliers": terms.multipliers,
-            "z": terms.system.unknowns if terms.system else (),
-            "corrections": tuple(f"correction[{i}]" for i in range(self.sizes.n_h)),
-            "q_rate": tuple(f"rate({q})" for q in terms.q),
-            "multiplier_rates": tuple(f"rate({l})" for l in terms.multipliers),
-            "correction_rates": tuple(f"rate(correction[{i}])" for i in range(self.sizes.n_h)),
-            "cj": ("cj",),
-            "impulses": tuple(f"impulse[{i}]" for i in range(len(terms.events))),
-            "dq": tuple(f"d({q})" for q in terms.q),
-            "dv": tuple(f"d({v})" for v in terms.v),
-            "du": tuple(f"d({u})" for u in terms.u),
-            "dp": tuple(f"d({p})" for p in terms.p),
-        }
-        return Port(name, symbols[name])
+        return Port(name, self._port_symbols[name])
+
+    @cached_property
+    def _port_symbols(self) -> Mapping[str, tuple[str, ...]]:
+        return port_symbols(self.terms, self.sizes.n_h)
 
     def _internal(self, name: str, ports: str, outputs: Sequence[Expr], checks: Sequence[Expr] = ()) -> Block:
         inputs = tuple(map(self.port, ports.split()))
@@ -236,6 +231,7 @@ class BlockMaker:
             "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
             "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
+            "inverse_dynamics_hessian_product": lambda: self._curvature(terms.inverse_dynamics),
         }
         trees: dict[str, Callable[[], Sequence[Expr]]] = {
             "project": lambda: [*self._normalised(), *self._symbols(terms.v)],
@@ -253,6 +249,8 @@ class BlockMaker:
         elif name == "rhs" and self.unrolled:
             accelerations, checks = self._accelerations
             outputs = [*(terms.rates or self._symbols(terms.v)), *accelerations]
+        elif name == "rhs_hessian_product":
+            outputs, checks = self._tree_curvature()
         elif (found := self._unrolled_derivative(name)) is not None:
             outputs, checks = found[0], [*self._turned, *found[1]]
         elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
@@ -270,8 +268,8 @@ class BlockMaker:
         return (*self._behind(name), *(RATES if self.terms.given_rates else ()))
 
     def _behind(self, name: str) -> tuple[str, ...]:
-        if name == "dae_jacobian":
-            return ("dae_tangent",)
+        if name in ALONG:
+            return (ALONG[name],)
         residual = "residual_tangent" if self.by_direction else "residual_jacobian"
         shift = SHIFTS.get(name)
         if shift and self.terms.by_columns and not self.has_loops:
@@ -351,6 +349,9 @@ class BlockMaker:
                 return self._internal(name, "q v a multipliers", self.slopes.packed())
             case "dae_tangent":  # dF along (dy, dy')
                 return self._dae_tangent()
+            case "inverse_tangent":  # d(M a + h) along (dq, dv, da)
+                seeds = dict(zip(self._through("q v a"), self._through("dq dv da"), strict=True))
+                return self._internal(name, "q v a dq dv da", jvp(terms.inverse_dynamics, seeds))
             case "mass_times":  # M a
                 along = {a: a for a in self._symbols(terms.a)}
                 return self._internal(name, "q a", jvp(terms.inverse_dynamics, along))
@@ -383,7 +384,10 @@ class BlockMaker:
         return port, dict(zip(self._symbols(names), self._symbols(self.port(port).symbols), strict=True))
 
     def _unrolled_derivative(self, name: str) -> tuple[list[Expr], list[Expr]] | None:
-        """A derivative of the right-hand side of a small tree, and checks of its mass matrix."""
+        """A derivative of the inverse dynamics, or of the right-hand side of a small tree, and checks of its mass matrix."""
+        if name == "inverse_dynamics_derivatives":
+            found = inverse_slopes(self.terms, self.slopes)
+            return None if found is None else (found, [])
         if not self.unrolled or name not in ("jacobian", *SHIFTS):
             return None
         if name == "jacobian":

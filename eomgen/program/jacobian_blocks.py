@@ -62,10 +62,11 @@ class ResidualSlopes:
     @cached_property
     def operations(self) -> int:
         """Of the derivatives of M a + h by the recursion."""
-        return count(list(self._by_recursion.values())).total
+        return count(list(self.by_recursion.values())).total
 
     @cached_property
-    def _by_recursion(self) -> Entries:
+    def by_recursion(self) -> Entries:
+        """Derivatives of M a + h by recursion over composite bodies."""
         assert self.forces is not None
         return self.joined(self.forces, self._symbols(self.terms.a))
 
@@ -102,7 +103,7 @@ class ResidualSlopes:
             forces = [x + y for x, y in zip(terms.inverse_dynamics, constraint_forces, strict=True)]
             return jacobian([*forces, *rest], wrt)
         entries = jacobian([*constraint_forces, *rest], wrt)
-        own = self._by_recursion
+        own = self.by_recursion
         if self.is_short(terms.inverse_dynamics):
             other = self.by_formula()
             own = own if self.operations < count(list(other.values())).total else other
