@@ -79,6 +79,9 @@ DAE = ("q", "v", "multipliers", "corrections", "q_rate", "a", "multiplier_rates"
 #: velocities, their change, impulses of the constraint rows and of the gaps
 STRIKE = ("q", "v", "a", "multipliers", "impulses")
 
+#: Kernels that are made together when the first of them is called: those of analyses.
+ANALYSES = "analyses"
+
 KERNELS: tuple[Kernel, ...] = (
     Kernel("rhs", ("q", "v"), lambda s: (s.n_x,), "x' = [q'; v'], after projecting x onto the constraints"),
     Kernel("jacobian", ("q", "v"), lambda s: (s.n_x, s.n_x), "dx'/dx of the complete rhs, row-major"),
@@ -98,17 +101,17 @@ KERNELS: tuple[Kernel, ...] = (
         ("q", "v", "a", "weights", "dq", "dv", "da"),
         lambda s: (s.n_q + 2 * s.n_v,),
         "sum of weights times Hessians of M a + h by [q, v, a], times the direction",
-        late="second order",
+        late="Hessians of inverse dynamics",
     ),
     Kernel(
         "rhs_hessian_product",
         ("q", "v", "rate_weights", "dq", "dv", "du"),
         lambda s: (0 if s.n_c else s.n_x + s.n_u,),
         "of a tree: sum of weights times Hessians of x' by [x, u], times the direction",
-        late="second order",
+        late="Hessians of rhs",
     ),
     Kernel("energy", ("q", "v"), lambda s: (2,), "kinetic and potential energy (J)"),
-    Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, late="analyses"),
+    Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, late=ANALYSES),
     Kernel("constraints", ("q",), lambda s: (s.n_h,), "residuals C of the holonomic rows (m, rad)"),
     Kernel("constraint_jacobian", ("q",), lambda s: (s.n_c, s.n_v), "C_q, all rows, row-major"),
     Kernel(
@@ -125,20 +128,20 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel(
         "resets", ("q", "v"), lambda s: (s.n_resets,), "new values of states after events, in the order of `resets`"
     ),
-    Kernel("event_slopes", ("q", "v"), lambda s: (s.n_events, s.n_x), "d(events)/dx, row-major", late="analyses"),
+    Kernel("event_slopes", ("q", "v"), lambda s: (s.n_events, s.n_x), "d(events)/dx, row-major", late=ANALYSES),
     Kernel(
         "event_derivatives",
         ("q", "v"),
         lambda s: ((s.n_events + s.n_resets), s.n_x + 1 + s.n_u + s.n_p) if s.n_events else (0, 0),
         "[events, resets] by [q, v, t, u, p]",
-        late="analyses",
+        late=ANALYSES,
     ),
     Kernel(
         "strike_derivatives",
         STRIKE,
         lambda s: (s.n_strike, s.n_x + 1 + s.n_u + s.n_p),
         "[M a + C_q^T l - n^T g, a/s^2 + C_q^T l, C_q v + C_t, rates of events] by [q, v, t, u, p]",
-        late="analyses",
+        late=ANALYSES,
     ),
     Kernel(
         "kinematics", ("q_i", "v_i", "a_i", "q_guess"), lambda s: (s.n_q + 2 * s.n_v,), "[q; v; a] of the whole tree"
@@ -148,61 +151,61 @@ KERNELS: tuple[Kernel, ...] = (
     ),
     Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_loop_coordinates, s.n_v), "dy/dq, row-major"),
     Kernel("alignment", ("q",), lambda s: (s.n_alignments,), "positive unless an axis of a cut joint is flipped"),
-    Kernel("motion_outputs", ("q", "v", "a"), lambda s: (s.n_y,), "the outputs at any accelerations", late="analyses"),
+    Kernel("motion_outputs", ("q", "v", "a"), lambda s: (s.n_y,), "the outputs at any accelerations", late=ANALYSES),
     Kernel("finite_forces", ("q", "v"), lambda s: (s.n_finite_forces,), "1 where a force element's loads are finite"),
     Kernel(
-        "input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", late="analyses"
+        "input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", late=ANALYSES
     ),
     Kernel(
         "parameter_jacobian",
         ("q", "v"),
         lambda s: (s.n_x, s.n_p),
         "dx'/dp of the complete rhs, row-major",
-        late="analyses",
+        late=ANALYSES,
     ),
     Kernel(
         "assembly_jacobian",
         ("q", "v"),
         lambda s: (s.n_h + s.n_c + 2 * s.n_loop_coordinates, s.n_x + s.n_u + s.n_p),
         "[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]",
-        late="analyses",
+        late=ANALYSES,
     ),
     Kernel(
         "output_derivatives",
         ("q", "v", "a"),
         lambda s: (s.n_y, s.n_q + 2 * s.n_v + s.n_u + s.n_p),
         "outputs by [q, v, a, u, p], each at fixed others",
-        late="analyses",
+        late=ANALYSES,
     ),
     Kernel(
         "needed_wrenches",
         ("q", "v", "a"),
         lambda s: (s.n_wrenches,),
         "wrench that joints and constraints exert on each body (6, about its origin), loads of cut joints (6)",
-        late="analyses",
+        late=ANALYSES,
     ),
     Kernel(
         "wrench_geometry",
         ("q",),
         lambda s: (s.n_wrench_geometry,),
         "constraint rows by displacements of bodies (n_c, n_bodies, 6), joints' points (3), their free directions (6)",
-        late="analyses",
+        late=ANALYSES,
     ),
     Kernel(
         "canonical",
         ("q", "v"),
         lambda s: (2, s.n_momenta),
         "momenta dT/dv, and their rates -dH/dq + Q",
-        late="analyses",
+        late=ANALYSES,
     ),
     Kernel(
         "dae_residual",
         DAE,
         lambda s: (s.n_dae,),
         "F(t, y, y') of y = [q; v; multipliers; corrections]",
-        late="analyses",
+        late=ANALYSES,
     ),
-    Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late="analyses"),
+    Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=ANALYSES),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )
 

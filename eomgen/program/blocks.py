@@ -162,12 +162,7 @@ class BlockMaker:
         outputs = tuple(jvp(self._dae_residual, seeds))
         return Block("dae_tangent", (*given, along), outputs, (len(outputs),), public=False)
 
-    def _curvature(self, rows: Sequence[Expr]) -> list[Expr]:
-        """Of the inverse dynamics by q, v, a."""
-        z, along = (self._through(names) for names in ("q v a", "dq dv da"))
-        return hessian_product(rows, self._through("weights"), z, along)
-
-    def _tree_curvature(self) -> tuple[list[Expr], list[Expr]]:
+    def _tree_hessian_product(self) -> tuple[list[Expr], list[Expr]]:
         """Of the right-hand side by q, v, u, and checks of the mass matrix."""
         accelerations, checks = self._accelerations
         given = self._through("rate_weights"), self._through("dq dv du")
@@ -231,7 +226,9 @@ class BlockMaker:
             "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
             "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
-            "inverse_dynamics_hessian_product": lambda: self._curvature(terms.inverse_dynamics),
+            "inverse_dynamics_hessian_product": lambda: hessian_product(
+                terms.inverse_dynamics, *map(self._through, ("weights", "q v a", "dq dv da"))
+            ),
         }
         trees: dict[str, Callable[[], Sequence[Expr]]] = {
             "project": lambda: [*self._normalised(), *self._symbols(terms.v)],
@@ -250,7 +247,7 @@ class BlockMaker:
             accelerations, checks = self._accelerations
             outputs = [*(terms.rates or self._symbols(terms.v)), *accelerations]
         elif name == "rhs_hessian_product":
-            outputs, checks = self._tree_curvature()
+            outputs, checks = self._tree_hessian_product()
         elif (found := self._unrolled_derivative(name)) is not None:
             outputs, checks = found[0], [*self._turned, *found[1]]
         elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
@@ -384,7 +381,7 @@ class BlockMaker:
         return port, dict(zip(self._symbols(names), self._symbols(self.port(port).symbols), strict=True))
 
     def _unrolled_derivative(self, name: str) -> tuple[list[Expr], list[Expr]] | None:
-        """A derivative of the inverse dynamics, or of the right-hand side of a small tree, and checks of its mass matrix."""
+        """A derivative of the inverse dynamics, or of a small tree's right-hand side, and checks of its mass matrix."""
         if name == "inverse_dynamics_derivatives":
             found = inverse_slopes(self.terms, self.slopes)
             return None if found is None else (found, [])

@@ -52,9 +52,9 @@ class TreeHessian:
 
     def shortest(self) -> list[Expr]:
         """By the formula of the accelerations or by that of the inverse dynamics, whichever takes fewer operations."""
-        found = [self._by_accelerations()]
+        found = [self.by_accelerations()]
         if self.terms.mass_matrix:
-            found.append(self._by_inverse_dynamics())
+            found.append(self.by_inverse_dynamics())
         return min(found, key=lambda one: count(one).total)
 
     @property
@@ -62,11 +62,12 @@ class TreeHessian:
         """q'"""
         return list(self.terms.rates or self._symbols(self.terms.v))
 
-    def _by_accelerations(self) -> list[Expr]:
+    def by_accelerations(self) -> list[Expr]:
+        """From the formula of v'."""
         return hessian_product([*self._rates, *self.accelerations], self.weights, self.z, self.direction)
 
-    def _by_inverse_dynamics(self) -> list[Expr]:
-        """r(z, a(z)) = 0 differentiated twice, r = M a + h.
+    def by_inverse_dynamics(self) -> list[Expr]:
+        """From r(z, a(z)) = 0 differentiated twice, r = M a + h.
 
         With a' = -M^-1 r_z d and w' = -M^-1 w the products of Hessians of r by (z, a) along (d, a') are (g, g_a); the
         accelerations change with z too, which adds -r_z^T M^-1 g_a.
