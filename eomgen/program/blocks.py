@@ -19,8 +19,10 @@ from .factor import exceeding, factorize, is_unrolled, outward, positivity, solv
 from .inverse_slopes import inverse_slopes
 from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .loop_blocks import LoopBlocks, estimate
+from .loop_slopes import BY_BODIES, LoopSlopes
 from .port_symbols import port_symbols
 from .program import Block, Limits, Port
+from .residuals import acceleration_residual, force_residual
 from .second_order import TreeHessian, hessian_product
 from .terms import Row, SystemTerms
 
@@ -78,6 +80,13 @@ class BlockMaker:
         return loops if loops.determined else None
 
     @cached_property
+    def _loop_slopes(self) -> LoopSlopes | None:
+        """The derivatives of that form along directions, if it goes by bodies and they are fewer operations."""
+        if not isinstance(self._loops, BodyLoops):
+            return None
+        return LoopSlopes(self._loops, self.port("dq").symbols, self.port("dv").symbols)
+
+    @cached_property
     def outputs_need_accelerations(self) -> bool:
         """Whether an output depends on an acceleration."""
         return not symbols_of(self.terms.outputs).isdisjoint(self.terms.a)
@@ -118,24 +127,11 @@ class BlockMaker:
 
     @cached_property
     def _force_residual(self) -> list[Expr]:
-        """r1 = M a + h + C_q^T l"""
-        terms = self.terms
-        r1 = list(terms.inverse_dynamics)
-        for row, l in zip(terms.constraint_jacobian, self._symbols(terms.multipliers), strict=True):
-            r1 = [r + c * l for r, c in zip(r1, row, strict=True)]
-        return r1
+        return force_residual(self.terms)
 
     @cached_property
     def _acceleration_residual(self) -> list[Expr]:
-        """r2 = C_q a + gamma"""
-        terms = self.terms
-        a = self._symbols(terms.a)
-        r2 = []
-        for row, r in zip(terms.constraint_jacobian, terms.gamma, strict=True):
-            for c, x in zip(row, a, strict=True):
-                r = r + c * x
-            r2.append(r)
-        return r2
+        return acceleration_residual(self.terms)
 
     @cached_property
     def _squares(self) -> list[Expr]:
@@ -293,9 +289,10 @@ class BlockMaker:
         accelerate = formed if self.outputs_need_accelerations else ()
         mass = "mass_times" if self.terms.by_columns else "mass_matrix"
         direct = ("closing", "dynamics") if self._loops is not None else ()
+        along = ("closing", "dynamics", *BY_BODIES) if self._loop_slopes is not None else ()
         return {
             "rhs": (*project, *formed, *direct),
-            "jacobian": (*project, *formed, residual),
+            "jacobian": (*project, *formed, residual, *along),
             "embedded_mass_matrix": ("scales", "position", mass),
             "project": project,
             "outputs": (*project, *accelerate, "accelerated_outputs"),
@@ -329,6 +326,9 @@ class BlockMaker:
                 assert self._loops is not None
                 outputs, checks = self._loops.dynamics()
                 return self._internal(name, "q v", outputs, [*self._turned, *checks])
+            case "loop_slopes" | "slopes_by_position" | "slopes_by_velocity":
+                assert self._loop_slopes is not None
+                return self._loop_slopes.block(name, tuple(map(self.port, ("q", "v", "dq", "dv"))), self._turned)
             case "gamma":
                 return self._internal(name, "q v", terms.gamma)
             case "rate":  # C_t
