@@ -227,7 +227,7 @@ def compile_core(
     with _timed(equations.seconds, "program"):
         program = build(equations, target, [k.name for k in KERNELS if not k.late])
     core = _load(equations, program, target, options, equations.seconds)
-    late = {k.name: k.late for k in KERNELS if k.late and 0 not in k.shape(program.sizes)}
+    late = {k.name: str(k.late) for k in KERNELS if k.late and 0 not in k.shape(program.sizes)}
 
     def load_late(group: str) -> Core:
         wanted = [name for name, of in late.items() if of == group]

@@ -328,7 +328,7 @@ class BlockMaker:
                 return self._internal(name, "q v", outputs, [*self._turned, *checks])
             case "loop_slopes" | "slopes_by_position" | "slopes_by_velocity":
                 assert self._loop_slopes is not None
-                return self._loop_slopes.block(name, tuple(map(self.port, ("q", "v", "dq", "dv"))), self._turned)
+                return self._loop_slopes.block(name, list(map(self.port, ("q", "v", "dq", "dv"))), self._turned)
             case "gamma":
                 return self._internal(name, "q v", terms.gamma)
             case "rate":  # C_t

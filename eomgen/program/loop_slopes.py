@@ -77,10 +77,8 @@ class LoopSlopes:
                 z[j + c] = _sum(N[i + m, j + c] * factor * de[m] for m in range(4) if (i + m, j + c) in N)
         if loops.h:
             every = loops.h == len(loops.J)
-            factor = loops.factor if every else loops.regularised(loops.J[: loops.h])
-            z = self._projected(
-                z, self._at_rest(loops.h), loops.h, factor, loops.corrections if every else loops.passes[0]
-            )
+            G = loops.factor if every else loops.regularised(loops.J[: loops.h])
+            z = self._projected(z, self._at_rest(loops.h), loops.h, G, loops.corrections if every else loops.passes[0])
         moved = substitute(rates, dict(zip(self.v, z, strict=True)))
         for i, _ in terms.quaternion_slots:
             e, de = self.q[i : i + 4], self.dq[i : i + 4]
@@ -169,7 +167,7 @@ class LoopSlopes:
         """Symbols of the coefficients."""
         return tuple(f"coefficient[{k}]" for k in range(len(self.coefficients)))
 
-    def block(self, name: str, ports: tuple[Port, Port, Port, Port], checks: Sequence[Expr]) -> Block:
+    def block(self, name: str, ports: Sequence[Port], checks: Sequence[Expr]) -> Block:
         """A block of :data:`BY_BODIES` with the ports of q, v, dq, dv.
 
         ``loop_slopes``: projected velocities (n,), whether all is sound, whether no change point can be near, then the
@@ -179,7 +177,7 @@ class LoopSlopes:
             outputs, more = self.loops.dynamics()
             n = self.terms.n_v
             every = (*outputs[:n], *outputs[2 * n :], *self.coefficients)
-            return Block(name, ports[:2], every, (len(every),), (*checks, *more), public=False)
+            return Block(name, tuple(ports[:2]), every, (len(every),), (*checks, *more), public=False)
         mapping = dict(zip(self.coefficients, self._symbols(self.names), strict=True))
         which = BY_BODIES.index(name) - 1
         changes = substitute(self._columns[which], mapping)

@@ -6,9 +6,9 @@ What every analysis and every run takes.  :class:`~..api.module.Module` is the s
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike
 from ..numeric.scales import Array
 from .argument_names import both_names
 from .assembled import Assembled
-from .derivatives import Derivatives
 from .kernels import Kernels, Projection, Rows
 from .layout import Layout
 from .momenta import Momenta
+from .refusals import Refusal
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .tree_motion import DependentMotion
 
 
-class BoundModel(Assembled, Momenta, Derivatives):
+class BoundModel(Assembled, Momenta):
     """A model with parameters and inputs bound, and the calls that need no analysis and no run.
 
     What its attributes and calls are, :class:`~..api.module.Module` says, whose parameters it has too.
@@ -39,6 +39,7 @@ class BoundModel(Assembled, Momenta, Derivatives):
     description: Any = None
 
     rhs: Timed
+    jacobian: Timed
     bias: Timed
     outputs: Timed
     mass_matrix: State
@@ -75,7 +76,9 @@ class BoundModel(Assembled, Momenta, Derivatives):
         self.n_q, self.n_v, self.n_x, self.n_u, self.n_p = layout.n_q, layout.n_v, layout.n_x, layout.n_u, layout.n_p
         self.n_y, self.n_dof, self.n_bodies = layout.n_y, layout.n_dof, layout.n_bodies
         self.n_c, self.n_rows = len(layout.rows), layout.n_c
-        self.rhs, self.bias, self.outputs = (kernels.timed(name) for name in ("rhs", "bias", "outputs"))
+        jacobian: Any = kernels.timed("jacobian")
+        self.rhs, self.jacobian, jacobian.others = kernels.timed("rhs"), jacobian, partial(getattr, self)
+        self.bias, self.outputs = kernels.timed("bias"), kernels.timed("outputs")
         self.mass_matrix = kernels.state("mass_matrix")
         self.embedded_mass_matrix = kernels.state("embedded_mass_matrix")
         self.energy, self.poses = kernels.state("energy"), kernels.state("poses")
@@ -140,6 +143,27 @@ class BoundModel(Assembled, Momenta, Derivatives):
     def constraint_labels(self) -> tuple[str, ...]:
         """Names of all constraint rows, in the order of :meth:`multipliers`."""
         return self.kernels.layout.constraint_labels
+
+    # derivatives
+
+    @cached_property
+    def input_jacobian(self) -> Timed:
+        """``input_jacobian(t, x)`` -> (n_x, n_u), the derivative of the complete rhs by the inputs."""
+        return self._derivative("input_jacobian")
+
+    @cached_property
+    def parameter_jacobian(self) -> Timed:
+        """``parameter_jacobian(t, x)`` -> (n_x, n_p), the derivative of the complete rhs by the parameters.
+
+        The projection is part of the rhs: where parameters move the constraints, the state is taken along to the
+        nearest one on them.  Exact at states on the constraints; others are projected first.
+        """
+        return self._derivative("parameter_jacobian")
+
+    def _derivative(self, name: str) -> Timed:
+        layout = self.kernels.layout
+        refused = layout.given_rates or not layout.projects
+        return cast("Timed", Refusal(layout)) if refused else self.kernels.timed(name)
 
     # kinematics
 

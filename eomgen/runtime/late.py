@@ -42,7 +42,7 @@ class LateCore:
 
     def having(self, name: str) -> Core:
         """The core with a rarer kernel, made now if there is none yet."""
-        group = NAMED[name].late
+        group = str(NAMED[name].late)
         if group not in self.further:
             self.further[group] = self.load(group)
         return self.further[group]

@@ -63,7 +63,7 @@ def restore(kind: type[Any], name: str, file: str, p: Array, u: Array, late: Lat
 
     def load(group: str) -> Any:
         if group not in made:
-            rare = ", ".join(name for name in names if name not in core.names and NAMED[name].late == group)
+            rare = ", ".join(name for name in names if name not in core.names and str(NAMED[name].late) == group)
             raise UsageError(f"the module was pickled without {rare}; call one of them before you pickle it")
         return _find_core(*made[group])
 

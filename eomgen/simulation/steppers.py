@@ -61,7 +61,7 @@ def solver_class(core: Any, name: str) -> Any:
         """A compiled stepper."""
 
         def __new__(cls, fun: Any, *args: Any, **options: Any) -> Any:
-            jac = getattr(options.get("jac"), "kernel", options.get("jac"))
+            jac = options.get("jac")
             known = jac is None or (isinstance(jac, rhs) and jac.name == "jacobian" and jac.context is fun.context)
             if isinstance(fun, rhs) and fun.name == "rhs" and known and options.get("jac_sparsity") is None:
                 return super().__new__(cls)

@@ -166,9 +166,7 @@ def test_both_ways_to_differentiate_accelerations_twice_agree(seed: int) -> None
     factor = factorize(terms.mass_matrix, terms.parent)
     accelerations = solve(factor, [-h for h in terms.bias])
     z = (*terms.q, *terms.v, *terms.u)
-    w, d, e = (
-        [graph.symbol(f"{what}{k}") for k in range(n)] for what, n in (("w", n_x), ("d", len(z)), ("e", len(z)))
-    )
+    w, d, e = ([graph.symbol(f"{what}{k}") for k in range(n)] for what, n in (("w", n_x), ("d", len(z)), ("e", len(z))))
     random = np.random.default_rng(seed)
     values = {x.node[1]: random.uniform(-1, 1) for x in (*w, *d, *e)}
     values |= {name: random.uniform(-1, 1) for name in (*z, *terms.p, terms.t)}
