@@ -1,7 +1,7 @@
 """Derivatives of inverse dynamics and of forward dynamics of robots against Pinocchio's, bases afloat included.
 
-J. Carpentier, N. Mansard, Analytical derivatives of rigid body dynamics algorithms, RSS 2018: computeRNEADerivatives and
-computeABADerivatives.
+J. Carpentier, N. Mansard, Analytical derivatives of rigid body dynamics algorithms, RSS 2018: computeRNEADerivatives,
+from which those of v' = -M^-1 h follow.
 """
 
 from __future__ import annotations
