@@ -130,9 +130,8 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("motion_outputs", ("q", "v", "a"), lambda s: (s.n_y,), "the outputs at any accelerations", late=True),
     Kernel("finite_forces", ("q", "v"), lambda s: (s.n_finite_forces,), "1 where a force element's loads are finite"),
     Kernel("input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", late=True),
-    Kernel(
-        "parameter_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_p), "dx'/dp of the complete rhs, row-major", late=True
-    ),
+    Kernel("parameter_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_p), "dx'/dp of the complete rhs, row-major",
+           late=True),
     Kernel(
         "assembly_jacobian",
         ("q", "v"),

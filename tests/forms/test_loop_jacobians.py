@@ -1,4 +1,4 @@
-"""Jacobians of loops by articulated bodies: against the NumPy target, which solves a dense embedded system per column."""
+"""Jacobians of loops by articulated bodies, against the NumPy target, which solves a dense system for each column."""
 
 from __future__ import annotations
 
