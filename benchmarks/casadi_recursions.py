@@ -7,6 +7,7 @@ or composite bodies and L^T D L from the leaves, whichever takes fewer operation
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import casadi as ca
@@ -146,6 +147,72 @@ class Robot:
         """A wrench on the link, in parent axes about the parent's origin."""
         push = ca.mtimes(self.turn[k], push)
         return ca.mtimes(self.turn[k], turn) + ca.cross(self.place[k], push), push
+
+
+def inverse_dynamics(robot: Robot, a: Any) -> Any:
+    """M a + h by Newton-Euler."""
+    links = range(len(robot.turn))
+    motions: list[tuple[Any, Any]] = []
+    wrenches: list[tuple[Any, Any]] = []
+    for k in links:
+        above = motions[robot.parent(k)] if robot.parent(k) >= 0 else (ca.SX.zeros(3), robot.gravity)
+        angular, linear = robot.carried(k, above)
+        for c, column in enumerate(robot.columns[k]):
+            rate = a[robot.first(k) + c]
+            angular, linear = angular + column[:3] * rate, linear + column[3:] * rate
+        motions.append((angular, linear))
+        wrenches.append(_add(_times(robot.inertia(k), angular, linear), robot.load(k)))
+    tau = [ca.SX(0)] * robot.n
+    for k in reversed(links):
+        for c, column in enumerate(robot.columns[k]):
+            tau[robot.first(k) + c] = _dot(column, wrenches[k])
+        above = robot.parent(k)
+        if above >= 0:
+            wrenches[above] = _add(wrenches[above], robot.lifted(k, *wrenches[k]))
+    return ca.vertcat(*tau)
+
+
+def write_derivatives(model: Any) -> dict[str, Text]:
+    """Texts of one argument: by what they differentiate.
+
+    ``inverse_dynamics_derivatives`` and ``inverse_dynamics_hessian_product`` of [q; v; a (w; d)], ``jacobian`` of
+    [q; v; tau] and ``rhs_hessian_product`` of [q; v; tau; w; d], by whichever recursion is shorter then.
+    """
+    n_q, n = model.nq, model.nv
+    z, w, d = ca.SX.sym("z", n_q + 2 * n), ca.SX.sym("w", n), ca.SX.sym("d", n_q + 2 * n)
+    drag = ca.SX(ca.DM(np.asarray(model.damping)))
+    robot = Robot(model, z[:n_q], z[n_q : n_q + n])
+    tau = inverse_dynamics(robot, z[n_q + n :]) + drag * robot.v
+    bent = ca.jtimes(ca.gradient(ca.dot(w, tau), z), z, d)
+    found = {
+        "inverse_dynamics_derivatives": _text("", [z], ca.jacobian(tau, z)),
+        "inverse_dynamics_hessian_product": _text("", [z, w, d], bent),
+    }
+    ways: dict[str, list[Text]] = {"jacobian": [], "rhs_hessian_product": []}
+    for method, solve in (("articulated bodies", articulated), ("composite bodies", composite)):
+        x, u = ca.SX.sym("x", n_q + n), ca.SX.sym("u", n)
+        robot = Robot(model, x[:n_q], x[n_q:])
+        rates = ca.vertcat(robot.rates(), solve(robot, u - drag * robot.v))
+        w, d = ca.SX.sym("w", n_q + n), ca.SX.sym("d", n_q + 2 * n)
+        both = ca.vertcat(x, u)
+        ways["jacobian"].append(_text(method, [x, u], ca.jacobian(rates, x)))
+        bent = ca.jtimes(ca.gradient(ca.dot(w, rates), both), both, d)
+        ways["rhs_hessian_product"].append(_text(method, [x, u, w, d], bent))
+    return found | {name: min(texts, key=lambda text: text.operations) for name, texts in ways.items()}
+
+
+def _text(method: str, symbols: list[Any], result: Any) -> Text:
+    """Of one argument, the symbols one below the other; the result row by row."""
+    every = ca.SX.sym("every", sum(x.numel() for x in symbols))
+    cuts = np.cumsum([0, *(x.numel() for x in symbols)]).tolist()
+    parts = [every[a:b] for a, b in pairwise(cuts)]
+    (moved,) = ca.substitute([ca.densify(result).T], symbols, parts)
+    f = ca.Function("f", [every], [ca.densify(moved)], {"cse": True})
+    silent = (ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST)
+    count = sum(f.instruction_id(k) not in silent for k in range(f.n_instructions()))
+    generator = ca.CodeGenerator("f", {"with_header": False})
+    generator.add(f)
+    return Text(method, count, generator.dump())
 
 
 def composite(robot: Robot, forces: Any) -> Any:

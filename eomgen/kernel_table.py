@@ -48,22 +48,23 @@ class Kernel(NamedTuple):
         Sizes -> shape of the result for one state.
     result : str
         What the result is, one line for headers and documentation.
-    late : bool
-        Of analyses: left out of a module made in this process until it is first called; never out of an export.
+    late : bool or str
+        Left out of a module made in this process until one of those with the same value is called; never of an export.
     """
 
     name: str
     inputs: tuple[str, ...]
     shape: Callable[[Sizes], tuple[int, ...]]
     result: str
-    late: bool = False
+    late: bool | str = False
 
     def length(self, sizes: Sizes) -> int:
         """How many numbers ``x`` has."""
         each = {"q": sizes.n_q, "q_guess": sizes.n_q, "q_rate": sizes.n_q, "v": sizes.n_v, "a": sizes.n_v, "cj": 1}
         each |= dict.fromkeys(("q_i", "v_i", "a_i"), sizes.n_dof) | {"impulses": sizes.n_events}
         each |= dict.fromkeys(("multipliers", "multiplier_rates"), sizes.n_c)
-        each |= dict.fromkeys(("corrections", "correction_rates"), sizes.n_h)
+        each |= dict.fromkeys(("corrections", "correction_rates"), sizes.n_h) | {"rate_weights": sizes.n_x}
+        each |= {"dq": sizes.n_q, "du": sizes.n_u} | dict.fromkeys(("dv", "da", "weights"), sizes.n_v)
         return sum(each[port] for port in self.inputs)
 
 
@@ -75,6 +76,7 @@ DAE = ("q", "v", "multipliers", "corrections", "q_rate", "a", "multiplier_rates"
 
 #: velocities, their change, impulses of the constraint rows and of the gaps
 STRIKE = ("q", "v", "a", "multipliers", "impulses")
+BENT = ("q", "v", "a", "weights", "dq", "dv", "da")  #: a motion, weights of its forces, a direction
 
 KERNELS: tuple[Kernel, ...] = (
     Kernel("rhs", ("q", "v"), lambda s: (s.n_x,), "x' = [q'; v'], after projecting x onto the constraints"),
@@ -83,28 +85,29 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("embedded_mass_matrix", ("q",), lambda s: (s.n_dof, s.n_dof), "M of the independent coordinates, row-major"),
     Kernel("bias", ("q", "v"), lambda s: (s.n_v,), "h in M v' + h = generalized forces not in the model"),
     Kernel("inverse_dynamics", ("q", "v", "a"), lambda s: (s.n_v,), "M a + h, the generalized forces to add"),
+    Kernel("inverse_dynamics_derivatives", BENT[:3], lambda s: (s.n_v, s.n_q + 2 * s.n_v),
+           "M a + h by [q, v, a], each at fixed others; by a it is M", late="inverse dynamics"),
+    Kernel("inverse_dynamics_hessian_product", BENT, lambda s: (s.n_q + 2 * s.n_v,),
+           "sum of weights times Hessians of M a + h by [q, v, a], times the direction", late="its Hessians"),
+    Kernel("rhs_hessian_product", ("q", "v", "rate_weights", "dq", "dv", "du"),
+           lambda s: (0 if s.n_c else s.n_x + s.n_u,), late="Hessians of rhs",
+           result="of a tree: sum of weights times Hessians of x' by [x, u], times the direction"),
     Kernel("energy", ("q", "v"), lambda s: (2,), "kinetic and potential energy (J)"),
     Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, late=True),
     Kernel("constraints", ("q",), lambda s: (s.n_h,), "residuals C of the holonomic rows (m, rad)"),
     Kernel("constraint_jacobian", ("q",), lambda s: (s.n_c, s.n_v), "C_q, all rows, row-major"),
-    Kernel(
-        "coordinate_slopes",
-        ("q",),
-        lambda s: (s.n_coordinate_slopes, s.n_q),
-        "dC/dq of holonomic rows where q' is given",
-    ),
+    Kernel("coordinate_slopes", ("q",), lambda s: (s.n_coordinate_slopes, s.n_q),
+           "dC/dq of holonomic rows where q' is given"),
     Kernel("velocity_constraints", ("q", "v"), lambda s: (s.n_c,), "C_q v + C_t, all rows, nonholonomic ones last"),
     Kernel("project", ("q", "v"), lambda s: (s.n_x,), "the nearest state on the constraints"),
     Kernel("poses", ("q",), lambda s: (s.n_bodies, 4, 4), "body frames to ground, homogeneous, row-major"),
     Kernel("outputs", ("q", "v"), lambda s: (s.n_y,), "the outputs of the model at the projected state"),
     Kernel("events", ("q", "v"), lambda s: (s.n_events,), "values whose zeros are the model's events"),
-    Kernel(
-        "resets", ("q", "v"), lambda s: (s.n_resets,), "new values of states after events, in the order of `resets`"
-    ),
+    Kernel("resets", ("q", "v"), lambda s: (s.n_resets,),
+           "new values of states after events, in the order of `resets`"),
     Kernel("event_slopes", ("q", "v"), lambda s: (s.n_events, s.n_x), "d(events)/dx, row-major", late=True),
     Kernel(
-        "event_derivatives",
-        ("q", "v"),
+        "event_derivatives", ("q", "v"),
         lambda s: ((s.n_events + s.n_resets), s.n_x + 1 + s.n_u + s.n_p) if s.n_events else (0, 0),
         "[events, resets] by [q, v, t, u, p]",
         late=True,
@@ -127,9 +130,8 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("motion_outputs", ("q", "v", "a"), lambda s: (s.n_y,), "the outputs at any accelerations", late=True),
     Kernel("finite_forces", ("q", "v"), lambda s: (s.n_finite_forces,), "1 where a force element's loads are finite"),
     Kernel("input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", late=True),
-    Kernel(
-        "parameter_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_p), "dx'/dp of the complete rhs, row-major", late=True
-    ),
+    Kernel("parameter_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_p), "dx'/dp of the complete rhs, row-major",
+           late=True),
     Kernel(
         "assembly_jacobian",
         ("q", "v"),
@@ -162,7 +164,7 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
     Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
-)
+)  # fmt: skip
 
 #: The same by name.
 NAMED = {kernel.name: kernel for kernel in KERNELS}

@@ -227,12 +227,13 @@ def compile_core(
     with _timed(equations.seconds, "program"):
         program = build(equations, target, [k.name for k in KERNELS if not k.late])
     core = _load(equations, program, target, options, equations.seconds)
-    late = [k.name for k in KERNELS if k.late and 0 not in k.shape(program.sizes)]
+    late = {k.name: str(k.late) for k in KERNELS if k.late and 0 not in k.shape(program.sizes)}
 
-    def load_late() -> Core:
-        return _load(equations, build(equations, target, late), target, options)
+    def load_late(group: str) -> Core:
+        wanted = [name for name, of in late.items() if of == group]
+        return _load(equations, build(equations, target, wanted), target, options)
 
-    return LateCore(core, late, load_late)
+    return LateCore(core, list(late), load_late)
 
 
 def _load(

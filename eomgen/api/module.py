@@ -33,10 +33,14 @@ if TYPE_CHECKING:
     from ..ensembles.simulate_many import simulate_many as _simulate_many
     from ..identification.fit import fit as _fit
     from ..runtime.canonical import Canonical
+    from ..runtime.derivative_calls import inverse_dynamics_derivatives as _inverse_dynamics_derivatives
+    from ..runtime.derivative_calls import inverse_dynamics_hessian_product as _inverse_dynamics_hessian_product
+    from ..runtime.derivative_calls import rhs_hessian_product as _rhs_hessian_product
     from ..runtime.drawing import draw as _draw
     from ..runtime.drawing import draw_branches as _draw_branches
     from ..runtime.drawing import explore as _explore
     from ..runtime.minimal import Minimal
+    from ..runtime.protocols import Differentiated
     from ..runtime.summary import report as _report
     from ..simulation.dae_solution import Dae
     from ..simulation.impact_run import simulate_impacts as _simulate_impacts
@@ -69,6 +73,9 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "kinematic_analysis": "analysis.kinematic",
     "motion_range": "analysis.coordinate_range",
     "workspace": "analysis.workspace",
+    "inverse_dynamics_derivatives": "runtime.derivative_calls",
+    "inverse_dynamics_hessian_product": "runtime.derivative_calls",
+    "rhs_hessian_product": "runtime.derivative_calls",
     "report": "runtime.summary",
     "draw": "runtime.drawing",
     "draw_branches": "runtime.drawing",
@@ -149,7 +156,8 @@ class Module(BoundModel):
     rhs : callable
         ``rhs(t, x)`` -> x' (n_x,).  A pure function: x is projected onto the constraints first.
     jacobian : callable
-        ``jacobian(t, x)`` -> (n_x, n_x), the derivative of the complete rhs.  Exact, in all directions, at states on
+        ``jacobian(t, x, wrt="x")`` -> (n_x, n_x), the derivative of the complete rhs by the state; by the inputs with
+        ``wrt="u"``, (n_x, n_u), by the parameters with ``wrt="p"``, (n_x, n_p).  Exact, in all directions, at states on
         the constraints (of ``x0``, ``project`` or a trajectory); elsewhere it is the one at the projected state, off by
         the order of the distance, as derivatives by parameters and inputs are.
     bias : callable
@@ -203,10 +211,14 @@ class Module(BoundModel):
         kinematic_analysis = _kinematic_analysis
         motion_range = _motion_range
         workspace = _workspace
+        inverse_dynamics_derivatives = _inverse_dynamics_derivatives
+        inverse_dynamics_hessian_product = _inverse_dynamics_hessian_product
+        rhs_hessian_product = _rhs_hessian_product
         report = _report
         draw = _draw
         draw_branches = _draw_branches
         explore = _explore
+        jacobian: Differentiated
         minimal: Minimal
         canonical: Canonical
         dae: Dae

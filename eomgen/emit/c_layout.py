@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..program import Program
-from ..program.blocks import SHIFTS
+from ..program.blocks import ALONG, SHIFTS
+from ..program.loop_slopes import BY_BODIES
 
 CLOSE = ("scaled", "cholesky", "residual_sizes", "correct", "project", "close")
 PIVOT = ("eliminate", "pivots", "partition")
@@ -65,6 +66,11 @@ def space_file(program: Program) -> str:
     return "space_quaternions" if program.quaternion_slots else "space_plain"
 
 
+def derive_files(program: Program) -> tuple[str, ...]:
+    """The files of the Jacobian of a mechanism with loops, but for its driver."""
+    return (*DERIVE, "jacobian_bodies" if BY_BODIES[0] in program.block_names else "jacobian_here")
+
+
 def driver_files(program: Program) -> list[str]:
     """Names of the files in templates/c/drivers that hold this program's drivers, callees first."""
     direct = "residuals_along" if "residual_tangent" in program.block_names else "residuals_direct"
@@ -78,8 +84,8 @@ def driver_files(program: Program) -> list[str]:
         further = (f"{space}_more",) if program.has_loops or space == "space_plain" else ()
         files.update(dict.fromkeys((space, *further)))
     for driver in program.drivers:
-        if driver.name == "dae_jacobian":
-            needed: tuple[str, ...] = ("dae_jacobian",)
+        if driver.name in ALONG:
+            needed: tuple[str, ...] = (driver.name,)
         elif driver.name in SHIFTS:
             needed = shift_files(program, driver.name, direct)
         elif passes(program) and driver.name in ("rhs", "project", "outputs", "jacobian"):
@@ -96,7 +102,7 @@ def driver_files(program: Program) -> list[str]:
         elif driver.name == "rhs":
             needed = (*rhs_files(program), "rhs")
         elif driver.name == "jacobian":
-            needed = (*rhs_files(program), "multipliers", direct, *DERIVE, "jacobian_plain")
+            needed = (*rhs_files(program), "multipliers", direct, *derive_files(program), "jacobian_plain")
         elif driver.name == "outputs" and FORMED.intersection(driver.blocks):
             needed = (*ACCELERATE, "outputs_accelerated")
         else:
@@ -109,7 +115,7 @@ def _passing_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
     """Files of a driver of :func:`passes`."""
     accelerates = {"system", *FORMED} & {block for d in program.drivers if d.name == name for block in d.blocks}
     if name == "jacobian":
-        return (*rhs_files(program), *ACCELERATE, "multipliers", direct, *DERIVE, "jacobian_passing")
+        return (*rhs_files(program), *ACCELERATE, "multipliers", direct, *derive_files(program), "jacobian_passing")
     if name == "project":
         rates = any(d.name == "rhs" for d in program.drivers)
         across = (*rhs_files(program), "rhs_across", "project_passing")
@@ -148,6 +154,22 @@ def passing_areas(program: Program) -> list[tuple[str, int]]:
         ("KEPT", n_q + n),
         ("RATED", n_q + n),
         ("TURN", (n_q + n) ** 2 if "jacobian" in {d.name for d in program.drivers} else 0),
+    ]
+
+
+def _areas_of_bodies(program: Program) -> list[tuple[str, int]]:
+    """Areas of ``jacobian_bodies``; the first three follow one upon the other."""
+    known = next((b.n_in for b in program.blocks if b.name == BY_BODIES[1]), None)
+    if known is None:
+        return []
+    n_q, n, f = program.sizes.n_q, program.sizes.n_v, program.sizes.n_dof
+    return [
+        ("SLOPES", n + 2),  # v, whether sound, whether far
+        ("COEFFICIENTS", known - n_q),
+        ("TURNING", n_q),  # a direction of q or of v
+        ("CHANGE", n_q + n),  # of q' and v'
+        ("SPAN", 2 * f * (n_q + n)),
+        ("SHARES", f * f),
     ]
 
 
@@ -220,6 +242,9 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
         ]
     if "dae_tangent" in names:
         lengths += [("DAE", 4 * program.sizes.n_dae), ("SLOPE", program.sizes.n_dae)]  # y, y', dy, dy'; dF
+    lengths += _areas_of_bodies(program)
+    if "inverse_tangent" in names:
+        lengths.append(("INVERSE", 2 * (n_q + 2 * n) + n))  # q, v, a, dq, dv, da; d(M a + h)
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area
     for name, length in lengths:
         areas.append((name, start, length))

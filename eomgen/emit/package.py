@@ -37,7 +37,8 @@ ANNOTATED: tuple[tuple[str, str], ...] = (
 FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces", "actuator_forces", "impact",
           "simulate_impacts", "consistent")  # fmt: skip
 MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
-ANALYSES = (*MOTIONS, "linearize", "modes", "equilibrium", "sensitivities", *FORCES)
+DERIVATIVES = ("inverse_dynamics_derivatives", "inverse_dynamics_hessian_product", "rhs_hessian_product")
+ANALYSES = (*MOTIONS, *DERIVATIVES, "linearize", "modes", "equilibrium", "sensitivities", *FORCES)
 PICTURES = ("draw", "draw_branches")
 METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *PICTURES, *ANALYSES)
 #: What a slim package has of them.

@@ -24,13 +24,23 @@ def describe_calls(program: Program) -> list[Call]:
     independent = "q_i, v_i, a_i"
     calls = [
         Call("rhs(t, x)", _shape(s.n_x), "x' = [q'; v'], after projecting x onto the constraints"),
-        Call("jacobian(t, x)", _shape(s.n_x, s.n_x), "dx'/dx of the complete rhs"),
+        Call("jacobian(t, x)", _shape(s.n_x, s.n_x), "dx'/dx of the complete rhs; wrt='u', 'p' as the next two"),
         Call("input_jacobian(t, x)", _shape(s.n_x, s.n_u), "dx'/du of the complete rhs"),
         Call("parameter_jacobian(t, x)", _shape(s.n_x, s.n_p), "dx'/dp of the complete rhs"),
         Call("mass_matrix(q)", _shape(s.n_v, s.n_v), "M of the spanning tree"),
         Call("embedded_mass_matrix(q)", _shape(s.n_dof, s.n_dof), "M of the independent coordinates"),
         Call("bias(t, x)", _shape(s.n_v), "h in M v' + h = generalized forces not in the model"),
         Call("inverse_dynamics(q, v, a)", _shape(s.n_v), "M a + h, the generalized forces to add"),
+        Call(
+            "inverse_dynamics_derivatives(q, v, a)",
+            ", ".join(_shape(s.n_v, n) for n in (s.n_q, s.n_v, s.n_v)),
+            "derivatives of inverse_dynamics by q, v and a",
+        ),
+        Call(
+            "inverse_dynamics_hessian_product(q, v, a, w, d)",
+            _shape(s.n_q + 2 * s.n_v),
+            "sum of w times its Hessians, times d = [dq; dv; da]",
+        ),
         Call("energy(x)", _shape(2), "kinetic and potential energy T, V (J)"),
         Call("center_of_mass(q)", _shape(3), "centre of mass of all bodies, ground axes (m)"),
         Call("com_jacobian(q)", _shape(3, s.n_v), "velocity of the centre of mass = com_jacobian v"),

@@ -122,18 +122,21 @@ def solve_tree(
     rows: Sequence[ConstraintRow] = (),
     term: float = 0.0,
     loaded: bool = True,
+    forces: Sequence[Expr] | None = None,
 ) -> TreeMotion:
     """v' of the tree, on which constraints may act; found in velocities of which some are turned.
 
-    Without ``loaded`` there are no forces, gravity and velocities: what the constraints alone make of their rests.
+    Without ``loaded`` there are no forces, gravity and velocities but the forces given: what these and the constraints
+    make of their rests.
     """
     turned, blocks = turn_links(kinematics)
     still = vec.zero(kinematics.graph)
-    forces = coordinate_forces(kinematics)
-    if not loaded:
+    if loaded:
+        forces = coordinate_forces(kinematics)
+    else:
         blocks = tuple(replace(b, gravity=None) for b in blocks)
         products = loads = [(still, still)] * len(loads)
-        forces = [kinematics.graph.zero] * len(forces)
+        forces = forces or [kinematics.graph.zero] * len(kinematics.v)
     afloat = falling(blocks)
     bodies = ArticulatedBodies(
         turned.graph,

@@ -44,6 +44,9 @@ PREFERENCE = 0.01
 #: Pivots of a coordinate that was chosen and may not be exchanged: dependent ones move at most 1e8 times as fast, which
 #: leaves half of the digits.
 CHOSEN = 1e-8
+#: Square of the share of a coordinate in the motion that others leave it, below which derivatives along the independent
+#: ones alone do not make up those of all: it costs four digits, and they are taken column by column.
+SPANNING = 1e-4
 #: Rank of the balance of all bodies, whose rows are products of two such matrices and of levers.
 BALANCE = 10.0 * STATE
 #: Rank of rows of velocities that users give beside the constraints, which are known to ACCEPTED.

@@ -12,12 +12,18 @@ from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from ..kernel_table import DAE, NAMED, Sizes
 from .body_loops import BodyLoops
+from .dae_rows import dae_kinematics
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
 from .embedded_loops import EmbeddedLoops
 from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
+from .inverse_slopes import inverse_slopes
 from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .loop_blocks import LoopBlocks, estimate
+from .loop_slopes import BY_BODIES, LoopSlopes
+from .port_symbols import port_symbols
 from .program import Block, Limits, Port
+from .residuals import acceleration_residual, force_residual
+from .second_order import TreeHessian, hessian_product
 from .terms import Row, SystemTerms
 
 COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h, C_q and gamma are put together from
@@ -25,6 +31,10 @@ RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q'
 
 #: Kernels that are derivatives by something other than the state -> what.
 SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}
+
+
+#: Kernels whose columns are derivatives along directions where they are not written out -> the block of one.
+ALONG = {"dae_jacobian": "dae_tangent", "inverse_dynamics_derivatives": "inverse_tangent"}
 
 
 def flat(rows: Sequence[Row]) -> Row:
@@ -70,6 +80,13 @@ class BlockMaker:
         return loops if loops.determined else None
 
     @cached_property
+    def _loop_slopes(self) -> LoopSlopes | None:
+        """The derivatives of that form along directions, if it goes by bodies and they are fewer operations."""
+        if not isinstance(self._loops, BodyLoops):
+            return None
+        return LoopSlopes(self._loops, self.port("dq").symbols, self.port("dv").symbols)
+
+    @cached_property
     def outputs_need_accelerations(self) -> bool:
         """Whether an output depends on an acceleration."""
         return not symbols_of(self.terms.outputs).isdisjoint(self.terms.a)
@@ -110,24 +127,11 @@ class BlockMaker:
 
     @cached_property
     def _force_residual(self) -> list[Expr]:
-        """r1 = M a + h + C_q^T l"""
-        terms = self.terms
-        r1 = list(terms.inverse_dynamics)
-        for row, l in zip(terms.constraint_jacobian, self._symbols(terms.multipliers), strict=True):
-            r1 = [r + c * l for r, c in zip(r1, row, strict=True)]
-        return r1
+        return force_residual(self.terms)
 
     @cached_property
     def _acceleration_residual(self) -> list[Expr]:
-        """r2 = C_q a + gamma"""
-        terms = self.terms
-        a = self._symbols(terms.a)
-        r2 = []
-        for row, r in zip(terms.constraint_jacobian, terms.gamma, strict=True):
-            for c, x in zip(row, a, strict=True):
-                r = r + c * x
-            r2.append(r)
-        return r2
+        return acceleration_residual(self.terms)
 
     @cached_property
     def _squares(self) -> list[Expr]:
@@ -143,16 +147,8 @@ class BlockMaker:
 
     @cached_property
     def _dae_residual(self) -> list[Expr]:
-        """F: kinematics with corrections (C. W. Gear, B. Leimkuhler, G. K. Gupta, 1985), forces, positions, rates."""
-        terms = self.terms
-        v = self._symbols(terms.v)
-        moved = list(v)
-        for row, mu in zip(terms.constraint_jacobian, self._symbols(self.port("corrections").symbols), strict=False):
-            moved = [x - s * s * c * mu for x, s, c in zip(moved, terms.coordinate_scales, row, strict=True)]
-        flow = substitute(terms.rates or v, dict(zip(v, moved, strict=True)))
-        rates = self._symbols(self.port("q_rate").symbols)
-        kinematic = [r - f for r, f in zip(rates, flow, strict=True)]
-        return [*kinematic, *self._force_residual, *terms.constraints, *terms.velocity_constraints]
+        rest = [*self._force_residual, *self.terms.constraints, *self.terms.velocity_constraints]
+        return [*dae_kinematics(self.terms, self.port("q_rate").symbols, self.port("corrections").symbols), *rest]
 
     def _dae_tangent(self) -> Block:
         given = [self.port(name) for name in DAE]
@@ -161,6 +157,15 @@ class BlockMaker:
         seeds = dict(zip(self._symbols(y), self._symbols(along.symbols), strict=True))
         outputs = tuple(jvp(self._dae_residual, seeds))
         return Block("dae_tangent", (*given, along), outputs, (len(outputs),), public=False)
+
+    def _tree_hessian_product(self) -> tuple[list[Expr], list[Expr]]:
+        """Of the right-hand side by q, v, u, and checks of the mass matrix."""
+        accelerations, checks = self._accelerations
+        given = self._through("rate_weights"), self._through("dq dv du")
+        return TreeHessian(self.terms, accelerations, *given).shortest(), checks
+
+    def _through(self, ports: str) -> list[Expr]:
+        return self._symbols([symbol for name in ports.split() for symbol in self.port(name).symbols])
 
     def _normalised(self) -> list[Expr]:
         """q with Euler parameters of length 1."""
@@ -173,30 +178,11 @@ class BlockMaker:
     # -- blocks ---------------------------------------------------------------------------------------------------
     def port(self, name: str) -> Port:
         """The symbols behind the name of a port."""
-        terms = self.terms
-        independent = terms.preferred
-        symbols: Mapping[str, tuple[str, ...]] = {
-            "q": terms.q,
-            "v": terms.v,
-            "a": terms.a,
-            "q_i": tuple(terms.q[terms.coordinate_of[i]] for i in independent),
-            "v_i": tuple(terms.v[i] for i in independent),
-            "a_i": tuple(terms.a[i] for i in independent),
-            "q_guess": tuple(f"guess({q})" for q in terms.q),
-            "multipliers": terms.multipliers,
-            "z": terms.system.unknowns if terms.system else (),
-            "corrections": tuple(f"correction[{i}]" for i in range(self.sizes.n_h)),
-            "q_rate": tuple(f"rate({q})" for q in terms.q),
-            "multiplier_rates": tuple(f"rate({l})" for l in terms.multipliers),
-            "correction_rates": tuple(f"rate(correction[{i}])" for i in range(self.sizes.n_h)),
-            "cj": ("cj",),
-            "impulses": tuple(f"impulse[{i}]" for i in range(len(terms.events))),
-            "dq": tuple(f"d({q})" for q in terms.q),
-            "dv": tuple(f"d({v})" for v in terms.v),
-            "du": tuple(f"d({u})" for u in terms.u),
-            "dp": tuple(f"d({p})" for p in terms.p),
-        }
-        return Port(name, symbols[name])
+        return Port(name, self._port_symbols[name])
+
+    @cached_property
+    def _port_symbols(self) -> Mapping[str, tuple[str, ...]]:
+        return port_symbols(self.terms, self.sizes.n_h)
 
     def _internal(self, name: str, ports: str, outputs: Sequence[Expr], checks: Sequence[Expr] = ()) -> Block:
         inputs = tuple(map(self.port, ports.split()))
@@ -236,6 +222,9 @@ class BlockMaker:
             "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
             "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
+            "inverse_dynamics_hessian_product": lambda: hessian_product(
+                terms.inverse_dynamics, *map(self._through, ("weights", "q v a", "dq dv da"))
+            ),
         }
         trees: dict[str, Callable[[], Sequence[Expr]]] = {
             "project": lambda: [*self._normalised(), *self._symbols(terms.v)],
@@ -253,6 +242,8 @@ class BlockMaker:
         elif name == "rhs" and self.unrolled:
             accelerations, checks = self._accelerations
             outputs = [*(terms.rates or self._symbols(terms.v)), *accelerations]
+        elif name == "rhs_hessian_product":
+            outputs, checks = self._tree_hessian_product()
         elif (found := self._unrolled_derivative(name)) is not None:
             outputs, checks = found[0], [*self._turned, *found[1]]
         elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
@@ -270,8 +261,8 @@ class BlockMaker:
         return (*self._behind(name), *(RATES if self.terms.given_rates else ()))
 
     def _behind(self, name: str) -> tuple[str, ...]:
-        if name == "dae_jacobian":
-            return ("dae_tangent",)
+        if name in ALONG:
+            return (ALONG[name],)
         residual = "residual_tangent" if self.by_direction else "residual_jacobian"
         shift = SHIFTS.get(name)
         if shift and self.terms.by_columns and not self.has_loops:
@@ -298,9 +289,10 @@ class BlockMaker:
         accelerate = formed if self.outputs_need_accelerations else ()
         mass = "mass_times" if self.terms.by_columns else "mass_matrix"
         direct = ("closing", "dynamics") if self._loops is not None else ()
+        along = ("closing", "dynamics", *BY_BODIES) if self._loop_slopes is not None else ()
         return {
             "rhs": (*project, *formed, *direct),
-            "jacobian": (*project, *formed, residual),
+            "jacobian": (*project, *formed, residual, *along),
             "embedded_mass_matrix": ("scales", "position", mass),
             "project": project,
             "outputs": (*project, *accelerate, "accelerated_outputs"),
@@ -334,6 +326,9 @@ class BlockMaker:
                 assert self._loops is not None
                 outputs, checks = self._loops.dynamics()
                 return self._internal(name, "q v", outputs, [*self._turned, *checks])
+            case "loop_slopes" | "slopes_by_position" | "slopes_by_velocity":
+                assert self._loop_slopes is not None
+                return self._loop_slopes.block(name, list(map(self.port, ("q", "v", "dq", "dv"))), self._turned)
             case "gamma":
                 return self._internal(name, "q v", terms.gamma)
             case "rate":  # C_t
@@ -351,6 +346,9 @@ class BlockMaker:
                 return self._internal(name, "q v a multipliers", self.slopes.packed())
             case "dae_tangent":  # dF along (dy, dy')
                 return self._dae_tangent()
+            case "inverse_tangent":  # d(M a + h) along (dq, dv, da)
+                seeds = dict(zip(self._through("q v a"), self._through("dq dv da"), strict=True))
+                return self._internal(name, "q v a dq dv da", jvp(terms.inverse_dynamics, seeds))
             case "mass_times":  # M a
                 along = {a: a for a in self._symbols(terms.a)}
                 return self._internal(name, "q a", jvp(terms.inverse_dynamics, along))
@@ -383,7 +381,10 @@ class BlockMaker:
         return port, dict(zip(self._symbols(names), self._symbols(self.port(port).symbols), strict=True))
 
     def _unrolled_derivative(self, name: str) -> tuple[list[Expr], list[Expr]] | None:
-        """A derivative of the right-hand side of a small tree, and checks of its mass matrix."""
+        """A derivative of the inverse dynamics, or of a small tree's right-hand side, and checks of its mass matrix."""
+        if name == "inverse_dynamics_derivatives":
+            found = inverse_slopes(self.terms, self.slopes)
+            return None if found is None else (found, [])
         if not self.unrolled or name not in ("jacobian", *SHIFTS):
             return None
         if name == "jacobian":

@@ -19,6 +19,7 @@ class BodyLoops(LoopBlocks):
     """No partition and no mass matrix; sound where elimination keeps enough of every inertia."""
 
     passes = 3, 1  # what is left of both is looked at
+    multipliers: list[Expr]  #: of the scaled rows, once there is a motion
 
     @cached_property
     def motion(self) -> TreeMotion | None:
@@ -33,9 +34,11 @@ class BodyLoops(LoopBlocks):
         if self.redundant:  # again, with what the term in G has left of the constraints
             left = times(self.rows, solved.accelerations)
             again = [ConstraintRow(row.entries, row.rest + x) for row, x in zip(rows, left, strict=True)]
-            more = terms.constrained(again, TIKHONOV, loaded=False).accelerations
-            total = tuple(a + b for a, b in zip(solved.accelerations, more, strict=True))
-            solved = solved._replace(accelerations=total)
+            more = terms.constrained(again, TIKHONOV, loaded=False)
+            total = tuple(a + b for a, b in zip(solved.accelerations, more.accelerations, strict=True))
+            self.multipliers = [a + b for a, b in zip(solved.multipliers, more.multipliers, strict=True)]
+            return solved._replace(accelerations=total)
+        self.multipliers = list(solved.multipliers)
         return solved
 
     def _accelerate(self, moved: dict[Expr, Expr], conditions: list[Expr]) -> tuple[list[Expr], list[Expr]]:

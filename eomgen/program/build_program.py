@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ..errors import UsageError
+from ..graph.count import count
 from ..graph.substitute import symbols_of
 from ..kernel_table import KERNELS, Kernel, Sizes
 from ..suggestions import hint, joined
@@ -24,6 +25,8 @@ from .terms import SystemTerms
 ABI = 1
 #: Kernels whose metadata tell the places of entries that are not identically zero, where they are straight-line code.
 SPARSE = ("jacobian", "input_jacobian", "parameter_jacobian", "mass_matrix", "constraint_jacobian")
+#: Kernels that are left out where they would be long, unless they are named.
+LONG = ("inverse_dynamics_hessian_product", "rhs_hessian_product")
 
 
 def build_program(
@@ -68,6 +71,8 @@ def build_program(
     has |= {"events": bool(terms.events), "resets": bool(terms.resets)}
     if terms.given_rates or not terms.projects:  # their derivatives by inputs and parameters are not derived
         has |= dict.fromkeys(SHIFTS, False)
+    if terms.given_rates or metadata.get("no_inertia") or metadata.get("indefinite"):
+        has["rhs_hessian_product"] = False
     if terms.given_rates:
         has |= {"dae_residual": False, "dae_jacobian": False}
     wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]
@@ -77,7 +82,8 @@ def build_program(
     for kernel in wanted:
         block = maker.public(kernel.name)
         if block is not None:
-            blocks[kernel.name] = block
+            if kernels is not None or kernel.name not in LONG or count(block.outputs).total <= limits.second_order:
+                blocks[kernel.name] = block
             continue
         behind = maker.drivers_need(kernel.name)
         needed.update(dict.fromkeys(behind))
@@ -86,9 +92,8 @@ def build_program(
         if other not in blocks:
             public = maker.public(other) if any(k.name == other for k in KERNELS) else None
             blocks[other] = public or maker.internal(other)
-    kernel_shapes = {
-        k.name: list(k.shape(sizes)) for k in KERNELS if k in wanted or (k.name in blocks and blocks[k.name].public)
-    }
+    made = {*(d.name for d in drivers), *(b.name for b in blocks.values() if b.public)}
+    kernel_shapes = {k.name: list(k.shape(sizes)) for k in KERNELS if k.name in made}
 
     roots = [y for block in blocks.values() for y in (*block.outputs, *block.checks)]
     hoisted, parameter_only = hoist(terms.graph, roots, terms.p)

@@ -19,6 +19,7 @@ from ..graph.substitute import substitute
 from ..graph.traverse import reachable
 from .factor import Factor, factorize, path, positivity, solve
 from .program import Limits
+from .residuals import acceleration_residual, constraint_forces
 from .terms import SystemTerms
 
 Entries = dict[tuple[int, int], Expr]
@@ -62,10 +63,11 @@ class ResidualSlopes:
     @cached_property
     def operations(self) -> int:
         """Of the derivatives of M a + h by the recursion."""
-        return count(list(self._by_recursion.values())).total
+        return count(list(self.by_recursion.values())).total
 
     @cached_property
-    def _by_recursion(self) -> Entries:
+    def by_recursion(self) -> Entries:
+        """Derivatives of M a + h by recursion over composite bodies."""
         assert self.forces is not None
         return self.joined(self.forces, self._symbols(self.terms.a))
 
@@ -86,23 +88,13 @@ class ResidualSlopes:
     def entries(self) -> Entries:
         """All that are not identically zero, in terms of (q, v, a, multipliers)."""
         terms = self.terms
-        zero = terms.graph.zero
-        constraint_forces = [zero] * terms.n_v
-        for row, l in zip(terms.constraint_jacobian, self._symbols(terms.multipliers), strict=True):
-            constraint_forces = [r + c * l for r, c in zip(constraint_forces, row, strict=True)]
-        a = self._symbols(terms.a)
-        r2 = []
-        for row, r in zip(terms.constraint_jacobian, terms.gamma, strict=True):
-            for c, x in zip(row, a, strict=True):
-                r = r + c * x
-            r2.append(r)
-        rest = [*r2, *terms.velocity_constraints]
+        rest = [*acceleration_residual(terms), *terms.velocity_constraints]
         wrt = self._symbols((*terms.q, *terms.v))
         if not self.recursive:
-            forces = [x + y for x, y in zip(terms.inverse_dynamics, constraint_forces, strict=True)]
+            forces = [x + y for x, y in zip(terms.inverse_dynamics, constraint_forces(terms), strict=True)]
             return jacobian([*forces, *rest], wrt)
-        entries = jacobian([*constraint_forces, *rest], wrt)
-        own = self._by_recursion
+        entries = jacobian([*constraint_forces(terms), *rest], wrt)
+        own = self.by_recursion
         if self.is_short(terms.inverse_dynamics):
             other = self.by_formula()
             own = own if self.operations < count(list(other.values())).total else other

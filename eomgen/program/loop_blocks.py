@@ -164,14 +164,37 @@ class LoopBlocks(ABC):
             conditions.append(graph.apply("lt", left, size * LEFT + NOTHING))
         return x
 
+    @property
+    def factor(self) -> SparseFactor:
+        """Of J J^T, of all rows."""
+        return self._factor[0]
+
+    @property
+    def corrections(self) -> int:
+        """Passes by it after which velocities are projected."""
+        return self._factor[1][0]
+
+    def regularised(self, rows: Sequence[Row]) -> SparseFactor:
+        """The factor of J J^T of some rows, which may depend on each other."""
+        return self._regularised(rows, GENTLE)[0]
+
+    @cached_property
+    def moved(self) -> list[Expr]:
+        """Projected velocities (n,)."""
+        return self._moved([])
+
+    def _moved(self, conditions: list[Expr]) -> list[Expr]:
+        v = [self.terms.graph.symbol(name) for name in self.terms.v]
+        rate = [x * i for x, i in zip(self.terms.constraint_rate, self.inverse, strict=True)]
+        return self._corrected(v, rate, conditions)
+
     def dynamics(self) -> tuple[list[Expr], list[Expr]]:
         """Projected velocities (n,), accelerations (n,), 1 if these are sound, 1 if no change point can be near; and
         checks of the inertia.
         """
         v = [self.terms.graph.symbol(name) for name in self.terms.v]
-        rate = [x * i for x, i in zip(self.terms.constraint_rate, self.inverse, strict=True)]
         conditions: list[Expr] = []
-        moved = self._corrected(v, rate, conditions)
+        moved = self._moved(conditions)
         a, checks = self._accelerate(dict(zip(v, moved, strict=True)), conditions)
         return [*moved, *a, self._all(conditions), self._far()], checks
 

@@ -27,6 +27,8 @@ class Limits:
     unrolled_loops: int = 4_000  #: loops get a straight-line rhs where factors take at most so many multiplications
     jacobian_nodes: int = 10_000  #: above so many estimated operations the Jacobian is made direction by direction
     jacobian_recursive: int = 40_000  #: the same of one made by recursion over composite bodies
+    #: second derivatives of more operations are generated only where they are named
+    second_order: int = 40_000
     statements: int = 1500  #: statements in one generated function at most
 
 

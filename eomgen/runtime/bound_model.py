@@ -6,7 +6,7 @@ What every analysis and every run takes.  :class:`~..api.module.Module` is the s
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self, cast
 
@@ -76,7 +76,8 @@ class BoundModel(Assembled, Momenta):
         self.n_q, self.n_v, self.n_x, self.n_u, self.n_p = layout.n_q, layout.n_v, layout.n_x, layout.n_u, layout.n_p
         self.n_y, self.n_dof, self.n_bodies = layout.n_y, layout.n_dof, layout.n_bodies
         self.n_c, self.n_rows = len(layout.rows), layout.n_c
-        self.rhs, self.jacobian = kernels.timed("rhs"), kernels.timed("jacobian")
+        jacobian: Any = kernels.timed("jacobian")
+        self.rhs, self.jacobian, jacobian.others = kernels.timed("rhs"), jacobian, partial(getattr, self)
         self.bias, self.outputs = kernels.timed("bias"), kernels.timed("outputs")
         self.mass_matrix = kernels.state("mass_matrix")
         self.embedded_mass_matrix = kernels.state("embedded_mass_matrix")

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from ..kernel_table import NAMED
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
@@ -25,18 +26,26 @@ class LateCore:
     late : sequence of str
         Names of the further kernels.
     load : callable
-        Makes a core that has them.
+        Makes a core of those that are late together: of :attr:`~..kernel_table.Kernel.late` of the table.
+
+    Attributes
+    ----------
+    further : dict of str to Core
+        Cores made so far, by what their kernels have in common.
     """
 
-    def __init__(self, core: Core, late: Sequence[str], load: Callable[[], Core]) -> None:
+    def __init__(self, core: Core, late: Sequence[str], load: Callable[[str], Core]) -> None:
         self.core = core
         self.names = (*core.names, *(name for name in late if name not in core.names))
         self.load = load
+        self.further: dict[str, Core] = {}
 
-    @cached_property
-    def further(self) -> Core:
-        """The core with the rarer kernels."""
-        return self.load()
+    def having(self, name: str) -> Core:
+        """The core with a rarer kernel, made now if there is none yet."""
+        group = str(NAMED[name].late)
+        if group not in self.further:
+            self.further[group] = self.load(group)
+        return self.further[group]
 
     def timed(self, name: str, *options: Any) -> Any:
         """A kernel of time and state; see :class:`~.protocols.Core`."""
@@ -77,7 +86,7 @@ class LateKernel:
     @cached_property
     def kernel(self) -> Any:
         """The kernel itself."""
-        core, (context, *rest) = self.core.further, self.options
+        core, (context, *rest) = self.core.having(self.name), self.options
         return getattr(core, self.maker)(self.name, core.context(context.p, context.u, rest[-1]), *rest)
 
     @property

@@ -243,10 +243,20 @@ class NumpyKernel:
 
 
 class NumpyTimed(NumpyKernel):
-    """A kernel of time and state."""
+    """A kernel of time and state; of a jacobian ``others(name)`` is the kernel by something else."""
 
-    def __call__(self, t: Any, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None) -> Array:
+    others: Any = None
+
+    def __call__(
+        self, t: Any, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None, wrt: str | None = None
+    ) -> Array:
         """Evaluate at time t, or one time for each state (k,), and state x (n,) or k states as columns (n, k)."""
+        if wrt is not None and self.others is None:
+            raise TypeError(f"{self.name} has no argument wrt")
+        if wrt not in (None, "x", "u", "p"):
+            raise self.error(f"wrt must be 'x' (the state), 'u' (the inputs) or 'p' (the parameters), not {wrt!r}")
+        if wrt in ("u", "p"):
+            return np.asarray(self.others(f"{'input' if wrt == 'u' else 'parameter'}_jacobian")(t, x, p, u, out))
         return self.evaluate(t, self.read(x, "x", self.n_in), p, u, out)
 
 

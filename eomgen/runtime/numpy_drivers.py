@@ -43,6 +43,8 @@ NEEDS = {
 SHIFTS = {"input_jacobian": "input_shift", "parameter_jacobian": "parameter_shift"}
 SHIFTED = {"input_jacobian": "input_acceleration", "parameter_jacobian": "parameter_acceleration"}
 
+#: kernels whose columns are derivatives along directions -> the block of one
+ALONG = {"dae_jacobian": "dae_tangent", "inverse_dynamics_derivatives": "inverse_tangent"}
 
 #: (t, x, u, c) -> [x, x', anything] of the projected state, and the weakest pivot there
 Motion: TypeAlias = Callable[[float, Array, Array, Array], tuple[Array, float]]
@@ -85,7 +87,7 @@ class Drivers:
             names += ["rhs", *(["outputs"] if "accelerated_outputs" in blocks else [])]
             if not layout.projects and ("residual_jacobian" in blocks or "residual_tangent" in blocks):
                 names.append("jacobian")
-        self.names = (*names, *(["dae_jacobian"] if "dae_tangent" in blocks else []))
+        self.names = (*names, *(name for name, block in ALONG.items() if block in blocks))
         self._scales: tuple[Array, Scales] | None = None
 
     def make(self, name: str) -> Callable[..., Array]:
@@ -296,6 +298,10 @@ class Drivers:
         n = self.layout.n_dae
         along = np.vstack([np.repeat(x[: 2 * n, None], n, axis=1), np.eye(n), x[2 * n] * np.eye(n)])
         return np.asarray(self.blocks["dae_tangent"](t, along, u, c), dtype=float)
+
+    def _inverse_dynamics_derivatives(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        along = np.vstack([np.repeat(x[:, None], len(x), axis=1), np.eye(len(x))])
+        return np.asarray(self.blocks["inverse_tangent"](t, along, u, c), dtype=float)
 
     def _jacobian_given(self, t: float, x: Array, u: Array, c: Array) -> Array:
         """The derivative of a right-hand side that does not project: K [da; dl] = -[dr1; dr2]."""

@@ -18,11 +18,12 @@ from ..errors import ToolchainError, UsageError
 from ..files.build_folder import MANIFEST, read_entry
 from ..files.ownership import read_trusted, require_trusted
 from ..files.source import find_module, load_source
+from ..kernel_table import NAMED
 from ..numeric.scales import Array
 from .late import LateCore, eager
 
-#: Names of all kernels of a module that makes some of them late, and the name and file of the code of those.
-Late = tuple[tuple[str, ...], tuple[str, str] | None]
+#: Names of all kernels of a module that makes some of them late, and of those made the name and file of the code.
+Late = tuple[tuple[str, ...], dict[str, tuple[str, str]]]
 
 
 def reduce(module: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
@@ -42,8 +43,8 @@ def reduce(module: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         )
     late: Late | None = None
     if isinstance(module.core, LateCore):
-        further: Any = module.core.__dict__.get("further")
-        late = module.core.names, None if further is None else (further.__name__, str(further.__file__))
+        further: dict[str, Any] = module.core.further
+        late = module.core.names, {group: (made.__name__, str(made.__file__)) for group, made in further.items()}
     return restore, (type(module), name, str(file), module.p, module.u, late)
 
 
@@ -60,11 +61,11 @@ def restore(kind: type[Any], name: str, file: str, p: Array, u: Array, late: Lat
         return kind(core, p, u)
     names, made = late
 
-    def load() -> Any:
-        if made is None:
-            rare = ", ".join(name for name in names if name not in core.names)
+    def load(group: str) -> Any:
+        if group not in made:
+            rare = ", ".join(name for name in names if name not in core.names and str(NAMED[name].late) == group)
             raise UsageError(f"the module was pickled without {rare}; call one of them before you pickle it")
-        return _find_core(*made)
+        return _find_core(*made[group])
 
     return kind(LateCore(core, names, load), p, u)
 

@@ -27,6 +27,20 @@ class Timed(Protocol):
     ) -> Array: ...
 
 
+class Differentiated(Timed, Protocol):
+    """The kernel ``jacobian``, by the state, ``wrt="u"`` or ``wrt="p"``."""
+
+    def __call__(
+        self,
+        t: ArrayLike,
+        x: ArrayLike,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+        wrt: str | None = None,
+    ) -> Array: ...
+
+
 class State(Protocol):
     """A kernel of the state, or of the coordinates, alone."""
 

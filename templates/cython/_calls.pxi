@@ -49,12 +49,19 @@ ctypedef object (*ternary)(object, object, object)
 cdef class Timed(Kernel):
     """A kernel of time and state: ``f(t, x, p=None, u=None, out=None)``."""
 
-    def __call__(self, t, x, p=None, u=None, out=None):
+    def __call__(self, t, x, p=None, u=None, out=None, wrt=None):
         """Evaluate at time t, a float or (k,), and state x, (n,) or (n, k) for k states as columns.
 
         p (n_p,) and u, (n_u,) or (n_u, k), replace the context's; out is a float64 array of the result's shape,
-        ``shape`` or ``(*shape, k)``.
+        ``shape`` or ``(*shape, k)``. ``wrt`` is for a jacobian: 'x', 'u' or 'p', by which it is.
         """
+        if wrt is not None:
+            if self.others is None:
+                raise TypeError(f"{self.name} has no argument wrt")
+            if wrt not in ("x", "u", "p"):
+                raise self.error(f"wrt must be 'x' (the state), 'u' (the inputs) or 'p' (the parameters), not {wrt!r}")
+            if wrt != "x":
+                return self.others(f"{'input' if wrt == 'u' else 'parameter'}_jacobian")(t, x, p, u, out)
         return self.evaluate(t, x, p, u, out)
 
 

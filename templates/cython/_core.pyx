@@ -169,6 +169,8 @@ cdef class Kernel:
 
     Attributes
     ----------
+    others : callable or None
+        Of a jacobian: ``others(name)`` gives the kernel that differentiates by something else.
     failure : tuple or None
         With ``nan``: (status, t, x) of the last failure. Assign None to forget it.
     """
@@ -183,6 +185,7 @@ cdef class Kernel:
     cdef object fail, error
     cdef readonly object name, shape, nan, context
     cdef object last_failure
+    cdef public object others
 
     def __cinit__(self, str name not None, Context context not None, shape, fail, nan=False, error=ValueError):
         set_quick_call(self)

@@ -1,5 +1,5 @@
-static int jacobian_here(double t, const double *restrict x, const double *restrict u, const double *restrict c,
-                         double *restrict out, double *restrict weakest, double *restrict w)
+static int jacobian_by_partition(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                                 double *restrict out, double *restrict weakest, double *restrict w)
 {
     partition parts;
     const int width = N + 1 + M;
