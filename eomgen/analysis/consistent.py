@@ -243,10 +243,10 @@ def _velocities(
         if largest(rate) == 0.0 or not largest(rate) < before or not J.any():
             break
         before = largest(rate)
-        fast = max(largest(v / scales.q), largest(rate))
+        fast = max(scales.speed(v), largest(rate))
         v[free] += algebra.solve(L.T, least(J, -rate / sizes, np.zeros(J.shape[1]), fast))
     rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
-    if largest(rate) > ACCEPTED * max(1.0, largest(v / scales.q)):
+    if largest(rate) > ACCEPTED * max(1.0, scales.speed(v)):
         worst = layout.constraint_labels[int(np.abs(rate).argmax())]
         kept = f" with {', '.join(held)} held" if held else ""
         raise ProjectionError(

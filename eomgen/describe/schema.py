@@ -32,6 +32,7 @@ from .fields import (
     PLACED,
     POINT,
     SHORT,
+    STATE,
     SIMULATION,
     SOLID,
     Field,
@@ -273,6 +274,7 @@ def model_schema() -> dict[str, Any]:
         "constraints": _section(
             {"oneOf": [_element("constraint", CONSTRAINTS, name) for name in CONSTRAINTS]}, MODEL["constraints"].doc
         ),
+        "states": _section(_short("states", STATE), MODEL["states"].doc),
         "outputs": _section(_short("outputs", OUTPUT_FIELDS), MODEL["outputs"].doc),
         "events": _section(_short("events", EVENT), MODEL["events"].doc),
         "lagrangian": {**_table(LAGRANGIAN), "description": MODEL["lagrangian"].doc},

@@ -68,9 +68,10 @@ def driver_files(program: Program) -> list[str]:
         files |= {"terms": None, "terms_loops" if program.has_loops else "terms_tree": None}
     if program.drivers:
         space = ("space_quaternions", "space_quaternions_more") if program.has_loops else ("space_quaternions",)
+        turned = program.quaternion_slots or program.given_rates or program.n_states
         if program.given_rates:
             space = ("space_given", "space_given_more") if program.has_loops else ("space_given",)
-        files.update(dict.fromkeys(space if program.quaternion_slots or program.given_rates else ("space_plain",)))
+        files.update(dict.fromkeys(space if turned else ("space_plain",)))
     for driver in program.drivers:
         if driver.name == "dae_jacobian":
             needed: tuple[str, ...] = ("dae_jacobian",)

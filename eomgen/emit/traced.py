@@ -82,7 +82,7 @@ def _context(program: Program, library: str, steps: int) -> dict[str, Any]:
     kinds = {type(f.evaluator) for f in functions}
     drivers = {d.name for d in program.drivers}
     has_loops, n_v = program.has_loops, sizes.n_v
-    space = Space.of(n_v, program.quaternion_slots)
+    space = Space.of(n_v, program.quaternion_slots, program.n_states)
     minimal = has_loops and "kinematics" in drivers
     public = _public(program, minimal)
     independent_q = [program.coordinate_of[k] if program.coordinate_of else k for k in program.preferred]

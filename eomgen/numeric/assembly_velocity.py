@@ -85,7 +85,7 @@ def assemble_velocity(
         v[free] -= scales.q[free] * (inverse @ e)
     e = J @ (v / scales.q) + offset / row_scales
     worst = float(np.abs(e).max()) if e.size else 0.0
-    speed = max([1.0, *np.abs(v / scales.q), *np.abs(offset / row_scales)])
+    speed = max([1.0, scales.speed(v), *np.abs(offset / row_scales)])
     if worst <= CONTRADICTION * speed:
         return Rates(v, worst)
     velocity_names = names or [f"v[{i}]" for i in range(len(v))]

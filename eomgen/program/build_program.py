@@ -127,6 +127,7 @@ def build_program(
         limits=limits,
         system=terms.system,
         projects=terms.projects,
+        n_states=terms.n_states,
     )
 
 

@@ -54,7 +54,9 @@ class Layout:
         self.quaternion_slots: tuple[tuple[int, int], ...] = tuple(
             (int(i), int(j)) for i, j in data.get("quaternion_slots", ())
         )
-        self.space = Space.of(self.n_v, self.quaternion_slots)
+        #: first-order states, which are the last of the velocities
+        self.states: tuple[str, ...] = tuple(data.get("states", ()))
+        self.space = Space.of(self.n_v, self.quaternion_slots, len(self.states))
         self.velocity_labels = tuple(n[:-4] if n.endswith("_dot") and n[:-4] in self.q else n for n in self.v)
         coordinate_of: list[int] | None = data.get("coordinate_of")
         if coordinate_of is not None:  # given equations name their velocities as they like

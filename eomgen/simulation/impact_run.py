@@ -193,7 +193,7 @@ class _ImpactRun:
 
     def _speed(self, x: Array) -> float:
         layout = self.module.layout
-        return float(np.abs(x[layout.n_q :] / layout.scales.q).max(initial=0.0)) * max(1.0, layout.length)
+        return layout.scales.speed(x[layout.n_q :]) * max(1.0, layout.length)
 
     def _go_on(self, t: float, x: Array, rates: Array) -> tuple[float, Array, NDArray[np.bool_]]:
         """Integrate to the next closing gap: the time and state there, and which gaps close."""
