@@ -77,16 +77,16 @@ def balance_forces(
     layout = module.layout
     scales, n_q, n_h, order = layout.scales, layout.n_q, layout.n_h, layout.independent
     rest = np.concatenate([q, np.zeros(layout.n_v - len(s)), s])
-    J = scales.jacobian(module.constraint_jacobian(q, t=t, rows="all"))
+    J = scales.jacobian(module.kernels.constraint_jacobian(q, t=t, rows="all"))
     split = partition(J, layout.rank, order if preferred is None else preferred)
     rate = scales.residual(module.velocity_constraints(rest, t=t, rows="all"))
     x = np.concatenate([q, scales.q * split.particular(-rate)])
     x[len(x) - len(s) :] = s
     a = module.rhs(t, x)[n_q:]
     if rate.any():
-        tree = module.mass_matrix(q, t=t) @ a
+        tree = module.kernels.mass_matrix(q, t=t) @ a
     else:  # nothing moves: no mass matters
-        tree = -module.bias(t, x)
+        tree = -module.kernels.bias(t, x)
     wider = _displacements(J[:n_h], split.independent) if n_h < layout.n_c else split
     surplus = np.setdiff1d(wider.independent, split.independent)
     if held is not None and len(held):
@@ -153,7 +153,7 @@ def slopes(
     motion = np.zeros_like(by_unknown, shape=(layout.n_v, by_unknown.shape[1]))
     if len(parameters) and n_h:
         moved = assembly_jacobian(module, t, x)[:n_h, layout.n_x + layout.n_u :][:, list(parameters)]
-        C_q = module.constraint_jacobian(x[:n_q], t=t, rows="all")[:n_h]
+        C_q = module.kernels.constraint_jacobian(x[:n_q], t=t, rows="all")[:n_h]
         stacked = np.vstack([scales.jacobian(C_q), held * scales.q])
         wanted = np.vstack([moved / scales.c[:n_h, None], held_by[:, list(parameters)]])
         step = -algebra.lstsq(stacked, wanted, rcond=STATE)

@@ -133,7 +133,7 @@ def describe(search: Search, point: SearchPoint, steps: int) -> Equilibrium:
 def _held_motion(search: Search, module: BoundModel, here: Balance, t: float) -> tuple[Array, SecondOrder | None]:
     """A of the motion with the held coordinates held, and its equations of second order where it has such."""
     n_q, s = module.n_q, module.layout.scales.q
-    tree = module.mass_matrix(here.x[:n_q], t=t)
+    tree = module.kernels.mass_matrix(here.x[:n_q], t=t)
     M = here.B.T @ tree @ here.B
     slopes, rates = force_slopes(module, t, here, lambda q: search.gradients(module, q))
     kept = here.positions < len(s) - here.n_states  # states are among the velocities

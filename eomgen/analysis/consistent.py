@@ -122,7 +122,7 @@ def _metric(
     layout = module.layout
     if weights == "mass":
         try:
-            return np.asarray(np.linalg.cholesky(module.mass_matrix(q, t=t)))
+            return np.asarray(np.linalg.cholesky(module.kernels.mass_matrix(q, t=t)))
         except np.linalg.LinAlgError:
             raise UsageError(
                 "weights='mass' needs a positive definite mass matrix of the tree, and this one is not: a body has no "
@@ -162,7 +162,7 @@ def _positions(
     scales = layout.scales
 
     def rows(q: Array) -> tuple[Array, Array]:
-        C_q = module.constraint_jacobian(q, t=t, rows="all")[:n_h][:, free] / scales.c[:n_h, None]
+        C_q = module.kernels.constraint_jacobian(q, t=t, rows="all")[:n_h][:, free] / scales.c[:n_h, None]
         return module.constraints(q, t=t, rows="all") / scales.c[:n_h], algebra.solve(L, C_q.T).T
 
     def moved(q: Array, y: Array) -> Array:
@@ -232,7 +232,7 @@ def _velocities(
     layout, scales = module.layout, module.layout.scales
     free = np.array([name not in held for name in layout.v])
     L = _metric(module, q, t, weights, layout.v)[np.ix_(free, free)]
-    J = module.constraint_jacobian(q, t=t, rows="all")[:, free] / scales.c[:, None]
+    J = module.kernels.constraint_jacobian(q, t=t, rows="all")[:, free] / scales.c[:, None]
     J = algebra.solve(L, J.T).T
     sizes = np.linalg.norm(J, axis=1)
     sizes = np.where(sizes > RANK * sizes.max(initial=0.0), sizes, np.inf)

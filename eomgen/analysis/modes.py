@@ -263,7 +263,7 @@ def modes(
         x = module.x0(x, t=t)[: module.n_q if at_rest else module.n_x]
     state = np.array(read_numbers("x", x))
     if state.shape == (module.n_q,):
-        state = np.concatenate([state, np.zeros(module.n_v)])
+        state = np.concatenate([state, np.zeros(module.layout.n_v)])
     linear = linearize(module, state, t, independent=independent)
     if not linear.is_equilibrium:
         k = int(np.abs(linear.drift).argmax())

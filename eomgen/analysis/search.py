@@ -137,7 +137,7 @@ class Search:
             K, rates = force_slopes(point.module, self.t, here, lambda q: self.gradients(point.module, q))
             basis, inverse = _orthonormal(here.Z / s[:, None])
             J = np.vstack([s[here.velocities, None] * K, (rates / s[:, None])[here.surplus]]) @ inverse
-            sizes = np.abs(here.B * s[here.velocities]).T @ np.abs(point.module.bias(self.t, here.x))
+            sizes = np.abs(here.B * s[here.velocities]).T @ np.abs(point.module.kernels.bias(self.t, here.x))
             sizes = np.concatenate([sizes, np.zeros(len(here.surplus))])
             flow: Array | None = None if len(here.surplus) else basis @ (inverse.T @ K @ inverse)
             return LinearizedResidual(
@@ -197,12 +197,12 @@ class Search:
         if self.supported:
             return np.eye(basis.shape[1])
         s = self.scale
-        return np.asarray(basis.T @ (s[:, None] * point.module.mass_matrix(point.q, t=self.t) * s) @ basis)
+        return np.asarray(basis.T @ (s[:, None] * point.module.kernels.mass_matrix(point.q, t=self.t) * s) @ basis)
 
     def mass(self, point: SearchPoint) -> Array:
         """Mass matrix of the independent velocities."""
         B = point.here.B
-        return np.asarray(B.T @ point.module.mass_matrix(point.q, t=self.t) @ B)
+        return np.asarray(B.T @ point.module.kernels.mass_matrix(point.q, t=self.t) @ B)
 
     def rounded(self, point: SearchPoint) -> float:
         """Scaled size of the numbers that the position is made of, at least 1."""

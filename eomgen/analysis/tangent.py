@@ -72,7 +72,7 @@ def find_tangent(
     scales, n_q, n_h = layout.scales, layout.n_q, layout.n_h
     preferred = layout.independent if independent is None else choose_velocities(layout, independent)
     strict = independent is not None
-    C_q = module.constraint_jacobian(x[:n_q], t=t, rows="all")
+    C_q = module.kernels.constraint_jacobian(x[:n_q], t=t, rows="all")
     J = scales.jacobian(C_q)
     B, velocities = _basis(J, layout.rank, preferred, strict, scales)
     if n_h == layout.n_c:
@@ -142,7 +142,7 @@ def projected_directions(module: BoundModel, t: float, x: Array, jacobian: Array
     if not layout.n_c:
         return np.eye(layout.n_x)
     q = x[:n_q]
-    dz = tangent_projector(module.constraint_jacobian(q, t=t, rows="all")[: layout.n_h], scales)
+    dz = tangent_projector(module.kernels.constraint_jacobian(q, t=t, rows="all")[: layout.n_h], scales)
     unit = np.eye(n_q)
     if space is None:
         dq = dz

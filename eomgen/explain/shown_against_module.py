@@ -97,17 +97,17 @@ def _energy(k: int) -> Callable[[StateNumbers], Wanted]:
 
 
 def _force(s: StateNumbers) -> Wanted:
-    terms = s.module.embedded_mass_matrix(s.q) * s.a[s.free]
+    terms = s.module.kernels.embedded_mass_matrix(s.q) * s.a[s.free]
     return terms.sum(axis=1), float(np.abs(terms).max(initial=0.0))
 
 
 def _gamma(s: StateNumbers) -> Wanted:
-    terms = s.module.constraint_jacobian(s.q) * s.a
+    terms = s.module.kernels.constraint_jacobian(s.q) * s.a
     return -terms.sum(axis=1), float(np.abs(terms).max(initial=0.0))
 
 
 def _velocity_constraints(s: StateNumbers) -> Wanted:
-    terms = s.module.constraint_jacobian(s.q) * s.v
+    terms = s.module.kernels.constraint_jacobian(s.q) * s.v
     return s.module.velocity_constraints(s.x), float(np.abs(terms).max(initial=0.0))
 
 
@@ -115,12 +115,12 @@ def _velocity_constraints(s: StateNumbers) -> Wanted:
 COMPARED: dict[str, Callable[[StateNumbers], Wanted]] = {
     "T": _energy(0),
     "V": _energy(1),
-    "mass_matrix": lambda s: (s.module.embedded_mass_matrix(s.q).ravel(), 0.0),
+    "mass_matrix": lambda s: (s.module.kernels.embedded_mass_matrix(s.q).ravel(), 0.0),
     "force": _force,
-    "momenta": lambda s: (s.module.mass_matrix(s.q) @ s.v, 0.0),
+    "momenta": lambda s: (s.module.kernels.mass_matrix(s.q) @ s.v, 0.0),
     "constraints": lambda s: (s.module.constraints(s.q), 1.0),
     "velocity_constraints": _velocity_constraints,
-    "constraint_jacobian": lambda s: (s.module.constraint_jacobian(s.q).ravel(), 0.0),
+    "constraint_jacobian": lambda s: (s.module.kernels.constraint_jacobian(s.q).ravel(), 0.0),
     "gamma": _gamma,
 }
 

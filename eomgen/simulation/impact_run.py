@@ -79,7 +79,7 @@ def simulate_impacts(
             )
     most = read_count("most, the number of impacts,", most, 1)
     found, _ = check_gaps(module.layout, gaps)
-    if not module.n_dof:
+    if not module.layout.n_dof:
         raise UsageError(
             f"{module.name} has no degree of freedom: its drivers determine the motion, and no impact can change it"
         )

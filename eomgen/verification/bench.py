@@ -150,7 +150,7 @@ class Bench:
         E_h = self.bounds("bias", lambda: self.terms.bias)[1][:, k]
         E_g = self.bounds("gamma", lambda: self.terms.gamma)[1][layout.rows, k]
         if self.terms.by_columns:
-            M = module.mass_matrix(case.q, p=case.p, u=case.u, t=case.t)
+            M = module.kernels.mass_matrix(case.q, p=case.p, u=case.u, t=case.t)
             E_M = n * UNIT * np.abs(M)
         d = np.sqrt(np.maximum(np.diag(M), 0.0))
         E_M = E_M + FOLDED * np.outer(d, d)
