@@ -45,7 +45,7 @@ def accelerations(bench: Bench, truth: Truth, values: Values) -> Numbers:
         chosen = kernels.get(name, outputs)
         return bench.system.evaluate(f"kernel {name}", chosen, values)  # type: ignore[arg-type]
 
-    M = of("mass_matrix", lambda: [x for row in bench.equations.tree.mass_matrix for x in row])
+    M = of("mass_matrix", lambda: [x for row in bench.terms.mass_matrix for x in row])
     C = of("constraint_jacobian", lambda: [x for row in terms.constraint_jacobian for x in row])
     gamma, h = of("gamma", lambda: terms.gamma), of("bias", lambda: terms.bias)
     C_rows = [C[n * i : n * i + n] for i in rows]

@@ -77,8 +77,9 @@ def _kinetic(module: BoundModel, cases: Sequence[Case]) -> Finding:
         return Finding.skipped(check, "there are no bodies")
     found = Comparison(check)
     for c in cases:
-        T, expected = float(module.energy(c.x, p=c.p, u=c.u, t=c.t)[0]), float(c.v @ _mass(module, c) @ c.v) / 2.0
-        size = float(np.abs(c.v) @ np.abs(_mass(module, c)) @ np.abs(c.v)) / 2.0
+        v, M = c.v[: module.n_v], module.mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
+        T, expected = float(module.energy(c.x, p=c.p, u=c.u, t=c.t)[0]), float(v @ M @ v) / 2.0
+        size = float(np.abs(v) @ np.abs(M) @ np.abs(v)) / 2.0
         found.add(c.number, [T - expected], [KERNEL * size], size)
     return found.finding()
 
