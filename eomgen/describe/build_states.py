@@ -6,7 +6,7 @@ from ..graph.core import Expr
 from .build_quantities import in_si, read_described
 from .description import DescribedEntry
 from .fields import LAW, STATE
-from .mechanism import State
+from .mechanism import FirstOrderState
 from .values import Reader, is_number
 
 
@@ -31,9 +31,9 @@ def declare_states(reader: Reader, entries: list[DescribedEntry], bare: bool) ->
     return usable
 
 
-def build_states(reader: Reader, entries: list[DescribedEntry]) -> tuple[tuple[State, ...], dict[str, Expr]]:
+def build_states(reader: Reader, entries: list[DescribedEntry]) -> tuple[tuple[FirstOrderState, ...], dict[str, Expr]]:
     """The states in the order of their declaration, and their initial values by name; faults are noted."""
-    states: list[State] = []
+    states: list[FirstOrderState] = []
     initial: dict[str, Expr] = {}
     for entry in entries:
         unit, doc = read_described(reader, entry, STATE)
@@ -45,5 +45,5 @@ def build_states(reader: Reader, entries: list[DescribedEntry]) -> tuple[tuple[S
             initial[entry.name] = reader.graph.constant(0.0 if value is None else value)
         elif start is not None:
             initial[entry.name] = reader.expression(path, start)
-        states.append(State(str(entry.name), rate, unit.si, doc))
+        states.append(FirstOrderState(str(entry.name), rate, unit.si, doc))
     return tuple(states), initial

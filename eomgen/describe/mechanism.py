@@ -173,7 +173,7 @@ class Output:
 
 
 @dataclass(frozen=True)
-class State:
+class FirstOrderState:
     """A first-order state s with s' = rate, beside the coordinates and velocities of the mechanism."""
 
     name: str
@@ -252,7 +252,7 @@ class Mechanism:
     joints: tuple[JointSpec, ...]
     forces: tuple[Force, ...]
     outputs: tuple[Output, ...]
-    states: tuple[State, ...] = ()
+    states: tuple[FirstOrderState, ...] = ()
     events: tuple[Event, ...] = ()
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
     element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from ..describe.input_names import rate_of, split_rate
-from ..describe.mechanism import Input, Output, Parameter, State
+from ..describe.mechanism import FirstOrderState, Input, Output, Parameter
 from ..equations.tree_equations import TreeEquations
 from ..equations.tree_slopes import ForceSlopes, can_differentiate
 from ..errors import UsageError
@@ -190,7 +190,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
     if m.bare:
         units = {}
     docs: dict[str, str] = {}
-    described: list[Parameter | Input | State | Output] = [*m.parameters, *m.inputs, *m.states, *m.outputs]
+    described: list[Parameter | Input | FirstOrderState | Output] = [*m.parameters, *m.inputs, *m.states, *m.outputs]
     for item in described:
         if item.unit:
             units[item.name] = item.unit

@@ -112,7 +112,7 @@ class SystemTerms:
         return (
             not self.given_rates
             and self.n_c == len(self.constraints)
-            and all(self.coordinate_of[k] >= 0 for k in self.preferred)
+            and all(self.coordinate_of[k] >= 0 for k in self.preferred if k < self.n_v - self.n_states)
         )
 
     @property

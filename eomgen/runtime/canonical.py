@@ -15,6 +15,7 @@ from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.projection import correct_position
 from ..numeric.scales import Array
+from .refusals import refuse_states
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ class Canonical:
 
     def __init__(self, module: BoundModel) -> None:
         layout = module.layout
+        refuse_states(layout, "the canonical form")
         if layout.n_momenta != layout.n_v:
             raise UnavailableError(
                 f"model {layout.name!r} was derived by method {layout.metadata.get('method')!r}, which has no momenta; "

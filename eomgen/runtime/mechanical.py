@@ -30,14 +30,14 @@ class Mechanical:
         layout = kernels.layout
         count = len(layout.states)
         n, free = layout.n_v - count, layout.n_dof - count
-        self.mass_matrix: Any = Part(kernels.mass_matrix, n, n)
-        self.embedded_mass_matrix: Any = Part(kernels.embedded_mass_matrix, free, free)
-        self.bias: Any = Part(kernels.bias, n)
-        self.constraint_jacobian: Any = Part(kernels.constraint_jacobian, None, n)
-        self.inverse_dynamics: Any = InverseDynamics(kernels, n)
+        self.mass_matrix: Any = MechanicalPart(kernels.mass_matrix, n, n)
+        self.embedded_mass_matrix: Any = MechanicalPart(kernels.embedded_mass_matrix, free, free)
+        self.bias: Any = MechanicalPart(kernels.bias, n)
+        self.constraint_jacobian: Any = MechanicalPart(kernels.constraint_jacobian, None, n)
+        self.inverse_dynamics: Any = MechanicalInverse(kernels, n)
 
 
-class Part:
+class MechanicalPart:
     """The first rows and columns of a function's result; None: all."""
 
     def __init__(self, function: Any, *kept: int | None) -> None:
@@ -51,7 +51,7 @@ class Part:
         return repr(self.function)
 
 
-class InverseDynamics:
+class MechanicalInverse:
     """Generalized forces to add, (n_v,), for accelerations a at q and [v; s]."""
 
     def __init__(self, kernels: Kernels, n: int) -> None:
