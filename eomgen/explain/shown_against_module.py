@@ -53,11 +53,11 @@ class StateNumbers(NamedTuple):
 
     @property
     def v(self) -> Any:
-        return self.x[self.module.n_q :]
+        return self.x[self.module.n_q : self.module.n_q + self.module.n_v]
 
     @property
     def a(self) -> Any:
-        return self.module.rhs(0.0, self.x)[self.module.n_q :]
+        return self.module.rhs(0.0, self.x)[self.module.n_q : self.module.n_q + self.module.n_v]
 
 
 def compare(author: Author, module: Any) -> Difference:
@@ -69,7 +69,7 @@ def compare(author: Author, module: Any) -> Difference:
     moves = bool(equations.mobility.n_dof)
     for seed in range(STATES):
         x = random_state(module, seed + 1)
-        free = list(module.layout.metadata["independent"])
+        free = module.layout.independent_moving.tolist()
         state = StateNumbers(module, x, state_values(module, x, 0.0), free)
         for name, of_module in COMPARED.items():
             if name in wanted and (moves or name in ("T", "V")):
@@ -97,17 +97,17 @@ def _energy(k: int) -> Callable[[StateNumbers], Wanted]:
 
 
 def _force(s: StateNumbers) -> Wanted:
-    terms = s.module.kernels.embedded_mass_matrix(s.q) * s.a[s.free]
+    terms = s.module.embedded_mass_matrix(s.q) * s.a[s.free]
     return terms.sum(axis=1), float(np.abs(terms).max(initial=0.0))
 
 
 def _gamma(s: StateNumbers) -> Wanted:
-    terms = s.module.kernels.constraint_jacobian(s.q) * s.a
+    terms = s.module.constraint_jacobian(s.q) * s.a
     return -terms.sum(axis=1), float(np.abs(terms).max(initial=0.0))
 
 
 def _velocity_constraints(s: StateNumbers) -> Wanted:
-    terms = s.module.kernels.constraint_jacobian(s.q) * s.v
+    terms = s.module.constraint_jacobian(s.q) * s.v
     return s.module.velocity_constraints(s.x), float(np.abs(terms).max(initial=0.0))
 
 
@@ -115,12 +115,12 @@ def _velocity_constraints(s: StateNumbers) -> Wanted:
 COMPARED: dict[str, Callable[[StateNumbers], Wanted]] = {
     "T": _energy(0),
     "V": _energy(1),
-    "mass_matrix": lambda s: (s.module.kernels.embedded_mass_matrix(s.q).ravel(), 0.0),
+    "mass_matrix": lambda s: (s.module.embedded_mass_matrix(s.q).ravel(), 0.0),
     "force": _force,
-    "momenta": lambda s: (s.module.kernels.mass_matrix(s.q) @ s.v, 0.0),
+    "momenta": lambda s: (s.module.mass_matrix(s.q) @ s.v, 0.0),
     "constraints": lambda s: (s.module.constraints(s.q), 1.0),
     "velocity_constraints": _velocity_constraints,
-    "constraint_jacobian": lambda s: (s.module.kernels.constraint_jacobian(s.q).ravel(), 0.0),
+    "constraint_jacobian": lambda s: (s.module.constraint_jacobian(s.q).ravel(), 0.0),
     "gamma": _gamma,
 }
 
