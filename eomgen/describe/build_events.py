@@ -68,7 +68,9 @@ def _instant(reader: Reader, path: str, value: Any) -> Expr:
     """An expression of what is known of a state without solving for accelerations."""
     expression = reader.expression(path, value, OUTPUT)
     for name, what in late_names(reader.names, symbols_of([expression])):
-        remedy = "allowed are t, parameters, inputs, coordinates, velocities, states, positions and velocities of markers"
+        remedy = (
+            "allowed are t, parameters, inputs, coordinates, velocities, states, positions and velocities of markers"
+        )
         reader.faults.add(path, f"the {what} {name!r} cannot be used in an event", remedy)
     return expression
 
@@ -83,6 +85,7 @@ def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...
         if name in known:
             result.append((str(name), _instant(reader, f"{path}.{name}", value)))
         else:
-            remedy = nearest(shown(name), known, "coordinates, velocities and states")
-            reader.faults.add(f"{path}.{name}", f"no coordinate, velocity or state {name!r}", remedy)
+            states = bool(reader.description.sections["states"])
+            remedy = nearest(shown(name), known, f"coordinates and velocities{' and states' * states}")
+            reader.faults.add(f"{path}.{name}", f"no coordinate or velocity{' or state' * states} {name!r}", remedy)
     return tuple(result)

@@ -20,7 +20,9 @@ def declare_states(reader: Reader, entries: list[DescribedEntry], bare: bool) ->
     """
     if entries and bare:
         message = "a bare Lagrangian, or equations, have no states beside them"
-        reader.faults.add("states", message, "write them as velocities of from_equations, or describe bodies and joints")
+        reader.faults.add(
+            "states", message, "write them as velocities of from_equations, or describe bodies and joints"
+        )
     usable = []
     for entry in entries:
         if isinstance(entry.name, str) and entry.name.endswith("_dot"):

@@ -66,7 +66,7 @@ OUTPUT_FIELDS: Fields = {
 STATE: Fields = {
     "rate": Field(
         "expression",
-        "its derivative by time: of t, parameters, inputs, coordinates, rates, states, positions, velocities of markers",
+        "its derivative: of t, parameters, inputs, coordinates, rates, states, positions and velocities of markers",
         required=True,
         level=LAW,
     ),

@@ -16,7 +16,7 @@ from ..errors import NonFiniteError, SingularMassMatrixError
 from . import algebra
 from .definite import indefinite_factor, moves_inertia, safely_positive
 from .partitions import Partition, partition
-from .projection import largest, minimum_norm, project, tangent_projector
+from .projection import minimum_norm, project, tangent_projector
 from .scales import Array, GivenRates, Indices, Position, Rate, Scales
 
 

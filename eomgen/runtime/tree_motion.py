@@ -158,7 +158,9 @@ class DependentMotion:
             )
 
     def _place(self, target: Array) -> str:
-        return place([self.layout.velocity_labels[i] for i in self.layout.independent_moving], target).removeprefix(", ")
+        return place([self.layout.velocity_labels[i] for i in self.layout.independent_moving], target).removeprefix(
+            ", "
+        )
 
     def _blocked(self, target: Array, found: Array) -> EvaluationError:
         """Why the step to independent values failed."""

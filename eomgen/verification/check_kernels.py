@@ -41,7 +41,9 @@ def _derived(bench: Bench) -> list[Finding]:
             C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
             shift, n = bench.shift(k, C), module.n_x
             limit = (
-                2.0 * bound + np.abs(slope[:, :n]) @ shift + np.abs(slope[:, n : n + module.layout.n_v]) @ bench.moved(k, C)
+                2.0 * bound
+                + np.abs(slope[:, :n]) @ shift
+                + np.abs(slope[:, n : n + module.layout.n_v]) @ bench.moved(k, C)
             )
             outputs.add(k, actual - expected, limit, size_of(expected), bench.layout.y)
         found.append(outputs.finding())

@@ -59,7 +59,9 @@ def _definite(module: BoundModel, cases: Sequence[Case]) -> Finding:
     """The matrix of the degrees of freedom, each scaled to a unit diagonal."""
     check = "embedded_mass_matrix: symmetric, positive definite"
     if not module.layout.n_dof or module.layout.given_rates:
-        return Finding.skipped(check, "there is no degree of freedom" if not module.layout.n_dof else "equations are given")
+        return Finding.skipped(
+            check, "there is no degree of freedom" if not module.layout.n_dof else "equations are given"
+        )
     if module.metadata.get("indefinite"):
         return Finding.skipped(check, "the model accepts masses and inertias that no body can have")
     found = Comparison(check, "asymmetry; or the smallest eigenvalue at unit diagonal, sign reversed")

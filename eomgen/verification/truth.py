@@ -183,8 +183,8 @@ class Truth(PreciseState):
             k = self.system.kinematics.loop_coordinates.names.index(name)
             bend = self.bend(self.measured, self.later)[k]
             total = [f + inertia * bend * y for f, y in zip(total, self.coordinate_slopes(name), strict=True)]
-        rates = self.system.evaluate("states", lambda: self.system.kinematics.state_rates, self.values)
-        return [*total[: self.n - len(rates)], *(-s for s in rates)]
+        flow = self.system.evaluate("states", lambda: self.system.kinematics.state_rates, self.values)
+        return [*total[: self.n - len(flow)], *(-s for s in flow)]
 
     def inverse_dynamics(self, a: Sequence[Number]) -> Numbers:
         """M a + h."""

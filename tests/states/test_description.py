@@ -31,7 +31,11 @@ FAULTS: dict[str, tuple[Callable[[eg.Model], object], str, str]] = {
     "no number": (lambda m: m.state("a", 1, initial=float("nan")), "states.a.initial", "nan is not a number"),
     "infinite": (lambda m: m.state("a", 1, initial=float("inf")), "states.a.initial", "inf is not a number"),
     "unknown name": (lambda m: m.state("a", "s/tua"), "states.a.rate", "did you mean 'tau'?"),
-    "acceleration": (lambda m: m.state("a", "s_ddot"), "states.a.rate", "the acceleration 's_ddot' cannot be used here"),
+    "acceleration": (
+        lambda m: m.state("a", "s_ddot"),
+        "states.a.rate",
+        "the acceleration 's_ddot' cannot be used here",
+    ),
     "of a marker": (lambda m: m.state("a", "ax(body)"), "states.a.rate", "the acceleration of a marker"),
     "its own rate": (lambda m: m.state("a", "-a_dot"), "states.a.rate", "the rate of a state 'a_dot'"),
     "initial of s": (lambda m: m.state("a", 1, initial="s"), "states.a.initial", "the coordinate 's' cannot be used"),

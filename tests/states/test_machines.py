@@ -157,7 +157,9 @@ def test_an_exported_package_has_states(tmp_path: Path, slim: bool) -> None:
         "print(json.dumps([list(mod.x_names), mod.rhs(0.0, x).tolist(), mod.simulate(0.3, rtol=1e-10)['z'][-1]]))"
     )
     env = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"PYTHONPATH": str(tmp_path / "out")}
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=tmp_path, env=env)
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=tmp_path, env=env
+    )
     import json
 
     names, rates, z = json.loads(done.stdout)
@@ -170,7 +172,9 @@ def test_an_exported_package_has_states(tmp_path: Path, slim: bool) -> None:
 def test_a_functional_mock_up_unit_has_states(tmp_path: Path) -> None:
     fmpy = pytest.importorskip("fmpy")
     file = servo().derive().write_fmu(tmp_path / "servo.fmu")
-    run = fmpy.simulate_fmu(str(file), stop_time=0.3, output=["z", "w"], relative_tolerance=1e-9, start_values={"z": 0.3})
+    run = fmpy.simulate_fmu(
+        str(file), stop_time=0.3, output=["z", "w"], relative_tolerance=1e-9, start_values={"z": 0.3}
+    )
     alone = solve_ivp(lambda t, x: by_hand(x), (0, 0.3), [0.2, 0, 0.3, 0], rtol=1e-11, atol=1e-12)
     assert [run["z"][-1], run["w"][-1]] == pytest.approx(alone.y[2:, -1].tolist(), abs=1e-5)
 
