@@ -33,6 +33,7 @@ class Sizes(NamedTuple):
     n_events: int = 0
     n_resets: int = 0  #: states that events give new values
     n_strike: int = 0  #: rows of what velocities obey where an event changes them, 0 where they just change
+    n_states: int = 0  #: first-order states, the last of the n_v velocities and of the n_dof independent ones
     n_dae: int = 0  #: unknowns [q; v; multipliers; corrections] of the differential-algebraic form
 
 
@@ -61,7 +62,8 @@ class Kernel(NamedTuple):
     def length(self, sizes: Sizes) -> int:
         """How many numbers ``x`` has."""
         each = {"q": sizes.n_q, "q_guess": sizes.n_q, "q_rate": sizes.n_q, "v": sizes.n_v, "a": sizes.n_v, "cj": 1}
-        each |= dict.fromkeys(("q_i", "v_i", "a_i"), sizes.n_dof) | {"impulses": sizes.n_events}
+        each |= dict.fromkeys(("v_i", "a_i"), sizes.n_dof) | {"q_i": sizes.n_dof - sizes.n_states}
+        each["impulses"] = sizes.n_events
         each |= dict.fromkeys(("multipliers", "multiplier_rates"), sizes.n_c)
         each |= dict.fromkeys(("corrections", "correction_rates"), sizes.n_h) | {"rate_weights": sizes.n_x}
         each |= {"dq": sizes.n_q, "du": sizes.n_u} | dict.fromkeys(("dv", "da", "weights"), sizes.n_v)

@@ -41,15 +41,23 @@ class Balance(NamedTuple):
     forces: Array  #: (n_dof - k,) B^T Q
     tree: Array  #: (n_v,) Q of the tree
     size: float  #: largest entry of Q, scaled, to compare with
+    n_states: int  #: first-order states, which count as displacements whose accelerations are their rates
 
     @property
     def v(self) -> Array:
-        """(n_v,) velocities that the constraints enforce."""
-        return self.x[len(self.x) - len(self.a) :]
+        """(n_v,) velocities that the constraints enforce, 0 for first-order states."""
+        v = np.array(self.x[len(self.x) - len(self.a) :])
+        v[len(v) - self.n_states :] = 0.0
+        return v
 
 
 def balance_forces(
-    module: BoundModel, t: float, q: Array, held: Array | None = None, preferred: Indices | None = None
+    module: BoundModel,
+    t: float,
+    q: Array,
+    s: Array,
+    held: Array | None = None,
+    preferred: Indices | None = None,
 ) -> Balance:
     """The forces at a position on the constraints.
 
@@ -60,22 +68,25 @@ def balance_forces(
     module : BoundModel
     t : float
     q : (n_q,) array
+    s : (n_s,) array
+        First-order states.
     held : (k, n_v) array, optional
         Gradients of held coordinates by displacements, which no virtual displacement may change.
     preferred : (n_dof,) indices, optional
     """
     layout = module.layout
     scales, n_q, n_h, order = layout.scales, layout.n_q, layout.n_h, layout.independent
-    rest = np.concatenate([q, np.zeros(layout.n_v)])
-    J = scales.jacobian(module.constraint_jacobian(q, t=t, rows="all"))
+    rest = np.concatenate([q, np.zeros(layout.n_v - len(s)), s])
+    J = scales.jacobian(module.kernels.constraint_jacobian(q, t=t, rows="all"))
     split = partition(J, layout.rank, order if preferred is None else preferred)
     rate = scales.residual(module.velocity_constraints(rest, t=t, rows="all"))
     x = np.concatenate([q, scales.q * split.particular(-rate)])
+    x[len(x) - len(s) :] = s
     a = module.rhs(t, x)[n_q:]
     if rate.any():
-        tree = module.mass_matrix(q, t=t) @ a
+        tree = module.kernels.mass_matrix(q, t=t) @ a
     else:  # nothing moves: no mass matters
-        tree = -module.bias(t, x)
+        tree = -module.kernels.bias(t, x)
     wider = _displacements(J[:n_h], split.independent) if n_h < layout.n_c else split
     surplus = np.setdiff1d(wider.independent, split.independent)
     if held is not None and len(held):
@@ -85,7 +96,7 @@ def balance_forces(
         wider = _displacements(np.vstack([J[:n_h], holding]), split.independent) if n_h < layout.n_c else split
     B, Z = (scales.q[:, None] * one.B / scales.q[one.independent] for one in (split, wider))
     size = float(np.abs(scales.q * tree).max(initial=0.0))
-    return Balance(x, split.independent, B, wider.independent, Z, surplus, a, B.T @ tree, tree, size)
+    return Balance(x, split.independent, B, wider.independent, Z, surplus, a, B.T @ tree, tree, size, len(s))
 
 
 def _displacements(J: Array, velocities: Indices) -> Partition:
@@ -135,21 +146,23 @@ def slopes(
     layout = module.layout
     n_q, n_h, scales = layout.n_q, layout.n_h, layout.scales
     J = module.jacobian(t, x)
-    tangent = find_tangent(module, t, x, J)
+    tangent = find_tangent(module, t, x, J, states=True)
     P = module.parameter_jacobian(t, x)[:, list(parameters)]
     U = module.input_jacobian(t, x)[:, list(inputs)]
     by_unknown = np.hstack([P, U])[n_q:]
     motion = np.zeros_like(by_unknown, shape=(layout.n_v, by_unknown.shape[1]))
     if len(parameters) and n_h:
         moved = assembly_jacobian(module, t, x)[:n_h, layout.n_x + layout.n_u :][:, list(parameters)]
-        C_q = module.constraint_jacobian(x[:n_q], t=t, rows="all")[:n_h]
+        C_q = module.kernels.constraint_jacobian(x[:n_q], t=t, rows="all")[:n_h]
         stacked = np.vstack([scales.jacobian(C_q), held * scales.q])
         wanted = np.vstack([moved / scales.c[:n_h, None], held_by[:, list(parameters)]])
         step = -algebra.lstsq(stacked, wanted, rcond=STATE)
         motion[:, : len(parameters)] = scales.q[:, None] * step
         by_unknown = by_unknown + (J[:, :n_q] @ scales.rates(x[:n_q], motion))[n_q:]
     along = tangent.T[:, : tangent.Z.shape[1]]
-    return BalanceSlopes(tangent.Z, (J @ along)[n_q:], along[n_q:], by_unknown, motion)
+    rates = np.array(along[n_q:])
+    rates[layout.n_v - len(layout.states) :] = 0.0
+    return BalanceSlopes(tangent.Z, (J @ along)[n_q:], rates, by_unknown, motion)
 
 
 def assembly_jacobian(module: BoundModel, t: float, x: Array) -> Array:
@@ -176,12 +189,14 @@ def force_slopes(
     """
     layout, scales = module.layout, module.layout.scales
     forces, rates = [], []
+    moving, s = layout.n_v - here.n_states, here.x[layout.n_x - here.n_states :]
     for k, column in zip(here.positions, here.Z.T, strict=True):
-        h, sides = step * scales.q[k], []
+        h, sides = step * (scales.q[k] if k < moving else max(1.0, abs(s[k - moving]))), []
         for sign in (1.0, -1.0):
             q = scales.move(here.x[: layout.n_q], sign * h * column / scales.q)
             q = module.project(np.concatenate([q, np.zeros(layout.n_v)]), t=t)[: layout.n_q]
-            sides.append(balance_forces(module, t, q, gradients(q), here.velocities))
+            there = s + sign * h * column[moving:]
+            sides.append(balance_forces(module, t, q, there, gradients(q), here.velocities))
         forces.append((sides[0].forces - sides[1].forces) / (2.0 * h))
         rates.append((sides[0].v - sides[1].v) / (2.0 * h))
     width = len(here.positions)

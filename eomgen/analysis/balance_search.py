@@ -27,7 +27,7 @@ def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
     ------
     EquilibriumError
     """
-    start = search.at(q, search.initial_unknowns())
+    start = search.start(q)
     first, steps, found = newton(search, start, reach=REACH)
     if found:
         return first, steps
@@ -55,7 +55,7 @@ def _failure(search: Search, point: SearchPoint) -> EquilibriumError:
     here, layout = point.here, search.layout
     names = [layout.velocity_labels[k] for k in here.velocities]
     left = dict(zip(names, here.forces.tolist(), strict=True))
-    where = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, point.q, strict=True))
+    where = ", ".join(f"{n} = {x:.6g}" for n, x in zip((*layout.q, *layout.states), (*point.q, *point.s), strict=True))
     head = f"no equilibrium of {layout.name!r} found from this guess: "
     rates = np.abs(here.v / layout.scales.q)[here.surplus]
     if rates.size and rates.max() > MOVING:
@@ -68,8 +68,9 @@ def _failure(search: Search, point: SearchPoint) -> EquilibriumError:
         )
     scaled = np.abs(here.forces * layout.scales.q[here.velocities])
     worst = int(scaled.argmax())
+    what = "rate of the state" if names[worst] in layout.states else "generalized force along"
     return EquilibriumError(
-        f"{head}the generalized force along {names[worst]} is still {here.forces[worst]:.6g} at {where}; give "
+        f"{head}the {what} {names[worst]} is still {here.forces[worst]:.6g} at {where}; give "
         "another guess, or hold a coordinate that no force balances",
         left,
     )

@@ -21,7 +21,7 @@ from .tables import as_html, as_text, number, without_noise
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from .search import Search
+    from .search import Search, SearchPoint
 
 
 class Equilibrium:
@@ -34,10 +34,12 @@ class Equilibrium:
     q : (n_q,) array
     coordinates : dict of str to float
         All of them, those of cut joints included.
+    states : dict of str to float
+        First-order states, whose rates vanish too.
     unknowns : dict of str to float
         Parameters and inputs that were solved for.
     forces : dict of str to float
-        What is left of the generalized force along each independent coordinate (N, N m).
+        What is left of the generalized force along each independent coordinate (N, N m), and of the rates of states.
     supports : dict of str to float
         Generalized force (N, N m) that holds each held coordinate, where no unknowns balance it.
     eigenvalues : (n,) complex array
@@ -55,6 +57,7 @@ class Equilibrium:
     def __init__(self, module: BoundModel, t: float, x: Array, found: dict[str, Any]) -> None:
         self.module, self.t, self.x, self.q = module, t, x, x[: module.n_q]
         self.coordinates: dict[str, float] = found["coordinates"]
+        self.states: dict[str, float] = found["states"]
         self.unknowns: dict[str, float] = found["unknowns"]
         self.forces: dict[str, float] = found["forces"]
         self.supports: dict[str, float] = found["supports"]
@@ -64,9 +67,9 @@ class Equilibrium:
         self.steps: int = found["steps"]
 
     def __getitem__(self, name: str) -> float:
-        values = {**self.coordinates, **self.unknowns}
+        values = {**self.coordinates, **self.states, **self.unknowns}
         if name not in values:
-            raise unknown("coordinate or unknown", name, values)
+            raise unknown("coordinate, state or unknown", name, values)
         return values[name]
 
     @property
@@ -81,6 +84,7 @@ class Equilibrium:
         ]
         shown = without_noise([*self.coordinates.values()], units, sizes)
         lines = [(name, f"{value:.10g}") for name, value in zip(self.coordinates, shown, strict=True)]
+        lines += [(name, f"{value:.10g}") for name, value in self.states.items()]
         lines += [(f"{name} (solved)", f"{value:.10g}") for name, value in self.unknowns.items()]
         lines += [(f"support at {name}", f"{value:.6g}") for name, value in self.supports.items()]
         lines.append(("largest force left", f"{max(map(abs, self.forces.values()), default=0.0):.2g}"))
@@ -94,14 +98,16 @@ class Equilibrium:
         return as_html(f"Equilibrium of {self.module.name}", self.facts)
 
 
-def describe(search: Search, module: BoundModel, q: Array, unknowns: Array, steps: int) -> Equilibrium:
+def describe(search: Search, point: SearchPoint, steps: int) -> Equilibrium:
     """The result at a balanced position."""
-    t, layout = search.t, module.layout
+    t, module, q, s = search.t, point.module, point.q, point.s
+    layout = module.layout
     held = search.gradients(module, q) if search.supported else None
-    here = balance_forces(module, t, q, held)
+    here = balance_forces(module, t, q, s, held)
     found: dict[str, Any] = {
         "coordinates": read_coordinates(module, q, t),
-        "unknowns": dict(zip(search.names, unknowns.tolist(), strict=True)),
+        "states": dict(zip(layout.states, s.tolist(), strict=True)),
+        "unknowns": dict(zip(search.names, point.unknowns.tolist(), strict=True)),
         "forces": {layout.velocity_labels[k]: float(f) for k, f in zip(here.velocities, here.forces, strict=True)},
         "supports": {},
         "linear": None,
@@ -111,7 +117,7 @@ def describe(search: Search, module: BoundModel, q: Array, unknowns: Array, step
         linear = linearize(module, here.x, t)
         found |= {"linear": linear, "eigenvalues": linear.eigenvalues, "stability": linear.stability}
     else:
-        free = balance_forces(module, t, q)
+        free = balance_forces(module, t, q, s)
         pull = algebra.lstsq((held @ free.B).T, free.forces, rcond=STATE)
         rows = search.held_rows(module, q)
         found["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
@@ -127,18 +133,20 @@ def describe(search: Search, module: BoundModel, q: Array, unknowns: Array, step
 def _held_motion(search: Search, module: BoundModel, here: Balance, t: float) -> tuple[Array, SecondOrder | None]:
     """A of the motion with the held coordinates held, and its equations of second order where it has such."""
     n_q, s = module.n_q, module.layout.scales.q
-    tree = module.mass_matrix(here.x[:n_q], t=t)
+    tree = module.kernels.mass_matrix(here.x[:n_q], t=t)
     M = here.B.T @ tree @ here.B
     slopes, rates = force_slopes(module, t, here, lambda q: search.gradients(module, q))
+    kept = here.positions < len(s) - here.n_states  # states are among the velocities
+    positions, slopes, rates = here.positions[kept], slopes[:, kept], rates[:, kept]
     damping = module.jacobian(t, here.x)[n_q:, n_q:]
     K, C = -slopes, -here.B.T @ tree @ damping @ here.B
     A = np.block([
-        [rates[here.positions], here.B[here.positions]],
+        [rates[positions], here.B[positions]],
         [-algebra.solve(M, K), -algebra.solve(M, C)],
     ])  # fmt: skip
-    if len(here.positions) != len(M) or np.any(here.v):
+    if len(positions) != len(M) or np.any(here.v):
         return A, None
-    K_error = stiffness_errors(M, A[len(M) :, : len(M)], np.zeros(0), s[here.positions], DIFFERENCES)
+    K_error = stiffness_errors(M, A[len(M) :, : len(M)], np.zeros(0), s[positions], DIFFERENCES)
     C_error = DIFFERENCES * np.abs(here.B).T @ np.abs(tree) @ np.abs(damping) @ np.abs(here.B)
     return A, SecondOrder(M, C, K, C_error, K_error)
 

@@ -122,7 +122,7 @@ def _metric(
     layout = module.layout
     if weights == "mass":
         try:
-            return np.asarray(np.linalg.cholesky(module.mass_matrix(q, t=t)))
+            return np.asarray(np.linalg.cholesky(module.kernels.mass_matrix(q, t=t)))
         except np.linalg.LinAlgError:
             raise UsageError(
                 "weights='mass' needs a positive definite mass matrix of the tree, and this one is not: a body has no "
@@ -162,7 +162,7 @@ def _positions(
     scales = layout.scales
 
     def rows(q: Array) -> tuple[Array, Array]:
-        C_q = module.constraint_jacobian(q, t=t, rows="all")[:n_h][:, free] / scales.c[:n_h, None]
+        C_q = module.kernels.constraint_jacobian(q, t=t, rows="all")[:n_h][:, free] / scales.c[:n_h, None]
         return module.constraints(q, t=t, rows="all") / scales.c[:n_h], algebra.solve(L, C_q.T).T
 
     def moved(q: Array, y: Array) -> Array:
@@ -232,7 +232,7 @@ def _velocities(
     layout, scales = module.layout, module.layout.scales
     free = np.array([name not in held for name in layout.v])
     L = _metric(module, q, t, weights, layout.v)[np.ix_(free, free)]
-    J = module.constraint_jacobian(q, t=t, rows="all")[:, free] / scales.c[:, None]
+    J = module.kernels.constraint_jacobian(q, t=t, rows="all")[:, free] / scales.c[:, None]
     J = algebra.solve(L, J.T).T
     sizes = np.linalg.norm(J, axis=1)
     sizes = np.where(sizes > RANK * sizes.max(initial=0.0), sizes, np.inf)
@@ -243,10 +243,10 @@ def _velocities(
         if largest(rate) == 0.0 or not largest(rate) < before or not J.any():
             break
         before = largest(rate)
-        fast = max(largest(v / scales.q), largest(rate))
+        fast = max(scales.speed(v), largest(rate))
         v[free] += algebra.solve(L.T, least(J, -rate / sizes, np.zeros(J.shape[1]), fast))
     rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
-    if largest(rate) > ACCEPTED * max(1.0, largest(v / scales.q)):
+    if largest(rate) > ACCEPTED * max(1.0, scales.speed(v)):
         worst = layout.constraint_labels[int(np.abs(rate).argmax())]
         kept = f" with {', '.join(held)} held" if held else ""
         raise ProjectionError(

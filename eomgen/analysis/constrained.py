@@ -53,7 +53,7 @@ class ProjectedStates(NamedTuple):
 
     def residual(self, a: Array) -> Array:
         """M a + h, (n_v, k)."""
-        return self.evaluate(self.module.inverse_dynamics, self.q, self.v, a)
+        return self.evaluate(self.module.kernels.inverse_dynamics, self.q, self.v, a)
 
     def shaped(self, result: Array, out: Array | None = None) -> Array:
         """A result (..., k) as it was asked for."""

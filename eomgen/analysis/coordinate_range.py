@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import UsageError
 from ..runtime.given_start import Start
 from ..runtime.near_names import unknown
-from ..runtime.refusals import require_velocities
+from ..runtime.refusals import refuse_states, require_velocities
 from ..runtime.room import read_number, read_numbers
 from ..texts import shown
 from .driven_coordinates import DrivenCoordinates, DrivenPath
@@ -91,6 +91,7 @@ def motion_range(
         As :meth:`kinematic_analysis`.
     """
     require_velocities(module.layout)
+    refuse_states(module.layout, "motion_range")
     if parameters is not None or inputs is not None:
         module = module.bind(parameters, inputs)
     with np.errstate(all="ignore"):

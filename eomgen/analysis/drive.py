@@ -24,6 +24,7 @@ from ..numeric.partitions import partition
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.near_names import read_names
+from ..runtime.refusals import refuse_states
 from ..runtime.room import read_numbers
 from ..suggestions import hint, joined
 from .constrained import ProjectedStates, free_motions, prepare, solve_multipliers
@@ -116,6 +117,7 @@ def actuator_forces(
     """
     module = module if p is None and u is None else module.bind(p, u)
     layout = module.layout
+    refuse_states(layout, "actuator_forces")
     states = prepare(module, t, x)
     count = len(states.t)
     names = _drives(layout, actuated)
@@ -185,7 +187,7 @@ def _check_inputs(
         for i, j in inputs:
             u[j] = forces[i, k]
         left = B.T @ (
-            module.inverse_dynamics(states.q[:, k], states.v[:, k], a[:, k], u=u, t=float(states.t[k]))
+            module.kernels.inverse_dynamics(states.q[:, k], states.v[:, k], a[:, k], u=u, t=float(states.t[k]))
             - S[:, others, k] @ forces[others, k]
         )
         size = np.abs(B).T @ (np.abs(S[:, :, k]) @ np.abs(forces[:, k]))
@@ -318,7 +320,7 @@ def _input_effect(states: ProjectedStates, j: int) -> Array:
     for step in (-1.0, 0.0, 1.0):
         u = module.u
         u[j] += step
-        h.append(np.asarray(module.bias(states.t, states.x, u=u)))
+        h.append(np.asarray(module.kernels.bias(states.t, states.x, u=u)))
     slope, bend = 0.5 * (h[0] - h[2]), h[0] - 2.0 * h[1] + h[2]
     if np.abs(bend).max(initial=0.0) > AFFINE * max(*(np.abs(y).max(initial=0.0) for y in h), TINY):
         raise UsageError(

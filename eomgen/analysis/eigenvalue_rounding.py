@@ -135,7 +135,7 @@ def own_accelerations(module: BoundModel, t: float, x: Array, B: Array, velociti
     """
     if not len(mass):
         return np.zeros(0)
-    forces = np.abs(B).T @ np.abs(module.bias(t, x))
+    forces = np.abs(B).T @ np.abs(module.kernels.bias(t, x))
     try:
         return np.asarray(np.abs(np.linalg.inv(mass)) @ forces / module.layout.scales.q[velocities])
     except np.linalg.LinAlgError:

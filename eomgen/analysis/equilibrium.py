@@ -35,14 +35,14 @@ def equilibrium(
     hold: Mapping[str, float | None] | Sequence[str] = (),
     unknowns: Sequence[str] = (),
 ) -> Equilibrium:
-    """Find a position at rest in which all forces are in balance (by virtual work).
+    """Find a position at rest in which all forces are in balance (by virtual work) and no first-order state changes.
 
     Newton's iteration is tried first, then the motion in a viscous fluid, then the method of Levenberg and Marquardt.
 
     Parameters
     ----------
     guess : mapping of str to float, or (n_q,) array, optional
-        Where to start: coordinates by name, or all of them; the declared initial position by default.
+        Where to start: coordinates and states by name, or all coordinates; the declared initial position by default.
     t : float
         Time (s), held fixed.  Constraints that move in time move with the velocities they have then.
     p, u : optional
@@ -77,7 +77,7 @@ def equilibrium(
     given = {name: read_value(f"hold: {name}", value) for name, value in wanted.items() if value is not None}
     initial = Initial(module.kernels, time)
     if initial.sort(given).rates:
-        raise UsageError(f"hold takes coordinates, not rates: {', '.join(initial.sort(given).rates)}")
+        raise UsageError(f"hold takes coordinates, not rates or states: {', '.join(initial.sort(given).rates)}")
     q = _start(module, guess, given, time)
     here = read_coordinates(module, q, time)
     for name in wanted:
@@ -85,7 +85,7 @@ def equilibrium(
             raise unknown("coordinate", name, here)
         given.setdefault(name, here[name])
     given = initial.sort(given).positions
-    search = Search(module, time, given, unknowns)
+    search = Search(module, time, given, unknowns, _states(module, guess))
     rows = len(search.gradients(module, q))
     if unknowns and len(unknowns) < rows:
         raise UsageError(
@@ -93,14 +93,27 @@ def equilibrium(
             "unknowns as held coordinates, or none: supports then hold the coordinates"
         )
     point, steps = find_balance(search, q)
-    return describe(search, point.module, point.q, point.unknowns, steps)
+    return describe(search, point, steps)
+
+
+def _states(module: BoundModel, guess: Any) -> Array:
+    """First-order states where the search begins: of the guess, else declared, else 0."""
+    layout = module.layout
+    if guess is None or isinstance(guess, Mapping):
+        given = {**layout.initial, **(guess or {})}
+        return np.array([read_value(name, given.get(name, 0.0)) for name in layout.states])
+    whole = np.array(read_numbers("guess", guess))
+    if whole.shape == (layout.n_x,):
+        return whole[layout.n_x - len(layout.states) :]
+    return np.array([layout.initial.get(name, 0.0) for name in layout.states])
 
 
 def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) -> Array:
     """A closed position near the guess that has the held values."""
     initial = initial_of(module.kernels, t, guess if isinstance(guess, Mapping) else ())
     if guess is None or isinstance(guess, Mapping):
-        values = {name: read_value(name, value) for name, value in (guess or {}).items()}
+        named = {name: value for name, value in (guess or {}).items() if name not in module.layout.states}
+        values = {name: read_value(name, value) for name, value in named.items()}
         if initial.sort(values).rates:
             raise UsageError("guess is a position: name coordinates in it, not rates")
         loose = {name: value for name, value in values.items() if name not in held}

@@ -251,7 +251,7 @@ def _locks(states: ProjectedStates, names: Sequence[str]) -> Array:
 def _apply(states: ProjectedStates, rows: Array, rates: Array, e: Array, names: Sequence[str]) -> Impact:
     layout, v = states.module.layout, states.v[:, 0]
     C_q = states.jacobian()
-    M = states.evaluate(states.module.mass_matrix, states.q)[..., 0]
+    M = states.evaluate(states.module.kernels.mass_matrix, states.q)[..., 0]
     B, condition = conditioned_motions(C_q[0], layout.scales)
     rows, rates = rows.reshape(-1, layout.n_v), read_numbers("rates", rates)
     rest, fixed = _rounding(rows, v, B, condition, layout)

@@ -19,7 +19,7 @@ from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.given_start import Start, last_state
 from ..runtime.near_names import unknown
-from ..runtime.refusals import require_velocities
+from ..runtime.refusals import refuse_states, require_velocities
 from ..runtime.room import read_flag, read_numbers, read_value, require_room
 from ..texts import shown
 from .driven_coordinates import DrivenCoordinates, DrivenPath
@@ -141,6 +141,7 @@ def kinematic_analysis(
         Unknown names, wrong shapes, too many coordinates led.
     """
     require_velocities(module.layout)
+    refuse_states(module.layout, "kinematic_analysis")
     asked = read_range(module, t, led)
     if parameters is not None or inputs is not None:
         module = module.bind(parameters, inputs)

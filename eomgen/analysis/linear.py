@@ -114,7 +114,7 @@ def linearize(
     drift = np.concatenate([v[tangent.positions], rates[n_q:][tangent.velocities]])
     names = displacement_names(layout)
     states = (*(names[k] for k in tangent.positions), *(layout.v[k] for k in tangent.velocities))
-    mass = tangent.B.T @ module.mass_matrix(state[:n_q], t=time) @ tangent.B
+    mass = tangent.B.T @ module.kernels.mass_matrix(state[:n_q], t=time) @ tangent.B
     damping, stiffness = -mass @ A[n_z:, n_z:], -mass @ A[n_z:, :n_z]
     own = own_accelerations(module, time, state, tangent.B, tangent.velocities, mass)
     return Linearization(

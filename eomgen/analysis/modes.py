@@ -52,6 +52,8 @@ class Damped(NamedTuple):
 class Modes:
     """Natural frequencies, mode shapes and damping of small motions about an equilibrium.
 
+    First-order states stand still in the undamped modes; the damped ones are those of the whole model.
+
     Attributes
     ----------
     squares : (n_dof,) array
@@ -76,15 +78,17 @@ class Modes:
         assert linear.mass is not None
         assert linear.tangent is not None
         self.linear, self.name, self._module = linear, linear.name, module
-        self.names, self.v_names = linear.velocity_names, linear.layout.v
-        self.squares, self.shapes = _undamped(linear.mass, stiffness(linear))
+        n = len(linear.velocity_names) - len(linear.layout.states)  # those of first-order states are the last
+        self.names, self.v_names = linear.velocity_names[:n], linear.layout.v
+        self.squares, self.shapes = _undamped(linear.mass[:n, :n], stiffness(linear)[:n, :n])
         turned = np.abs(linear.A[: len(linear.position_names), len(linear.position_names) :])
-        still = np.abs(self.squares) <= uncertainty(self.squares, self.shapes, linear.stiffness_error @ turned)
+        K_error = (linear.stiffness_error @ turned)[:n, :n]
+        still = np.abs(self.squares) <= uncertainty(self.squares, self.shapes, K_error)
         self._still = still
         self.rigid, self.diverging = int(still.sum()), int((self.squares[~still] < 0.0).sum())
         self.frequencies = np.sqrt(np.where(still, 0.0, np.maximum(self.squares, 0.0)))
         self.hertz = self.frequencies / (2.0 * np.pi)
-        self.motions = linear.tangent.B @ self.shapes
+        self.motions = linear.tangent.B[:, :n] @ self.shapes
 
     @cached_property
     def damped(self) -> list[Damped]:
@@ -259,7 +263,7 @@ def modes(
         x = module.x0(x, t=t)[: module.n_q if at_rest else module.n_x]
     state = np.array(read_numbers("x", x))
     if state.shape == (module.n_q,):
-        state = np.concatenate([state, np.zeros(module.n_v)])
+        state = np.concatenate([state, np.zeros(module.layout.n_v)])
     linear = linearize(module, state, t, independent=independent)
     if not linear.is_equilibrium:
         k = int(np.abs(linear.drift).argmax())

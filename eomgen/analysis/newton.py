@@ -41,7 +41,7 @@ def newton(
         residual = search.residual(point.here, point.here)
         change = solver.solve(residual)
         shown = solver.shown(change)
-        size, longest = float(np.linalg.norm(shown)), largest(solver.linear.moved @ change)
+        size, longest = float(np.linalg.norm(shown)), search.longest(solver.linear.moved @ change)
         if not np.isfinite(size):
             return point, step, False
         arrived = solver.arrived(residual, change, search.rounded(point))

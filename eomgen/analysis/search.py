@@ -10,12 +10,13 @@ import numpy as np
 from ..errors import AssemblyError, EvaluationError, PartitionError, UsageError
 from ..limits.statics import DIFFERENCES, LEAST_UNKNOWN
 from ..numeric import algebra
+from ..numeric.projection import largest
 from ..numeric.scales import Array, Indices
 from ..runtime.initial import Initial
 from ..runtime.near_names import unknown
 from .balance import Balance, assembly_jacobian, balance_forces, force_slopes, slopes
 from .eigenvalue_rounding import own_accelerations
-from .linear_step import RANK, LinearizedResidual
+from .linear_step import RANK, LinearizedResidual, Solver
 from .tangent import displacement_names
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ class SearchPoint(NamedTuple):
     """One iterate."""
 
     q: Array
+    s: Array  #: first-order states
     unknowns: Array
     module: BoundModel
     here: Balance
@@ -43,8 +45,14 @@ class Held(NamedTuple):
 class Search:
     """The equations of balance for one model, time and set of held coordinates, and the ways to solve them."""
 
-    def __init__(self, module: BoundModel, t: float, held: Mapping[str, float], unknowns: Sequence[str]) -> None:
+    def __init__(
+        self, module: BoundModel, t: float, held: Mapping[str, float], unknowns: Sequence[str], s: Array
+    ) -> None:
         layout = module.layout
+        self.first = s  #: first-order states where the search begins
+        self.scale = np.array(layout.scales.q)  #: (n_v,) of displacements; of states what they are about to change by
+        self.moving = layout.n_v - len(s)
+        self.scale[self.moving :] = np.maximum(1.0, np.abs(s))
         self.module, self.layout, self.t, self.held, self.names = module, layout, t, held, tuple(unknowns)
         for name in self.names:
             if name not in layout.p + layout.u:
@@ -85,7 +93,27 @@ class Search:
         rows = [held.gradient for held in self.held_rows(module, q)]
         return np.array(rows).reshape(len(rows), self.layout.n_v)
 
-    def at(self, q: Array, values: Array, preferred: Indices | None = None) -> SearchPoint:
+    def start(self, q: Array) -> SearchPoint:
+        """The first iterate; the scales of states become the changes that the linear equations tell there."""
+        point = self.at(q, self.first, self.initial_unknowns())
+        if len(self.first):
+            solver = Solver(self.linearize(point))
+            change = solver.linear.moved @ solver.solve(self.residual(point.here, point.here))
+            found = np.abs(change[self.moving :]) * self.scale[self.moving :]
+            self.scale[self.moving :] = np.maximum(self.scale[self.moving :], np.nan_to_num(found, posinf=0.0))
+        return point
+
+    def longest(self, displacement: Array) -> float:
+        """The largest entry of a scaled displacement (n_v,), states left out: none leads them out of their range."""
+        return largest(displacement[: self.moving])
+
+    def distance(self, a: SearchPoint, b: SearchPoint) -> Array:
+        """The scaled displacement (n_v,) from b to a."""
+        d = self.layout.scales.distance(a.q, b.q)
+        d[self.moving :] = (a.s - b.s) / self.scale[self.moving :]
+        return d
+
+    def at(self, q: Array, states: Array, values: Array, preferred: Indices | None = None) -> SearchPoint:
         """The iterate near q on the constraints."""
         module = self.bound(values)
         initial = Initial(module.kernels, self.t)
@@ -94,22 +122,22 @@ class Search:
         elif self.held:
             q = initial.system.with_values(q, self.held)
         held = self.gradients(module, q) if self.supported else None
-        return SearchPoint(q, values, module, balance_forces(module, self.t, q, held, preferred))
+        return SearchPoint(q, states, values, module, balance_forces(module, self.t, q, states, held, preferred))
 
     def residual(self, here: Balance, like: Balance) -> Array:
         """What must vanish, at the independent velocities and surplus displacements of another place."""
-        s = self.layout.scales.q
+        s = self.scale
         forces = s[here.velocities] * here.forces if self.supported else (here.a / s)[like.velocities]
         return np.concatenate([forces, (here.v / s)[like.surplus]])
 
     def linearize(self, point: SearchPoint) -> LinearizedResidual:
         """The equations near an iterate, by displacements of length 1 that are at right angles (scaled)."""
-        here, s = point.here, self.layout.scales.q
+        here, s = point.here, self.scale
         if self.supported:
             K, rates = force_slopes(point.module, self.t, here, lambda q: self.gradients(point.module, q))
             basis, inverse = _orthonormal(here.Z / s[:, None])
             J = np.vstack([s[here.velocities, None] * K, (rates / s[:, None])[here.surplus]]) @ inverse
-            sizes = np.abs(here.B * s[here.velocities]).T @ np.abs(point.module.bias(self.t, here.x))
+            sizes = np.abs(here.B * s[here.velocities]).T @ np.abs(point.module.kernels.bias(self.t, here.x))
             sizes = np.concatenate([sizes, np.zeros(len(here.surplus))])
             flow: Array | None = None if len(here.surplus) else basis @ (inverse.T @ K @ inverse)
             return LinearizedResidual(
@@ -142,7 +170,7 @@ class Search:
             return np.asarray(np.abs(J).sum(axis=1))
         mass = self.mass(point)
         spread = np.abs(algebra.inv(mass)) @ np.abs(mass)
-        s = self.layout.scales.q[here.velocities]
+        s = self.scale[here.velocities]
         own = own_accelerations(point.module, self.t, here.x, here.B, here.velocities, mass)
         rows = spread @ (np.abs(J[:n]).sum(axis=1) * s) / s
         return np.concatenate([rows + own, np.abs(J[n:]).sum(axis=1)])
@@ -161,20 +189,20 @@ class Search:
 
     def drive(self, here: Balance) -> Array:
         """What pulls at the scaled displacements of the tree: accelerations and enforced velocities, or forces."""
-        s = self.layout.scales.q
+        s = self.scale
         return np.asarray(s * here.tree if self.supported else (here.a + here.v) / s)
 
     def metric(self, point: SearchPoint, basis: Array) -> Array:
         """The metric in which the drive is the gradient of a potential, if there is one."""
         if self.supported:
             return np.eye(basis.shape[1])
-        s = self.layout.scales.q
-        return np.asarray(basis.T @ (s[:, None] * point.module.mass_matrix(point.q, t=self.t) * s) @ basis)
+        s = self.scale
+        return np.asarray(basis.T @ (s[:, None] * point.module.kernels.mass_matrix(point.q, t=self.t) * s) @ basis)
 
     def mass(self, point: SearchPoint) -> Array:
         """Mass matrix of the independent velocities."""
         B = point.here.B
-        return np.asarray(B.T @ point.module.mass_matrix(point.q, t=self.t) @ B)
+        return np.asarray(B.T @ point.module.kernels.mass_matrix(point.q, t=self.t) @ B)
 
     def rounded(self, point: SearchPoint) -> float:
         """Scaled size of the numbers that the position is made of, at least 1."""
@@ -186,7 +214,8 @@ class Search:
         """The iterate a scaled displacement (n_v,) and a change of the unknowns away; None where there is none."""
         try:
             q = self.layout.scales.move(point.q, displacement)
-            there = self.at(q, point.unknowns + change, point.here.velocities)
+            states = point.s + self.scale[self.moving :] * displacement[self.moving :]
+            there = self.at(q, states, point.unknowns + change, point.here.velocities)
         except (AssemblyError, EvaluationError, PartitionError, UsageError):
             return None
         finite = np.isfinite(there.here.a).all() and np.isfinite(there.here.tree).all()

@@ -54,7 +54,9 @@ def stiffness_errors(M: Array, slopes: Array, own: Array, sizes: Array, error: f
         local[:, : len(own)] += np.diag(M.diagonal() * own)
     n = len(M)
     stiffest = float((sizes[:n] * np.abs(M @ slopes)[:, :n].diagonal() * sizes[:n]).max(initial=0.0))
-    shared = 2.0 * EPS * max(1.0, error / MARGIN) * stiffest / np.outer(sizes[:n], sizes)
+    rows = np.ones(n)  # of first-order states, which are no displacements
+    rows[: len(sizes)] = sizes[:n]
+    shared = 2.0 * EPS * max(1.0, error / MARGIN) * stiffest / np.outer(rows, sizes)
     return np.asarray(error * local + shared)
 
 

@@ -40,7 +40,12 @@ def displacement_names(layout: Layout) -> tuple[str, ...]:
 
 
 def find_tangent(
-    module: BoundModel, t: float, x: Array, jacobian: Array, independent: Sequence[str] | None = None
+    module: BoundModel,
+    t: float,
+    x: Array,
+    jacobian: Array,
+    independent: Sequence[str] | None = None,
+    states: bool = False,
 ) -> TangentSpace:
     """The independent directions at a state on the constraints.
 
@@ -53,6 +58,8 @@ def find_tangent(
         dx'/dx there.
     independent : sequence of str, optional
         n_dof coordinates or velocities to take; by default those of the model as far as they serve here.
+    states : bool, optional
+        Whether changes of first-order states count among the displacements; they are among the velocities anyway.
 
     Raises
     ------
@@ -65,7 +72,7 @@ def find_tangent(
     scales, n_q, n_h = layout.scales, layout.n_q, layout.n_h
     preferred = layout.independent if independent is None else choose_velocities(layout, independent)
     strict = independent is not None
-    C_q = module.constraint_jacobian(x[:n_q], t=t, rows="all")
+    C_q = module.kernels.constraint_jacobian(x[:n_q], t=t, rows="all")
     J = scales.jacobian(C_q)
     B, velocities = _basis(J, layout.rank, preferred, strict, scales)
     if n_h == layout.n_c:
@@ -73,24 +80,28 @@ def find_tangent(
     else:  # the others follow in their order, so that as many as possible have the names of velocities
         order = np.concatenate([velocities, np.setdiff1d(np.arange(layout.n_v), velocities)])
         Z, positions = _basis(J[:n_h], rank(J[:n_h]).rank, order, False, scales)
+    moving = layout.n_v - len(layout.states)
+    Z, positions = (Z, positions) if states else (Z[:, positions < moving], positions[positions < moving])
     dq = scales.rates(x[:n_q], Z)
     dv = _velocity_change(layout, x, jacobian[:n_q, :n_q] @ dq, dq)
     dv = dv - B @ dv[velocities]  # the independent velocities stay
+    dv[moving:] = Z[moving:]
     T = np.block([[dq, np.zeros((n_q, B.shape[1]))], [dv, B]])
     return TangentSpace(positions, velocities, Z, B, T)
 
 
 def choose_velocities(layout: Layout, names: Sequence[str]) -> Indices:
     """Indices of n_dof velocities from their names or those of their coordinates."""
-    allowed = dict.fromkeys((*layout.velocity_labels, *layout.v))
+    moving, count = layout.n_v - len(layout.states), layout.n_dof - len(layout.states)
+    allowed = dict.fromkeys((*layout.velocity_labels[:moving], *layout.v[:moving]))
     chosen, names = [], read_names("independent", names)
     for name in names:
         if name not in allowed:
             raise unknown("coordinate of the tree", name, allowed)
         chosen.append((layout.velocity_labels if name in layout.velocity_labels else layout.v).index(name))
-    if len(set(chosen)) != layout.n_dof or len(chosen) != layout.n_dof:
-        raise UsageError(f"independent must name {layout.n_dof} different coordinates, not {', '.join(names)}")
-    return np.array(chosen, dtype=np.intp)
+    if len(set(chosen)) != count or len(chosen) != count:
+        raise UsageError(f"independent must name {count} different coordinates, not {', '.join(names)}")
+    return np.array([*chosen, *range(moving, layout.n_v)], dtype=np.intp)
 
 
 def _basis(
@@ -131,11 +142,14 @@ def projected_directions(module: BoundModel, t: float, x: Array, jacobian: Array
     if not layout.n_c:
         return np.eye(layout.n_x)
     q = x[:n_q]
-    dz = tangent_projector(module.constraint_jacobian(q, t=t, rows="all")[: layout.n_h], scales)
+    dz = tangent_projector(module.kernels.constraint_jacobian(q, t=t, rows="all")[: layout.n_h], scales)
     unit = np.eye(n_q)
     if space is None:
         dq = dz
     else:
         dq = np.asarray(space.rates(q, dz @ space.velocities(q, unit)) + space.stretch(q, unit))
     dq = np.hstack([dq, np.zeros((n_q, layout.n_v))])
-    return np.vstack([dq, _velocity_change(layout, x, jacobian[:n_q], dq)])
+    found = np.vstack([dq, _velocity_change(layout, x, jacobian[:n_q], dq)])
+    own = slice(layout.n_x - len(layout.states), None)
+    found[own, own] = np.eye(len(layout.states))
+    return found

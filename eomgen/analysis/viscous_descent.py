@@ -14,7 +14,6 @@ import numpy as np
 from ..limits.rounding import EPS
 from ..limits.statics import CLOSE
 from ..numeric import algebra
-from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .newton import CONTRACTS, LONGEST
 
@@ -40,7 +39,7 @@ def creep(search: Search, point: SearchPoint) -> tuple[SearchPoint, int, bool]:
         there, contraction = None, 1.0
         for _ in range(TRIES):
             change = here.implicit(rate, here.drive)
-            longest = np.inf if change is None else largest(here.basis @ change)
+            longest = np.inf if change is None else search.longest(here.basis @ change)
             if change is not None and longest <= LONGEST:
                 there, contraction = _corrected(search, point, rate, here.basis @ change)
                 if there is not None:
@@ -95,7 +94,7 @@ def _corrected(
         point, before = there, float(np.linalg.norm(displacement))
         here = _Flow.at(search, point)
         assert here is not None
-        moved = here.basis.T @ search.layout.scales.distance(point.q, start.q)
+        moved = here.basis.T @ search.distance(point, start)
         change = algebra.lstsq(rate * np.eye(len(here.A)) - here.A, here.drive - rate * moved, rcond=None)
         displacement = here.basis @ change
         size = float(np.linalg.norm(displacement))

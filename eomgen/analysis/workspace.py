@@ -17,7 +17,7 @@ from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.given_start import Start
 from ..runtime.near_names import require, unknown
-from ..runtime.refusals import require_velocities
+from ..runtime.refusals import refuse_states, require_velocities
 from ..runtime.room import read_number
 from ..runtime.storage import table_path
 from .tables import as_html, as_text, number
@@ -303,6 +303,7 @@ def workspace(
         Unknown names, too many coordinates, too many points, outputs that are not functions of position.
     """
     require_velocities(module.layout)
+    refuse_states(module.layout, "workspace")
     if parameters is not None or inputs is not None:
         module = module.bind(parameters, inputs)
     with np.errstate(all="ignore"):

@@ -128,11 +128,12 @@ class LateMethod:
 class Module(BoundModel):
     """A model ready to be evaluated and simulated.
 
-    ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of
-    ``x_names``; q' = v but for Euler parameters.  Every state may be one (n,) or a batch (n, k) of k states as columns;
-    results then carry the same last axis.  Every call takes ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound
-    here by default, and ``out=None`` to write into; calls of positions alone take ``t=0.0`` too.  A call that fails
-    raises an :class:`~..errors.EvaluationError` with the time and the state.
+    ``x = [q; v; s]`` are the coordinates and velocities of the spanning tree and the first-order states of the model,
+    if it has any, in SI units and radians, in the order of ``x_names``; q' = v but for Euler parameters.  Every state
+    may be one (n,) or a batch (n, k) of k states as columns; results then carry the same last axis.  Every call takes
+    ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound here by default, and ``out=None`` to write into; calls of
+    positions alone take ``t=0.0`` too.  A call that fails raises an :class:`~..errors.EvaluationError` with the time
+    and the state.
 
     Parameters
     ----------
@@ -143,11 +144,11 @@ class Module(BoundModel):
     Attributes
     ----------
     name, doc : str
-    q_names, v_names, x_names, u_names, p_names, y_names, body_names : tuple of str
+    q_names, v_names, s_names, x_names, u_names, p_names, y_names, body_names : tuple of str
         What the entries of each vector are called.
     loop_names : tuple of str
         Coordinates of the joints that were cut; they can be given as initial values and read from results.
-    n_q, n_v, n_x, n_u, n_p, n_y, n_c, n_dof, n_bodies : int
+    n_q, n_v, n_s, n_x, n_u, n_p, n_y, n_c, n_dof, n_bodies : int
         Sizes; n_c counts the independent constraint rows, n_rows all of them.
     p, u : arrays
         The parameters and inputs bound.
@@ -167,7 +168,8 @@ class Module(BoundModel):
     mass_matrix, embedded_mass_matrix : callable
         ``mass_matrix(q)`` -> (n_v, n_v) of the tree; (n_dof, n_dof) of the independent coordinates.
     inverse_dynamics : callable
-        ``inverse_dynamics(q, v, a)`` -> (n_v,) generalized forces to add to those of the model.
+        ``inverse_dynamics(q, v, a)`` -> (n_v,) generalized forces to add to those of the model.  Of a model with
+        first-order states, v is [v; s], since forces depend on them.
     energy : callable
         ``energy(x)`` -> (T, V) in J.
     constraints, constraint_jacobian, velocity_constraints : callable

@@ -40,7 +40,7 @@ def impact(work: Prepared, t: float, gap: tuple[str, ...], stop: tuple[str, ...]
         return
     say(repr(found))
     print_heading("velocities after it")
-    units = [module.layout.unit(name) for name in module.v_names]
+    units = [module.layout.unit(name) for name in module.layout.v]
     before = found.before[module.n_q :].tolist()
-    rates = without_noise([after[name] for name in module.v_names], units, before)
-    print_rows([(n, f"{x:.6g} {unit}") for n, x, unit in zip(module.v_names, rates, units, strict=True)])
+    rates = without_noise([after[name] for name in module.layout.v], units, before)
+    print_rows([(n, f"{x:.6g} {unit}") for n, x, unit in zip(module.layout.v, rates, units, strict=True)])

@@ -68,7 +68,9 @@ def _instant(reader: Reader, path: str, value: Any) -> Expr:
     """An expression of what is known of a state without solving for accelerations."""
     expression = reader.expression(path, value, OUTPUT)
     for name, what in late_names(reader.names, symbols_of([expression])):
-        remedy = "allowed are t, parameters, inputs, coordinates, velocities, positions and velocities of markers"
+        remedy = (
+            "allowed are t, parameters, inputs, coordinates, velocities, states, positions and velocities of markers"
+        )
         reader.faults.add(path, f"the {what} {name!r} cannot be used in an event", remedy)
     return expression
 
@@ -77,12 +79,13 @@ def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...
     if not isinstance(given, Mapping):
         reader.wrong(path, given, "rates")
         return ()
-    known = list(reader.names.of("coordinate", "velocity"))
+    known = list(reader.names.of("coordinate", "velocity", "state"))
     result = []
     for name, value in in_order(given, known):
         if name in known:
             result.append((str(name), _instant(reader, f"{path}.{name}", value)))
         else:
-            remedy = nearest(shown(name), known, "coordinates and velocities")
-            reader.faults.add(f"{path}.{name}", f"no coordinate or velocity {name!r}", remedy)
+            states = bool(reader.description.sections["states"])
+            remedy = nearest(shown(name), known, f"coordinates and velocities{' and states' * states}")
+            reader.faults.add(f"{path}.{name}", f"no coordinate or velocity{' or state' * states} {name!r}", remedy)
     return tuple(result)

@@ -21,6 +21,7 @@ from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .build_quantities import Outputs, read_input, read_parameter, with_signal
+from .build_states import build_states, declare_states
 from .cam_turns import check_turns
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
@@ -86,6 +87,7 @@ def build(description: Description) -> Mechanism:
         reader, values.get("equations"), lagrangian_values is not None or bool(sections["bodies"] or sections["joints"])
     )
 
+    declared = declare_states(reader, sections["states"], given_values is not None or lagrangian_values is not None)
     read_outputs = Outputs(reader, sections["outputs"]).all
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     bodies = _bodies(reader, sections["bodies"])
@@ -96,10 +98,12 @@ def build(description: Description) -> Mechanism:
     given = build_equations(reader, given_values)
     constraints = build_elements(around, "constraint", sections["constraints"], CONSTRAINTS)
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
+    states, begun = build_states(reader, declared)
     outputs = read_outputs()
     events = build_events(reader, sections["events"])
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
-    initial = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity"))
+    kinds = ("coordinate", "velocity", *(("state",) if declared else ()))
+    initial = begun | _initial(reader, "initial", values.get("initial", {}), kinds)
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
     independent = _independent(reader, values.get("independent", ()))
     simulation = _simulation(reader, values.get("simulation", {}))
@@ -131,6 +135,7 @@ def build(description: Description) -> Mechanism:
         joints=joints,
         forces=forces,
         outputs=outputs,
+        states=states,
         events=events,
         quantities=dict(reader.quantities),
         element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked},
@@ -234,7 +239,7 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
     return result
 
 
-_PLURAL = {"coordinate": "coordinates", "velocity": "velocities"}
+_PLURAL = {"coordinate": "coordinates", "velocity": "velocities", "state": "states"}
 
 
 def _independent(reader: Reader, given: Any) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from .units import Unit, UnitError, read_unit
 from .values import Reader
 
 
-def _described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[Unit, str]:
+def read_described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[Unit, str]:
     """Unit and doc of an entry, its keys checked."""
     check_keys(entry.path, entry.values, fields, reader.faults)
     text, doc = (reader.text(f"{entry.path}.{key}", entry.values.get(key, "")) for key in ("unit", "doc"))
@@ -35,7 +35,7 @@ def _described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[U
     return unit, doc
 
 
-def _in_si(reader: Reader, path: str, value: float | None, unit: Unit) -> float | None:
+def in_si(reader: Reader, path: str, value: float | None, unit: Unit) -> float | None:
     """A value in SI units; one that no double holds there is a fault."""
     if value is None or unit.size == 1.0:
         return value
@@ -50,19 +50,19 @@ def _in_si(reader: Reader, path: str, value: float | None, unit: Unit) -> float 
 def read_parameter(reader: Reader, entry: DescribedEntry) -> Parameter:
     """The parameter of an entry."""
     reader.names.declare("parameter", entry.name, entry.path)
-    unit, doc = _described(reader, entry, PARAMETER)
+    unit, doc = read_described(reader, entry, PARAMETER)
     given = entry.values.get("value")
     value = None if given is None else reader.number(f"{entry.path}.value", given)
-    return Parameter(str(entry.name), _in_si(reader, f"{entry.path}.value", value, unit), unit.si, doc)
+    return Parameter(str(entry.name), in_si(reader, f"{entry.path}.value", value, unit), unit.si, doc)
 
 
 def read_input(reader: Reader, entry: DescribedEntry) -> Input:
     """The input of an entry, without its expression over time."""
     reader.names.declare("input", entry.name, entry.path)
-    unit, doc = _described(reader, entry, INPUT)
+    unit, doc = read_described(reader, entry, INPUT)
     given = entry.values.get("value")
     value = 0.0 if given is None else reader.number(f"{entry.path}.value", given)
-    return Input(str(entry.name), _in_si(reader, f"{entry.path}.value", value, unit) or 0.0, unit.si, doc)
+    return Input(str(entry.name), in_si(reader, f"{entry.path}.value", value, unit) or 0.0, unit.si, doc)
 
 
 def with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:
@@ -125,7 +125,7 @@ class Outputs:
 
     def _output(self, entry: DescribedEntry) -> tuple[Output, Expr]:
         reader, faults, path = self._reader, self._reader.faults, entry.path
-        unit, doc = _described(reader, entry, OUTPUT_FIELDS)
+        unit, doc = read_described(reader, entry, OUTPUT_FIELDS)
         expression: Expr = reader.stand_in
         if "expression" in entry.values:
             expression = reader.expression(f"{path}.expression", entry.values["expression"], OUTPUT)

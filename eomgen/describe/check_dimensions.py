@@ -86,6 +86,8 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
         wanted = None if field is None else field.measured_in(values, numbers, length(field))
         if section in ("outputs", "inputs") and entry is not None and entry.path in units:
             wanted = units[entry.path].dimension
+        if section == "states" and entry is not None and entry.path in units:
+            wanted = units[entry.path].dimension.times(TIME, -1 if steps[0] == "rate" else 0)
         if steps and steps[0] in ("initial", "guess", "reset"):
             wanted = names.get(str(steps[-1]), Known(None)).dimension
         certain = section == "outputs" and check.is_certain(expression)
@@ -131,6 +133,10 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
                 for order, suffix in enumerate(RATES if section == "inputs" else ("",)):
                     own = units[entry.path].dimension.times(TIME, -order)
                     found.setdefault(f"{entry.name}{suffix}", Known(own, True))
+    for entry in reader.description.sections["states"]:
+        if entry.path in units:
+            for order, suffix in enumerate(RATES[:2]):
+                found[f"{entry.name}{suffix}"] = Known(units[entry.path].dimension.times(TIME, -order), True)
     for joint in joints:
         # the parameters of a curve or surface may be lengths, angles or anything else
         free = max((option.own for option in joint.joint.options.values()), default=0)

@@ -33,7 +33,7 @@ class OwnNames:
 
         self.bodies = named("bodies") - {GROUND_NAME}
         self.joints = named("joints")
-        self.symbols = named("parameters", "inputs", "functions", "outputs", "events")
+        self.symbols = named("parameters", "inputs", "functions", "states", "outputs", "events")
         for entry in sections["joints"]:
             kind = entry.values.get("type")
             if not isinstance(entry.name, str):

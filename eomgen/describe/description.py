@@ -18,7 +18,9 @@ from ..graph.shown import NO_TEXT, shortened, shown
 GROUND_NAME = "ground"
 
 #: Sections made of named entries, in the order of a model file.
-SECTIONS = ("parameters", "inputs", "functions", "bodies", "joints", "forces", "constraints", "outputs", "events")
+SECTIONS = (
+    *("parameters", "inputs", "functions", "bodies", "joints", "forces", "constraints", "states", "outputs", "events"),
+)
 
 Values = dict[str, Any]
 

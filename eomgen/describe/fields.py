@@ -63,6 +63,18 @@ OUTPUT_FIELDS: Fields = {
     "doc": _DOC,
     "latex": _LATEX,
 }
+STATE: Fields = {
+    "rate": Field(
+        "expression",
+        "its derivative: of t, parameters, inputs, coordinates, rates, states, positions and velocities of markers",
+        required=True,
+        level=LAW,
+    ),
+    "initial": Field("expression", "its value where a run begins", default=0),
+    "unit": Field("unit", "unit of the state; an initial value that is a number is converted to SI", default=""),
+    "doc": _DOC,
+    "latex": _LATEX,
+}
 EVENT: Fields = {
     "expression": Field(
         "expression",
@@ -241,6 +253,7 @@ MODEL: Fields = {
     "joints": Field("table", "joints between bodies"),
     "forces": Field("table", "force elements"),
     "constraints": Field("table", "equations between coordinates or markers"),
+    "states": Field("table", "first-order states: names of quantities with their rates"),
     "outputs": Field("table", "named results"),
     "events": Field("table", "events to find during a run, and what they do"),
     "components": Field("table", "parts of mechanisms that can be added several times"),
@@ -265,7 +278,7 @@ COMPONENT: Fields = {
     "file": Field("file", "model file of the component (path from this file's folder), instead of all other keys"),
     "attachments": MODEL["attachments"],
     **{key: MODEL[key] for key in ("parameters", "inputs", "functions", "bodies", "joints", "forces")},
-    **{key: MODEL[key] for key in ("constraints", "outputs", "events", "initial", "guess", "add")},
+    **{key: MODEL[key] for key in ("constraints", "states", "outputs", "events", "initial", "guess", "add")},
 }
 ADDED: Fields = {
     "component": Field("name", "name of a component", required=True),
@@ -279,7 +292,7 @@ ADDED: Fields = {
 }
 
 #: Sections whose entries may be written as one value: section -> the key it stands for.
-SHORT = {"parameters": "value", "inputs": "value", "outputs": "expression", "events": "expression"}
+SHORT = {"parameters": "value", "inputs": "value", "states": "rate", "outputs": "expression", "events": "expression"}
 
 
 def joint_type(type_name: str) -> ElementType:
@@ -319,9 +332,9 @@ def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
     types: Any = {"joints": JOINTS, "forces": FORCES, "constraints": CONSTRAINTS}.get(section)
     if types is not None and isinstance(kind, str) and kind in types:
         return joint_fields(kind) if section == "joints" else types[kind].fields(section[:-1], types)
-    return {"bodies": BODY, "parameters": PARAMETER, "inputs": INPUT, "outputs": OUTPUT_FIELDS, "events": EVENT}.get(
-        section, {}
-    )
+    own: dict[str, Fields] = {"bodies": BODY, "parameters": PARAMETER, "inputs": INPUT, "states": STATE}
+    own |= {"outputs": OUTPUT_FIELDS, "events": EVENT}
+    return own.get(section, {})
 
 
 @cache

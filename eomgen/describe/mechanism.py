@@ -173,6 +173,16 @@ class Output:
 
 
 @dataclass(frozen=True)
+class FirstOrderState:
+    """A first-order state s with s' = rate, beside the coordinates and velocities of the mechanism."""
+
+    name: str
+    rate: Expr
+    unit: str = ""
+    doc: str = ""
+
+
+@dataclass(frozen=True)
 class Lagrangian:
     """A bare Lagrangian L(q, v, t): one generalized force a coordinate, Rayleigh dissipation D, constraints C = 0.
 
@@ -242,10 +252,11 @@ class Mechanism:
     joints: tuple[JointSpec, ...]
     forces: tuple[Force, ...]
     outputs: tuple[Output, ...]
+    states: tuple[FirstOrderState, ...] = ()
     events: tuple[Event, ...] = ()
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
     element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element
-    initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate or ``<coordinate>_dot``
+    initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate, ``<coordinate>_dot`` or state
     guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts
     independent: tuple[str, ...] = ()
     simulation: Simulation = Simulation()

@@ -34,6 +34,7 @@ from .fields import (
     SHORT,
     SIMULATION,
     SOLID,
+    STATE,
     Field,
     Fields,
     function_fields,
@@ -273,6 +274,7 @@ def model_schema() -> dict[str, Any]:
         "constraints": _section(
             {"oneOf": [_element("constraint", CONSTRAINTS, name) for name in CONSTRAINTS]}, MODEL["constraints"].doc
         ),
+        "states": _section(_short("states", STATE), MODEL["states"].doc),
         "outputs": _section(_short("outputs", OUTPUT_FIELDS), MODEL["outputs"].doc),
         "events": _section(_short("events", EVENT), MODEL["events"].doc),
         "lagrangian": {**_table(LAGRANGIAN), "description": MODEL["lagrangian"].doc},

@@ -20,6 +20,7 @@ LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": 
 LEVELS |= {"rate": MOTION, "rate of rate": OUTPUT}  # of Euler parameters, which no velocity is
 LEVELS |= {"multiplier": OUTPUT}  # of the constraints of given equations
 LEVELS |= {"acceleration": OUTPUT, "output": LAW}
+LEVELS |= {"state": LAW, "rate of a state": OUTPUT}
 LEVELS |= {"event": OUTPUT + 1}
 LEVELS |= {"function": OUTPUT + 1}  # by itself; calls are not looked up here
 
@@ -27,9 +28,9 @@ _LEVEL_REMEDY = {
     NUMBER: "allowed are numbers and pi",
     CONSTANT: "allowed are numbers, parameters and pi",
     MOTION: "allowed are t, parameters, inputs, coordinates and their velocities",
-    LAW: "allowed are t, parameters, inputs, coordinates and their velocities, positions and velocities of markers, "
-    "and outputs of these",
-    OUTPUT: "allowed are t, parameters, inputs, coordinates, their rates, motion of markers and energies",
+    LAW: "allowed are t, parameters, inputs, coordinates and their velocities, states, positions and velocities of "
+    "markers, and outputs of these",
+    OUTPUT: "allowed are t, parameters, inputs, coordinates, states, their rates, motion of markers and energies",
 }
 RATES = ("", "_dot", "_ddot")
 #: Kind declared -> kinds of the name, its ``_dot`` and its ``_ddot``.
@@ -37,6 +38,7 @@ _RATES_OF = {
     "coordinate": ("coordinate", "velocity", "acceleration"),
     "parameter of rotation": ("coordinate", "rate", "rate of rate"),
     "velocity": ("velocity", "acceleration"),
+    "state": ("state", "rate of a state"),
 }
 #: Energies of the whole mechanism, for outputs; a name of the model's own comes first.
 ENERGIES = ("kinetic_energy", "potential_energy", "total_energy")
@@ -45,6 +47,7 @@ ENERGIES = ("kinetic_energy", "potential_energy", "total_energy")
 def late_names(names: Namespace, used: Iterable[str]) -> Iterator[tuple[str, str]]:
     """Those of the symbols ``used`` that are known only when accelerations are, and what they are."""
     late = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
+    late["rate of a state"] = "rate of a state"
     for name in sorted(used):
         what, found = late.get(names.kinds.get(name, "")), marker_quantity(name)
         if found is not None and QUANTITIES[found.name][0] in ACCELERATIONS:
@@ -86,8 +89,8 @@ class Namespace:
             self.faults.add(
                 path,
                 f"the name {clash!r} is already used by the {other}{own}",
-                "parameters, inputs, functions, coordinates, outputs and events share one namespace, with the _dot "
-                "and _ddot of coordinates; rename one",
+                "parameters, inputs, functions, coordinates, states, outputs and events share one namespace, with the "
+                "_dot and _ddot of coordinates; rename one",
             )
             return False
         return True

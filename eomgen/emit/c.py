@@ -136,10 +136,11 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "order": [*program.preferred, *others],
         "dependent": [int(i in others) for i in range(sizes.n_v)],
         "parent": program.parent,
+        "n_states": program.n_states,
         "quaternion_slots": program.quaternion_slots,
         "coordinate_of": program.coordinate_of,
         "has_loops": program.has_loops and program.projects,
-        "rates_are_velocities": not (program.quaternion_slots or program.given_rates),
+        "rates_are_velocities": not (program.quaternion_slots or program.given_rates or program.n_states),
         "by_columns": program.by_columns,
         "system": program.system if "system" in program.block_names else None,
         "kernels": [

@@ -63,7 +63,7 @@ def space_file(program: Program) -> str:
     """The file that says how coordinates move with velocities."""
     if program.given_rates:
         return "space_given"
-    return "space_quaternions" if program.quaternion_slots else "space_plain"
+    return "space_quaternions" if program.quaternion_slots or program.n_states else "space_plain"
 
 
 def derive_files(program: Program) -> tuple[str, ...]:

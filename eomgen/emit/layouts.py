@@ -12,12 +12,14 @@ def describe_layouts(program: Program) -> list[tuple[str, list[str]]]:
     """Titles with one line per entry, for headers and docstrings."""
     metadata = program.metadata
     q, v = program.coordinates, program.velocities
-    chosen = [program.coordinate_of[i] for i in program.preferred]
+    moving = len(v) - program.n_states
+    preferred = [i for i in program.preferred if i < moving]
+    chosen = [program.coordinate_of[i] for i in preferred]
     independent = ("q_i, the independent coordinates", _entries(metadata, "q_i", [q[i] for i in chosen]))
     if -1 in chosen:
-        independent = ("v_i, the independent velocities", _entries(metadata, "v_i", [v[i] for i in program.preferred]))
+        independent = ("v_i, the independent velocities", _entries(metadata, "v_i", [v[i] for i in preferred]))
     sections = [
-        ("x = [q; v], the state", _entries(metadata, "x", [*q, *v])),
+        (f"x = [q; v{'; s' if program.n_states else ''}], the state", _entries(metadata, "x", [*q, *v])),
         ("p, the parameters", _entries(metadata, "p", program.parameters, metadata.get("p_values"))),
         ("u, the inputs", _entries(metadata, "u", program.inputs, metadata.get("u_values"))),
         ("y, the outputs", _entries(metadata, "y", metadata.get("y_names", ()))),

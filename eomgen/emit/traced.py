@@ -82,10 +82,11 @@ def _context(program: Program, library: str, steps: int) -> dict[str, Any]:
     kinds = {type(f.evaluator) for f in functions}
     drivers = {d.name for d in program.drivers}
     has_loops, n_v = program.has_loops, sizes.n_v
-    space = Space.of(n_v, program.quaternion_slots)
+    space = Space.of(n_v, program.quaternion_slots, program.n_states)
     minimal = has_loops and "kinematics" in drivers
     public = _public(program, minimal)
-    independent_q = [program.coordinate_of[k] if program.coordinate_of else k for k in program.preferred]
+    moving = [k for k in program.preferred if k < n_v - program.n_states]
+    independent_q = [program.coordinate_of[k] if program.coordinate_of else k for k in moving]
     if minimal and not program.coordinate_of:
         inputs = next(d for d in program.drivers if d.name == "kinematics").ports[0].symbols
         independent_q = [program.coordinates.index(name) for name in inputs]
@@ -123,6 +124,8 @@ def _context(program: Program, library: str, steps: int) -> dict[str, Any]:
         "minimal": minimal,
         "independent_q": independent_q,
         "independent_names": [program.velocities[k] for k in program.preferred],
+        "turned": space is not None,
+        "n_states": program.n_states,
         "slots": [list(slot) for slot in program.quaternion_slots],
         "plain": [] if space is None else list(zip(space.plain_q.tolist(), space.plain_v.tolist(), strict=True)),
         "public": public,
@@ -143,7 +146,8 @@ def _public(program: Program, minimal: bool) -> list[Traced]:
             function = "tree_mass_matrix" if kernel.name == "mass_matrix" else function
         found.append(Traced(kernel.name, arguments, kernel.shape, NAMED[kernel.name].result, function))
     if minimal:
-        given, n = {"z": 2 * sizes.n_dof, "q_guess": sizes.n_q}, 2 * sizes.n_dof
+        n = 2 * sizes.n_dof - sizes.n_states
+        given = {"z": n, "q_guess": sizes.n_q}
         if n:
             found.append(Traced("minimal_rhs", given, (n,), "z' of z = [q_i; v_i], the degrees of freedom", "minimal"))
         found.append(Traced("full_state", given, (sizes.n_x,), "x = [q; v] that belongs to z", "tree_state"))

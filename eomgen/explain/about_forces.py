@@ -45,6 +45,21 @@ def forces(author: Author) -> list[Section]:
     return found
 
 
+def states(author: Author) -> Section | None:
+    """The rates of the first-order states, None without any."""
+    names = author.equations.kinematics.state_names
+    if not names:
+        return None
+    text = "Beside the coordinates and velocities the model has states of its own, with these equations of first order."
+    pieces: list[Piece] = [Sentence(text)]
+    written = author.write("rates of first-order states", list(author.equations.kinematics.state_rates), "S_")
+    author.printer.meet(str(symbol) for symbol, _ in written.intermediates)
+    pieces += [FormulaLine((author.printer.latex(s), x)) for s, x in written.intermediates]
+    left = (author.symbol(f"{name}_dot") for name in names)
+    pieces += [FormulaLine(pair) for pair in zip(left, written.expressions, strict=True)]
+    return Section("First-order states", tuple(pieces))
+
+
 def _work(author: Author, column: Any) -> Any:
     """Q^T delta q_i as a sum."""
     total = zip(column, author.equations.independent, strict=True)

@@ -23,7 +23,7 @@ def calculation(author: Author, state: Mapping[str, float], reason: str) -> Sect
         return Section(title, (Sentence(f"No numbers: {reason}"),))
     eqs = author.equations
     k = eqs.kinematics
-    names = [*k.names, *k.velocity_names, *k.parameter_names, *k.input_names]
+    names = [*k.names, *k.velocity_names, *k.state_names, *k.parameter_names, *k.input_names]
     rows = tuple((f"${author.symbol(name)}$", f"{state[name]:.6g}") for name in names if name in state)
     numbers = dict(state)
     pieces: list[Piece] = [

@@ -153,7 +153,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
         sections.append(about_motion.constraints(author))
         sections += about_forces.forces(author)
         sections += [about_methods.energies(author), about_methods.steps(author)]
-    sections += [about_methods.final(author), about_numbers.counts(author)]
+    sections += [about_methods.final(author), about_forces.states(author), about_numbers.counts(author)]
     if full:
         state = {} if module is None else state_values(module, module.x0(), 0.0)
         sections.append(about_numbers.calculation(author, state, reason))

@@ -53,11 +53,11 @@ class StateNumbers(NamedTuple):
 
     @property
     def v(self) -> Any:
-        return self.x[self.module.n_q :]
+        return self.x[self.module.n_q : self.module.n_q + self.module.n_v]
 
     @property
     def a(self) -> Any:
-        return self.module.rhs(0.0, self.x)[self.module.n_q :]
+        return self.module.rhs(0.0, self.x)[self.module.n_q : self.module.n_q + self.module.n_v]
 
 
 def compare(author: Author, module: Any) -> Difference:
@@ -69,7 +69,7 @@ def compare(author: Author, module: Any) -> Difference:
     moves = bool(equations.mobility.n_dof)
     for seed in range(STATES):
         x = random_state(module, seed + 1)
-        free = list(module.layout.metadata["independent"])
+        free = module.layout.independent_moving.tolist()
         state = StateNumbers(module, x, state_values(module, x, 0.0), free)
         for name, of_module in COMPARED.items():
             if name in wanted and (moves or name in ("T", "V")):

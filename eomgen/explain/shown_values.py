@@ -52,7 +52,7 @@ def state_values(module: Any, x: np.ndarray, t: float) -> dict[str, float]:
     """Numbers of all symbols at a state: coordinates, velocities, accelerations, parameters, inputs, time."""
     values = dict(zip(module.x_names, map(float, x), strict=True)) | {"t": t}
     rates = module.rhs(t, x)[module.n_q :]
-    values |= dict(zip(map(acceleration_name, module.v_names), map(float, rates), strict=True))
+    values |= dict(zip(map(acceleration_name, module.layout.v), map(float, rates), strict=True))
     values |= dict(zip(module.p_names, map(float, module.p), strict=True))
     return values | dict(zip(module.u_names, map(float, module.u), strict=True))
 
@@ -61,7 +61,9 @@ def random_state(module: Any, seed: int, t: float = 0.0, size: float = 0.1) -> n
     """A consistent state near the declared one, moving."""
     random = np.random.default_rng(seed)
     x = np.array(module.x0(t=t))
-    places = module.layout.place_scales.q if not module.layout.metadata["quaternion_slots"] else 1.0
+    places = (
+        module.layout.place_scales.q[: module.layout.moving] if not module.layout.metadata["quaternion_slots"] else 1.0
+    )
     x[: module.n_q] += size * places * random.uniform(-1, 1, module.n_q)
-    x[module.n_q :] += module.layout.scales.q * random.uniform(-1, 1, module.n_v)
+    x[module.n_q :] += module.layout.scales.q * random.uniform(-1, 1, module.layout.n_v)
     return np.array(module.project(x, t=t))

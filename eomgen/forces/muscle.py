@@ -55,9 +55,8 @@ class Muscle(Force):
         tension = force_max [a fl(l) fv(v) + fp(l) + damping v] cos alpha
 
     with the fibre length l l_opt = sqrt((L - slack)^2 + (l_opt sin alpha_opt)^2) of the path's length L, its pennation
-    cos alpha = (L - slack) / (l l_opt), and v velocity_max = L' cos alpha.  The activation a is an input or any
-    expression: the state holds coordinates and velocities only, so dynamics of activation and an elastic tendon are
-    outside.  The thickness of the muscle, l_opt sin alpha_opt, stays.
+    cos alpha = (L - slack) / (l l_opt), and v velocity_max = L' cos alpha.  The activation a is an input, a first-order
+    state or any expression; an elastic tendon is outside.  The thickness of the muscle, l_opt sin alpha_opt, stays.
     """
 
     sentence: ClassVar[str] = (

@@ -106,6 +106,16 @@ class Kinematics:
         return tuple(u.name for u in self.mechanism.inputs)
 
     @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the first-order states."""
+        return tuple(s.name for s in self.mechanism.states)
+
+    @cached_property
+    def state_rates(self) -> tuple[Expr, ...]:
+        """s' of the first-order states, of (t, q, v, s, u)."""
+        return tuple(self.resolve([s.rate for s in self.mechanism.states]))
+
+    @property
     def euler_parameters(self) -> tuple[tuple[str, ...], ...]:
         """Names of the coordinates that are Euler parameters, four by four."""
         return tuple(self.names[i : i + 4] for i, _ in self.quaternion_slots)

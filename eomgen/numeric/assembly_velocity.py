@@ -87,7 +87,7 @@ def assemble_velocity(
         e = J @ (v / size) + offset / row_size
         v[free] -= size[free] * (inverse @ e)
     e = J @ (v / size) + offset / row_size
-    rates = np.concatenate([v / size, np.broadcast_to(offset / row_size, e.shape)])
+    rates = np.concatenate([scales.moving(v), np.broadcast_to(offset / row_size, e.shape)])
     worst = np.abs(e).max(axis=0, initial=0.0)
     speed = np.abs(rates).max(axis=0, initial=1.0)
     bad = ~(worst <= CONTRADICTION * speed)

@@ -112,7 +112,7 @@ def kinematics(
     q = np.array(guess, dtype=float)
     q[scales.coordinates(independent)] = q_i
     if not rank:
-        v, a = np.empty_like(q), np.empty_like(q)
+        v, a = np.empty_like(s), np.empty_like(s)
         v[independent], a[independent] = v_i, a_i
         return q, v, a
     q, _, split = solve_dependent(position, q, scales, rank, independent)

@@ -16,7 +16,7 @@ from ..errors import NonFiniteError, SingularMassMatrixError
 from . import algebra
 from .definite import indefinite_factor, moves_inertia, safely_positive
 from .partitions import Partition, partition
-from .projection import largest, minimum_norm, project, tangent_projector
+from .projection import minimum_norm, project, tangent_projector
 from .scales import Array, GivenRates, Indices, Position, Rate, Scales
 
 
@@ -106,7 +106,7 @@ def accelerate(terms: Terms, v: Array, scales: Scales, system: Embedded) -> Arra
     s = scales.q
     a_p = np.zeros(len(s))
     if len(terms.gamma):
-        fastest = largest(v / s)  # times itself: a power of a float that overflows is no number but an OverflowError
+        fastest = scales.speed(v)  # times itself: a power of a float that overflows is no number but an OverflowError
         if not np.isfinite(fastest * fastest):
             raise NonFiniteError("the squares of the velocities overflow")
         a_p = minimum_norm(terms.C_q, -terms.gamma[:, None], scales, fastest * fastest, 2)[:, 0] / s

@@ -69,7 +69,15 @@ class Around(NamedTuple):
     @property
     def speed(self) -> float:
         """The largest scaled velocity."""
-        return largest(self.v / self.scales.q)
+        return self.scales.speed(self.v)
+
+    @property
+    def direction(self) -> Array:
+        """The scaled velocities (n,) at unit speed, those of first-order states 0."""
+        d = self.v / self.scales.q / self.speed
+        if self.scales.space is not None:
+            d[len(d) - self.scales.space.n_states :] = 0.0
+        return d
 
     def close(self, t: float, q: Array) -> tuple[Array, Array]:
         """The nearest closed position, and the scaled Jacobian there."""
@@ -102,7 +110,7 @@ class ClosedCurve:
     def __init__(self, around: Around, reach: float) -> None:
         self.around, self.reach = around, reach
         self.time_per_length = 1.0 / around.speed if around.timed else 0.0
-        d = around.v / around.scales.q / around.speed
+        d = around.direction
         _, J = around.close(self.time(1), around.scales.move(around.q, reach * d))
         there = around.split(J)
         self.T, self.pivots = there.B, [there.weakest]

@@ -94,7 +94,7 @@ def correct_position(
 def correct_velocity(C_q: Array, C_t: Array, v: Array, scales: Scales) -> Array:
     """The nearest v (n,) with C_q v + C_t = 0."""
     x, y = v / scales.q, -scales.residual(C_t)
-    return np.asarray(scales.q * least(scales.jacobian(C_q), y, x, max(largest(x), largest(y))))
+    return np.asarray(scales.q * least(scales.jacobian(C_q), y, x, max(scales.speed(v), largest(y))))
 
 
 def project(
@@ -124,7 +124,7 @@ def project(
         return q, v
     C, C_q = position(q)  # a state that is on the constraints already stays as it is, to the last bit
     if largest(scales.residual(C)) <= EXACT and largest(scales.residual(C_q @ v + rate(q))) <= EXACT * max(
-        1.0, largest(v / scales.q)
+        1.0, scales.speed(v)
     ):
         return q, v
     q, C_q = correct_position(position, q, scales, given)

@@ -2,7 +2,8 @@
 
 A ball is four Euler parameters e0 (scalar) .. e3 in q and the three components of an angular velocity in v, in the
 turned axes: e' = E-bar^T w / 2 (Shabana, Computational Dynamics, ch. 7).  All other velocities are the rates of the
-other coordinates, in the same order.  The length of e is kept by every step and means nothing.
+other coordinates, in the same order; first-order states stand last among the velocities and move nothing.  The length
+of e is kept by every step and means nothing.
 """
 
 from __future__ import annotations
@@ -27,15 +28,18 @@ class Space(NamedTuple):
     plain_q: Indices  #: coordinates that are in no ball
     plain_v: Indices  #: their velocities
 
+    n_states: int = 0  #: first-order states, the last of the velocities, which move no coordinate
+
     @classmethod
-    def of(cls, n_v: int, quaternion_slots: Sequence[Sequence[int]]) -> Space | None:
-        """The space of n_v velocities; None where q' = v throughout."""
-        if not quaternion_slots:
+    def of(cls, n_v: int, quaternion_slots: Sequence[Sequence[int]], n_states: int = 0) -> Space | None:
+        """The space of n_v velocities, states included; None where q' = v throughout."""
+        if not quaternion_slots and not n_states:
             return None
         pairs = tuple((int(i), int(j)) for i, j in quaternion_slots)
-        q = np.setdiff1d(np.arange(n_v + len(pairs)), [k for i, _ in pairs for k in range(i, i + 4)])
-        v = np.setdiff1d(np.arange(n_v), [k for _, j in pairs for k in range(j, j + 3)])
-        return cls(pairs, q.astype(np.intp), v.astype(np.intp))
+        moving = n_v - n_states
+        q = np.setdiff1d(np.arange(moving + len(pairs)), [k for i, _ in pairs for k in range(i, i + 4)])
+        v = np.setdiff1d(np.arange(moving), [k for _, j in pairs for k in range(j, j + 3)])
+        return cls(pairs, q.astype(np.intp), v.astype(np.intp), n_states)
 
     def rates(self, q: Array, v: Array) -> Array:
         """q' = N(q) v, (n_q,) or (n_q, k)."""
@@ -54,7 +58,7 @@ class Space(NamedTuple):
 
     def velocities(self, q: Array, dq: Array) -> Array:
         """The smallest v whose N v differs from dq only along the Euler parameters; (n_v,) or (n_v, k)."""
-        result = np.empty((len(q) - len(self.quaternion_slots), *dq.shape[1:]))
+        result = np.zeros((len(q) - len(self.quaternion_slots) + self.n_states, *dq.shape[1:]))
         result[self.plain_v] = dq[self.plain_q]
         for i, j in self.quaternion_slots:
             e, d = q[i : i + 4], dq[i : i + 4]
@@ -83,7 +87,7 @@ class Space(NamedTuple):
 
     def difference(self, a: Array, b: Array) -> Array:
         """The d (n_v,) with move(b, d) = a but for lengths and signs of Euler parameters."""
-        result = np.empty(len(a) - len(self.quaternion_slots))
+        result = np.zeros(len(a) - len(self.quaternion_slots) + self.n_states)
         result[self.plain_v] = a[self.plain_q] - b[self.plain_q]
         for i, j in self.quaternion_slots:
             e, f = a[i : i + 4], b[i : i + 4]

@@ -132,6 +132,7 @@ def build_program(
         limits=limits,
         system=terms.system,
         projects=terms.projects,
+        n_states=terms.n_states,
     )
 
 
@@ -158,6 +159,7 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_events=len(terms.events),
         n_resets=len(terms.resets),
         n_strike=_strike_rows(terms),
+        n_states=terms.n_states,
         n_dae=len(terms.q) + terms.n_v + terms.n_c + len(terms.constraints),
     )
 

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from ..describe.input_names import rate_of, split_rate
-from ..describe.mechanism import Input, Output, Parameter
+from ..describe.mechanism import FirstOrderState, Input, Output, Parameter
 from ..equations.tree_equations import TreeEquations
 from ..equations.tree_slopes import ForceSlopes, can_differentiate
 from ..errors import UsageError
@@ -28,6 +28,7 @@ from .factor import has_long_paths
 from .given_multipliers import multiplier_values
 from .rolling_discs import describe_discs
 from .soundness import flag_forces
+from .state_terms import with_states
 from .terms import SystemTerms
 
 
@@ -41,10 +42,11 @@ def collect_terms(
     c, loop = kinematics.constraints, kinematics.loop_coordinates
     names = kinematics.names
     length = kinematics.length_scale
+    in_c = in_c and not kinematics.mechanism.states
     recursive = equations.accelerations is not None or (c.labels and equations.constrained is not None and in_c)
     by_columns = bool(recursive) and has_long_paths(kinematics.parent)
     scale = {"length": length, "angle": kinematics.graph.one}
-    return SystemTerms(
+    terms = SystemTerms(
         graph=kinematics.graph,
         t="t",
         q=names,
@@ -71,7 +73,7 @@ def collect_terms(
         coordinate_scales=tuple(scale[kind] for kind in kinematics.velocity_kinds),
         constraint_scales=row_scales(kinematics),
         n_dof=mobility.n_dof,
-        preferred=tuple(kinematics.velocity_labels.index(n) for n in mobility.independent),
+        preferred=_independent(kinematics, mobility),
         parent=_pattern(kinematics),
         centroidal=tuple(_centroidal(kinematics)),
         quaternion_slots=kinematics.quaternion_slots,
@@ -94,6 +96,12 @@ def collect_terms(
         canonical=equations.canonical,
         slopes=partial(ForceSlopes, kinematics) if can_differentiate(kinematics) else None,
     )
+    return with_states(terms, kinematics.state_names, kinematics.state_rates)
+
+
+def _independent(kinematics: Kinematics, mobility: Mobility) -> tuple[int, ...]:
+    """Places of the independent velocities."""
+    return tuple(kinematics.velocity_labels.index(n) for n in mobility.independent)
 
 
 def _pattern(kinematics: Kinematics) -> tuple[int, ...]:
@@ -139,7 +147,8 @@ def resolved_outputs(kinematics: Kinematics, equations: TreeEquations) -> list[E
 
 def _resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:
     """Event, state and its new value, of all resets."""
-    places = {name: k for k, name in enumerate((*kinematics.names, *kinematics.velocity_names))}
+    names = (*kinematics.names, *kinematics.velocity_names, *kinematics.state_names)
+    places = {name: k for k, name in enumerate(names)}
     found: list[tuple[int, int, Expr]] = []
     for i, event in enumerate(kinematics.mechanism.events):
         for name, value in event.reset:
@@ -168,7 +177,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
     """What a module knows of itself without any expression; sizes and kernels are added by the program."""
     m, c, loop = kinematics.mechanism, kinematics.constraints, kinematics.loop_coordinates
     names = kinematics.names
-    velocities = list(kinematics.velocity_names)
+    velocities, states = list(kinematics.velocity_names), list(kinematics.state_names)
     units: dict[str, str] = {}
     for name, kind in (*zip(names, kinematics.kinds, strict=True), *zip(loop.names, loop.kinds, strict=True)):
         unit = {"angle": "rad", "turn": "rad", "length": "m", "parameter": "1"}[kind]
@@ -181,7 +190,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
     if m.bare:
         units = {}
     docs: dict[str, str] = {}
-    described: list[Parameter | Input | Output] = [*m.parameters, *m.inputs, *m.outputs]
+    described: list[Parameter | Input | FirstOrderState | Output] = [*m.parameters, *m.inputs, *m.states, *m.outputs]
     for item in described:
         if item.unit:
             units[item.name] = item.unit
@@ -193,8 +202,9 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "doc": m.doc,
         "method": equations.method,
         "q_names": list(names),
-        "v_names": velocities,
-        "x_names": [*names, *velocities],
+        "v_names": [*velocities, *states],
+        "x_names": [*names, *velocities, *states],
+        **({"states": states} if states else {}),
         "u_names": list(kinematics.input_names),
         "p_names": list(kinematics.parameter_names),
         "y_names": [o.name for o in m.outputs],
@@ -208,7 +218,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "loop_names": list(loop.names),
         "loop_kinds": list(loop.kinds),
         "coordinate_kinds": list(kinematics.kinds),
-        "velocity_kinds": list(kinematics.velocity_kinds),
+        "velocity_kinds": [*kinematics.velocity_kinds, *("state" for _ in states)],
         "quaternion_slots": [list(slot) for slot in kinematics.quaternion_slots],
         **({"coordinate_of": list(kinematics.coordinate_of)} if m.given is not None else {}),
         **({"energy_known": False} if m.given is not None and m.given.kinetic_energy.is_zero else {}),
@@ -223,7 +233,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "docs": docs,
         **({"latex": dict(m.latex)} if m.latex else {}),
         **({"instances": dict(m.instances)} if m.instances else {}),
-        "independent": [kinematics.velocity_labels.index(n) for n in mobility.independent],
+        "independent": [*_independent(kinematics, mobility), *range(len(velocities), len(velocities) + len(states))],
         "independent_rows": list(rows),
         "redundant_rows": [i for i in range(len(c.labels)) if i not in rows],
         "q_reference": list(mobility.q_reference),
@@ -277,7 +287,7 @@ def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]
     given = {u.name: u.signal for u in kinematics.mechanism.inputs if u.signal is not None}
     if not given:
         return {}
-    states = (*kinematics.names, *kinematics.velocity_names)
+    states = (*kinematics.names, *kinematics.velocity_names, *kinematics.state_names)
     places = {name: ("x", k) for k, name in enumerate(states)}
     places |= {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)} | {"t": ("t", 0)}
     known = [kinematics.graph.symbol(name) for name in ("t", *states, *kinematics.parameter_names)]

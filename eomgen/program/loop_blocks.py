@@ -160,7 +160,8 @@ class LoopBlocks(ABC):
         if self.gentle:
             graph = self.terms.graph
             left = total_magnitude([a + b for a, b in zip(r, times(self.rows, x), strict=True)]) * self.unit
-            size = total_magnitude([a * (1.0 / s) for a, s in zip(x, self.s, strict=True)])
+            moving = self.terms.n_v - self.terms.n_states
+            size = total_magnitude([a * (1.0 / s) for a, s in zip(x[:moving], self.s, strict=False)])
             conditions.append(graph.apply("lt", left, size * LEFT + NOTHING))
         return x
 

@@ -14,7 +14,7 @@ def port_symbols(terms: SystemTerms, n_h: int) -> Mapping[str, tuple[str, ...]]:
         "q": terms.q,
         "v": terms.v,
         "a": terms.a,
-        "q_i": tuple(terms.q[terms.coordinate_of[i]] for i in independent),
+        "q_i": tuple(terms.q[terms.coordinate_of[i]] for i in independent if i < terms.n_v - terms.n_states),
         "v_i": tuple(terms.v[i] for i in independent),
         "a_i": tuple(terms.a[i] for i in independent),
         "q_guess": tuple(f"guess({q})" for q in terms.q),

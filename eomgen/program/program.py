@@ -138,6 +138,7 @@ class Program:
     quaternion_slots: tuple[tuple[int, int], ...] = ()
     given_rates: bool = False
     coordinate_of: tuple[int, ...] = ()
+    n_states: int = 0  #: first-order states, the last of the velocities
     limits: Limits = field(default_factory=Limits)
     system: LinearSystem | None = None
     projects: bool = True

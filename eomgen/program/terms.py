@@ -60,7 +60,7 @@ class SystemTerms:
     quaternion_slots: tuple[
         tuple[int, int], ...
     ] = ()  #: where Euler parameters start in q, and their angular velocity in v
-    rates: Row = ()  #: q' where there are Euler parameters, or where it is given
+    rates: Row = ()  #: q' where there are Euler parameters or states, or where it is given
     given_rates: bool = False  #: whether q' = N(q, t) v + b(q, t) is given; then n_q and n have nothing to do with
     #: each other
     paired: tuple[int, ...] = ()  #: with ``given_rates``: per velocity the coordinate whose rate it is, -1 for none
@@ -82,6 +82,7 @@ class SystemTerms:
     resets: Row = ()  #: of (q, v): new values of states after events
     input_rates: tuple[tuple[str, str], ...] = ()  #: inputs with the input that is their rate
     impacts: bool = False  #: whether an event is a gap with a restitution
+    n_states: int = 0  #: first-order states, the last of the velocities: of unit inertia, no coordinate's rate
     projects: bool = True  #: whether rhs takes the projected state; not with Baumgarte's stabilisation
 
     @property
@@ -96,10 +97,11 @@ class SystemTerms:
 
     @property
     def coordinate_of(self) -> tuple[int, ...]:
-        """Per velocity the coordinate whose rate it is, -1 for angular velocities of spherical joints."""
+        """Per velocity the coordinate whose rate it is, -1 for angular velocities of spherical joints and states."""
         if self.given_rates:
             return self.paired
         turning = {k for _, j in self.quaternion_slots for k in range(j, j + 3)}
+        turning |= set(range(self.n_v - self.n_states, self.n_v))
         parameters = {k for i, _ in self.quaternion_slots for k in range(i, i + 4)}
         plain = iter([k for k in range(len(self.q)) if k not in parameters])
         return tuple(-1 if k in turning else next(plain) for k in range(self.n_v))
@@ -110,7 +112,7 @@ class SystemTerms:
         return (
             not self.given_rates
             and self.n_c == len(self.constraints)
-            and all(self.coordinate_of[k] >= 0 for k in self.preferred)
+            and all(self.coordinate_of[k] >= 0 for k in self.preferred if k < self.n_v - self.n_states)
         )
 
     @property
@@ -133,7 +135,7 @@ class SystemTerms:
         """
         n, m = self.n_v, self.n_c
         sizes = {
-            "q": (len(self.rates) if self.given_rates else n + len(self.quaternion_slots), len(self.q)),
+            "q": (len(self.rates) if self.given_rates else n - self.n_states + len(self.quaternion_slots), len(self.q)),
             "a": (len(self.a), n),
             "multipliers": (len(self.multipliers), m),
             "mass_matrix": (len(self.mass_matrix), 0 if self.by_columns else n),

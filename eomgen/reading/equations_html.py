@@ -29,10 +29,10 @@ def equations_html(equations: Readable) -> str:
     """Formulas of the equations of motion."""
     printed = PrintedEquations(equations)
     if equations.mobility.n_dof == 0:
-        return "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
-    return "".join(
-        parts_html(PrintedParts(printed)) if printed.is_long else [*_motion(printed), *_intermediates(printed)]
-    )
+        still = "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
+        return "".join([still, *_states(printed)])
+    motion = parts_html(PrintedParts(printed)) if printed.is_long else [*_motion(printed), *_intermediates(printed)]
+    return "".join([*motion, *_states(printed)])
 
 
 def facts_html(equations: Readable) -> str:
@@ -148,6 +148,12 @@ def _intermediates(printed: PrintedEquations) -> Iterator[str]:
     if printed.intermediates:
         yield f"<p {LEFT}>where</p>"
         yield from (_line(printed, mathml(Name(name), printed.names), x) for name, x in printed.intermediates)
+
+
+def _states(printed: PrintedEquations) -> Iterator[str]:
+    if printed.states:
+        yield f"<p {LEFT}>first-order states</p>"
+        yield from (_line(printed, mathml(rate, printed.names), x) for rate, x in printed.states)
 
 
 def parts_html(parts: PrintedParts) -> Iterator[str]:

@@ -99,7 +99,9 @@ class _Code:
     def __init__(self, equations: Readable, language: Language, form: str) -> None:
         self.language, self.form, self.model = language, form, equations.kinematics.mechanism.name
         named = equations.intermediates
-        whole = [*(x for _, x in named), *equations.mass_matrix, *equations.force]
+        own = equations.written("state_rates") if equations.states else ([], sympy.Matrix())
+        named = [*named, *own[0]]
+        whole = [*(x for _, x in named), *equations.mass_matrix, *equations.force, *own[1]]
         unknown = {str(f.func) for x in whole for f in x.atoms(AppliedUndef)}
         if unknown:
             raise UnavailableError(
@@ -107,10 +109,12 @@ class _Code:
                 "latex and text show them by name, and eomgen generate writes code for them"
             )
         symbols = set().union(*(x.free_symbols for x in whole), {symbol for symbol, _ in named})
-        self.renamed = _renamed((str(s) for s in symbols), language.reserved, form)
+        self.renamed = _renamed((str(s) for s in symbols), language.reserved | {"state_rates", "stateRates"}, form)
         put = {s: sympy.Symbol(self.renamed[str(s)]) for s in symbols}
         self.named = [(put[symbol], x.xreplace(put)) for symbol, x in named]
         self.mass, self.force = equations.mass_matrix.xreplace(put), equations.force.xreplace(put)
+        self.states = [x.xreplace(put) for x in own[1]]
+        self.state_names = equations.kinematics.state_names
         inner = {symbol for symbol, _ in self.named}
         self.arguments = sorted(str(symbol) for symbol in put.values() if symbol not in inner)
         self.rates = equations.acceleration_names
@@ -118,6 +122,7 @@ class _Code:
 
     def file(self) -> str:
         notes = [f"M * [{', '.join(self.rates)}] = f of {self.model}"]
+        notes += [f"[{', '.join(f'{n}_dot' for n in self.state_names)}] = state_rates"] if self.states else []
         notes += [f"{new} is {old} of the model" for old, new in sorted(self.renamed.items()) if old != new]
         if self.form == "mathematica":
             return "\n".join([*(f"(* {note} *)" for note in notes), *self._mathematica(), ""])
@@ -142,17 +147,21 @@ class _Code:
             *self._lines(lambda name, x: f"{name} = {x}"),
             f"M = sympy.Matrix({[[*row] for row in self.mass.tolist()]})",
             f"f = sympy.Matrix({list(self.force)})",
+            *([f"state_rates = sympy.Matrix({self.states})"] if self.states else []),
         ]
 
     def _matlab(self) -> list[str]:
         n = self.mass.rows
+        more = ", state_rates" if self.states else ""
         return [
-            f"function [M, f] = {self.function}({', '.join(self.arguments)})",
+            f"function [M, f{more}] = {self.function}({', '.join(self.arguments)})",
             *self._lines(lambda name, x: f"  {name} = {x};"),
             f"  M = zeros({n}, {n});",
             *(f"  M({i}, {j}) = {x};" for i, j, x in self._cells(1)),
             f"  f = zeros({n}, 1);",
             *(f"  f({i}) = {self.language.print(x)};" for i, x in enumerate(self.force, 1)),
+            *([f"  state_rates = zeros({len(self.states)}, 1);"] if self.states else []),
+            *(f"  state_rates({i}) = {self.language.print(x)};" for i, x in enumerate(self.states, 1)),
             "end",
         ]
 
@@ -165,20 +174,24 @@ class _Code:
             *(f"    M[{i}, {j}] = {x}" for i, j, x in self._cells(1)),
             f"    f = zeros({n})",
             *(f"    f[{i}] = {self.language.print(x)}" for i, x in enumerate(self.force, 1)),
-            "    return M, f",
+            *([f"    state_rates = zeros({len(self.states)})"] if self.states else []),
+            *(f"    state_rates[{i}] = {self.language.print(x)}" for i, x in enumerate(self.states, 1)),
+            f"    return M, f{', state_rates' if self.states else ''}",
             "end",
         ]
 
     def _c(self) -> list[str]:
         n = self.mass.rows
         given = "".join(f"double {name}, " for name in self.arguments)
+        more = f", double state_rates[{len(self.states)}]" if self.states else ""
         return [
             "#include <math.h>",
-            f"void {self.function}({given}double M[{n}][{n}], double f[{n}])",
+            f"void {self.function}({given}double M[{n}][{n}], double f[{n}]{more})",
             "{",
             *self._lines(lambda name, x: f"  const double {name} = {x};"),
             *(f"  M[{i}][{j}] = {x};" for i, j, x in self._cells(0)),
             *(f"  f[{i}] = {self.language.print(x)};" for i, x in enumerate(self.force)),
+            *(f"  state_rates[{i}] = {self.language.print(x)};" for i, x in enumerate(self.states)),
             "}",
         ]
 
@@ -188,6 +201,7 @@ class _Code:
             *self._lines(lambda name, x: f"{name} = {x};"),
             f"M = {{{', '.join(f'{{{row}}}' for row in rows)}}};",
             f"f = {{{', '.join(map(self.language.print, self.force))}}};",
+            *([f"stateRates = {{{', '.join(map(self.language.print, self.states))}}};"] if self.states else []),
         ]
 
 

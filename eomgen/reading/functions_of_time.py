@@ -22,7 +22,7 @@ def dynamic_symbols(kinematics: Kinematics) -> Callable[[str], Any]:
     loop = kinematics.loop_coordinates.names
     for name in (*kinematics.names, *loop):
         orders |= {name: (name, 0), f"{name}_dot": (name, 1), f"{name}_ddot": (name, 2)}
-    for velocity in kinematics.velocity_names:
+    for velocity in (*kinematics.velocity_names, *kinematics.state_names):
         base, order = orders.setdefault(velocity, (velocity, 0))
         orders[acceleration_name(velocity)] = (base, order + 1)
     inputs = kinematics.input_names

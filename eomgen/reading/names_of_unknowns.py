@@ -16,7 +16,8 @@ from ..notation.notation import Notation
 def model_notation(kinematics: Kinematics, more: Iterable[str] = ()) -> Notation:
     """How the names of a model are printed, and further names after them."""
     k, m = kinematics, kinematics.mechanism
-    rates = [*k.velocity_names, *map(acceleration_name, k.velocity_names)]
+    velocities = [*k.velocity_names, *k.state_names]
+    rates = [*velocities, *map(acceleration_name, velocities)]
     outputs = [output.name for output in m.outputs]
     names = [*k.names, *k.loop_coordinates.names, *k.parameter_names, *k.input_names, *outputs, *rates, *more]
     return Notation(names, m.latex, m.instances)

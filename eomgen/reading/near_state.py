@@ -48,6 +48,8 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
         others, or an entry has no value.
     """
     kinematics, graph = quantities.kinematics, quantities.graph
+    if kinematics.state_names:
+        raise UnavailableError("the model has first-order states; use linearize of the module")
     if kinematics.given_rates:
         raise UnavailableError("rates of coordinates are given as functions of velocities; use linearize of the module")
     inputs = kinematics.input_names

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
+from ..kinematics.state import acceleration_name
 from ..notation.notation import Notation
 from ..printing import Formulas, Order, number, text
 from ..printing.factor_order import COORDINATE, GRAVITY, INERTIA, INPUT, MASS, PARAMETER, RATE
@@ -148,6 +149,17 @@ class PrintedEquations:
         """v' of M v' = f."""
         return [self.formula(x) for x in self.equations.symbols_put_in(self.equations.acceleration_names)]
 
+    @cached_property
+    def states(self) -> list[tuple[Formula, Formula]]:
+        """First-order states: their rates, and what these are, after named parts of the latter."""
+        kinematics = self.equations.kinematics
+        if not kinematics.state_names:
+            return []
+        rates = self.equations.symbols_put_in([acceleration_name(name) for name in kinematics.state_names])
+        named, column = self.equations.written("state_rates")
+        pairs = [*named, *zip(rates, column, strict=True)]
+        return [(self.formula(left), self.formula(right)) for left, right in pairs]
+
     @property
     def values(self) -> list[Formula]:
         """Equations of what was put in, ``l = 0.5``; a second time for a name with what came later."""
@@ -213,9 +225,11 @@ class PrintedEquations:
     @property
     def attributes(self) -> tuple[str, ...]:
         """Attributes to read next."""
-        loops = OF_LOOPS if self.equations.constraint_names else ()
+        loops: tuple[str, ...] = OF_LOOPS if self.equations.constraint_names else ()
         mechanism, there = self.equations.kinematics.mechanism, type(self.equations)
+        loops = (*loops, "states", "state_rates") if mechanism.states else loops
         lacking = {*(OF_BODIES if mechanism.bare else ()), *(OF_PARTS if mechanism.given is not None else ())}
+        lacking |= {"linearize"} if mechanism.states else set()  # refused
         return tuple(name for name in (*ATTRIBUTES, *loops) if hasattr(there, name) and name not in lacking)
 
 

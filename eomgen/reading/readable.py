@@ -150,6 +150,16 @@ class Readable(QuantitiesOfMethods):
         parts = {name: sympy.Matrix(n, 1, written[(k + 1) * n : (k + 2) * n]) for k, name in enumerate(names)}
         return NamedSum.of(written[:n], parts, self._plain)
 
+    @property
+    def states(self) -> tuple[Any, ...]:
+        """First-order states, SymPy symbols."""
+        return tuple(map(self._symbol, self.kinematics.state_names))
+
+    @cached_property
+    def state_rates(self) -> Any:
+        """s' (n_s, 1) of the first-order states ``states``."""
+        return self._column("state_rates", lambda s: s.kinematics.state_rates)
+
     # -- constraints --------------------------------------------------------------------------------------------------
     @cached_property
     def constraints(self) -> Any:

@@ -44,7 +44,7 @@ WHOLE = (
     *("T", "V", "lagrangian", "momenta", "mass_matrix", "force", "quadratic_velocity", "generalized_forces"),
     *("constraints", "velocity_constraints", "constraint_jacobian", "gamma", "velocity_transformation"),
     *("velocity_offset", "acceleration_offset", "body_velocity_transformation", "body_mass_matrix"),
-    *("gibbs_function", "hamiltonian", "momentum_rates", "block_system", "tree_system"),
+    *("gibbs_function", "hamiltonian", "momentum_rates", "block_system", "tree_system", "state_rates"),
 )
 SHOWN = 8  #: names that a message lists
 BY_NAME = ("poses", "velocities", "accelerations", "loop_coordinates", "free_bodies", "joint_forces")

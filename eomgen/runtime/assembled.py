@@ -186,7 +186,7 @@ class Assembled:
         for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
             scalar = isinstance(given, (float, int, np.number)) or (isinstance(given, np.ndarray) and not given.ndim)
             if scalar and name in layout.q + layout.loops + layout.v:
-                kind = "velocity" if name in layout.v else "coordinate"
+                kind = "state" if name in layout.states else "velocity" if name in layout.v else "coordinate"
                 raise UsageError(f"{name}= gives the {what}; give the {kind} {name!r} in a dict: {{{name!r}: ...}}")
         kernels = (self if p is None and u is None else self.bind(p, u)).kernels
         return initial_of(kernels, read_number("t", t), names)

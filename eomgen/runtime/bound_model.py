@@ -18,6 +18,7 @@ from .argument_names import both_names
 from .assembled import Assembled
 from .kernels import Kernels, Projection, Rows
 from .layout import Layout
+from .mechanical import Mechanical
 from .momenta import Momenta
 from .refusals import Refusal
 from .room import read_numbers
@@ -70,21 +71,24 @@ class BoundModel(Assembled, Momenta):
         self.layout = layout = kernels.layout
         self.metadata = layout.metadata
         self.name, self.doc, self.limits = layout.name, str(layout.metadata.get("doc") or ""), layout.limits
-        self.q_names, self.v_names, self.x_names = layout.q, layout.v, layout.x
+        moving = layout.n_v - len(layout.states)
+        self.q_names, self.v_names, self.s_names, self.x_names = layout.q, layout.v[:moving], layout.states, layout.x
         self.u_names, self.p_names, self.y_names = layout.u, layout.p, layout.y
         self.body_names, self.loop_names = layout.bodies, layout.loops
-        self.n_q, self.n_v, self.n_x, self.n_u, self.n_p = layout.n_q, layout.n_v, layout.n_x, layout.n_u, layout.n_p
-        self.n_y, self.n_dof, self.n_bodies = layout.n_y, layout.n_dof, layout.n_bodies
+        self.n_q, self.n_v, self.n_s, self.n_x = layout.n_q, moving, len(layout.states), layout.n_x
+        self.n_u, self.n_p, self.n_y, self.n_bodies = layout.n_u, layout.n_p, layout.n_y, layout.n_bodies
+        self.n_dof = layout.n_dof - self.n_s
         self.n_c, self.n_rows = len(layout.rows), layout.n_c
         jacobian: Any = kernels.timed("jacobian")
         self.rhs, self.jacobian, jacobian.others = kernels.timed("rhs"), jacobian, partial(getattr, self)
-        self.bias, self.outputs = kernels.timed("bias"), kernels.timed("outputs")
-        self.mass_matrix = kernels.state("mass_matrix")
-        self.embedded_mass_matrix = kernels.state("embedded_mass_matrix")
+        self.outputs = kernels.timed("outputs")
         self.energy, self.poses = kernels.state("energy"), kernels.state("poses")
         self.project = Projection(kernels.state("project"))
-        self.inverse_dynamics = kernels.motion("inverse_dynamics")
-        self.constraints, self.constraint_jacobian = kernels.constraints, kernels.constraint_jacobian
+        self.constraints = kernels.constraints
+        mechanical = kernels if not self.n_s else Mechanical(kernels)
+        self.mass_matrix, self.embedded_mass_matrix = mechanical.mass_matrix, mechanical.embedded_mass_matrix
+        self.bias, self.inverse_dynamics = mechanical.bias, mechanical.inverse_dynamics
+        self.constraint_jacobian = mechanical.constraint_jacobian
         self.velocity_constraints = kernels.velocity_constraints
 
     @property

@@ -15,6 +15,7 @@ from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.projection import correct_position
 from ..numeric.scales import Array
+from .refusals import refuse_states
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ class Canonical:
 
     def __init__(self, module: BoundModel) -> None:
         layout = module.layout
+        refuse_states(layout, "the canonical form")
         if layout.n_momenta != layout.n_v:
             raise UnavailableError(
                 f"model {layout.name!r} was derived by method {layout.metadata.get('method')!r}, which has no momenta; "
@@ -82,7 +84,7 @@ class Canonical:
         rate, N = np.zeros(layout.n_c), np.eye(layout.n_v)
         if layout.n_c:
             q = correct_position(lambda x: self._position(x, t), q, layout.scales)[0]
-            J = layout.scales.jacobian(module.constraint_jacobian(q, t=t, rows="all"))
+            J = layout.scales.jacobian(module.kernels.constraint_jacobian(q, t=t, rows="all"))
             rest = np.concatenate([q, np.zeros(layout.n_v)])
             rate = layout.scales.residual(module.velocity_constraints(rest, t=t, rows="all"))
             N = algebra.svd(J)[2][layout.rank :].T
@@ -90,7 +92,7 @@ class Canonical:
         else:
             least = np.zeros(layout.n_v)
         still = self.momenta(np.concatenate([q, np.zeros(layout.n_v)]), t)  # what p is at v = 0
-        M = s[:, None] * module.mass_matrix(q, t=t) * s
+        M = s[:, None] * module.kernels.mass_matrix(q, t=t) * s
         right = N.T @ (s * (p - still) - M @ least)  # N^T (M v + b) = N^T p, v = least + N y
         embedded = N.T @ M @ N
         sizes = algebra.eigvalsh(correlated(embedded)) if np.isfinite(embedded).all() else np.zeros(1)
@@ -103,7 +105,7 @@ class Canonical:
 
     def _position(self, q: Array, t: float) -> tuple[Array, Array]:
         module = self._module
-        return module.constraints(q, t=t, rows="all"), module.constraint_jacobian(q, t=t, rows="all")
+        return module.constraints(q, t=t, rows="all"), module.kernels.constraint_jacobian(q, t=t, rows="all")
 
     def rhs(self, t: float, z: ArrayLike) -> Array:
         """z' = [q'; p'] (n_z,): q' = dH/dp and p' = -dH/dq + Q, with the forces of constraints.
@@ -115,7 +117,7 @@ class Canonical:
         q, v = x[: layout.n_q], x[layout.n_q :]
         rates = np.array(self._terms(x, t=t)[1])
         if layout.n_c:  # -C_q^T l = M a + h
-            rates += module.inverse_dynamics(q, v, module.rhs(t, x)[layout.n_q :], t=t)
+            rates += module.kernels.inverse_dynamics(q, v, module.rhs(t, x)[layout.n_q :], t=t)
         return np.concatenate([layout.scales.rates(q, v), rates])
 
     def hamiltonian(self, z: ArrayLike, t: float = 0.0) -> float:

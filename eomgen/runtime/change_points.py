@@ -48,7 +48,7 @@ class ChangePoint(NamedTuple):
 def scaled_jacobians(module: BoundModel, t: Array, x: Array, u: Array | None = None) -> Array:
     """Scaled constraint Jacobians (k, m, n) at times (k,), states (n_x, k) and inputs (n_u, k)."""
     layout = module.layout
-    C_q = np.moveaxis(module.constraint_jacobian(x[: layout.n_q], t=t, u=u, rows="all"), -1, 0)
+    C_q = np.moveaxis(module.kernels.constraint_jacobian(x[: layout.n_q], t=t, u=u, rows="all"), -1, 0)
     return np.asarray(layout.scales.jacobian(C_q))
 
 

@@ -110,8 +110,8 @@ class DaeForm:
         y[: layout.n_x], yp[: layout.n_x] = x, rates
         if len(layout.rows):
             q, v, a = x[: layout.n_q], x[layout.n_q :], rates[layout.n_q :]
-            J = layout.scales.jacobian(module.constraint_jacobian(q, t=t, u=u, rows="all"))[layout.rows]
-            force = layout.scales.q * module.inverse_dynamics(q, v, a, t=t, u=u)
+            J = layout.scales.jacobian(module.kernels.constraint_jacobian(q, t=t, u=u, rows="all"))[layout.rows]
+            force = layout.scales.q * module.kernels.inverse_dynamics(q, v, a, t=t, u=u)
             l = algebra.lstsq(J.T, -force, rcond=None)
             y[layout.n_x : layout.n_x + len(l)] = l / layout.scales.c[layout.rows]
         return y, yp

@@ -31,6 +31,8 @@ ENERGY = (
 class Kernels:
     """The calls of one model, sharing one set of parameters and inputs.
 
+    Here the velocities are [v; s], first-order states among them; :mod:`.mechanical` leaves these out for users.
+
     Parameters
     ----------
     core : Core
@@ -53,6 +55,9 @@ class Kernels:
         self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
         self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)
         self.velocity_constraints = Rows(self.state("velocity_constraints"), layout.rows)
+        self.mass_matrix, self.bias = self.state("mass_matrix"), self.timed("bias")
+        self.embedded_mass_matrix = self.state("embedded_mass_matrix")
+        self.inverse_dynamics = self.motion("inverse_dynamics")
 
     def _unscaled(self, *_: Any) -> None:
         """Refuse parameters whose lengths and masses scale nothing."""

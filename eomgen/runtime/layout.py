@@ -54,7 +54,11 @@ class Layout:
         self.quaternion_slots: tuple[tuple[int, int], ...] = tuple(
             (int(i), int(j)) for i, j in data.get("quaternion_slots", ())
         )
-        self.space = Space.of(self.n_v, self.quaternion_slots)
+        #: first-order states, which are the last of the velocities
+        self.states: tuple[str, ...] = tuple(data.get("states", ()))
+        self.n_states = len(self.states)
+        self.moving = self.n_v - self.n_states  #: velocities of the mechanism
+        self.space = Space.of(self.n_v, self.quaternion_slots, self.n_states)
         self.velocity_labels = tuple(n[:-4] if n.endswith("_dot") and n[:-4] in self.q else n for n in self.v)
         coordinate_of: list[int] | None = data.get("coordinate_of")
         if coordinate_of is not None:  # given equations name their velocities as they like
@@ -93,6 +97,8 @@ class Layout:
         rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
         self.scales = Scales.of_kinds(self.velocity_kinds, rows, self.length, self.space)
         self.row_lengths = np.array([kind == "length" for kind in data.get("constraint_kinds", ())], dtype=bool)
+        #: independent velocities of the mechanism
+        self.independent_moving = self.independent[self.independent < self.moving]
         #: coordinates of the independent velocities, where each is the rate of one
         self.independent_q = self.scales.coordinates(self.independent)
         #: the scales of coordinates and holonomic rows, where they are not those of the velocities
@@ -140,7 +146,7 @@ class Layout:
         ------
         UsageError
         """
-        turning = [self.v[i] for i in self.independent if self.velocity_labels[i] == self.v[i]]
+        turning = [self.v[i] for i in self.independent_moving if self.velocity_labels[i] == self.v[i]]
         if self.given_rates:
             reason = "the rates of its coordinates are given as functions of velocities"
         elif self.n_h < self.n_c:

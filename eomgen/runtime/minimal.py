@@ -41,6 +41,8 @@ class Memory(threading.local):
 class Minimal:
     """The equations of motion in independent coordinates and velocities only: x = [q_i; v_i].
 
+    First-order states follow: x = [q_i; v_i; s].
+
     The set of independent coordinates is fixed.  The dependent ones are solved by Newton's iteration, starting from the
     last converged position, which is the only memory a call leaves; :meth:`reset` sets it.  Each thread has a memory of
     its own, so that threads do not disturb one another; a new thread begins where :meth:`reset` was told last.  A step
@@ -49,9 +51,9 @@ class Minimal:
     Attributes
     ----------
     x_names : tuple of str
-        Names of the entries of x = [q_i; v_i].
-    q_names, v_names : tuple of str
-        Their two halves.
+        Names of the entries of x.
+    q_names, v_names, s_names : tuple of str
+        Their parts.
     n_x : int
     """
 
@@ -62,8 +64,8 @@ class Minimal:
         self._layout = layout
         self._path = DependentMotion(module.kernels)
         self.q_names = tuple(layout.q[i] for i in layout.independent_q)
-        self.v_names = tuple(layout.v[i] for i in layout.independent)
-        self.x_names = self.q_names + self.v_names
+        self.v_names, self.s_names = tuple(layout.v[i] for i in layout.independent_moving), layout.states
+        self.x_names = self.q_names + self.v_names + self.s_names
         self.n_x = len(self.x_names)
         self._start: list[Array | None] = [None]
         self._memory = Memory(self._start)
@@ -161,13 +163,14 @@ class Minimal:
         before = memory.q
         full = self._solve(t, state)
         x_dot = self._module.rhs(t, full, u=u)
-        motion = np.concatenate([full[self._layout.n_q :], x_dot[self._layout.n_q :]])
+        moving = slice(self._layout.n_q, self._layout.n_q + self._layout.moving)
+        motion = np.concatenate([full[moving], x_dot[moving]])
         self._check_crossing(t, motion, state, before)
         memory.recent = [*memory.recent[-REMEMBERED:], (t, motion)]
         return self.reduce(x_dot)
 
     def _solve(self, t: float, x: Array) -> Array:
-        n, k = self._layout.n_q, self._layout.n_dof
+        n, k = self._layout.n_q, len(self._layout.independent_q)
         memory = self._memory
         if memory.q is None:
             self.reset()
@@ -179,7 +182,7 @@ class Minimal:
             if not np.isfinite(way).all():
                 raise UsageError(f"x is not finite: {x}")
             near = self._path.follow(near, q_i, t)
-        full = self._path.motion(q_i, v_i, np.zeros(k), near, t)[: self._layout.n_x]
+        full = self._path.motion(q_i, v_i, np.zeros_like(v_i), near, t)[: self._layout.n_x]
         memory.q = full[:n].copy()
         return full
 
@@ -192,19 +195,19 @@ class Minimal:
         layout = self._layout
         if not layout.rank or before is None:
             return
-        scales = layout.scales.q
+        scales, chosen = layout.scales.q[: layout.moving], layout.independent_moving
         v, a = np.abs(motion.reshape(2, -1) / scales).max(axis=1)
-        own = np.abs(motion[layout.independent] / scales[layout.independent]).max()
+        own = np.abs(motion[chosen] / scales[chosen]).max()
         if v <= AMPLIFIED * own:
             return
         for time, other in self._memory.recent:
             gap = abs(t - time)
             v_other, a_other = np.abs(other.reshape(2, -1) / scales).max(axis=1)
-            own_other = np.abs(other[layout.independent] / scales[layout.independent]).max()
+            own_other = np.abs(other[chosen] / scales[chosen]).max()
             if v_other <= AMPLIFIED * own_other or gap == 0.0 or min(v, v_other) * gap > 1.0:
                 continue
-            change = (motion - other)[: layout.n_v] / scales
-            turned = (motion[: layout.n_v] / scales) @ (other[: layout.n_v] / scales) < 0.0
+            change = (motion - other)[: layout.moving] / scales
+            turned = (motion[: layout.moving] / scales) @ (other[: layout.moving] / scales) < 0.0
             if turned and np.abs(change).max() > SUDDEN * max(a, a_other) * gap:
                 self._memory.q = before
                 raise PartitionError(

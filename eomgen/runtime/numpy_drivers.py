@@ -369,7 +369,8 @@ class Drivers:
 
     def _kinematics(self, t: float, x: Array, u: Array, c: Array) -> Array:
         layout, k = self.layout, self.layout.n_dof
-        q_i, v_i, a_i, guess = x[:k], x[k : 2 * k], x[2 * k : 3 * k], x[3 * k :]
+        free = k - layout.n_states
+        q_i, v_i, a_i, guess = np.split(x, (free, free + k, free + 2 * k))
         terms, position, rate = self._bound(t, u, c)
         return np.concatenate(
             kinematics_of(

@@ -25,6 +25,21 @@ def require_velocities(layout: Layout) -> None:
         )
 
 
+def refuse_states(layout: Layout, what: str) -> None:
+    """Refuse a model with first-order states where their values are not asked for.
+
+    Raises
+    ------
+    UnavailableError
+    """
+    if layout.states:
+        raise UnavailableError(
+            f"{what} is not available for models with first-order states, and {layout.name!r} has "
+            f"{', '.join(layout.states)}; available are rhs, jacobian, simulate, simulate_many, equilibrium, "
+            "linearize, modes, sensitivities, reactions, impact, minimal and dae"
+        )
+
+
 def require_projection(layout: Layout) -> None:
     """Refuse a model whose right-hand side holds constraints by Baumgarte's stabilisation.
 

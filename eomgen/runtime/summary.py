@@ -23,7 +23,7 @@ def facts(module: BoundModel) -> list[tuple[str, str]]:
     """Label and value of each line of the report."""
     layout, data = module.layout, module.metadata
     lines = [
-        ("degrees of freedom", str(layout.n_dof)),
+        ("degrees of freedom", str(layout.n_dof - len(layout.states))),
         ("coordinates", listed(layout.q)),
     ]
     if layout.n_c:

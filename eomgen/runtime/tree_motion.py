@@ -69,7 +69,8 @@ class IndependentPath:
         return Tangent(np.zeros_like(self.scales.q)) if found is None else found.tangent
 
     def _kinematics(self, s: float, rate: Array, guess: Array) -> Array:
-        x = np.concatenate([self.at(s), rate, np.zeros_like(rate), guess])
+        rest = np.zeros(self.motion.layout.n_states)  # states stand still
+        x = np.concatenate([self.at(s), rate, rest, np.zeros_like(rate), rest, guess])
         return np.asarray(self.motion.kernel(x, t=self.t))
 
 
@@ -81,15 +82,16 @@ class DependentMotion:
         self.fail = kernels.fail
         if layout.rank:
             self.kernel = kernels.state("kinematics", nan=True)
-        self.scales_i = layout.scales.q[layout.independent]
+        self.scales_i = layout.scales.q[layout.independent_moving]
 
     def newton(self, q_i: Array, v_i: Array, a_i: Array, guess: Array, t: float) -> Array:
         """[q, v, a] (3 n,) by one Newton iteration from a guess, wherever it leads."""
         layout = self.layout
         if not layout.rank:
-            result = np.empty((3, layout.n_v))
-            result[:, layout.independent] = q_i, v_i, a_i
-            return result.ravel()
+            q, motion = np.empty(layout.n_q), np.empty((2, layout.n_v))
+            q[layout.independent_q] = q_i
+            motion[:, layout.independent] = v_i, a_i
+            return np.concatenate([q, motion.ravel()])
         result = self.kernel(np.concatenate([q_i, v_i, a_i, guess]), t=t)
         if not np.isfinite(result).all():
             raise self._blocked(q_i, result)
@@ -122,7 +124,7 @@ class DependentMotion:
         With one degree of freedom all columns lie on one line.  It is followed once, over points at whole distances
         from the start, so that the result of a column does not depend on the others.
         """
-        if self.layout.n_dof != 1 or not self.layout.rank:
+        if len(self.layout.independent_q) != 1 or not self.layout.rank:
             return [self.follow(start, targets[:, j], 0.0) for j in range(targets.shape[1])]
         origin, unit, n_q = start[self.layout.independent_q], self.scales_i[0], self.layout.n_q
         lengths = (targets[0] - origin[0]) / unit
@@ -139,7 +141,7 @@ class DependentMotion:
             while not way.blocked and way.points[-1].s <= farthest:
                 way.to(np.floor(way.points[-1].s) + 1.0)
             guesses = interpolate(way.points, way.scales, np.abs(lengths[chosen]))
-            x = np.concatenate([targets[:, chosen], np.zeros((2, len(chosen))), guesses])
+            x = np.concatenate([targets[:, chosen], np.zeros((2 * self.layout.n_dof, len(chosen))), guesses])
             found = self.kernel(x, t=0.0)[:n_q]
             for j, q, guess in zip(chosen, found.T, guesses.T, strict=True):
                 near = np.abs(path.scales.distance(q, guess)).max() <= ASTRAY  # False for NaN
@@ -156,7 +158,9 @@ class DependentMotion:
             )
 
     def _place(self, target: Array) -> str:
-        return place([self.layout.velocity_labels[i] for i in self.layout.independent], target).removeprefix(", ")
+        return place([self.layout.velocity_labels[i] for i in self.layout.independent_moving], target).removeprefix(
+            ", "
+        )
 
     def _blocked(self, target: Array, found: Array) -> EvaluationError:
         """Why the step to independent values failed."""
@@ -196,7 +200,7 @@ def motions(
     q, v, a : (n,) or (n, k) arrays
     """
     layout = path.layout
-    n_q, n, size = layout.n_q, layout.n_v, layout.n_dof
+    n_q, n, size = layout.n_q, layout.n_v, len(layout.independent_q)
     labels, width = ("q_i", "v_i", "a_i"), n_q + 2 * n
     arrays = [None if x is None else read_numbers(what, x, width) for what, x in zip(labels, given, strict=True)]
     columns = max((part.shape[1:] for part in arrays if part is not None), key=len, default=())
@@ -209,6 +213,7 @@ def motions(
             raise UsageError(f"{name} must be finite")
         parts.append(np.broadcast_to(full if full.shape[1:] == columns else full[:, None], (size, *columns)))
     q, v, a = (part if columns else part[:, None] for part in parts)
+    v, a = (np.concatenate([part, np.zeros((layout.n_states, part.shape[1]))]) for part in (v, a))
     if t.shape not in ((), q.shape[1:]):
         raise UsageError(f"t must be a number or have shape {q.shape[1:]}, one a position, not {t.shape}")
     times = np.broadcast_to(t, q.shape[1:])
@@ -226,4 +231,5 @@ def motions(
         result[:, j] = solve(q[:, j], v[:, j], a[:, j], near[j], float(times[j]))
     if not columns:
         result = result[:, 0]
-    return result[:n_q], result[n_q : n_q + n], result[n_q + n :]
+    moving = layout.moving
+    return result[:n_q], result[n_q : n_q + moving], result[n_q + n : n_q + n + moving]

@@ -34,7 +34,7 @@ def swing(module: Any, x: Array, direction: Array, count: int) -> Array:
     turns = np.sin(2.0 * np.pi * np.arange(count) / count)
     for _ in range(TRIES):
         q = x[:n, None] + size * direction[:, None] * turns
-        states = np.concatenate([q, np.zeros((module.n_v, count))])
+        states = np.concatenate([q, np.zeros((module.layout.n_v, count))])
         try:
             return np.asarray(module.project(states)) if module.n_rows or module.layout.space else states
         except EvaluationError:

@@ -79,7 +79,7 @@ def simulate_impacts(
             )
     most = read_count("most, the number of impacts,", most, 1)
     found, _ = check_gaps(module.layout, gaps)
-    if not module.n_dof:
+    if not module.layout.n_dof:
         raise UsageError(
             f"{module.name} has no degree of freedom: its drivers determine the motion, and no impact can change it"
         )
@@ -193,7 +193,7 @@ class _ImpactRun:
 
     def _speed(self, x: Array) -> float:
         layout = self.module.layout
-        return float(np.abs(x[layout.n_q :] / layout.scales.q).max(initial=0.0)) * max(1.0, layout.length)
+        return layout.scales.speed(x[layout.n_q :]) * max(1.0, layout.length)
 
     def _go_on(self, t: float, x: Array, rates: Array) -> tuple[float, Array, NDArray[np.bool_]]:
         """Integrate to the next closing gap: the time and state there, and which gaps close."""

@@ -42,7 +42,7 @@ class Strike:
     def __init__(self, module: BoundModel, t: float, x: Array) -> None:
         self.module, self.t, self.layout = module, t, module.layout
         self.q, self.v = x[: self.layout.n_q], x[self.layout.n_q :]
-        self.C_q = module.constraint_jacobian(self.q, t=t, rows="all")
+        self.C_q = module.kernels.constraint_jacobian(self.q, t=t, rows="all")
         self.B = free_motions(self.C_q, self.layout.scales)
         self._slopes = module.kernels.timed("strike_derivatives")
 
@@ -89,7 +89,7 @@ def after_impact(
     layout, strike = module.layout, Strike(module, t, x)
     n_q, n_x, names = layout.n_q, layout.n_x, layout.u
     change, none, rest = strike.v - v, np.zeros(layout.n_c), np.zeros(layout.n_events)
-    M = module.mass_matrix(strike.q, t=t)
+    M = module.kernels.mass_matrix(strike.q, t=t)
     n = strike.rows(v, change, none, rest)[3][event : event + 1, n_q:n_x]
     g = np.array(rest)
     g[event] = algebra.lstsq(strike.B.T @ n.T, strike.B.T @ M @ change, rcond=None)[0]

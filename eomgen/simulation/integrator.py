@@ -69,7 +69,7 @@ class Integrator:
         first_step: float | None = None,
         step: float | None = None,
     ) -> None:
-        if not module.n_dof:
+        if not module.layout.n_dof:
             raise UsageError(
                 f"{module.name} has no degree of freedom to integrate: its drivers determine the motion; use simulate"
             )

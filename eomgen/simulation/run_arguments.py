@@ -49,7 +49,7 @@ def declare(module: BoundModel) -> dict[str, Any]:
 def own_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:
     """Method and step of a run: RK4 with the model's own step where it has one and nothing else is given."""
     own = module.metadata.get("simulation", {}).get("step")
-    if own is None or not module.n_dof or method not in (None, "RK4"):
+    if own is None or not module.layout.n_dof or method not in (None, "RK4"):
         return method, step
     return "RK4", own if step is None else step
 

@@ -135,7 +135,7 @@ def simulate(
         kept = Checkpoint(checkpoint, checkpoint_every, resume)
     elif resume is not None:
         raise UsageError("resume needs checkpoint=, the file to continue from")
-    if (isinstance(method, str) and method == "kinematic") or (method is None and not module.n_dof):
+    if (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof):
         from .driven import follow_drivers
 
         steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **options}

@@ -83,7 +83,7 @@ class Bench:
     @cached_property
     def graph_kernels(self) -> dict[str, Callable[[], Sequence[Expr]]]:
         """Kernels that are expressions of the graph, by name."""
-        terms, tree = self.terms, self.equations.tree
+        terms = self.terms
 
         def flat(rows: Sequence[Sequence[Expr]]) -> list[Expr]:
             return [x for row in rows for x in row]
@@ -107,7 +107,7 @@ class Bench:
             "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
         }
         if not terms.by_columns:
-            found["mass_matrix"] = lambda: flat(tree.mass_matrix)
+            found["mass_matrix"] = lambda: flat(terms.mass_matrix)
         names = self.module.core.names
         return {k: f for k, f in found.items() if k in names and 0 not in self.layout.shape(k)}
 
@@ -150,7 +150,7 @@ class Bench:
         E_h = self.bounds("bias", lambda: self.terms.bias)[1][:, k]
         E_g = self.bounds("gamma", lambda: self.terms.gamma)[1][layout.rows, k]
         if self.terms.by_columns:
-            M = module.mass_matrix(case.q, p=case.p, u=case.u, t=case.t)
+            M = module.kernels.mass_matrix(case.q, p=case.p, u=case.u, t=case.t)
             E_M = n * UNIT * np.abs(M)
         d = np.sqrt(np.maximum(np.diag(M), 0.0))
         E_M = E_M + FOLDED * np.outer(d, d)

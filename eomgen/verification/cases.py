@@ -77,10 +77,10 @@ def draw(module: BoundModel, rng: np.random.Generator, geometric: Array, number:
         for _ in range(3):
             x = _state(module, rng, t, p, inputs)
             if x is not None:
-                a = rng.standard_normal(module.n_v) * _sizes(module, module.layout.velocity_kinds)
+                a = rng.standard_normal(module.layout.n_v) * _sizes(module, module.layout.velocity_kinds)
                 return Case(number, t, x, a, p, inputs, module.n_q)
     x = module.x0(t=0.0)
-    a = rng.standard_normal(module.n_v) * _sizes(module, module.layout.velocity_kinds)
+    a = rng.standard_normal(module.layout.n_v) * _sizes(module, module.layout.velocity_kinds)
     return Case(number, 0.0, module.project(x, t=0.0), a, module.p, module.u, module.n_q)
 
 
@@ -95,7 +95,7 @@ def _geometric(module: BoundModel, rng: np.random.Generator) -> Array:
     if not module.n_rows:
         return here
     q = module.layout.q_reference + 0.1 * rng.standard_normal(module.n_q)
-    x = np.concatenate([q, rng.standard_normal(module.n_v)])
+    x = np.concatenate([q, rng.standard_normal(module.layout.n_v)])
 
     def rows(p: Array) -> Array:
         return np.concatenate(
@@ -116,7 +116,7 @@ def _state(module: BoundModel, rng: np.random.Generator, t: float, p: Array, u: 
     q_kinds = layout.coordinate_kinds
     shift = rng.standard_normal(module.n_q) * np.array([LENGTH if kind == "length" else ANGLE for kind in q_kinds])
     shift *= _sizes(module, q_kinds)
-    v = SPEED * rng.standard_normal(module.n_v) * _sizes(module, layout.velocity_kinds)
+    v = SPEED * rng.standard_normal(module.layout.n_v) * _sizes(module, layout.velocity_kinds)
     try:
         reference = module.x0(t=t, p=p, u=u)[: module.n_q]
     except EomgenError:
@@ -144,7 +144,7 @@ def _closed(module: BoundModel, x: Array, t: float, p: Array, u: Array) -> bool:
         return False
     if layout.n_alignments and not (module.kernels.state("alignment")(q, p=p, u=u, t=t) > 0.0).all():
         return False
-    J = scales.jacobian(module.constraint_jacobian(q, p=p, u=u, t=t, rows="all"))
+    J = scales.jacobian(module.kernels.constraint_jacobian(q, p=p, u=u, t=t, rows="all"))
     values = algebra.singular_values(J)
-    rank = module.n_v - module.n_dof
+    rank = module.layout.n_v - module.layout.n_dof
     return bool(values[rank - 1] > REGULAR * values[0]) if rank and rank <= len(values) else True

@@ -45,7 +45,7 @@ def accelerations(bench: Bench, truth: Truth, values: Values) -> Numbers:
         chosen = kernels.get(name, outputs)
         return bench.system.evaluate(f"kernel {name}", chosen, values)  # type: ignore[arg-type]
 
-    M = of("mass_matrix", lambda: [x for row in bench.equations.tree.mass_matrix for x in row])
+    M = of("mass_matrix", lambda: [x for row in bench.terms.mass_matrix for x in row])
     C = of("constraint_jacobian", lambda: [x for row in terms.constraint_jacobian for x in row])
     gamma, h = of("gamma", lambda: terms.gamma), of("bias", lambda: terms.bias)
     C_rows = [C[n * i : n * i + n] for i in rows]
@@ -58,18 +58,18 @@ def accelerations(bench: Bench, truth: Truth, values: Values) -> Numbers:
 def _condition(bench: Bench, case: Case) -> float:
     """Condition of the system of accelerations and multipliers, rows and columns of like size."""
     module = bench.module
-    C = module.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
-    M, m = module.mass_matrix(case.q, p=case.p, u=case.u, t=case.t), len(C)
+    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+    M, m = module.kernels.mass_matrix(case.q, p=case.p, u=case.u, t=case.t), len(C)
     d = 1.0 / np.sqrt(np.maximum(np.diag(M), TINY + EPS * size_of(np.diag(M))))
     M, C = M * d * d[:, None], C * d
     C = C / np.maximum(np.linalg.norm(C, axis=1), TINY)[:, None]
-    return float(algebra.cond(np.block([[M, C.T], [C, np.zeros((m, m))]]))) if module.n_v else 1.0
+    return float(algebra.cond(np.block([[M, C.T], [C, np.zeros((m, m))]]))) if module.layout.n_v else 1.0
 
 
 def _tangent(bench: Bench, truth: Truth, rng: np.random.Generator) -> tuple[Array, Array]:
     """A random displacement w (n_v,) and change of velocity (n_v,) along the constraints."""
     case, module, n = truth.case, bench.module, bench.layout.n_v
-    C = module.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
     back = algebra.pinv(C) if len(C) else np.zeros((n, 0))
     free = np.eye(n) - back @ C if len(C) else np.eye(n)
     sizes = module.layout.scales.q
@@ -104,14 +104,14 @@ def _along(bench: Bench) -> Finding:
     if bench.terms.by_columns or bench.layout.given_rates:
         why = "the mass matrix is not written out" if bench.terms.by_columns else "rates of coordinates are given"
         return Finding.skipped(check, why)
-    if not bench.module.n_dof:
+    if not bench.module.layout.n_dof:
         return Finding.skipped(check, "the constraints allow no motion")
     found, rng = Comparison(check), np.random.default_rng(1)
     for k, truth in enumerate(bench.truths):
         case = truth.case
         J = bench.module.jacobian(case.t, case.x, p=case.p, u=case.u)
         condition = _condition(bench, case) * bench.dependence(
-            bench.module.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+            bench.module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
         )
         # where terms of the forces cancel, their slopes do too
         exact, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
@@ -147,7 +147,7 @@ def _noise(bench: Bench, k: int) -> Array:
     """By how much rounding may move x' (n_x,)."""
     truth, layout = bench.truths[k], bench.layout
     a, multipliers = (numbers(x) for x in truth.solve(list(layout.rows)))
-    C = bench.module.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t)
+    C = bench.module.kernels.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t)
     rates = np.abs(bench.slopes(truth.case))[: layout.n_q] @ bench.shift(k, C)
     return np.concatenate([rates, bench.acceleration_limit(k, a, multipliers)])
 

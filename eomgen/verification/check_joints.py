@@ -98,7 +98,9 @@ def _joints(bench: Bench) -> Finding:
                 flat = [*plain.position, *(x for row in plain.rotation for x in row)]
                 gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
                 labels += [f"{spec.name} {what}" for what in PARTS]
-        C = bench.module.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t, rows="all")
+        C = bench.module.kernels.constraint_jacobian(
+            truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t, rows="all"
+        )
         moved = float(np.abs(algebra.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0
         length = max(1.0, bench.layout.length)
         rounding = float(held[:, k].max(initial=0.0)) + UNIT * float(np.abs(truth.case.q).max(initial=0.0)) * float(

@@ -38,10 +38,12 @@ def _derived(bench: Bench) -> list[Finding]:
             actual = module.outputs(case.t, case.x, p=case.p, u=case.u)
             bound = bench.bounds("motion_outputs", lambda: bench.terms.outputs)[1][:, k]
             slope = module.kernels.motion("output_derivatives")(case.q, case.v, a, p=case.p, u=case.u, t=case.t)
-            C = module.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+            C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
             shift, n = bench.shift(k, C), module.n_x
             limit = (
-                2.0 * bound + np.abs(slope[:, :n]) @ shift + np.abs(slope[:, n : n + module.n_v]) @ bench.moved(k, C)
+                2.0 * bound
+                + np.abs(slope[:, :n]) @ shift
+                + np.abs(slope[:, n : n + module.layout.n_v]) @ bench.moved(k, C)
             )
             outputs.add(k, actual - expected, limit, size_of(expected), bench.layout.y)
         found.append(outputs.finding())
@@ -54,7 +56,7 @@ def _batches(bench: Bench) -> Finding:
     case = bench.cases[0]
     rng = np.random.default_rng(COLUMNS)
     q = case.q[:, None] + 0.1 * rng.standard_normal((module.n_q, COLUMNS))
-    x = np.concatenate([q, case.v[:, None] + rng.standard_normal((module.n_v, COLUMNS))])
+    x = np.concatenate([q, case.v[:, None] + rng.standard_normal((module.layout.n_v, COLUMNS))])
     terms = bench.terms
     symbols = {name: np.full(COLUMNS, float(v[0])) for name, v in bench.symbols.items()}
     symbols |= dict(zip((*terms.q, *terms.v), x, strict=True))

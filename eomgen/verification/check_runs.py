@@ -67,7 +67,7 @@ def check(bench: Bench) -> list[Finding]:
 
 
 def _inapplicable(bench: Bench) -> str:
-    if not bench.module.n_dof:
+    if not bench.module.layout.n_dof:
         return "drivers move the whole mechanism, so nothing is integrated"
     if Events(bench.layout, None).resets:
         return "events reset its state, and an integrator finds no events"

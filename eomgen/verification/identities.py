@@ -48,23 +48,25 @@ def identities(module: BoundModel, cases: Sequence[Case]) -> list[Finding]:
 
 
 def _mass(module: BoundModel, c: Case) -> Array:
-    return module.mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
+    return module.kernels.mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
 
 
 def _jacobian(module: BoundModel, c: Case) -> Array:
-    return module.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)
+    return module.kernels.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)
 
 
 def _definite(module: BoundModel, cases: Sequence[Case]) -> Finding:
     """The matrix of the degrees of freedom, each scaled to a unit diagonal."""
     check = "embedded_mass_matrix: symmetric, positive definite"
-    if not module.n_dof or module.layout.given_rates:
-        return Finding.skipped(check, "there is no degree of freedom" if not module.n_dof else "equations are given")
+    if not module.layout.n_dof or module.layout.given_rates:
+        return Finding.skipped(
+            check, "there is no degree of freedom" if not module.layout.n_dof else "equations are given"
+        )
     if module.metadata.get("indefinite"):
         return Finding.skipped(check, "the model accepts masses and inertias that no body can have")
     found = Comparison(check, "asymmetry; or the smallest eigenvalue at unit diagonal, sign reversed")
     for c in cases:
-        M = module.embedded_mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
+        M = module.kernels.embedded_mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
         found.add(c.number, M - M.T, KERNEL * size_of(M) * np.ones_like(M), size_of(M))
         smallest = float(algebra.eigvalsh(correlated(M))[0]) if np.isfinite(M).all() else -np.inf
         found.add(c.number, [max(0.0, -smallest)], [0.0])
@@ -77,8 +79,9 @@ def _kinetic(module: BoundModel, cases: Sequence[Case]) -> Finding:
         return Finding.skipped(check, "there are no bodies")
     found = Comparison(check)
     for c in cases:
-        T, expected = float(module.energy(c.x, p=c.p, u=c.u, t=c.t)[0]), float(c.v @ _mass(module, c) @ c.v) / 2.0
-        size = float(np.abs(c.v) @ np.abs(_mass(module, c)) @ np.abs(c.v)) / 2.0
+        v, M = c.v[: module.n_v], module.mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
+        T, expected = float(module.energy(c.x, p=c.p, u=c.u, t=c.t)[0]), float(v @ M @ v) / 2.0
+        size = float(np.abs(v) @ np.abs(M) @ np.abs(v)) / 2.0
         found.add(c.number, [T - expected], [KERNEL * size], size)
     return found.finding()
 
@@ -86,10 +89,10 @@ def _kinetic(module: BoundModel, cases: Sequence[Case]) -> Finding:
 def _inverse(module: BoundModel, cases: Sequence[Case]) -> Finding:
     found = Comparison("inverse_dynamics: M a + h")
     for c in cases:
-        M, h = _mass(module, c), module.bias(c.t, c.x, p=c.p, u=c.u)
-        expected = module.inverse_dynamics(c.q, c.v, c.a, p=c.p, u=c.u, t=c.t)
+        M, h = _mass(module, c), module.kernels.bias(c.t, c.x, p=c.p, u=c.u)
+        expected = module.kernels.inverse_dynamics(c.q, c.v, c.a, p=c.p, u=c.u, t=c.t)
         size = size_of(np.abs(M) @ np.abs(c.a) + np.abs(h))
-        found.add(c.number, M @ c.a + h - expected, KERNEL * size, size, module.v_names)
+        found.add(c.number, M @ c.a + h - expected, KERNEL * size, size, module.layout.v)
     return found.finding()
 
 
@@ -105,9 +108,9 @@ def _slopes(module: BoundModel, cases: Sequence[Case]) -> Finding:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "equations are given")
     found, n_h = Comparison(check), module.layout.n_h
     for c in cases:
-        C = module.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t, rows="all")[:n_h]
+        C = module.kernels.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t, rows="all")[:n_h]
         for j, scale in enumerate(module.layout.scales.q):
-            way = _rates(module, c.q, np.eye(module.n_v)[j]) * scale
+            way = _rates(module, c.q, np.eye(module.layout.n_v)[j]) * scale
             slope, error = extrapolate(_along_q(module, c, way), KERNEL * size_of(C) * size_of(c.q))
             size = size_of(C) * scale
             found.add(c.number, slope - C[:, j] * scale, error + KERNEL * size, size, module.constraint_labels[:n_h])
@@ -138,7 +141,7 @@ def _balance(module: BoundModel, cases: Sequence[Case]) -> Finding:
     found = Comparison("rhs: forces in balance along free motions")
     for c in cases:
         a = module.rhs(c.t, c.x, p=c.p, u=c.u)[module.n_q :]
-        M, h, C = _mass(module, c), module.bias(c.t, c.x, p=c.p, u=c.u), _jacobian(module, c)
+        M, h, C = _mass(module, c), module.kernels.bias(c.t, c.x, p=c.p, u=c.u), _jacobian(module, c)
         scale = module.layout.scales.q
         free = _null(C * scale) * scale[:, None]
         size = np.abs(free).T @ (np.abs(M) @ np.abs(a) + np.abs(h))
@@ -202,9 +205,9 @@ def _minimal(module: BoundModel, cases: Sequence[Case]) -> Finding:
         layout.require_minimal_form()
     except EomgenError:
         return Finding.skipped(check, "positions do not follow from independent coordinates")
-    if not module.n_dof or not layout.projects:
+    if not module.layout.n_dof or not layout.projects:
         return Finding.skipped(
-            check, "there is no degree of freedom" if not module.n_dof else "derived with baumgarte="
+            check, "there is no degree of freedom" if not module.layout.n_dof else "derived with baumgarte="
         )
     found = Comparison(check)
     for c in cases:

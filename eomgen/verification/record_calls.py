@@ -55,7 +55,7 @@ def record_calls(module: BoundModel | None) -> str:
     if module is not None:
         try:
             x = np.asarray(module.x0(), dtype=float)
-            start = Case(0, 0.0, x, np.zeros(module.n_v), module.p, module.u, module.n_q)
+            start = Case(0, 0.0, x, np.zeros(module.layout.n_v), module.p, module.u, module.n_q)
             found.append({"id": "x0", "call": "x0", "arguments": [], "given": {}, **_judged(x, [])})
             cases = [start, *random_cases(module, STATES - 1, SEED)] if module.n_x else [start]
         except EomgenError:  # no state can be assembled: the package says so when it is called

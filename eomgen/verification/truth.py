@@ -158,6 +158,8 @@ class Truth(PreciseState):
         for name, inertia in self.drives:
             y = self.coordinate_slopes(name)
             M = [[x + inertia * y[i] * y[j] for j, x in enumerate(row)] for i, row in enumerate(M)]
+        for k in range(self.n - len(mechanism.states), self.n):
+            M[k][k] = self.mp.mpf(1)
         return M
 
     @cached_property
@@ -181,7 +183,8 @@ class Truth(PreciseState):
             k = self.system.kinematics.loop_coordinates.names.index(name)
             bend = self.bend(self.measured, self.later)[k]
             total = [f + inertia * bend * y for f, y in zip(total, self.coordinate_slopes(name), strict=True)]
-        return total
+        flow = self.system.evaluate("states", lambda: self.system.kinematics.state_rates, self.values)
+        return [*total[: self.n - len(flow)], *(-s for s in flow)]
 
     def inverse_dynamics(self, a: Sequence[Number]) -> Numbers:
         """M a + h."""

@@ -107,8 +107,6 @@ def _minimal(check: str, model: Builder, original: Original, random: Any) -> Fin
     own = original.module
     if not own.n_dof:
         return Finding.skipped(check, "there is no degree of freedom")
-    if len(own.x_names) != own.n_q + own.n_v:
-        return Finding.skipped(check, "the model has states of its own")
     try:
         minimal = Minimal(own)
     except UsageError as why:

@@ -92,7 +92,7 @@ class _Signed(Visitor):
             raise NotApplicable(f"{quantity} can change its sign")
 
         changed = rewritten(value, lambda name: f"(-{name})" if name in self.signs else name, str, element)
-        if slot.key in ("initial", "guess"):
+        if slot.key in ("initial", "guess") and not slot.section:
             return negative(changed) if slot.place[0] in self.signs else changed
         if slot.type == "coupling" and slot.key == "coordinates":
             return negative(changed) if slot.place[0] in self.signs | self.joints else changed

@@ -158,7 +158,7 @@ class References(Visitor):
         self.keys: set[str] = set()
         self.texts: set[str] = set()
         bare = Description()
-        for section in ("forces", "constraints", "events", "inputs"):
+        for section in ("forces", "constraints", "states", "events", "inputs"):
             bare.sections[section] = description.sections[section]
         visit(bare, self)
 

@@ -54,7 +54,7 @@ static int accelerate(double t, const double *restrict u, const double *restrict
         r[i] = gamma[i] / s[N + i];
     }
     double fastest = 0.0;
-    for (int k = 0; k < N; k++) {
+    for (int k = 0; k < MOVING; k++) {
         fastest = fmax(fastest, fabs(w[AT_V + k] / s[k]));
     }
     /* of minimum norm: no small pivot makes it large */

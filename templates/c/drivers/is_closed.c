@@ -7,7 +7,7 @@ static int is_closed(double t, const double *restrict x, const double *restrict 
     (void)position_block(t, x, u, c, C, w);
     (void)rate_block(t, x, u, c, r, w);
     double fastest = 1.0, left = 0.0;
-    for (int k = 0; k < N; k++) {
+    for (int k = 0; k < MOVING; k++) {
         fastest = fmax(fastest, fabs(x[NQ + k] / s[k]));
     }
     for (int i = 0; i < M; i++) {

@@ -2,14 +2,15 @@
 static int kinematics_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                             double *restrict out, double *restrict w)
 {
+    enum { FREE = F - (N - MOVING) };
     partition parts;
     const int width = N + 1 + M;
     double *const q = out, *const v = out + NQ, *const a = out + NQ + N;
     (void)scales_block(t, x, u, c, w + AT_SCALES, w);
     for (int k = 0; k < NQ; k++) {
-        q[k] = x[3 * F + k];
+        q[k] = x[FREE + 2 * F + k];
     }
-    for (int k = 0; k < F; k++) {
+    for (int k = 0; k < FREE; k++) {
         q[COORDINATE[ORDER[k]]] = x[k];
     }
     int status = close_dependent(t, q, u, c, w);
@@ -23,12 +24,12 @@ static int kinematics_driver(double t, const double *restrict x, const double *r
         return status;
     }
     form_transformation(width, &parts, w);
-    complete(x + F, w + AT_RATE, &parts, v, w);
+    complete(x + FREE, w + AT_RATE, &parts, v, w);
     normalise(q);
     for (int k = 0; k < NQ + N; k++) {
         w[AT_X + k] = out[k];
     }
     (void)terms_block(t, w + AT_X, u, c, w + AT_TERMS, w);
-    complete(x + 2 * F, w + AT_TERMS + N * (N + 1) / 2 + N + M * N, &parts, a, w);
+    complete(x + FREE + F, w + AT_TERMS + N * (N + 1) / 2 + N + M * N, &parts, a, w);
     return 0;
 }

@@ -13,7 +13,9 @@ static double interpolate_best(double t, const double *restrict x, const double 
     }
     for (int k = 0; k < NQ + N; k++) {
         state[k] = x[k];
-        *speed = k < NQ ? 0.0 : fmax(*speed, fabs(x[k] / w[AT_SCALES + k - NQ]));
+        if (k >= NQ && k < NQ + MOVING) {
+            *speed = fmax(*speed, fabs(x[k] / w[AT_SCALES + k - NQ]));
+        }
     }
     normalise(state);
     if (!(*speed > CROSSINGS_STILL)) {

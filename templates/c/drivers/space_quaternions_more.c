@@ -17,7 +17,7 @@ EOMGEN_SHARED void find_velocities(const double *restrict q, const double *restr
 /* Replaces a change dq by that of the velocities d; the change of the length of Euler parameters stays. */
 EOMGEN_SHARED void spread(const double *restrict q, const double *restrict d, double *restrict dq)
 {
-    double stretch[QUATERNIONS];
+    double stretch[QUATERNIONS + 1];
     for (int b = 0; b < QUATERNIONS; b++) {
         const double *const e = q + QUATERNION[b][0], *const de = dq + QUATERNION[b][0];
         stretch[b] = (e[0] * de[0] + e[1] * de[1] + e[2] * de[2] + e[3] * de[3])
