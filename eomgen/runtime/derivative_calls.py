@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UnavailableError, UsageError
 from ..numeric.scales import Array
-from .refusals import require_velocities
+from .refusals import refuse_states, require_velocities
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -52,7 +52,13 @@ def inverse_dynamics_derivatives(
         ``dtau_dq`` (n_v, n_q), ``dtau_dv`` and ``dtau_da`` (n_v, n_v); the last is the mass matrix.  Columns of Euler
         parameters are partial derivatives by the four numbers: along a rotation with angular velocity w they combine
         as ``dtau_dq @ dq`` with the change dq = N(q) w of q at that velocity.
+
+    Raises
+    ------
+    UnavailableError
+        The model has first-order states.
     """
+    refuse_states(module.layout, "inverse_dynamics_derivatives")
     n_q, n_v = module.n_q, module.n_v
     every = _kept(module, "motion", "inverse_dynamics_derivatives")(q, v, a, p, u, out, t)
     return InverseDynamicsDerivatives(every[:, :n_q], every[:, n_q : n_q + n_v], every[:, n_q + n_v :])
@@ -88,7 +94,13 @@ def inverse_dynamics_hessian_product(
     Returns
     -------
     (n_q + 2 n_v,) or (n_q + 2 n_v, k) array
+
+    Raises
+    ------
+    UnavailableError
+        The model has first-order states.
     """
+    refuse_states(module.layout, "inverse_dynamics_hessian_product")
     n_q, n_v = module.n_q, module.n_v
     given = zip("qva", (q, v, a), (n_q, n_v, n_v), strict=True)
     x = _stacked([*given, ("weights", weights, n_v), ("direction", direction, n_q + 2 * n_v)])

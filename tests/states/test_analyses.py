@@ -152,3 +152,23 @@ def test_what_knows_no_states_says_so(call: Any) -> None:
 def test_verification_holds() -> None:
     found = servo("cython").verify(seconds=20)
     assert found.ok, str(found)
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_second_derivatives_contain_states_and_those_of_inverse_dynamics_are_refused(target: str) -> None:
+    """x'' = -k a^2 x / m, a' = x^2 - a: the Hessians by hand."""
+    m = eg.Model("pumped")
+    m.prismatic("x", m.ground, m.body("b", mass=M), axis="x")
+    m.state("a", "x**2 - a")
+    m.torque("f", "x", "-3*a**2*x")
+    module = m.compile(target=target)
+    x, a = 0.4, 0.7
+    weights, direction = np.array([0.3, 1.1, -0.6]), np.array([0.2, 0.9, -0.5])
+    force = np.array([[0, 0, -6 * a], [0, 0, 0], [-6 * a, 0, -6 * x]]) / M
+    rate = np.array([[2.0, 0, 0], [0, 0, 0], [0, 0, 0]])
+    expected = weights[1] * force @ direction + weights[2] * rate @ direction
+    found = module.rhs_hessian_product(0.0, [x, 0.1, a], weights, direction)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
+    for call, arguments in (("inverse_dynamics_derivatives", ()), ("inverse_dynamics_hessian_product", ([1.0], [1.0]))):
+        with pytest.raises(UnavailableError, match=f"{call} is not available for models with first-order states"):
+            getattr(module, call)([x], [0.1], [0.0], *arguments)
