@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 SPREAD = 0.03  #: relative spread of parameters
 ANGLE, LENGTH = 0.4, 0.2  #: spread of coordinates: rad, and parts of the model's length
+STATE_SPREAD = 0.3  #: spread of first-order states: parts of their initial values, or 0.3 about 0
 SPEED = 1.0  #: spread of velocities: rad/s, and lengths of the model per second
 LATEST = 0.5  #: latest time (s)
 HALVINGS = 8  #: of the way from the reference position, until it closes
@@ -118,9 +119,11 @@ def _state(module: BoundModel, rng: np.random.Generator, t: float, p: Array, u: 
     shift *= _sizes(module, q_kinds)
     v = SPEED * rng.standard_normal(module.layout.n_v) * _sizes(module, layout.velocity_kinds)
     try:
-        reference = module.x0(t=t, p=p, u=u)[: module.n_q]
+        start = module.x0(t=t, p=p, u=u)
     except EomgenError:
         return None
+    reference, s = start[: module.n_q], start[module.n_x - module.n_s :]
+    v[module.n_v :] = s + STATE_SPREAD * rng.standard_normal(module.n_s) * np.where(s == 0.0, 1.0, np.abs(s))
     for k in range(HALVINGS):
         try:
             x = module.project(np.concatenate([reference + shift * 0.5**k, v]), t=t, p=p, u=u)

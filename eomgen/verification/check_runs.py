@@ -108,7 +108,7 @@ def _time_scale(bench: Bench, case: Case) -> float:
     """A time in which the state changes by about its own size (s): 1 / |eigenvalue of largest size|."""
     J = bench.slopes(case)
     fastest = float(np.abs(algebra.eigvals(J)).max(initial=0.0)) if np.isfinite(J).all() else 0.0
-    speed = float(np.abs(case.v / bench.layout.scales.q).max(initial=0.0))
+    speed = bench.layout.scales.speed(case.v)
     return 1.0 / max(fastest, speed, SLOWEST)
 
 

@@ -38,7 +38,7 @@ def compare(functions: Any, module: Any, names: Any) -> None:
     for name in names:
         arguments, shape, _ = functions.EQUATIONS[name]
         given = x if "x" in arguments else x[: module.n_q]
-        call = getattr(module, name)
+        call = getattr(module.kernels, name, None) or getattr(module, name)  # v is [v; s] with first-order states
         call = call.every if name in ("constraints", "constraint_jacobian") else call
         expected = np.ravel(call(0.0, given) if name in TIMED else call(given))
         found = np.asarray(getattr(functions, name)(0.0, given, module.u, module.p)).reshape(shape).ravel()

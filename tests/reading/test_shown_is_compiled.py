@@ -42,8 +42,9 @@ class Compared:
         self.module: Any = self.equations.compile(target="numpy")
         self.x = random_state(self.module, seed)
         self.values = state_values(self.module, self.x, 0.0)
-        self.q, self.v = self.x[: self.module.n_q], self.x[self.module.n_q :]
-        self.a = self.module.rhs(0.0, self.x)[self.module.n_q :]
+        n = self.module.n_q + self.module.n_v
+        self.q, self.v = self.x[: self.module.n_q], self.x[self.module.n_q : n]
+        self.a = self.module.rhs(0.0, self.x)[self.module.n_q : n]
         self.free = list(self.module.layout.metadata["independent"])
 
     def shown(self, name: str, part: str | None = None) -> Any:

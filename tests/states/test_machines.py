@@ -90,7 +90,7 @@ def boom(t: float, x: np.ndarray) -> list[float]:
     inertia = 200 * 9 / 12 + 200 * 1.5**2 + 500 * 9
     turn = (5e-3 * p * slope - 9.81 * np.cos(phi) * (200 * 1.5 + 500 * 3)) / inertia
     volume = 5e-4 + 5e-3 * (length - 1.2)
-    return [rate, turn, 1e9 * (2e-4 * np.sin(2 * t) - 5e-3 * slope * rate - 4e-12 * p) / volume]
+    return [rate, turn, 1e9 * (1e-3 * np.sin(t) - 5e-3 * slope * rate - 4e-12 * p) / volume]
 
 
 def test_a_boom_on_oil_moves_as_equations_by_hand_say() -> None:
@@ -98,8 +98,7 @@ def test_a_boom_on_oil_moves_as_equations_by_hand_say() -> None:
     rng = np.random.default_rng(1)
     for _ in range(5):
         x = np.array([rng.uniform(0, 0.8), rng.normal(), rng.uniform(1e6, 5e6)])
-        u = [np.sin(2 * 0.3)]
-        np.testing.assert_allclose(mod.rhs(0.3, x, u=u), boom(0.3, x), rtol=1e-11)
+        np.testing.assert_allclose(mod.rhs(0.3, x), boom(0.3, x), rtol=1e-11)
     run = mod.simulate(6.0, rtol=1e-10, atol=1e-10)
     alone = solve_ivp(boom, (0, 6), mod.x0(), method="Radau", rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(run.x[:, -1], alone.y[:, -1], rtol=1e-6)
@@ -107,7 +106,7 @@ def test_a_boom_on_oil_moves_as_equations_by_hand_say() -> None:
     slope = reach @ [-1.2 * np.sin(0.3), 1.2 * np.cos(0.3)] / np.hypot(*reach)
     assert mod.x0()[2] == pytest.approx(9.81 * np.cos(0.3) * 1800 / (5e-3 * slope), rel=1e-4)  # carries the load
     oil = 5e-3**2 * slope**2 * 1e9 / (5e-4 + 5e-3 * (np.hypot(*reach) - 1.2))
-    fast = mod.linearize(u={"valve": 0.0}).eigenvalues[-1]
+    fast = mod.linearize().eigenvalues[-1]
     assert abs(fast) == pytest.approx(np.sqrt(oil / 5100), rel=2e-3)
 
 
