@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from ..runtime.drawing import draw_branches as _draw_branches
     from ..runtime.drawing import explore as _explore
     from ..runtime.minimal import Minimal
-    from ..runtime.protocols import Differentiated
+    from ..runtime.protocols import JacobianCall
     from ..runtime.summary import report as _report
     from ..simulation.dae_solution import Dae
     from ..simulation.impact_run import simulate_impacts as _simulate_impacts
@@ -220,7 +220,7 @@ class Module(BoundModel):
         draw = _draw
         draw_branches = _draw_branches
         explore = _explore
-        jacobian: Differentiated
+        jacobian: JacobianCall
         minimal: Minimal
         canonical: Canonical
         dae: Dae

@@ -81,7 +81,7 @@ class BlockMaker:
 
     @cached_property
     def _loop_slopes(self) -> LoopSlopes | None:
-        """The derivatives of that form along directions, if it goes by bodies and they are fewer operations."""
+        """The derivatives of that form along directions, if it goes by articulated bodies."""
         if not isinstance(self._loops, BodyLoops):
             return None
         return LoopSlopes(self._loops, self.port("dq").symbols, self.port("dv").symbols)

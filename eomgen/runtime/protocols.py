@@ -27,7 +27,7 @@ class Timed(Protocol):
     ) -> Array: ...
 
 
-class Differentiated(Timed, Protocol):
+class JacobianCall(Timed, Protocol):
     """The kernel ``jacobian``, by the state, ``wrt="u"`` or ``wrt="p"``."""
 
     def __call__(
