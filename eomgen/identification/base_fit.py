@@ -173,13 +173,13 @@ class _Data:
 
     def residuals(self, beta: Array) -> Array:
         """Measured less computed."""
-        return self.target - np.tensordot(beta, self.columns, (0, 1))
+        return np.asarray(self.target - np.tensordot(beta, self.columns, (0, 1)))
 
     def noise(self, beta: Array, unknowns: int) -> Array:
         """Standard deviation of each force's residuals, its share of the unknowns taken off."""
         squares = np.where(self.there, self.residuals(beta), 0.0) ** 2
         free = np.maximum(1, self.there.sum(axis=1)) * (1.0 - unknowns / self.count)
-        return np.maximum(np.sqrt(squares.sum(axis=1) / free), MEASURED * self.sizes())
+        return np.asarray(np.maximum(np.sqrt(squares.sum(axis=1) / free), MEASURED * self.sizes()))
 
     def solve(self, spread: Array) -> tuple[Array, Array, float, Any]:
         """Estimates, covariance, condition and which unknowns the rows do not tell, by singular values."""
@@ -227,8 +227,10 @@ def _not_inertial(
         if np.nanmax(np.abs(regressor(module, *motion, p=values | {name: 2.0 * size}) - regressor(module, *motion))):
             raise UsageError(f"{name} changes the geometry; mod.fit(data, parameters) finds such parameters")
         rest = rest - values[name] * columns[name]
-    every = inertial_remainder(module, *motion, p=values | {name: 2.0 * (values[name] or 1.0) for name in also}, u=u)
-    total = sum((2.0 * (values[name] or 1.0) * column for name, column in columns.items()), rest)
-    if np.nanmax(np.abs(every - total), initial=0.0) > LINEAR * max(whole, float(np.nanmax(np.abs(every), initial=0.0))):
+    doubled = {name: 2.0 * (values[name] or 1.0) for name in also}
+    every = np.asarray(inertial_remainder(module, *motion, p=values | doubled, u=u))
+    total = sum((doubled[name] * column for name, column in columns.items()), rest)
+    largest = max(whole, float(np.nanmax(np.abs(every), initial=0.0)))
+    if np.nanmax(np.abs(every - total), initial=0.0) > LINEAR * largest:
         raise UsageError(f"forces are not linear in {', '.join(also)} together; find one of each product only")
     return rest, columns

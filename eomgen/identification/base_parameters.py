@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analysis.tables import as_html, as_text
-from ..errors import ProjectionError, UsageError
+from ..errors import ProjectionError
 from ..limits.identification import EFFECT, ROUNDED_COEFFICIENT
 from ..numeric import algebra
 from ..numeric.scales import Array
@@ -32,8 +32,8 @@ SEED = 1991
 #: Rows of the regressor for each column, so that random states miss no direction.
 ROWS = 4
 SPARE = 8  #: states more, for models of few bodies
-#: In which order parameters of a body become base parameters, so that those of Khalil's rules remain for joints about z:
-#: masses, then first moments along the axis are the first that go to the parent.
+#: In which order parameters of a body become base parameters: for joints about z those of Khalil's rules remain, as
+#: masses and first moments along the axis are the first that go to the parent.
 ORDER = ("Izz", "Ixx", "Iyy", "Ixy", "Ixz", "Iyz", "mx", "my", "mz", "m")
 
 
@@ -243,11 +243,12 @@ def _observe(module: BoundModel, random: np.random.Generator, count: int) -> Arr
     Y = regressor(module, q, v, a) * s[:, None, None]
     if layout.n_c:
         C_q = np.moveaxis(np.asarray(module.constraint_jacobian(q, rows="all")), -1, 0)
-        rows = [free_directions(layout.scales.jacobian(C)).T @ y for C, y in zip(C_q, np.moveaxis(Y, -1, 0), strict=True)]
+        free = [free_directions(layout.scales.jacobian(C)) for C in C_q]
+        rows = [f.T @ y for f, y in zip(free, np.moveaxis(Y, -1, 0), strict=True)]
     else:
         rows = list(np.moveaxis(Y, -1, 0))
     W = np.concatenate(rows)
     W = W[np.isfinite(W).all(axis=1)]
     if not len(W):
         raise ProjectionError(f"model {module.name!r} has no finite regressor at any of {count} random states")
-    return W
+    return np.asarray(W)

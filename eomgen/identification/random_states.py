@@ -28,7 +28,8 @@ def random_states(module: BoundModel, random: np.random.Generator, count: int) -
             q[i : i + 4] = e / np.linalg.norm(e, axis=0)
         v, a = random.normal(size=(2, module.n_v, count))
         return q, rate * s * v, rate * rate * s * a
-    states, accelerations = [], []
+    states: list[Array] = []
+    accelerations: list[Array] = []
     for _ in range(4 * count):
         if len(states) == count:
             break

@@ -174,12 +174,12 @@ def _columns(module: BoundModel, q: Array, v: Array, a: Array, p: Any, t: float)
     turning, moving = np.moveaxis(_parts(twists)[:, :2].reshape(-1, 2, 3, count, n_v), 1, 0)
     force, moment = _wrenches(omega, alpha, lifted)
     result = np.einsum("bikj,bimk->jbmk", moving, force) + np.einsum("bikj,bimk->jbmk", turning, moment)
-    return result.reshape(n_v, -1, count)
+    return np.asarray(result.reshape(n_v, -1, count))
 
 
 def _parts(terms: Array) -> Array:
     """w, v, alpha, A of each body, (n_bodies, 4, 3, k)."""
-    return terms[:, :MOTION].reshape(len(terms), 4, 3, -1)
+    return np.asarray(terms[:, :MOTION].reshape(len(terms), 4, 3, -1))
 
 
 def _wrenches(omega: Array, alpha: Array, lifted: Array) -> tuple[Array, Array]:

@@ -18,6 +18,6 @@ EFFECT = 1e-10
 #: A factor of a base parameter, columns at length 1, that is rounding: that of the regressor (1e-15) over the least
 #: effect of its own among columns of robots (1e-2), and a hundred times more for the sums of the least squares.
 ROUNDED_COEFFICIENT = 1e-11
-#: By which forces may miss a straight line in a parameter that is found by linear least squares, over the largest force:
+#: By which forces may miss a straight line in a parameter that linear least squares find, over the largest force:
 #: differences of three evaluations keep 14 digits, and what is not linear misses by a part of its own size.
 LINEAR = 1e-10
