@@ -107,6 +107,14 @@ class Formula(Expressed):
         evaluate, values = self._evaluate, p.tolist()
         return lambda t, x: float(evaluate([t, *np.asarray(x).tolist(), *values])[0])
 
+    def at_times(self, t: Array, p: Array) -> Array | None:
+        """Values (k,) at times (k,) in one pass, of an expression of time alone; None where it reads the state."""
+        if self.depends_on_state:
+            return None
+        with np.errstate(all="ignore"):
+            found = self._evaluate([t, *[0.0] * len(self.layout.x), *p.tolist()])[0]
+        return np.broadcast_to(np.asarray(found, dtype=float), t.shape)
+
     def slopes(self, p: Array) -> Callable[[float, Array], Array]:
         """Its derivatives (1 + n_x + n_p,) by t, x and p, as f(t, x) at given parameters (n_p,)."""
         graph, known = self.expression.graph, ("t", *self.layout.x, *self.layout.p)

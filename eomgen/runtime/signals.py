@@ -326,7 +326,15 @@ class Forcing:
             return np.empty((0, len(t)))
         u = np.repeat(self.base[:, None], len(t), axis=1)
         tables = {i: signal for i, signal in self.varying.items() if isinstance(signal, Tabulated)}
-        if len(self.varying) > len(tables):
+        rest = self.varying.keys() - tables.keys()
+        quick = {i: self.formulas[i].at_times(t, self.parameters) for i in rest & self.formulas.keys()}
+        if (
+            all(values is not None and np.isfinite(values).all() for values in quick.values())
+            and not rest - quick.keys()
+        ):
+            for i, values in quick.items():
+                u[i] = values
+        else:  # one by one, so that faults tell where they are
             for j in range(len(t)):
                 u[:, j] = self(float(t[j]), x[:, j])
         edges = None if self.span is None else _inside(*self.span)
