@@ -1,8 +1,8 @@
 """Identification: parameters, inputs and initial values of a module that reproduce measured motions best.
 
 Weighted least squares by SciPy's ``least_squares``; the derivatives of the motions are those of :mod:`.run_slopes`, or
-of :mod:`..simulation.sensitivities` for loops, events and inputs that depend on the state.  Covariance of the estimates: (J^T J)^-1 of the weighted residuals (Y. Bard,
-Nonlinear Parameter Estimation, 1974, section 7.5).
+of :mod:`..simulation.sensitivities` for loops, events and inputs that depend on the state.  Covariance of the
+estimates: (J^T J)^-1 of the weighted residuals (Y. Bard, Nonlinear Parameter Estimation, 1974, section 7.5).
 """
 
 from __future__ import annotations
