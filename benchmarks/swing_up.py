@@ -159,7 +159,7 @@ def run(quick: bool) -> Report:
         "states differ by",
     )
     notes = (
-        "the same program: midpoint rule, same nodes, limits, tolerance 1e-8 and first guess; medians of five, in turns",
+        "the same program: midpoint rule, nodes, limits, tolerance 1e-8 and first guess; medians of five, in turns",
         "to prepare: from the model to the program; opty compiles C for each mesh, CasADi evaluates its graphs itself",
         "each with the IPOPT that it comes with or finds; both with MUMPS",
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +24,26 @@ from ..runtime.room import read_numbers
 from .regressor import inertial_remainder, regressor
 
 if TYPE_CHECKING:
-    from .base_parameters import BaseParameters
+    from ..runtime.bound_model import BoundModel
+
+
+class Reduced(Protocol):
+    """Base parameters as their fit sees them."""
+
+    @property
+    def module(self) -> BoundModel:
+        """Whose they are."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What each is called."""
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """What each stands for."""
+
+    def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, t: float = 0.0) -> Array:
+        """Y_b, (n_v, n_base, k)."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +68,7 @@ class BaseFit:
         What the motion does not tell apart.
     """
 
-    base: BaseParameters
+    base: Reduced
     names: tuple[str, ...]
     values: dict[str, float]
     errors: dict[str, float]
@@ -82,7 +101,7 @@ class BaseFit:
 
 
 def fit_base(
-    base: BaseParameters,
+    base: Reduced,
     q: ArrayLike,
     v: ArrayLike,
     a: ArrayLike,
@@ -198,7 +217,7 @@ class _Data:
 
 
 def _not_inertial(
-    base: BaseParameters, motion: tuple[ArrayLike, ArrayLike, ArrayLike], also: tuple[str, ...], u: Any
+    base: Reduced, motion: tuple[ArrayLike, ArrayLike, ArrayLike], also: tuple[str, ...], u: Any
 ) -> tuple[Array, dict[str, Array]]:
     """Forces that are not inertial without those of the parameters of ``also``, and the column of each of these."""
     module = base.module

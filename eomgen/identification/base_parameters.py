@@ -120,7 +120,7 @@ class BaseParameters:
         Parameters
         ----------
         q, v, a, t
-            As for :meth:`~eomgen.Module.regressor`.
+            As for :func:`~.regressor.regressor`.
 
         Returns
         -------
