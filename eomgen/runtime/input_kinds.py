@@ -73,10 +73,6 @@ class Expressed:
         """f(t, x) at given parameters (n_p,)."""
         raise NotImplementedError
 
-    def at_times(self, t: Array, p: Array) -> Array | None:
-        """Values (k,) at times (k,) in one pass, of an expression of time alone; None where there is no such pass."""
-        return None
-
     def switches(self, p: Array) -> Callable[[float, Array], list[float]]:
         """What changes its sign where a condition does."""
         raise NotImplementedError
