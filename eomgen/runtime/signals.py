@@ -330,9 +330,8 @@ class Forcing:
         if len(self.varying) > len(tables):
             for j in range(len(t)):
                 u[:, j] = self(float(t[j]), x[:, j])
-        edges = None if self.span is None else _inside(*self.span)
         for i, signal in tables.items():
-            inner = t if edges is None else np.clip(t, *edges)
+            inner = t if self.span is None else np.clip(t, *_inside(*self.span))
             u[i] = signal(t) if isinstance(signal, Signal) else signal.beside(t, inner)
         return u
 
