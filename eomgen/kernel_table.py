@@ -72,6 +72,7 @@ class Kernel(NamedTuple):
 
 #: One kernel for all sums over bodies, which share the poses: each alone would make models slower to compile.
 CENTROIDAL = "com (3), its Jacobian (3 x n_v), linear and angular momentum (6), inertia (9), both about the com"
+INERTIAL = "of bodies, about their origins: twist, its rate less gravity; m, m c, I"
 
 #: y, then y', of which only the rates of q and v are there
 DAE = ("q", "v", "multipliers", "corrections", "q_rate", "a", "multiplier_rates", "correction_rates")
@@ -162,6 +163,7 @@ KERNELS: tuple[Kernel, ...] = (
         "constraint rows by displacements of bodies (n_c, n_bodies, 6), joints' points (3), their free directions (6)",
         late=True,
     ),
+    Kernel("inertial_terms", ("q", "v", "a"), lambda s: ((s.n_wrenches > 0) * s.n_bodies, 22), INERTIAL, late=True),
     Kernel("canonical", ("q", "v"), lambda s: (2, s.n_momenta), "momenta dT/dv, and their rates -dH/dq + Q", late=True),
     Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
     Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),

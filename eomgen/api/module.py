@@ -31,7 +31,11 @@ if TYPE_CHECKING:
     from ..analysis.reactions import undetermined_reactions as _undetermined_reactions
     from ..analysis.workspace import workspace as _workspace
     from ..ensembles.simulate_many import simulate_many as _simulate_many
+    from ..identification.base_parameters import base_parameters as _base_parameters
     from ..identification.fit import fit as _fit
+    from ..identification.regressor import inertial_remainder as _inertial_remainder
+    from ..identification.regressor import regressor as _regressor
+    from ..identification.regressor import standard_parameters as _standard_parameters
     from ..runtime.canonical import Canonical
     from ..runtime.derivative_calls import inverse_dynamics_derivatives as _inverse_dynamics_derivatives
     from ..runtime.derivative_calls import inverse_dynamics_hessian_product as _inverse_dynamics_hessian_product
@@ -62,6 +66,10 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "equilibrium": "analysis.equilibrium",
     "sensitivities": "simulation.sensitivities",
     "fit": "identification.fit",
+    "standard_parameters": "identification.regressor",
+    "regressor": "identification.regressor",
+    "inertial_remainder": "identification.regressor",
+    "base_parameters": "identification.base_parameters",
     "multipliers": "analysis.constrained",
     "reactions": "analysis.reactions",
     "undetermined_reactions": "analysis.reactions",
@@ -202,6 +210,10 @@ class Module(BoundModel):
         equilibrium = _equilibrium
         sensitivities = _sensitivities
         fit = _fit
+        standard_parameters = _standard_parameters
+        regressor = _regressor
+        inertial_remainder = _inertial_remainder
+        base_parameters = _base_parameters
         multipliers = _multipliers
         reactions = _reactions
         undetermined_reactions = _undetermined_reactions

@@ -1,8 +1,8 @@
 """Identification: parameters, inputs and initial values of a module that reproduce measured motions best.
 
-Weighted least squares by SciPy's ``least_squares``; the derivatives of the motions are those of
-:mod:`..simulation.sensitivities`.  Covariance of the estimates: (J^T J)^-1 of the weighted residuals (Y. Bard,
-Nonlinear Parameter Estimation, 1974, section 7.5).
+Weighted least squares by SciPy's ``least_squares``; the derivatives of the motions are those of :mod:`.run_slopes`, or
+of :mod:`..simulation.sensitivities` for loops, events and inputs that depend on the state.  Covariance of the
+estimates: (J^T J)^-1 of the weighted residuals (Y. Bard, Nonlinear Parameter Estimation, 1974, section 7.5).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from ..runtime.near_names import check_names, read_names, require, require_mappi
 from ..runtime.room import read_value
 from .experiments import Experiment, read_experiments, read_sigma
 from .fit_result import Fit
+from .run_slopes import run_slopes
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -63,7 +64,8 @@ def fit(
         Standard deviation of the noise of each column.  By default it is found from the residuals, and the fit is
         repeated with it, so that units do not matter.
     derivatives : {'exact', 'differences'}
-        By integration beside the motion, or by differences of runs, which take less time and give fewer digits.
+        Along the steps of the run for trees whose inputs are given over time, else by integration beside the motion;
+        or by differences of runs, which give fewer digits, and take less time where exact ones are integrated.
     method, rtol, atol : optional
         Of the runs, as for ``simulate``.
     **options
@@ -209,11 +211,13 @@ class _Problem:
 
         parts = []
         for one in self.experiments:
-            found = sensitivities(self.module, self.names, **self.arguments(values, one))
+            arguments = self.arguments(values, one)
+            slopes = run_slopes(self.module, self.names, tuple(one.columns), arguments)
+            if slopes is None:
+                found = sensitivities(self.module, self.names, **arguments)
+                slopes = {name: np.array([found[name, of] for of in self.names]).T for name in one.columns}
             for name, measured in one.columns.items():
-                there = np.isfinite(measured)
-                rows = np.array([found[name, of][there] for of in self.names]).T
-                parts.append(rows / self.sigma[name])
+                parts.append(slopes[name][np.isfinite(measured)] / self.sigma[name])
         return np.vstack(parts)
 
     def spread(self, name: str) -> float:

@@ -221,6 +221,7 @@ class BlockMaker:
             "output_derivatives": lambda: output_derivatives(terms),
             "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
             "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
+            "inertial_terms": lambda: terms.inertial() if terms.inertial else (),
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
             "inverse_dynamics_hessian_product": lambda: hessian_product(
                 terms.inverse_dynamics, *map(self._through, ("weights", "q v a", "dq dv da"))

@@ -18,6 +18,7 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute, symbols_of
 from ..graph.tape import record_tape
 from ..kinematics import Kinematics
+from ..kinematics.inertial_terms import inertial_terms
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
 from ..kinematics.row_scales import row_scales
@@ -85,6 +86,7 @@ def collect_terms(
         accelerations=equations.accelerations,
         pivots=equations.pivots,
         wrenches=find_wrenches(kinematics),
+        inertial=partial(inertial_terms, kinematics),
         system=equations.system,
         turned=equations.turned,
         constrained=equations.constrained if c.labels else None,

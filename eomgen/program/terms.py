@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from ..equations.articulated import TreeMotion
 from ..equations.tree_equations import LinearSystem
@@ -72,6 +72,7 @@ class SystemTerms:
 
     accelerations: Row | None = None  #: (n,) a of (q, v) with M a + h = 0, of a method that has it without M
     wrenches: JointWrenches | None = None  #: what joints exert, formed when it is asked for
+    inertial: Callable[[], Sequence[Expr]] | None = None  #: (22 n_bodies,) motion of bodies and their parameters
     pivots: Row = ()  #: (n,) of q, with ``accelerations``: positive where M is positive definite
     system: LinearSystem | None = None  #: of a method that solves it for the accelerations
     slopes: Callable[[], ForceSlopes] | None = None  #: derivatives of the inverse dynamics by recursion

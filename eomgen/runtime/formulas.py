@@ -7,6 +7,7 @@ parser, is without this file and refuses texts.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -106,6 +107,21 @@ class Formula(Expressed):
         """f(t, x) at given parameters (n_p,)."""
         evaluate, values = self._evaluate, p.tolist()
         return lambda t, x: float(evaluate([t, *np.asarray(x).tolist(), *values])[0])
+
+    def sample_all(self, forcing: Any, t: Array) -> Array | None:
+        """All inputs (n_u, k) at times (k,) in one pass, where they are such expressions of time alone and finite.
+
+        None otherwise: then they are evaluated one by one, so that a fault tells its place.
+        """
+        u = np.repeat(forcing.base[:, None], len(t), axis=1)
+        for i in forcing.varying:
+            one = forcing.formulas.get(i)
+            if not isinstance(one, Formula) or one.depends_on_state:
+                return None
+            values = [t, *[0.0] * len(self.layout.x), *forcing.parameters.tolist()]
+            with np.errstate(all="ignore"):
+                u[i] = one._evaluate(values)[0]
+        return u if np.isfinite(u).all() else None
 
     def slopes(self, p: Array) -> Callable[[float, Array], Array]:
         """Its derivatives (1 + n_x + n_p,) by t, x and p, as f(t, x) at given parameters (n_p,)."""

@@ -105,6 +105,7 @@ class Bench:
             "events": lambda: terms.events,
             "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
             "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
+            "inertial_terms": lambda: terms.inertial() if terms.inertial else (),
         }
         if not terms.by_columns:
             found["mass_matrix"] = lambda: flat(terms.mass_matrix)

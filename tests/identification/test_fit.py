@@ -13,6 +13,7 @@ from scipy.optimize import curve_fit
 
 import eomgen as eg
 from eomgen.errors import UsageError
+from eomgen.identification.run_slopes import run_slopes
 
 TIMES = np.linspace(0.0, 2.0, 81)
 
@@ -92,6 +93,56 @@ def test_estimates_and_covariance_are_those_of_curve_fit(module: eg.Module) -> N
     assert fit.reduced_chi_squared == pytest.approx(1.0, abs=0.2)
     assert "m3" in str(fit)
     assert "chi^2 per degree of freedom" in fit._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("inputs", "gone"),
+    [
+        (DRIVE, False),
+        ({"tau": (np.linspace(0, 2, 9), np.array([0, 3, -2, 1, 4, 0, -3, 2, 1.0]))}, False),
+        ({"tau": 0.7}, False),
+        ({"tau": "-3*a + sin(t)"}, True),
+        ({"tau": "m2*sin(t)"}, True),
+        ({"tau": "1 if t < 1 else 0"}, True),
+        ({"tau": lambda t, x: np.sin(t)}, True),
+    ],
+)
+def test_derivatives_along_the_run_are_those_integrated_beside_it(inputs: Any, gone: bool) -> None:
+    """By parameters, an input and initial values, of states and outputs, to what runs of 1e-8 leave; others refuse."""
+    m = arm()
+    m.output("push", "m3*a_ddot + tau*d1 + b*b_dot")
+    module = m.compile(target="numpy")
+    names = (*EIGHT, "a", "b_dot", *(["tau"] if inputs == {"tau": 0.7} else []))
+    given: dict[str, Any] = {
+        "span": (0.0, 2.0), "initial": {**START, "b_dot": 0.3}, "inputs": inputs, "parameters": {"m2": 2.2},
+        "t_eval": np.linspace(0.0, 2.0, 21), "rtol": 1e-8, "atol": 1e-10, "method": "DOP853",
+    }  # fmt: skip
+    columns = ("a", "b_dot", "push")
+    found = run_slopes(module, names, columns, given)
+    if gone:
+        assert found is None
+        return
+    expected = module.sensitivities(names, **given | {"rtol": 1e-10, "atol": 1e-12})
+    for column in columns:
+        theirs = np.array([expected[column, name] for name in names]).T
+        assert found[column].shape == theirs.shape
+        bound = 1e-5 if column == "push" else 1e-6  # the friction's slope, 1 / 0.05, stands in accelerations
+        assert (np.abs(found[column] - theirs) <= bound * np.abs(theirs).max(axis=0)).all()
+
+
+def test_loops_events_and_laws_that_bend_are_left_to_the_integration() -> None:
+    given: dict[str, Any] = {"span": (0.0, 1.0), "inputs": None, "parameters": None, "t_eval": np.linspace(0, 1, 5),
+                             "rtol": 1e-8, "atol": 1e-10, "method": "DOP853"}  # fmt: skip
+    crank = models.build("slider_crank").compile(target="numpy")
+    assert run_slopes(crank, ("r",), ("theta",), {**given, "initial": {"theta": 0.3}}) is None
+    m = eg.Model("stop")
+    m.parameter("k", 400.0)
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    m.torque("wall", "J", "-k*max(s - 0.1, 0)")
+    start = {"s": 0.0, "s_dot": 1.0}
+    assert run_slopes(m.compile(target="numpy"), ("k",), ("s",), {**given, "initial": start}) is not None
+    m.event("away", "s + 5")
+    assert run_slopes(m.compile(target="numpy"), ("k",), ("s",), {**given, "initial": start}) is None
 
 
 def test_what_the_data_do_not_tell_is_named(module: eg.Module) -> None:

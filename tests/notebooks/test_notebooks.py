@@ -54,7 +54,7 @@ def pictures(cell: Any) -> list[Any]:
 
 def test_they_are_numbered_without_gaps() -> None:
     assert [name.split("_")[0] for name in NAMES] == [str(k) for k in range(len(NAMES))]
-    assert len(NAMES) == 12
+    assert len(NAMES) == 15
 
 
 @pytest.mark.slow

@@ -1,0 +1,215 @@
+"""Identification: states and accelerations -> the matrix Y by which a tree's forces are linear in inertial parameters.
+
+Y pi is what the joints must exert to move the bodies and to hold them against gravity, pi being per body its mass m,
+first moment m c and inertia I about the body's origin, in body axes (C. G. Atkeson, C. H. An, J. M. Hollerbach,
+Estimation of inertial parameters of manipulator loads and links, Int. J. Robotics Research 5(3) (1986), 101-119).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from ..runtime.kernels import fitting
+from ..runtime.room import read_numbers
+
+if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
+
+#: The inertial parameters of a body, in the order of columns; I is about the body's origin.
+STANDARD = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+MOTION = 12  #: numbers of a body's motion in the kernel, before its parameters
+CHUNK = 4_000_000  #: numbers held at once
+
+
+def standard_names(module: BoundModel) -> tuple[str, ...]:
+    """Names of the columns: ``m(link)``, ``mx(link)``, ..., ``Iyz(link)``, body by body.
+
+    Raises
+    ------
+    UsageError
+        A model without bodies.
+    """
+    if not module.n_bodies:
+        raise UsageError(f"model {module.name!r} has no bodies, hence no inertial parameters")
+    return tuple(f"{which}({body})" for body in module.body_names for which in STANDARD)
+
+
+def standard_parameters(module: BoundModel, /, p: Any = None) -> dict[str, float]:
+    """Tell the ten inertial parameters of every body that the model has.
+
+    Parameters
+    ----------
+    p : optional
+        As for ``bind``.
+
+    Returns
+    -------
+    dict of str to float
+        ``m(link)`` (kg), ``mx(link)``, ``my``, ``mz`` (first moment, kg m), ``Ixx(link)``, ``Iyy``, ``Izz``, ``Ixy``,
+        ``Ixz``, ``Iyz`` (kg m^2, about the body's origin, products with the tensor's own sign), in body axes.
+    """
+    names = standard_names(module)
+    state, still = module.layout.q_reference, np.zeros(module.n_v)
+    terms = module.kernels.motion("inertial_terms")(state, still, still, p=_values(module, p))
+    return dict(zip(names, map(float, terms[:, MOTION:].ravel()), strict=True))
+
+
+def regressor(
+    module: BoundModel,
+    /,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    p: Any = None,
+    u: Any = None,
+    out: Array | None = None,
+    t: float = 0.0,
+) -> Array:
+    """Compute Y(q, v, a): Y pi are the generalized forces of inertia and gravity on the spanning tree.
+
+    Parameters
+    ----------
+    q, v, a : (n_q,), (n_v,), (n_v,) arrays, or (..., k)
+    p, u, t, out : optional
+        As for ``inverse_dynamics``.
+
+    Returns
+    -------
+    (n_v, 10 n_bodies) or (n_v, 10 n_bodies, k) array
+        Columns in the order of :meth:`standard_parameters`.
+
+    Raises
+    ------
+    UsageError
+        A wrong shape, or a model without bodies.
+
+    Notes
+    -----
+    ``inverse_dynamics(q, v, a)`` is Y pi and what no body's inertia makes: springs, dampers and other force elements,
+    inputs, and the inertia of drives (``armature``).  :meth:`inertial_remainder` is that part.
+    """
+    names, (q, v, a), single = _motion(module, q, v, a)
+    values, count, n_v = _values(module, p), q.shape[1], module.n_v
+    result = np.empty((n_v, len(names), count))
+    width = max(1, CHUNK // max(1, module.n_bodies * max((MOTION + 10) * n_v, 60)))
+    for k in range(0, count, width):
+        some = slice(k, k + width)
+        result[:, :, some] = _columns(module, q[:, some], v[:, some], a[:, some], values, t)
+    result = result[..., 0] if single else result
+    if out is None:
+        return np.ascontiguousarray(result)
+    fitting(out, result.shape)[...] = result
+    return out
+
+
+def inertial_remainder(
+    module: BoundModel,
+    /,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    p: Any = None,
+    u: Any = None,
+    out: Array | None = None,
+    t: float = 0.0,
+) -> Array:
+    """Compute the part of ``inverse_dynamics`` that is not Y pi: force elements, inputs and the inertia of drives.
+
+    Parameters
+    ----------
+    q, v, a, p, u, out, t
+        As for :meth:`regressor`.
+
+    Returns
+    -------
+    (n_v,) or (n_v, k) array
+    """
+    pi = np.array(list(standard_parameters(module, p).values()))
+    whole = module.inverse_dynamics(q, v, a, p=_values(module, p), u=_inputs(module, u), t=t)
+    result = whole - np.tensordot(pi, regressor(module, q, v, a, p=p, t=t), (0, 1))
+    if out is None:
+        return np.asarray(result)
+    fitting(out, result.shape)[...] = result
+    return out
+
+
+def _values(module: BoundModel, p: Any) -> Any:
+    return module.layout.values("parameter", module.layout.p, p, module.p) if isinstance(p, Mapping) else p
+
+
+def _inputs(module: BoundModel, u: Any) -> Any:
+    return module.layout.values("input", module.layout.u, u, module.u) if isinstance(u, Mapping) else u
+
+
+def _motion(
+    module: BoundModel, q: ArrayLike, v: ArrayLike, a: ArrayLike
+) -> tuple[tuple[str, ...], tuple[Array, Array, Array], bool]:
+    names = standard_names(module)
+    arrays = [np.asarray(read_numbers(name, x), dtype=float) for name, x in (("q", q), ("v", v), ("a", a))]
+    sizes = (module.n_q, module.n_v, module.n_v)
+    single = all(x.ndim == 1 for x in arrays)
+    arrays = [x[:, None] if single else x for x in arrays]
+    shapes = {x.shape[1:] for x in arrays}
+    if [x.shape[:1] for x in arrays] != [(n,) for n in sizes] or len(shapes) != 1 or arrays[0].ndim != 2:
+        given = ", ".join(str(np.shape(x)) for x in (q, v, a))
+        wanted = ", ".join(f"({n},)" for n in sizes)
+        raise UsageError(f"q, v, a must have shapes {wanted}, or (..., k) for k states, not {given}")
+    return names, (arrays[0], arrays[1], arrays[2]), single
+
+
+def _columns(module: BoundModel, q: Array, v: Array, a: Array, p: Any, t: float) -> Array:
+    """Y of k states, (n_v, 10 n_bodies, k)."""
+    kernel = module.kernels.motion("inertial_terms")
+    n_v, count = v.shape
+    omega, _, alpha, lifted = np.moveaxis(_parts(kernel(q, v, a, p=p, t=t)), 1, 0)
+    twists = kernel(  # linear in v: those of unit velocities are the columns of the bodies' Jacobians
+        np.repeat(q, n_v, axis=1), np.tile(np.eye(n_v), count), np.zeros((n_v, n_v * count)), p=p, t=t
+    )
+    turning, moving = np.moveaxis(_parts(twists)[:, :2].reshape(-1, 2, 3, count, n_v), 1, 0)
+    force, moment = _wrenches(omega, alpha, lifted)
+    result = np.einsum("bikj,bimk->jbmk", moving, force) + np.einsum("bikj,bimk->jbmk", turning, moment)
+    return np.asarray(result.reshape(n_v, -1, count))
+
+
+def _parts(terms: Array) -> Array:
+    """w, v, alpha, A of each body, (n_bodies, 4, 3, k)."""
+    return np.asarray(terms[:, :MOTION].reshape(len(terms), 4, 3, -1))
+
+
+def _wrenches(omega: Array, alpha: Array, lifted: Array) -> tuple[Array, Array]:
+    """Force and moment about the body's origin for each parameter, (n_bodies, 3, 10, k) of (n_bodies, 3, k).
+
+    force = m A + ([alpha] + [w][w]) mc;  moment = -[A] mc + L(alpha) I + [w] L(w) I, where I w = L(w) (xx, .., yz).
+    """
+    bodies, _, count = omega.shape
+    force, moment = np.zeros((2, bodies, 3, 10, count))
+    force[:, :, 0] = lifted
+    W = _skew(omega)
+    force[:, :, 1:4] = _skew(alpha) + np.einsum("bijk,bjmk->bimk", W, W)
+    moment[:, :, 1:4] = -_skew(lifted)
+    moment[:, :, 4:] = _inertia_times(alpha) + np.einsum("bijk,bjmk->bimk", W, _inertia_times(omega))
+    return force, moment
+
+
+def _skew(x: Array) -> Array:
+    """[x]: [x] y = x cross y, of (n_bodies, 3, k)."""
+    result = np.zeros((len(x), 3, 3, x.shape[-1]))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        result[:, k, j], result[:, j, k] = x[:, i], -x[:, i]
+    return result
+
+
+def _inertia_times(x: Array) -> Array:
+    """L: I x = L (xx, yy, zz, xy, xz, yz)."""
+    result = np.zeros((len(x), 3, 6, x.shape[-1]))
+    for i in range(3):
+        result[:, i, i] = x[:, i]
+    for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2)), start=3):
+        result[:, i, column], result[:, j, column] = x[:, j], x[:, i]
+    return result
