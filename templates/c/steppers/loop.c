@@ -83,7 +83,7 @@ static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_jou
         for (int k = 0; k < ev->n_resets; k++) {
             ev->values_reset[k] = (double)NAN;
         }
-        const int status = ev->resets(run->t, run->y, run->u, run->c, ev->values_reset, run->w);
+        const int status = EOMGEN_RESETS(ev)(run->t, run->y, run->u, run->c, ev->values_reset, run->w);
         if (status != 0 && status != EOMGEN_NON_FINITE) {
             return EOMGEN_RESET_FAILED;
         }
@@ -98,7 +98,7 @@ static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_jou
     }
     if (ev->project != NULL) {
         memcpy(ev->y, run->y, (size_t)run->n * sizeof(double));
-        if (ev->project(run->t, ev->y, run->u, run->c, run->y, run->w) != 0) {
+        if (EOMGEN_PROJECT(ev)(run->t, ev->y, run->u, run->c, run->y, run->w) != 0) {
             return EOMGEN_RESET_FAILED;
         }
     }
