@@ -37,6 +37,12 @@ DEVICE_KERNELS = (
     "constraint_jacobian", "velocity_constraints", "project", "poses", "outputs", "events", "resets",
 )  # fmt: skip
 
+#: Those of them that are called with the time first, as functions of a module; others take it by name.
+TIMED_ON_DEVICE = ("rhs", "jacobian", "bias", "outputs", "events")
+
+#: What they need besides NumPy.
+CUDA_REQUIREMENTS = ("cuda-core>=1.0", "cuda-bindings>=13.0", "nvidia-cuda-nvrtc>=13.0")
+
 
 class Target(NamedTuple):
     """One target.
@@ -96,7 +102,11 @@ TARGETS: dict[str, Target] = {
         "set of functions of CasADi's SX", "emit.traced.casadi_package", arrays=True, kernels=TRACED_KERNELS
     ),
     "jax": Target("set of pure functions of JAX", "emit.traced.jax_package", arrays=True, kernels=TRACED_KERNELS),
-    "cuda": Target("set of functions of many states on NVIDIA GPUs", "emit.cuda.cuda_package.cuda_package", kernels=DEVICE_KERNELS),
+    "cuda": Target(
+        "set of functions of many states on NVIDIA GPUs",
+        "emit.cuda.cuda_package.cuda_package",
+        kernels=DEVICE_KERNELS,
+    ),
     "fmu": Target("functional mock-up unit for other simulators, one file", whole="fmu.generate_fmu"),
 }
 

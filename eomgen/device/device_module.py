@@ -14,12 +14,9 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..runtime.given_start import Span
+from ..targets import TIMED_ON_DEVICE
 from .arrays_on_device import Array, Device, DeviceArray
 from .device_runs import DeviceRuns, carry_out
-
-#: Functions called with the time first, as those of a module; others take it by name.
-TIMED = ("rhs", "jacobian", "bias", "outputs", "events")
-
 
 class DeviceModule:
     """The functions of a model on a device.
@@ -174,7 +171,7 @@ class BatchCall:
     def __init__(self, module: DeviceModule, name: str, ports: Sequence[tuple[str, int]], shape: tuple[int, ...]) -> None:
         self.module, self.name, self.ports, self.shape = module, name, ports, shape
         labels = [port for port, _ in ports]
-        self.labels = ["t", *labels, "p", "u"] if name in TIMED else [*labels, "p", "u", "t"]
+        self.labels = ["t", *labels, "p", "u"] if name in TIMED_ON_DEVICE else [*labels, "p", "u", "t"]
 
     def __call__(self, *given: Any, status: bool = False, **named: Any) -> Any:
         """Evaluate at one state or many.
@@ -197,7 +194,7 @@ class BatchCall:
         u, each_u = module.columns("u", module.u if values["u"] is None else values["u"], module.n_u, count)
         c, each_c = module.constants(values["p"], count)
         if not batch and max(each_t, each_u, each_c):
-            raise UsageError(f"{self.labels[0 if self.name not in TIMED else 1]} is one state, so t, p and u must be too")
+            raise UsageError(f"{self.labels[0 if self.name not in TIMED_ON_DEVICE else 1]} is one state, so t, p and u must be too")
         result = device.empty((prod(self.shape), count), np.float64)
         codes = device.empty((count,), np.int32)
         launch = module.kernel(f"{self.name}_batch", self.name)

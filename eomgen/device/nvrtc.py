@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..errors import MissingDependencyError, ToolchainError
+from ..targets import CUDA_REQUIREMENTS
 
-REQUIREMENTS = ("cuda-core>=1.0", "cuda-bindings>=13.0", "nvidia-cuda-nvrtc>=13.0")
-INSTALL = f"pip install {' '.join(repr(name) for name in REQUIREMENTS)}"
+INSTALL = f"pip install {' '.join(repr(name) for name in CUDA_REQUIREMENTS)}"
 
 
 def compile_device_text(text: str, architecture: str, wanted: Sequence[str] = (), options: Sequence[str] = ()) -> bytes:

@@ -14,6 +14,7 @@ from ...errors import UsageError
 from ...layer import read_layer, read_steppers
 from ...program import Block, KernelDriver, Program
 from ...simulation.events import GO_ON, RESET, crowd_of
+from ...targets import DEVICE_KERNELS
 from ..c import count_constants, emit_c
 from ..c_functions import used_calls
 from ..c_text import print_precompute
@@ -71,7 +72,7 @@ def describe_device(program: Program) -> dict[str, Any]:
 
 
 def _kernels(program: Program) -> list[Block | KernelDriver]:
-    return [k for k in program.kernels if k.n_out]
+    return [k for k in program.kernels if k.n_out and k.name in DEVICE_KERNELS]
 
 
 def _ports(kernel: Block | KernelDriver) -> list[tuple[str, int]]:

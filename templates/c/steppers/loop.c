@@ -24,7 +24,7 @@ static void store_step(const eomgen_run *run, eomgen_journey *j)
 }
 
 /* Begin the part that ends at the next corner. */
-static void set_out(eomgen_run *run, const eomgen_journey *j)
+static void begin_part(eomgen_run *run, const eomgen_journey *j)
 {
     run->t_bound = j->nodes[j->node];
     run->hold = run->t + 0.5 * (run->t_bound - run->t);
@@ -34,7 +34,7 @@ static void begin(const eomgen_method *method, eomgen_run *run, eomgen_journey *
 {
     j->begun = 1;
     run->direction = j->nodes[j->n_nodes - 1] < run->t ? -1.0 : 1.0;
-    set_out(run, j);
+    begin_part(run, j);
     eomgen_start(method, run);
     if (j->events != NULL) {
         j->events->last_reset = (double)NAN;
@@ -162,7 +162,7 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         }
         if (run->t == run->t_bound && j->node + 1 < j->n_nodes) { /* x' jumps here, or its slope */
             j->node++;
-            set_out(run, j);
+            begin_part(run, j);
             run->h_abs = h_abs > run->h_abs ? h_abs : run->h_abs;
             eomgen_start(method, run);
         }
