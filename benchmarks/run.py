@@ -16,7 +16,7 @@ from .report import Report, show, write
 BENCHMARKS = (
     *("derive", "growth", "compile", "panda", "robots", "latency"),
     *("call", "simulate", "integrate", "stiff", "loops", "large_loops", "four_bars", "robot_loops", "traced"),
-    *("operation_counts", "rhs", "robot_kernels", "grid_robots", "lanes", "ensembles", "equilibria"),
+    *("operation_counts", "rhs", "robot_kernels", "grid_robots", "lanes", "ensembles", "device", "equilibria"),
 )
 
 

@@ -34,7 +34,13 @@ class DeviceArray:
     @property
     def __cuda_array_interface__(self) -> dict[str, Any]:
         # stream 1: the default stream, on which everything of a DeviceModule runs
-        return {"shape": self.shape, "typestr": self.dtype.str, "data": (self.pointer, False), "version": 3, "stream": 1}
+        return {
+            "shape": self.shape,
+            "typestr": self.dtype.str,
+            "data": (self.pointer, False),
+            "version": 3,
+            "stream": 1,
+        }
 
     def numpy(self) -> Array:
         """A copy on the host, when all that comes before it is done."""

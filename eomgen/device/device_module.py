@@ -18,13 +18,14 @@ from ..targets import TIMED_ON_DEVICE
 from .arrays_on_device import Array, Device, DeviceArray
 from .device_runs import DeviceRuns, carry_out
 
+
 class DeviceModule:
     """The functions of a model on a device.
 
     ``rhs(t, x, p=None, u=None)`` and the others have the arguments of a module: x (n_x,) or (n_x, k); t, p and u the
-    same for all states, or (k,), (n_p, k), (n_u, k).  Arrays of NumPy are copied to the device and the result comes back
-    as an array of NumPy; where one of the states is an array on the device (of CuPy, PyTorch, JAX or Numba), the result
-    is a :class:`~.arrays_on_device.DeviceArray`.  An entry is NaN where the state has no value there; with
+    same for all states, or (k,), (n_p, k), (n_u, k).  Arrays of NumPy are copied to the device and the result comes
+    back as an array of NumPy; where one of the states is an array on the device (of CuPy, PyTorch, JAX or Numba), the
+    result is a :class:`~.arrays_on_device.DeviceArray`.  An entry is NaN where the state has no value there; with
     ``status=True`` the result is (result, status), with 0 where all is well.
 
     Parameters
@@ -129,8 +130,8 @@ class DeviceModule:
             self._kernels[name] = self.device.kernel(self.text, f"{self.name}_{name}", macros)
         return self._kernels[name]
 
-    def columns(self, label: str, given: Any, length: int, count: int | None = None) -> tuple[DeviceArray, int]:
-        """Numbers (length,) or (length, k) on the device, and k, or 0 where they are one column.
+    def columns(self, label: str, given: Any, length: int, count: int | None = None) -> tuple[DeviceArray, int | None]:
+        """Numbers (length,) or (length, k) on the device, and k, or None where they are one column.
 
         Raises
         ------
@@ -148,27 +149,31 @@ class DeviceModule:
             wanted = f"({length},) or ({length}, {'k' if count in (None, 1) else count})"
             raise UsageError(f"{label} must have shape {wanted}, not {shape}")
         on_device = found if isinstance(found, DeviceArray) else self.device.put(found)
-        return on_device, shape[1] if len(shape) == 2 else 0
+        return on_device, shape[1] if len(shape) == 2 else None
 
-    def constants(self, p: Any, count: int) -> tuple[DeviceArray, int]:
+    def constants(self, p: Any, count: int) -> tuple[DeviceArray, bool]:
         """What kernels take in place of parameters, and whether each state has its own."""
         if p is None and self._constants is not None:
-            return self._constants, 0
+            return self._constants, False
         if p is None and np.isnan(self.p).any():
             missing = [name for name, value in zip(self.p_names, self.p, strict=True) if np.isnan(value)]
             raise UsageError(f"no value is declared for {', '.join(missing)}; give p")
         given, each = self.columns("p", self.p if p is None else p, self.n_p, count)
-        found = self.device.empty((self.facts["n_const"], max(each, 1)), np.float64)
-        self.kernel("constants")(max(each, 1), given, found)
+        columns = 1 if each is None else each
+        found = self.device.empty((self.facts["n_const"], columns), np.float64)
+        if columns:
+            self.kernel("constants")(columns, given, found)
         if p is None:
             self._constants = found
-        return found, int(each > 0)
+        return found, each is not None
 
 
 class BatchCall:
     """One function of a model on a device."""
 
-    def __init__(self, module: DeviceModule, name: str, ports: Sequence[tuple[str, int]], shape: tuple[int, ...]) -> None:
+    def __init__(
+        self, module: DeviceModule, name: str, ports: Sequence[tuple[str, int]], shape: tuple[int, ...]
+    ) -> None:
         self.module, self.name, self.ports, self.shape = module, name, ports, shape
         labels = [port for port, _ in ports]
         self.labels = ["t", *labels, "p", "u"] if name in TIMED_ON_DEVICE else [*labels, "p", "u", "t"]
@@ -187,18 +192,18 @@ class BatchCall:
         for port, length in self.ports:
             array, each = module.columns(port, values[port], length, count if batch else None)
             found.append((array, each))
-            count, batch = (each, True) if each else (count, batch)
-        if any((each or 1) != count for _, each in found):
+            count, batch = (count, batch) if each is None else (each, True)
+        if any((1 if each is None else each) != count for _, each in found):
             raise UsageError(f"{' and '.join(port for port, _ in self.ports)} must have the same number of columns")
         t, each_t = self._times(values["t"], count)
         u, each_u = module.columns("u", module.u if values["u"] is None else values["u"], module.n_u, count)
         c, each_c = module.constants(values["p"], count)
-        if not batch and max(each_t, each_u, each_c):
-            raise UsageError(f"{self.labels[0 if self.name not in TIMED_ON_DEVICE else 1]} is one state, so t, p and u must be too")
+        if not batch and (each_t or each_u is not None or each_c):
+            raise UsageError(f"{self.ports[0][0]} is one state, so t, p and u must be too")
         result = device.empty((prod(self.shape), count), np.float64)
         codes = device.empty((count,), np.int32)
         launch = module.kernel(f"{self.name}_batch", self.name)
-        flags = [np.int64(bool(each)) for each in (each_t, each_u, each_c)]
+        flags = [np.int64(each) for each in (each_t, each_u is not None, each_c)]
         if count:
             launch(count, t, flags[0], *(array for array, _ in found), u, flags[1], c, flags[2], result, codes)
         shape = (*self.shape, count) if batch else self.shape
@@ -220,13 +225,13 @@ class BatchCall:
             raise UsageError(f"{self.name} needs {', '.join(missing)}")
         return values
 
-    def _times(self, given: Any, count: int) -> tuple[DeviceArray, int]:
+    def _times(self, given: Any, count: int) -> tuple[DeviceArray, bool]:
         there = self.module.device.view(given)
         if there is None:
             there = self.module.device.put(np.asarray(given, dtype=float))
         if there.shape not in ((), (1,), (count,)):
             raise UsageError(f"t must be a number or of shape ({count},), not {there.shape}")
-        return there, int(there.shape == (count,) and count > 1)
+        return there, there.shape == (count,) and count > 1
 
 
 def _declared(values: Sequence[float | None] | None) -> Array:

@@ -92,7 +92,7 @@ def carry_out(
     times = np.empty(0) if t_eval is None else ordered_times(t_eval, start, end, n)
     most, keep = read_count("max_steps", max_steps, 1), read_count("keep_events", keep_events, 1)
     states, count = module.columns("x0", x0, n)
-    if not count:
+    if count is None:
         states, count = states.reshaped((n, 1)), 1
     parameters, each_p = module.columns("p", module.p if p is None else p, module.n_p, count)
     inputs, each_u = module.columns("u", module.u if u is None else u, module.n_u, count)
@@ -109,9 +109,12 @@ def carry_out(
         made["notes"] = device.put(np.full(shapes["notes"], np.nan))
     results = ("times", "samples", "x", "t", "status", "counts", "failure", "failure_time")
     launch = module.kernel(f"{method.lower()}_runs", "runs", method)
+    if not count:
+        raise UsageError("x0 holds no states; give one column for each run")
+    nodes, atol = device.put(np.array([start, end])), device.put(np.broadcast_to(chosen["atol"], (n,)) * 1.0)
     launch(
-        count, device.put(np.array([start, end])), np.int32(2), states, parameters, np.int64(each_p > 0), inputs,
-        np.int64(each_u > 0), np.float64(chosen["rtol"]), device.put(np.broadcast_to(chosen["atol"], (n,)) * 1.0),
+        count, nodes, np.int32(2), states, parameters, np.int64(each_p is not None), inputs,
+        np.int64(each_u is not None), np.float64(chosen["rtol"]), atol,
         np.float64(chosen.get("max_step", np.inf)), np.float64(chosen.get("first_step", 0.0)), np.int64(most),
         device.put(times), np.int64(len(times)), *(made[name] for name in results),
         *((made["notes"], np.int64(kept), made["noted"]) if events else ()),
@@ -139,9 +142,7 @@ def _projected(module: DeviceModule, x: Array, t: Array, p: Any, u: Any) -> Arra
     if "project" not in module.facts["kernels"] or not x.size:
         return x
     flat = np.ascontiguousarray(x.reshape(x.shape[0], -1))
-    repeated = [
-        None if given is None else _repeated(module, given, flat.shape[1] // x.shape[-1]) for given in (p, u)
-    ]
+    repeated = [None if given is None else _repeated(module, given, flat.shape[1] // x.shape[-1]) for given in (p, u)]
     found = module.project(flat, *repeated, t=np.ascontiguousarray(t).ravel())
     return np.asarray(found).reshape(x.shape)
 

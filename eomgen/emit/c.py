@@ -27,9 +27,7 @@ NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h")
 PROCESSORS = ("eomgen_processor.h", "eomgen_contraction.h")
 
 
-def emit_c(
-    program: Program, precision: str | None = None, lanes: bool = True, separate: bool = True
-) -> SourceSet:
+def emit_c(program: Program, precision: str | None = None, lanes: bool = True, separate: bool = True) -> SourceSet:
     """The C sources of a program.
 
     Parameters

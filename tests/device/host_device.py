@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,8 +22,8 @@ void choose_state(long long j) { host_state = j; }
 #define EOMGEN_KERNEL
 #define EOMGEN_OWN host_state
 """
-FLAGS = ("-std=c11", "-O1", "-ffp-contract=off", "-fPIC", "-shared", "-x", "c")
-LAST = ("-lm",)
+FLAGS = ("-std=c11", "-O0", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-fPIC", "-shared", "-x", "c")
+WANTED = re.compile(r"EOMGEN_WANT_\w+")
 
 
 class OnHost:
@@ -60,15 +61,17 @@ class HostDevice:
         return None
 
     def kernel(self, text: str, name: str, wanted: Sequence[str]) -> Callable[..., None]:
-        key = (text, tuple(wanted))
-        if key not in self.libraries:
+        assert set(wanted) <= set(WANTED.findall(text)), wanted
+        if text not in self.libraries:  # with all kernels at once
             path = self.folder / f"{len(self.libraries)}.so"
             source = path.with_suffix(".cu")
             source.write_text(HEAD + text, encoding="utf-8")
-            command = [*find_compiler().command, *FLAGS, *(f"-D{macro}" for macro in wanted), str(source), "-o", str(path)]
-            subprocess.run([*command, *LAST], check=True, capture_output=True, text=True)
-            self.libraries[key] = ctypes.CDLL(str(path))
-        library = self.libraries[key]
+            macros = [f"-D{macro}" for macro in set(WANTED.findall(text))]
+            command = [*find_compiler().command, *FLAGS, *macros, str(source), "-o", str(path), "-lm"]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stderr
+            self.libraries[text] = ctypes.CDLL(str(path))
+        library = self.libraries[text]
 
         def launch(count: int, *arguments: Any) -> None:
             values = [_as_c(a) for a in (np.int64(count), *arguments)]

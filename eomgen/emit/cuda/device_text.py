@@ -46,11 +46,12 @@ def emit_device_text(program: Program) -> str:
     native = [f.name for f, _ in used_calls(program).values() if f.native is not None]
     if native:
         raise UsageError(
-            f"target 'cuda': function {', '.join(native)} is C code, which may need what a device does not have; give a "
-            "table or an expression"
+            f"target 'cuda': function {', '.join(native)} is C code, which may need what a device does not have; "
+            "give a table or an expression"
         )
     sources = dict(emit_c(program, lanes=False, separate=False))
-    texts = {**sources, **read_layer(), "steppers": read_steppers((*STEPPERS, *(EVENTS if program.metadata.get("events") else ())))}
+    parts = (*STEPPERS, *(EVENTS if program.metadata.get("events") else ()))
+    texts = {**sources, **read_layer(), "steppers": read_steppers(parts)}
     there: set[str] = set()
     model = _flattened([name for name in sources if name.endswith(".c")], texts, there)
     steppers = _flattened(["steppers"], texts, there)
@@ -87,7 +88,7 @@ def _no_runs(program: Program) -> str:
     if "rhs" not in {k.name for k in program.kernels}:
         return "the model has no equations of motion"
     if metadata.get("signals"):
-        return f"input {', '.join(metadata['signals'])} varies over time in the model, which ensembles on a device do not do"
+        return f"input {', '.join(metadata['signals'])} varies over time in the model; inputs are constant there"
     impacts = [event["name"] for event in metadata.get("events", ()) if event.get("restitution") is not None]
     if impacts:
         return f"event {', '.join(impacts)} is an impact, which needs Python"
@@ -108,7 +109,7 @@ def _context(program: Program) -> dict[str, Any]:
     name, projects = program.name, bool(sizes.n_c or program.quaternion_slots)
     kernels = []
     for k in _kernels(program):
-        ports, at = _ports(k), 0
+        ports = _ports(k)
         starts = [sum(length for _, length in ports[:i]) for i in range(len(ports))]
         kernels.append({"name": k.name, "n_in": k.n_in, "n_out": k.n_out, "ports": ports, "starts": starts})
     return {

@@ -41,6 +41,8 @@ void eomgen_force(eomgen_run *run, double t, const double *y)
             eomgen_play(s->tape, t, y, run->u, run->c, run->u + i);
             continue;
         }
+#else
+        (void)y;
 #endif
         if (s->n > 0) {
             run->u[i] = eomgen_table_value(s, t, run->hold);
