@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,7 @@ class CudaDevice:
 
     def empty(self, shape: Sequence[int], dtype: Any) -> DeviceArray:
         """New memory."""
-        length = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
+        length = prod(shape) * np.dtype(dtype).itemsize
         buffer = self.device.allocate(max(length, 1), stream=self.stream)
         return DeviceArray(self, int(buffer.handle), shape, dtype, buffer)
 
@@ -76,19 +77,8 @@ class CudaDevice:
         """An array of another library that lies on this GPU."""
         if isinstance(given, DeviceArray):
             return given
-        if hasattr(given, "__dlpack_device__"):
-            if given.__dlpack_device__()[0] == HOST:
-                return None
-        elif not hasattr(given, "__cuda_array_interface__"):
-            return None
-        from cuda.core.utils import StridedMemoryView
-
-        found = StridedMemoryView.from_any_interface(given, stream_ptr=int(self.stream.handle))
-        if found.dtype != np.float64:
-            raise UsageError(f"an array on the GPU must hold float64 (double), not {found.dtype}")
-        if not found.is_c_contiguous:
-            raise UsageError("an array on the GPU must lie in C order, without gaps; make a contiguous copy")
-        return DeviceArray(self, int(found.ptr), found.shape, np.float64, (given, found))
+        found = view_foreign(given, int(self.stream.handle))
+        return None if found is None else DeviceArray(self, int(found.ptr), found.shape, np.float64, (given, found))
 
     def kernel(self, text: str, name: str, wanted: Sequence[str]) -> Callable[..., None]:
         """A kernel as ``launch(count, *arguments)``; texts are compiled once."""
@@ -118,3 +108,37 @@ def choose_threads(count: int, processors: int) -> int:
     """Threads of a block: whole warps, as few as spread the states over all processors of the GPU."""
     warps = -(-count // WARP)
     return int(min(MOST, WARP * max(1, warps // (4 * processors))))
+
+
+def view_foreign(given: Any, stream: int) -> Any:
+    """A view of another library's array on a GPU, by its DLPack or ``__cuda_array_interface__``; None of others.
+
+    Parameters
+    ----------
+    given : object
+    stream : int
+        Handle of the stream that waits for what the other library has under way; -1: none waits.
+
+    Raises
+    ------
+    UsageError
+        It holds other numbers than float64, or not in C order.
+    """
+    if hasattr(given, "__dlpack_device__"):
+        if given.__dlpack_device__()[0] == HOST:
+            return None
+    elif not hasattr(given, "__cuda_array_interface__"):
+        return None
+    from cuda.core.utils import StridedMemoryView
+
+    found = StridedMemoryView.from_any_interface(given, stream_ptr=stream)
+    if found.dtype != np.float64:
+        raise UsageError(f"an array on the GPU must hold float64 (double), not {found.dtype}")
+    steps = [prod(found.shape[k + 1 :]) for k in range(len(found.shape))]  # in numbers, not in bytes
+    if (
+        found.strides is not None
+        and found.size
+        and any(n > 1 and given != wanted for n, given, wanted in zip(found.shape, found.strides, steps, strict=True))
+    ):
+        raise UsageError("an array on the GPU must lie in C order, without gaps; make a contiguous copy")
+    return found

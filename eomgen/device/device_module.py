@@ -67,8 +67,10 @@ class DeviceModule:
         self.x0 = np.array(facts["x0"], dtype=float)
         self._constants: DeviceArray | None = None
         self._kernels: dict[str, Callable[..., None]] = {}
+        self._calls: dict[str, BatchCall] = {}
         for name, (ports, shape) in facts["kernels"].items():
-            setattr(self, name, BatchCall(self, name, [(port, int(n)) for port, n in ports], tuple(shape)))
+            self._calls[name] = BatchCall(self, name, [(port, int(n)) for port, n in ports], tuple(shape))
+        vars(self).update(self._calls)
 
     def simulate_many(
         self,
@@ -122,6 +124,10 @@ class DeviceModule:
         """
         options = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
         return carry_out(self, span, x0, p, u, method, t_eval, options, step, max_steps, keep_events)
+
+    def call(self, name: str) -> BatchCall:
+        """One of the functions, by its name."""
+        return self._calls[name]
 
     def kernel(self, name: str, *wanted: str) -> Callable[..., None]:
         """A kernel of the text, compiled at the first call."""

@@ -143,7 +143,7 @@ def _projected(module: DeviceModule, x: Array, t: Array, p: Any, u: Any) -> Arra
         return x
     flat = np.ascontiguousarray(x.reshape(x.shape[0], -1))
     repeated = [None if given is None else _repeated(module, given, flat.shape[1] // x.shape[-1]) for given in (p, u)]
-    found = module.project(flat, *repeated, t=np.ascontiguousarray(t).ravel())
+    found = module.call("project")(flat, *repeated, t=np.ascontiguousarray(t).ravel())
     return np.asarray(found).reshape(x.shape)
 
 

@@ -20,6 +20,7 @@ from ..c_functions import used_calls
 from ..c_text import print_precompute
 from ..example_state import example_state
 from ..sources import render
+from ..straight import cut
 
 #: Methods of ensembles: rows of n numbers that each needs in K and F.
 METHODS = {"dop853": 15 + 7, "rk4": 4 + 3}
@@ -111,7 +112,8 @@ def _context(program: Program) -> dict[str, Any]:
     for k in _kernels(program):
         ports = _ports(k)
         starts = [sum(length for _, length in ports[:i]) for i in range(len(ports))]
-        kernels.append({"name": k.name, "n_in": k.n_in, "n_out": k.n_out, "ports": ports, "starts": starts})
+        one = {"name": k.name, "n_in": k.n_in, "n_out": k.n_out, "ports": ports, "starts": starts}
+        kernels.append(one | {"work": _work(program, {k.name})})
     return {
         "name": name,
         "prefix": name.upper(),
@@ -124,8 +126,22 @@ def _context(program: Program) -> dict[str, Any]:
         "project": projects,
         "resets_call": f"{name}_resets" if resets else "known_rhs",
         "project_call": f"{name}_project" if projects else "known_rhs",
+        "work": _work(program, {"rhs", *(("events", "resets", "project") if events else ())}),
         "methods": [{"name": method, "rows": rows} for method, rows in METHODS.items()],
     }
+
+
+def _work(program: Program, names: set[str]) -> str:
+    """Length of the work array of some kernels: every thread has one, so no longer than they need."""
+    used = [k for k in program.kernels if k.name in names]
+    if not all(isinstance(k, Block) for k in used):
+        return f"{program.name.upper()}_N_WORK"
+    lengths = (
+        cut(program.graph, k.outputs, k.checks, program.parameter_only, program.limits.statements).work
+        for k in used
+        if isinstance(k, Block)
+    )
+    return str(max(lengths, default=0))
 
 
 def _flattened(files: Iterable[str], texts: Mapping[str, str], there: set[str]) -> str:
