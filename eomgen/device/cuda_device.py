@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import prod
 from typing import Any
 
@@ -77,8 +77,19 @@ class CudaDevice:
         """An array of another library that lies on this GPU."""
         if isinstance(given, DeviceArray):
             return given
-        found = view_foreign(given, int(self.stream.handle))
-        return None if found is None else DeviceArray(self, int(found.ptr), found.shape, np.float64, (given, found))
+        told = getattr(given, "__cuda_array_interface__", None)
+        if told is not None:
+            pointer, shape = read_interface(told)
+            if told.get("stream") not in (None, 1):
+                self.device.sync()  # until what the other library has under way is done
+            return DeviceArray(self, pointer, shape, np.float64, given)
+        if not hasattr(given, "__dlpack_device__") or given.__dlpack_device__()[0] == HOST:
+            return None
+        from cuda.core.utils import StridedMemoryView
+
+        found = StridedMemoryView.from_any_interface(given, stream_ptr=int(self.stream.handle))
+        require_plain(found.shape, found.dtype, found.strides)
+        return DeviceArray(self, int(found.ptr), found.shape, np.float64, (given, found))
 
     def kernel(self, text: str, name: str, wanted: Sequence[str]) -> Callable[..., None]:
         """A kernel as ``launch(count, *arguments)``; texts are compiled once."""
@@ -110,35 +121,37 @@ def choose_threads(count: int, processors: int) -> int:
     return int(min(MOST, WARP * max(1, warps // (4 * processors))))
 
 
-def view_foreign(given: Any, stream: int) -> Any:
-    """A view of another library's array on a GPU, by its DLPack or ``__cuda_array_interface__``; None of others.
+def read_interface(told: Mapping[str, Any]) -> tuple[int, tuple[int, ...]]:
+    """Pointer and shape of a ``__cuda_array_interface__``.
+
+    Raises
+    ------
+    UsageError
+        See :func:`require_plain`.
+    """
+    shape, dtype = tuple(told["shape"]), np.dtype(told["typestr"])
+    strides = told.get("strides")
+    require_plain(shape, dtype, None if strides is None else [step // dtype.itemsize for step in strides])
+    return int(told["data"][0]), shape
+
+
+def require_plain(shape: Sequence[int], dtype: Any, strides: Sequence[int] | None) -> None:
+    """Refuse what kernels cannot read.
 
     Parameters
     ----------
-    given : object
-    stream : int
-        Handle of the stream that waits for what the other library has under way; -1: none waits.
+    shape, dtype
+    strides : sequence of int, optional
+        In numbers, not in bytes; in C order if None.
 
     Raises
     ------
     UsageError
         It holds other numbers than float64, or not in C order.
     """
-    if hasattr(given, "__dlpack_device__"):
-        if given.__dlpack_device__()[0] == HOST:
-            return None
-    elif not hasattr(given, "__cuda_array_interface__"):
-        return None
-    from cuda.core.utils import StridedMemoryView
-
-    found = StridedMemoryView.from_any_interface(given, stream_ptr=stream)
-    if found.dtype != np.float64:
-        raise UsageError(f"an array on the GPU must hold float64 (double), not {found.dtype}")
-    steps = [prod(found.shape[k + 1 :]) for k in range(len(found.shape))]  # in numbers, not in bytes
-    if (
-        found.strides is not None
-        and found.size
-        and any(n > 1 and given != wanted for n, given, wanted in zip(found.shape, found.strides, steps, strict=True))
-    ):
+    if dtype != np.float64:
+        raise UsageError(f"an array on the GPU must hold float64 (double), not {dtype}")
+    plain = [prod(shape[k + 1 :]) for k in range(len(shape))]
+    steps = plain if strides is None or not prod(shape) else strides
+    if any(n > 1 and step != wanted for n, step, wanted in zip(shape, steps, plain, strict=True)):
         raise UsageError("an array on the GPU must lie in C order, without gaps; make a contiguous copy")
-    return found

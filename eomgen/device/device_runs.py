@@ -15,10 +15,10 @@ from ..runtime.given_start import Span
 from ..simulation.run_arguments import check_method, declare, find_span, ordered_times, own_step
 from ..simulation.tolerances import check_tolerances
 from .arrays_on_device import Array
+from .device_functions import DeviceFunctions
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from .device_module import DeviceModule
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class DeviceRuns:
 
 
 def carry_out(
-    module: DeviceModule,
+    module: DeviceFunctions,
     span: Span,
     x0: Any,
     p: Any,
@@ -137,7 +137,7 @@ def carry_out(
     )  # fmt: skip
 
 
-def _projected(module: DeviceModule, x: Array, t: Array, p: Any, u: Any) -> Array:
+def _projected(module: DeviceFunctions, x: Array, t: Array, p: Any, u: Any) -> Array:
     """States (n_x, ..., k) at times (..., k) brought onto the constraints; NaN stays NaN."""
     if "project" not in module.facts["kernels"] or not x.size:
         return x
@@ -147,7 +147,7 @@ def _projected(module: DeviceModule, x: Array, t: Array, p: Any, u: Any) -> Arra
     return np.asarray(found).reshape(x.shape)
 
 
-def _repeated(module: DeviceModule, given: Any, times: int) -> Any:
+def _repeated(module: DeviceFunctions, given: Any, times: int) -> Any:
     """Parameters of k runs for as many states of each."""
     there = module.device.view(given)
     array = np.asarray(given, dtype=float) if there is None else there.numpy()

@@ -2,45 +2,39 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from eomgen.device.cuda_device import CudaDevice, choose_threads, view_foreign
+from eomgen.device.cuda_device import CudaDevice, choose_threads, read_interface
 from eomgen.errors import EomgenError, UsageError
 
 
-NOTHING = -1  #: stream that waits for nothing
+def interface(array: np.ndarray) -> dict[str, Any]:
+    """What an array says that lies on a GPU, as CuPy's do."""
+    own = array.__array_interface__
+    return {
+        "shape": own["shape"],
+        "typestr": own["typestr"],
+        "data": own["data"],
+        "strides": array.strides,
+        "version": 3,
+    }
 
 
-class Foreign:
-    """An array that says it lies on a GPU, as CuPy's do."""
-
-    def __init__(self, array: np.ndarray) -> None:
-        pointer = array.__array_interface__["data"]
-        self.array = array
-        self.__cuda_array_interface__ = {
-            "shape": array.shape, "typestr": array.dtype.str, "data": pointer, "strides": array.strides, "version": 3,
-        }  # fmt: skip
-
-
-def test_arrays_of_the_host_are_none_of_it() -> None:
-    assert view_foreign(np.zeros(3), NOTHING) is None
-    assert view_foreign([1.0, 2.0], NOTHING) is None
-    assert view_foreign(0.5, NOTHING) is None
-
-
-@pytest.mark.needs("NVRTC")
-def test_arrays_on_a_gpu_are_seen_as_they_are() -> None:
+def test_arrays_on_a_gpu_are_read_as_they_are() -> None:
     array = np.zeros((4, 5))
-    found = view_foreign(Foreign(array), NOTHING)
-    assert (found.ptr, tuple(found.shape)) == (array.ctypes.data, (4, 5))
-    view_foreign(Foreign(array[:, :1][:1]), NOTHING)  # steps along a single entry say nothing
-    with pytest.raises(UsageError, match="in C order"):
-        view_foreign(Foreign(array.T), NOTHING)
-    with pytest.raises(UsageError, match="in C order"):
-        view_foreign(Foreign(array[:, ::2]), NOTHING)
-    with pytest.raises(UsageError, match="must hold float64"):
-        view_foreign(Foreign(array.astype(np.float32)), NOTHING)
+    assert read_interface(interface(array)) == (array.ctypes.data, (4, 5))
+    assert read_interface({**interface(array), "strides": None}) == (array.ctypes.data, (4, 5))
+    assert read_interface(interface(array[:1, :1]))[1] == (1, 1)  # steps along a single entry say nothing
+    assert read_interface(interface(array[:, ::2][:, :0]))[1] == (4, 0)
+    for bad in (array.T, array[:, ::2], array[::2]):
+        with pytest.raises(UsageError, match="in C order"):
+            read_interface(interface(bad))
+    for kind in (np.float32, np.int64, ">f8"):
+        with pytest.raises(UsageError, match="must hold float64"):
+            read_interface(interface(array.astype(kind)))
 
 
 def test_blocks_are_small_until_every_processor_has_some() -> None:

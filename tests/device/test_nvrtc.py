@@ -6,6 +6,7 @@ import re
 
 import models
 import pytest
+from device.test_runs_on_device import bouncing
 
 import eomgen as eg
 from benchmarks.device import resources
@@ -15,6 +16,7 @@ from eomgen.emit.cuda.device_text import emit_device_text
 from eomgen.errors import MissingDependencyError, ToolchainError
 
 EXAMPLES = sorted(path.stem for path in models.EXAMPLES.glob("*.yaml"))
+BY_POINTER = re.compile(r"^\s*call[.\w]*\s+(\([^)]*\),\s*)?%", re.MULTILINE)
 QUICK = "--Ofast-compile=max"
 
 
@@ -34,8 +36,19 @@ def test_every_example_compiles_to_ptx(name: str) -> None:
         ptx = code.decode(errors="replace")
         assert f".target sm_{architecture[-2:]}" in ptx
         assert set(re.findall(r"\.entry (\w+)\(", ptx)) == kernels
-        # the stack is known beforehand: nothing is called by a pointer
-        assert not re.search(r"^\s*call[.\w]*\s+(\([^)]*\),\s*)?%", ptx, re.MULTILINE)
+
+
+@pytest.mark.slow
+@pytest.mark.needs("NVRTC")
+@pytest.mark.parametrize("method", ["DOP853", "RK4"])
+def test_runs_call_nothing_by_a_pointer(method: str) -> None:
+    """So that the stack is known beforehand; the table of a method is seen through."""
+    text = emit_device_text(pipeline.build(bouncing(True).derive(), "cuda"))
+    assert BY_POINTER.search("call (retval0), %rd1, (param0), proto;")
+    code = compile_device_text(text, "compute_90", ["EOMGEN_WANT_RUNS", f"EOMGEN_WANT_{method}"])
+    ptx = code.decode(errors="replace")
+    assert f"ball_{method.lower()}_runs" in ptx
+    assert not BY_POINTER.search(ptx)
 
 
 @pytest.mark.slow
