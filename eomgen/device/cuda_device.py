@@ -18,7 +18,7 @@ HOST = 1  #: device type of DLPack
 
 
 class CudaDevice:
-    """One GPU.
+    """One GPU, for the thread that makes it.
 
     Parameters
     ----------

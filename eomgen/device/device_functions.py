@@ -34,7 +34,7 @@ class DeviceFunctions:
         self.x_names = self.q_names + self.v_names
         self.n_q, self.n_v, self.n_x = len(self.q_names), len(self.v_names), len(self.x_names)
         self.n_u, self.n_p, self.n_dof = len(self.u_names), len(self.p_names), int(metadata["n_dof"])
-        self.p, self.u = (_declared(metadata.get(f"{kind}_values")) for kind in ("p", "u"))
+        self.p, self.u = (np.array(metadata[f"{kind}_values"], dtype=float) for kind in ("p", "u"))
         self.x0 = np.array(facts["x0"], dtype=float)
         self._constants: DeviceArray | None = None
         self._kernels: dict[str, Callable[..., None]] = {}
@@ -79,9 +79,6 @@ class DeviceFunctions:
         """What kernels take in place of parameters, and whether each state has its own."""
         if p is None and self._constants is not None:
             return self._constants, False
-        if p is None and np.isnan(self.p).any():
-            missing = [name for name, value in zip(self.p_names, self.p, strict=True) if np.isnan(value)]
-            raise UsageError(f"no value is declared for {', '.join(missing)}; give p")
         given, each = self.columns("p", self.p if p is None else p, self.n_p, count)
         columns = 1 if each is None else each
         found = self.device.empty((self.facts["n_const"], columns), np.float64)
@@ -156,7 +153,3 @@ class BatchCall:
         if there.shape not in ((), (1,), (count,)):
             raise UsageError(f"t must be a number or of shape ({count},), not {there.shape}")
         return there, there.shape == (count,) and count > 1
-
-
-def _declared(values: Sequence[float | None] | None) -> Array:
-    return np.array([np.nan if value is None else value for value in values or ()], dtype=float)

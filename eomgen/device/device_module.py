@@ -38,7 +38,7 @@ class DeviceModule(DeviceFunctions):
     ----------
     q_names, v_names, x_names, u_names, p_names, y_names : tuple of str
     p, u : arrays
-        Declared values; NaN where none is declared.
+        Declared values.
     x0 : (n_x,) array
         A consistent state.
     """
