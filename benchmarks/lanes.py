@@ -41,21 +41,27 @@ def aligned(length: int) -> np.ndarray:
     return room[-(room.ctypes.data // 8) % 8 :][:length]
 
 
+def robot(file: str, lock: tuple[str, ...]) -> Any:
+    """The model of a robot's file, with a motor at every joint."""
+    if str(TESTS) not in sys.path:
+        sys.path.insert(0, str(TESTS))
+    from robots.shipped import EXAMPLES
+
+    import eomgen as eg
+
+    return eg.load(str(EXAMPLES / file), actuate=True, lock=lock)
+
+
 class Ours:
     """A robot's right-hand side as eomgen writes and compiles it."""
 
     def __init__(self, file: str, lock: tuple[str, ...], folder: Path) -> None:
-        if str(TESTS) not in sys.path:
-            sys.path.insert(0, str(TESTS))
-        from robots.shipped import EXAMPLES
-
-        import eomgen as eg
         from eomgen import pipeline
         from eomgen.compilation import Options, find_compiler
         from eomgen.compilation.options import compile_flags
         from eomgen.emit import emit_c
 
-        model = eg.load(str(EXAMPLES / file), actuate=True, lock=lock)
+        model = robot(file, lock)
         equations = model.derive()
         program = pipeline.build(equations, "c", kernels=["rhs"])
         if "rhs" not in program.block_names:  # the chosen form solves in loops, which have no lanes

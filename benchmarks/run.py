@@ -17,7 +17,7 @@ BENCHMARKS = (
     *("derive", "growth", "compile", "panda", "robots", "latency"),
     *("call", "simulate", "integrate", "stiff", "loops", "large_loops", "four_bars", "robot_loops", "traced", "fit"),
     *("operation_counts", "rhs", "robot_kernels", "derivatives", "grid_robots", "lanes", "loop_lanes", "ensembles"),
-    "equilibria",
+    *("device", "equilibria"),
 )
 APART = ("swing_up",)  #: need packages that the tests have not; by name only
 EVERY = (*BENCHMARKS, *APART)

@@ -46,7 +46,7 @@ def generate(
     directory : Path or str
     method, independent, baumgarte : optional
         As for ``Model.compile``.
-    target : {'cython', 'numpy', 'c', 'fmu'}
+    target : {'cython', 'numpy', 'c', 'casadi', 'jax', 'cuda', 'fmu'}
     slim : bool, optional
         Write calls, events and ``simulate`` only, in a tenth of the Python text; what else is called refuses by name.
     precision : {'double', 'float'}, optional

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 from .limits.in_c import definitions
@@ -35,7 +36,7 @@ LAYER = {
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
     "eomgen_wide_steps.c": ("c/steppers/wide.c",),
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
-    "eomgen_ensembles.c": ("c/ensembles/ensembles.c",),
+    "eomgen_ensembles.c": ("c/ensembles/one_run.c", "c/ensembles/ensembles.c"),
     "eomgen_lane_runs.h": (
         *(
             "c/ensembles/lane_steps.c",
@@ -54,6 +55,12 @@ def read_layer() -> dict[str, str]:
     texts = {name: "\n".join(map(_read, parts)) for name, parts in LAYER.items()}
     texts["eomgen_steppers.c"] = tape_rows() + texts["eomgen_steppers.c"]
     return {name: definitions(text) + text if name.endswith((".c", ".h")) else text for name, text in texts.items()}
+
+
+def read_steppers(parts: Sequence[str]) -> str:
+    """The text of some parts of the steppers, and of a run of an ensemble by them."""
+    text = "\n".join((*(_read(f"c/steppers/{part}.c") for part in parts), _read("c/ensembles/one_run.c")))
+    return definitions(text) + text
 
 
 def read_header(name: str) -> str:

@@ -31,6 +31,18 @@ TRACED_KERNELS = (
     "velocity_constraints", "project", "poses", "outputs", "events", "kinematics", "dae_residual",
 )  # fmt: skip
 
+#: Kernels of a device: what is called for many states at once, and what runs need.
+DEVICE_KERNELS = (
+    "rhs", "jacobian", "mass_matrix", "embedded_mass_matrix", "bias", "inverse_dynamics", "energy", "constraints",
+    "constraint_jacobian", "velocity_constraints", "project", "poses", "outputs", "events", "resets",
+)  # fmt: skip
+
+#: Those of them that are called with the time first, as functions of a module; others take it by name.
+TIMED_ON_DEVICE = ("rhs", "jacobian", "bias", "outputs", "events")
+
+#: What they need besides NumPy.
+CUDA_REQUIREMENTS = ("cuda-core>=1.0", "cuda-bindings>=13.0", "nvidia-cuda-nvrtc>=13.0")
+
 
 class Target(NamedTuple):
     """One target.
@@ -90,6 +102,11 @@ TARGETS: dict[str, Target] = {
         "set of functions of CasADi's SX", "emit.traced.casadi_package", arrays=True, kernels=TRACED_KERNELS
     ),
     "jax": Target("set of pure functions of JAX", "emit.traced.jax_package", arrays=True, kernels=TRACED_KERNELS),
+    "cuda": Target(
+        "set of functions of many states on NVIDIA GPUs",
+        "emit.cuda.cuda_package.cuda_package",
+        kernels=DEVICE_KERNELS,
+    ),
     "fmu": Target("functional mock-up unit for other simulators, one file", whole="fmu.generate_fmu"),
 }
 

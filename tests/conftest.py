@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,8 @@ PROGRAMS = {
     "gcc for RISC-V": (("riscv64-linux-gnu-gcc",), "gcc-riscv64-linux-gnu libc6-dev-riscv64-cross"),
     "qemu": (("qemu-arm",), "qemu-user"),
 }
+#: The same for libraries of Python: name -> its module, and how it is installed.
+LIBRARIES = {"NVRTC": ("cuda.bindings.nvrtc", "pip install '.[cuda]'")}
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -46,7 +49,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def is_there(program: str) -> bool:
-    """Whether one of PROGRAMS is on the path."""
+    """Whether one of PROGRAMS is on the path, or one of LIBRARIES is installed."""
+    if program in LIBRARIES:
+        try:
+            return find_spec(LIBRARIES[program][0]) is not None
+        except ModuleNotFoundError:  # a package above it
+            return False
     return any(shutil.which(command) for command in PROGRAMS[program][0])
 
 
@@ -60,9 +68,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    for name, (_, package) in PROGRAMS.items():
+    told = {name: f"apt install {package}" for name, (_, package) in PROGRAMS.items()}
+    told |= {name: command for name, (_, command) in LIBRARIES.items()}
+    for name, command in told.items():
         if not is_there(name):
-            terminalreporter.write_line(f"tests that need {name} were left out; to run them: apt install {package}")
+            terminalreporter.write_line(f"tests that need {name} were left out; to run them: {command}")
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:

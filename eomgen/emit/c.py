@@ -27,7 +27,7 @@ NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h")
 PROCESSORS = ("eomgen_processor.h", "eomgen_contraction.h")
 
 
-def emit_c(program: Program, precision: str | None = None, lanes: bool = True) -> SourceSet:
+def emit_c(program: Program, precision: str | None = None, lanes: bool = True, separate: bool = True) -> SourceSet:
     """The C sources of a program.
 
     Parameters
@@ -37,6 +37,8 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True) -
         in single precision has neither lanes nor Taylor series.
     lanes : bool, optional
         Whether there are functions for several states at a time, and Taylor series.
+    separate : bool, optional
+        Whether the pieces of a large model go into files of their own.
 
     Returns
     -------
@@ -63,7 +65,7 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True) -
         about["precision"] = precision
     program = replace(program, metadata={**program.metadata, **about})
     printed = _print(program)
-    parts = distribute(program, printed)
+    parts = distribute(program, printed) if separate else []
     calls = used_calls(program)
     context = _context(program, printed) | {"parts": parts, "part_names": part_names(printed) if parts else []}
     context |= {"library": precision is not None, "costs": {}, "most_states": states_beside_change_points()}
@@ -107,10 +109,11 @@ def _print(program: Program) -> list[Printed]:
 def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
     twins, in_lanes = program.twins, program.metadata["lanes"]
     areas, n_work = work_areas(program, max((p.work for p in printed[1:]), default=0))
-    n_const = len(program.parameters) + len(program.hoisted) + printed[0].work
+    n_const = count_constants(program, printed[0])
     sizes = program.sizes
     results = {k.name: k.result for k in KERNELS}
     numbers = {**sizes._asdict(), "n_const": n_const, "n_work": n_work, "n_step_work": n_work + 5 * sizes.n_x}
+    numbers["closed_at"] = closed_at(program, areas)
     others = [i for i in range(sizes.n_v) if i not in program.preferred]
     drivers = [read_template(f"c/drivers/{file}.c") for file in driver_files(program)]
     roots = [y for b in program.blocks for y in (*b.outputs, *b.checks)]
@@ -124,7 +127,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "n_const": n_const,
         "n_work": n_work,
         "hoisted": len(program.hoisted),
-        "closed_at": closed_at(program, areas),
+        "closed_at": numbers["closed_at"],
         "work_at": len(program.parameters) + len(program.hoisted),
         "rank": sizes.n_v - sizes.n_dof,
         "indefinite": int(bool(program.metadata.get("indefinite"))),
@@ -162,6 +165,11 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "layouts": describe_layouts(program),
         "metadata_lines": _number_lines(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
     }
+
+
+def count_constants(program: Program, precompute: Printed) -> int:
+    """Length of c: parameters, what is computed from them once, and the work of that."""
+    return len(program.parameters) + len(program.hoisted) + precompute.work
 
 
 def closed_at(program: Program, areas: list[tuple[str, int, int]]) -> int:

@@ -102,7 +102,11 @@ const eomgen_model *eomgen_model_table(void);
 
 /* APART keeps pieces of very long code apart, so that compile time stays proportional to its length;
    PIECE marks a piece that lies in another file of the same library; SHARED a helper that not every model uses. */
-#if defined(__GNUC__)
+#if defined(__CUDACC__)
+#define EOMGEN_APART __noinline__
+#define EOMGEN_PIECE __noinline__ /* all in one file */
+#define EOMGEN_SHARED static __attribute__((unused))
+#elif defined(__GNUC__)
 #define EOMGEN_APART __attribute__((noinline))
 #define EOMGEN_PIECE __attribute__((visibility("hidden")))
 #define EOMGEN_SHARED static __attribute__((unused))

@@ -5,8 +5,12 @@
 #elif !defined(EOMGEN_VECTORS)
 static inline bits sincos_one(real a, real *restrict sines, real *restrict cosines)
 {
+#ifdef __CUDACC__
+    sincos(a, sines, cosines);
+#else
     *sines = sin(a);
     *cosines = cos(a);
+#endif
     return 0;
 }
 #elif !defined(EOMGEN_PLAIN)

@@ -156,7 +156,7 @@ def test_one_of_numpy_is_for_every_computer(tmp_path: Path) -> None:
     assert run_alone(tmp_path / "there", script)["x"] == [0.5, 0.0]
 
 
-@pytest.mark.parametrize("target", ["c", "fmu", "casadi", "jax"])
+@pytest.mark.parametrize("target", ["c", "fmu", "casadi", "jax", "cuda"])
 def test_other_targets_are_refused(target: str) -> None:
     with pytest.raises(UsageError, match=rf"for target cython or numpy; target {target} makes a .*: generate it"):
         require_wheel(target)

@@ -10,6 +10,10 @@
 /* How a trajectory ended: 0 at the end of its span, 1 at an event, or a failure of eomgen_travel or this. */
 enum { EOMGEN_BAD_PARAMETERS = -110 };
 
+#ifndef EOMGEN_PRECOMPUTE /* as EOMGEN_RHS */
+#define EOMGEN_PRECOMPUTE(model) (model)->precompute
+#endif
+
 enum { EOMGEN_CALLBACK_STRIDE = 500 }; /* evaluations between reads of `stop` */
 
 /* The trajectories of one batch and what became of them. The caller owns every array; rows belong to trajectories. Results do

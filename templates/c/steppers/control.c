@@ -7,10 +7,12 @@
 
 int eomgen_ready(eomgen_run *run, double t, const double *y, double *k)
 {
+#ifndef EOMGEN_ALONE
     if (run->until_callback == 0) {
         run->until_callback = run->callback(run->callback_data, &run->t);
         run->stopped = run->until_callback <= 0;
     }
+#endif
     for (int i = 0; run->stopped && i < run->n; i++) {
         k[i] = (double)NAN;
     }

@@ -5,6 +5,12 @@
 
 #include "eomgen_steppers.h"
 
+#ifndef EOMGEN_EVENTS /* as EOMGEN_RHS */
+#define EOMGEN_EVENTS(events) (events)->values
+#define EOMGEN_RESETS(events) (events)->resets
+#define EOMGEN_PROJECT(events) (events)->project
+#endif
+
 /* What happens at an event besides that it is noted. */
 enum {
     EOMGEN_GO_ON = 0,

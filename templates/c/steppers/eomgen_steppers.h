@@ -114,13 +114,19 @@ int eomgen_ready(eomgen_run *run, double t, const double *y, double *k);
 void eomgen_note(eomgen_run *run, int status, double t, const double *y);
 void eomgen_failed(eomgen_run *run, int status, double t, const double *y, double *k);
 
+/* What a run calls by a pointer; on a device, whose stack has to be known beforehand, by its name. There nobody is called
+   back either, and no expressions come at run time: EOMGEN_ALONE. */
+#ifndef EOMGEN_RHS
+#define EOMGEN_RHS(run) (run)->rhs
+#endif
+
 /* x' at (t, y) into k; NaN where the right-hand side fails, which is remembered. */
 static inline void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k)
 {
     if ((--run->until_callback == 0 || run->stopped || run->signals != NULL) && !eomgen_ready(run, t, y, k)) {
         return;
     }
-    const int status = run->rhs(t, y, run->u, run->c, k, run->w);
+    const int status = EOMGEN_RHS(run)(t, y, run->u, run->c, k, run->w);
     run->evaluations++;
     if (status != 0) {
         eomgen_failed(run, status, t, y, k);

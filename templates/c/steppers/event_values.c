@@ -17,18 +17,20 @@ static int event_values(eomgen_run *run, eomgen_events *ev, double t, const doub
     for (int i = 0; i < ev->n_model; i++) {
         g[i] = (double)NAN; /* if nothing is written */
     }
-    const int status = ev->values != NULL ? ev->values(t, y, run->u, run->c, g, run->w) : 0;
+    const int status = ev->values != NULL ? EOMGEN_EVENTS(ev)(t, y, run->u, run->c, g, run->w) : 0;
     if (status != 0 && status != EOMGEN_NON_FINITE) {
         for (int i = 0; i < ev->n_model; i++) {
             g[i] = (double)NAN;
         }
     }
+#ifndef EOMGEN_ALONE
     if (ev->tape != NULL) {
         eomgen_play(ev->tape, t, y, run->u, run->c, g + ev->n_model);
     }
     if (ev->outside != NULL && ev->outside(ev->asker, t, y, g + ev->n_model + ev->n_tape) != 0) {
         run->stopped = 1;
     }
+#endif
     for (int i = 0; i < ev->n; i++) {
         if (!isfinite(g[i])) {
             g[i] = (double)NAN; /* no event here, and none of the others' business */

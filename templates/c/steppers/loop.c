@@ -24,7 +24,7 @@ static void store_step(const eomgen_run *run, eomgen_journey *j)
 }
 
 /* Begin the part that ends at the next corner. */
-static void set_out(eomgen_run *run, const eomgen_journey *j)
+static void begin_part(eomgen_run *run, const eomgen_journey *j)
 {
     run->t_bound = j->nodes[j->node];
     run->hold = run->t + 0.5 * (run->t_bound - run->t);
@@ -34,7 +34,7 @@ static void begin(const eomgen_method *method, eomgen_run *run, eomgen_journey *
 {
     j->begun = 1;
     run->direction = j->nodes[j->n_nodes - 1] < run->t ? -1.0 : 1.0;
-    set_out(run, j);
+    begin_part(run, j);
     eomgen_start(method, run);
     if (j->events != NULL) {
         j->events->last_reset = (double)NAN;
@@ -83,7 +83,7 @@ static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_jou
         for (int k = 0; k < ev->n_resets; k++) {
             ev->values_reset[k] = (double)NAN;
         }
-        const int status = ev->resets(run->t, run->y, run->u, run->c, ev->values_reset, run->w);
+        const int status = EOMGEN_RESETS(ev)(run->t, run->y, run->u, run->c, ev->values_reset, run->w);
         if (status != 0 && status != EOMGEN_NON_FINITE) {
             return EOMGEN_RESET_FAILED;
         }
@@ -98,7 +98,7 @@ static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_jou
     }
     if (ev->project != NULL) {
         memcpy(ev->y, run->y, (size_t)run->n * sizeof(double));
-        if (ev->project(run->t, ev->y, run->u, run->c, run->y, run->w) != 0) {
+        if (EOMGEN_PROJECT(ev)(run->t, ev->y, run->u, run->c, run->y, run->w) != 0) {
             return EOMGEN_RESET_FAILED;
         }
     }
@@ -162,7 +162,7 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         }
         if (run->t == run->t_bound && j->node + 1 < j->n_nodes) { /* x' jumps here, or its slope */
             j->node++;
-            set_out(run, j);
+            begin_part(run, j);
             run->h_abs = h_abs > run->h_abs ? h_abs : run->h_abs;
             eomgen_start(method, run);
         }

@@ -36,9 +36,15 @@ void eomgen_force(eomgen_run *run, double t, const double *y)
 {
     for (int i = 0; i < run->n_u; i++) {
         const eomgen_signal *const s = run->signals + i;
+#ifndef EOMGEN_ALONE
         if (s->n > 0 && s->tape != NULL) {
             eomgen_play(s->tape, t, y, run->u, run->c, run->u + i);
-        } else if (s->n > 0) {
+            continue;
+        }
+#else
+        (void)y;
+#endif
+        if (s->n > 0) {
             run->u[i] = eomgen_table_value(s, t, run->hold);
         }
     }

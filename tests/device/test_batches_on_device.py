@@ -1,0 +1,166 @@
+"""Device code compiled for the host, number by number beside the module without a compiler (NumPy).
+
+The text is the one that NVRTC gets; only the words that a GPU has and a host lacks are defined away.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import models
+import numpy as np
+import pytest
+from device.host_device import HostDevice, OnHost
+
+import eomgen as eg
+from eomgen.cuda_functions import cuda_functions
+from eomgen.device.arrays_on_device import DeviceArray
+from eomgen.device.device_module import DeviceModule
+from eomgen.errors import UsageError
+from eomgen.targets import TIMED_ON_DEVICE
+
+EXAMPLES = sorted(path.stem for path in models.EXAMPLES.glob("*.yaml"))
+COLUMNS = 3
+EARLY = 1e-4  #: a time (s) that driven mechanisms reach from their start
+
+
+def on_host(equations: Any, folder: Path) -> DeviceModule:
+    return cuda_functions(equations, HostDevice(folder))
+
+
+def states_of(module: Any, count: int = COLUMNS, seed: int = 3, t: float = 0.0) -> np.ndarray:
+    """States near the start, a little off the constraints too."""
+    random = np.random.default_rng(seed)
+    x = module.x0()
+    columns = [module.project(x + 0.01 * random.normal(size=x.size), t=t) for _ in range(count)]
+    return np.array(columns).T + 1e-7 * random.normal(size=(x.size, count))
+
+
+def arguments_of(device: DeviceModule, name: str, x: np.ndarray) -> list[np.ndarray]:
+    q, v = x[: device.n_q], x[device.n_q :]
+    every = {"x": x, "q": q, "v": v, "a": np.sin(3.0 * v)}
+    return [every[port] for port, _ in device.facts["kernels"][name][0]]
+
+
+def named(device: DeviceModule, name: str, given: list[np.ndarray]) -> dict[str, np.ndarray]:
+    return dict(zip((port for port, _ in device.facts["kernels"][name][0]), given, strict=True))
+
+
+def expected(module: Any, name: str, given: list[np.ndarray], t: float, k: int) -> np.ndarray:
+    call = getattr(module, name) if name != "events" else module.kernels.timed("events", nan=True)
+    call = call.every if name in ("constraints", "constraint_jacobian", "velocity_constraints") else call
+    columns = [array[:, k] for array in given]
+    found = call(t, *columns) if name in TIMED_ON_DEVICE else call(*columns, t=t)
+    return np.array(found)
+
+
+def assert_near(found: np.ndarray, wanted: np.ndarray, name: str = "") -> None:
+    finite = np.isfinite(wanted)
+    assert (np.isfinite(found) == finite).all(), name
+    size = max(1.0, np.abs(wanted[finite]).max(initial=0.0))
+    np.testing.assert_allclose(found[finite], wanted[finite], rtol=0.0, atol=1e-12 * size, err_msg=name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_every_function_of_every_example(name: str, tmp_path: Path) -> None:
+    equations = eg.load(models.EXAMPLES / f"{name}.yaml").derive()
+    device, module = on_host(equations, tmp_path), equations.compile(target="numpy")
+    x = states_of(module, t=EARLY)
+    assert {"rhs", "jacobian", "mass_matrix", "inverse_dynamics", "energy", "poses"} <= set(device.facts["kernels"])
+    for kernel, (_, shape) in device.facts["kernels"].items():
+        given = arguments_of(device, kernel, x)
+        found, status = getattr(device, kernel)(**named(device, kernel, given), t=EARLY, status=True)
+        assert found.shape == (*shape, COLUMNS)
+        for k in range(COLUMNS):
+            assert_near(found[..., k], expected(module, kernel, given, EARLY, k), kernel)
+        assert (status == 0).all() or kernel == "events", kernel
+
+
+def test_parameters_inputs_and_times_of_each_state(tmp_path: Path) -> None:
+    equations = eg.load(models.EXAMPLES / "slider_crank.yaml").derive()
+    device, module = on_host(equations, tmp_path), equations.compile(target="numpy")
+    x = states_of(module)
+    p = np.repeat(device.p[:, None], COLUMNS, axis=1) * np.array([1.0, 1.001, 0.999])
+    u, t = np.array([[0.1, -2.0, 5.0]]), np.array([0.0, 0.5, 1.0])
+    found = device.rhs(t, x, p, u)
+    for k in range(COLUMNS):
+        assert_near(found[:, k], module.rhs(t[k], x[:, k], p=p[:, k], u=u[:, k]))
+    one = device.rhs(0.5, x[:, 1], p[:, 1], u[:, 1])
+    assert one.shape == (6,)
+    np.testing.assert_array_equal(one, found[:, 1])
+    assert np.ptp(found[3]) > 1.0  # the inputs are felt
+
+
+def test_arrays_of_the_device_are_not_copied(tmp_path: Path) -> None:
+    equations = eg.load(models.EXAMPLES / "double_pendulum.yaml").derive()
+    device = on_host(equations, tmp_path)
+    x = np.random.default_rng(0).normal(size=(4, 100))
+    wanted = device.rhs(0.0, x)
+    before = device.device.copies
+    found = device.rhs(0.0, OnHost(x))
+    assert device.device.copies == before + 2  # t and u
+    assert isinstance(found, DeviceArray)
+    assert found.shape == (4, 100)
+    np.testing.assert_array_equal(found.numpy(), wanted)
+    told = found.__cuda_array_interface__
+    assert (told["shape"], told["typestr"], told["version"]) == ((4, 100), "<f8", 3)
+    again = device.rhs(0.0, found)  # what comes out goes in
+    np.testing.assert_array_equal(again.numpy(), device.rhs(0.0, wanted))
+
+
+def test_a_state_that_fails_leaves_the_others_alone(tmp_path: Path) -> None:
+    equations = eg.load(models.EXAMPLES / "slider_crank.yaml").derive()
+    device, module = on_host(equations, tmp_path), equations.compile(target="numpy")
+    x = states_of(module)
+    good = device.rhs(0.0, x)
+    x[2, 1] = 5.0  # cannot be closed
+    x[0, 2] = np.nan
+    found, status = device.rhs(0.0, x, status=True)
+    np.testing.assert_array_equal(found[:, 0], good[:, 0])
+    assert np.isnan(found[:, 1:]).any(axis=0).all()
+    assert status[0] == 0
+    assert (status[1:] > 0).all()
+    with pytest.raises(eg.errors.EvaluationError):
+        module.rhs(0.0, x[:, 1])
+
+
+def test_no_states_give_no_results(tmp_path: Path) -> None:
+    device = on_host(eg.load(models.EXAMPLES / "double_pendulum.yaml").derive(), tmp_path)
+    assert device.mass_matrix(np.empty((2, 0))).shape == (2, 2, 0)
+
+
+def test_wrong_calls_are_refused_by_name(tmp_path: Path) -> None:
+    device = on_host(eg.load(models.EXAMPLES / "double_pendulum.yaml").derive(), tmp_path)
+    x = np.zeros((4, 3))
+    with pytest.raises(UsageError, match=r"x must have shape \(4,\) or \(4, k\), not \(3, 4\)"):
+        device.rhs(0.0, x.T)
+    with pytest.raises(UsageError, match=r"p must have shape \(5,\) or \(5, 3\), not \(5, 2\)"):
+        device.rhs(0.0, x, np.ones((5, 2)))
+    with pytest.raises(UsageError, match="t must be a number"):
+        device.rhs([0.0, 1.0], x)
+    with pytest.raises(UsageError, match="rhs needs x"):
+        device.rhs(0.0)
+    with pytest.raises(UsageError, match="mass_matrix takes q, p, u, t and status"):
+        device.mass_matrix(x[:2], x=x)
+    with pytest.raises(UsageError, match="same number of columns"):
+        device.inverse_dynamics(x[:2, 0], x[:2], x[:2])
+    with pytest.raises(UsageError, match=r"a must have shape \(2,\) or \(2, 3\), not \(2, 2\)"):
+        device.inverse_dynamics(x[:2], x[:2], np.zeros((2, 2)))
+    with pytest.raises(UsageError, match="x is one state"):
+        device.rhs(0.0, x[:, 0], np.ones((5, 2)))
+    with pytest.raises(UsageError, match="array of numbers"):
+        device.rhs(0.0, "state")
+
+
+def test_a_pendulum_of_any_length_falls_as_the_textbook_says(tmp_path: Path) -> None:
+    m = eg.Model("swing", gravity=(0, "-g", 0))
+    m.parameter("g", 9.81)
+    m.parameter("l", 1.0)
+    m.revolute("A", m.ground, m.body("bob", mass=1.0, com=(0, "-l", 0)), coordinate="theta")
+    device = on_host(m.derive(), tmp_path)
+    lengths, angles = np.array([0.1, 0.5, 2.0]), np.array([0.1, -1.0, 3.0])
+    given = {"g": np.full(3, 9.81), "l": lengths}
+    found = device.rhs(0.0, [angles, np.zeros(3)], [given[name] for name in device.p_names])
+    np.testing.assert_allclose(found, [np.zeros(3), -9.81 / lengths * np.sin(angles)], rtol=1e-14)

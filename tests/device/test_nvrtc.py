@@ -1,0 +1,95 @@
+"""NVRTC takes the device code of every example, for GPUs that are not here; what its machine code needs."""
+
+from __future__ import annotations
+
+import re
+
+import models
+import pytest
+from device.test_runs_on_device import bouncing
+
+import eomgen as eg
+from benchmarks.device import resources
+from eomgen import pipeline
+from eomgen.device.nvrtc import best_architecture, compile_device_text, compile_with_log, load_nvrtc
+from eomgen.emit.cuda.device_text import emit_device_text
+from eomgen.errors import MissingDependencyError, ToolchainError
+
+EXAMPLES = sorted(path.stem for path in models.EXAMPLES.glob("*.yaml"))
+BY_POINTER = re.compile(r"^\s*call[.\w]*\s+(\([^)]*\),\s*)?%", re.MULTILINE)
+QUICK = "--Ofast-compile=max"
+
+
+def text_of(name: str) -> str:
+    return emit_device_text(pipeline.build(eg.load(models.EXAMPLES / f"{name}.yaml").derive(), "cuda"))
+
+
+@pytest.mark.slow
+@pytest.mark.needs("NVRTC")
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_every_example_compiles_to_ptx(name: str) -> None:
+    text = text_of(name)
+    kernels = set(re.findall(r"EOMGEN_KERNEL void (\w+)\(", text))
+    assert f"{name}_rhs_batch" in kernels
+    for architecture in ("compute_80", "compute_90"):
+        code = compile_device_text(text, architecture, sorted(set(re.findall(r"EOMGEN_WANT_\w+", text))), [QUICK])
+        ptx = code.decode(errors="replace")
+        assert f".target sm_{architecture[-2:]}" in ptx
+        assert set(re.findall(r"\.entry (\w+)\(", ptx)) == kernels
+
+
+@pytest.mark.slow
+@pytest.mark.needs("NVRTC")
+@pytest.mark.parametrize("method", ["DOP853", "RK4"])
+def test_runs_call_nothing_by_a_pointer(method: str) -> None:
+    """So that the stack is known beforehand; the table of a method is seen through."""
+    text = emit_device_text(pipeline.build(bouncing(True).derive(), "cuda"))
+    assert BY_POINTER.search("call (retval0), %rd1, (param0), proto;")
+    code = compile_device_text(text, "compute_90", ["EOMGEN_WANT_RUNS", f"EOMGEN_WANT_{method}"])
+    ptx = code.decode(errors="replace")
+    assert f"ball_{method.lower()}_runs" in ptx
+    assert not BY_POINTER.search(ptx)
+
+
+@pytest.mark.slow
+@pytest.mark.needs("NVRTC")
+def test_a_small_tree_runs_in_registers() -> None:
+    text = text_of("double_pendulum")
+    code, log = compile_with_log(text, "sm_90", ["EOMGEN_WANT_RHS"], ["--ptxas-options=-v"])
+    assert code.startswith(b"\x7fELF")
+    registers, stack, spilled = resources(log, "double_pendulum_rhs_batch")
+    assert (spilled, registers < 64, stack < 256) == (0, True, True)
+
+
+@pytest.mark.needs("NVRTC")
+def test_only_what_is_wanted_is_compiled() -> None:
+    text = text_of("double_pendulum")
+    ptx = compile_device_text(text, "compute_80", ["EOMGEN_WANT_MASS_MATRIX"], [QUICK]).decode(errors="replace")
+    assert set(re.findall(r"\.entry (\w+)\(", ptx)) == {
+        "double_pendulum_constants",
+        "double_pendulum_mass_matrix_batch",
+    }
+
+
+@pytest.mark.needs("NVRTC")
+def test_a_gpu_newer_than_nvrtc_gets_ptx() -> None:
+    assert best_architecture((9, 0)) == "sm_90"
+    newer = best_architecture((99, 0))
+    assert newer.startswith("compute_")
+    assert compile_device_text('extern "C" __global__ void f(double *x) { *x = 1.0; }', newer)
+
+
+@pytest.mark.needs("NVRTC")
+def test_what_nvrtc_says_is_told() -> None:
+    with pytest.raises(ToolchainError, match="NVRTC could not compile for sm_90") as raised:
+        compile_device_text("no C at all", "sm_90")
+    assert "error" in raised.value.output
+
+
+def test_a_missing_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "cuda", None)
+    monkeypatch.setitem(sys.modules, "cuda.bindings", None)
+    with pytest.raises(MissingDependencyError, match="pip install 'cuda-core>=1.0'"):
+        load_nvrtc()
