@@ -54,6 +54,8 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
             where = "eqs.tree_system" if printed.of_loops else "eqs.mass_matrix, eqs.force, eqs.intermediates"
             rest = f"... and {len(shown) - lines} lines more: {where}"
             found += [rest, "or in a shell: eomgen derive MODEL --format text"]
+        if told := printed.told_of_numbers:
+            found += ["", *fold(told, columns, "", "  ")]
     found += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
     return "\n".join(found)
 

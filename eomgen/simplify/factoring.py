@@ -51,21 +51,21 @@ class Factoring:
         """The shortest form found: a product, or a sum of terms that share nothing worth while."""
         if len(poly) < 2:
             return poly
-        together = self._product(poly)
+        together = self.product(poly)
         if not reduce(common, poly):
             return together
         apart = self._sum(poly)
         return together if self.costs.of_terms(together) <= self.costs.of_terms(apart) else apart
 
-    def _product(self, poly: Poly) -> Poly:
-        """With all that is common taken out."""
+    def product(self, poly: Poly, one_term: bool = False) -> Poly:
+        """With all that is common taken out; numbers alone stay in the terms unless it has to be one term."""
         amount, monomial = readable_content(list(poly.values())), reduce(common, poly)
         if all(x < 0 for x in poly.values()):
             amount = -amount
         found = self._sum(multiply(poly, {inverse(monomial): ratio(1, amount)}))
         if len(found) == 1:
             return multiply(found, {monomial: amount})
-        return self._wrapped(found, monomial, amount) if monomial else scaled(found, amount)
+        return self._wrapped(found, monomial, amount) if monomial or one_term else scaled(found, amount)
 
     def _sum(self, poly: Poly) -> Poly:
         """The shortest form found with what all terms share left in each of them."""
@@ -113,7 +113,7 @@ class Factoring:
             if len(monomials) > 1:
                 inside = {m: poly[m] for m in monomials}
                 rest = {m: x for m, x in poly.items() if m not in inside}
-                return self._merged(add(rest, self._product(inside)))
+                return self._merged(add(rest, self.product(inside)))
         return poly
 
     def _divisors(self, poly: Poly) -> list[Monomial]:
