@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 
 from ..files.terminal import fold
@@ -21,6 +22,7 @@ HIGH = "".join(map(chr, SUPERSCRIPTS.values()))  #: digits of a power between a 
 LINES = 60  #: of formulas; how to get the others is said
 ENTRIES = (SHORT, 8, 5, 2)  #: characters of entries of a matrix, tried until the matrix fits
 DEEP = 9  #: parentheses in parentheses
+SHORT_GROUP = re.compile(r"\([^()]{1,16}\)")  #: parentheses that stay in one line
 #: Where lines end, the best first: the kind of space, and within how many parentheses, and of arguments among them.
 #: Between terms, between terms within parentheses, the outer ones first, between factors, and within arguments at last.
 BREAKS = (*((" ", deep, 0) for deep in range(DEEP)), (TIGHT, DEEP, 0), (TIGHT, DEEP, DEEP))
@@ -210,7 +212,8 @@ def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
     """A formula in lines that end where ``BREAKS`` says."""
     margin = " " * min(len(label) + 2, 12)
     line = f"  {label}"
-    for part in _fitting(shown, columns - len(margin), BREAKS):
+    together = SHORT_GROUP.sub(lambda group: group[0].replace(" ", TIGHT), shown)
+    for part in _fitting(together, columns - len(margin), BREAKS):
         if len(line) + len(part) > columns and line.strip():
             yield plain(line.rstrip())
             line = margin

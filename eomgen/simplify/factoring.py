@@ -11,6 +11,7 @@ from collections.abc import Collection, Iterable
 from functools import reduce
 
 from .atoms import (
+    ONE,
     Atoms,
     Frozen,
     Monomial,
@@ -60,6 +61,8 @@ class Factoring:
     def product(self, poly: Poly, one_term: bool = False) -> Poly:
         """With all that is common taken out; numbers alone stay in the terms unless it has to be one term."""
         amount, monomial = readable_content(list(poly.values())), reduce(common, poly)
+        if one_term and ONE in poly and any(abs(ratio(x, amount)) > max(1, abs(x)) for x in poly.values()):
+            amount = 1  # x - 1/10, not (10 x - 1)/10
         if all(x < 0 for x in poly.values()):
             amount = -amount
         found = self._sum(multiply(poly, {inverse(monomial): ratio(1, amount)}))
@@ -83,9 +86,10 @@ class Factoring:
     def _primitive(self, poly: Poly) -> Poly:
         if len(poly) < 2:
             return poly
-        square = self._square(poly)
-        if square is not None:
-            return square
+        for sign in (1, -1):
+            square = self._square(scaled(poly, sign))
+            if square is not None:
+                return scaled(square, sign)
         candidates = self._divisors(poly)
         best, cost = poly, self.costs.of_terms(poly)
         whole = reduce(common, poly)
@@ -160,7 +164,8 @@ class Factoring:
             base[monomial] = x if cross > 0 else -x
         if multiply(base, base) != poly:
             return None
-        return {((self.atoms.id("factor", freeze(self.factored(base))), 2),): 1}
+        ((monomial, amount),) = self.product(base, one_term=True).items()  # a^2 (1 + b)^2 of (a + a b)^2
+        return {tuple((atom, 2 * n) for atom, n in monomial): amount * amount}
 
 
 def readable_content(values: list[Number]) -> Number:

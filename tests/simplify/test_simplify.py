@@ -84,6 +84,31 @@ def test_roots_of_squares_have_no_sign() -> None:
     assert form.sympy()[1] == [sympy.Abs(cos(A))]
 
 
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        ((2 * a + a * b + 4 * x + 2 * b * x) / (2 + b), "a + 2*x"),  # together
+        (x * a / (a + b) + x * b / (a + b), "x"),  # in two terms
+        (cos(A) * a**2 / (a + b) - cos(A) * b**2 / (a + b) + x, "x + (a - b)*cos(A)"),  # beside others
+        ((5 + d) * ((5 + d / 2) / (5 + d)) ** 2 - d**2 / 4 / (5 + d), "5"),  # Steiner's term of a point on a rod
+        (-(a**2) + 2 * a * x - x**2, "-(a - x)**2"),
+    ],
+)
+def test_exact_quotients_and_squares(given: Any, wanted: str) -> None:
+    assert sympy.sstr(short(given)) == wanted
+
+
+def test_products_of_lengths_stay_products() -> None:
+    """The potential of a spring of numbers, and a product of lengths beside terms that are collected."""
+    extension = sympy.Abs(x - sympy.Rational(1, 2)) - sympy.Rational(1, 10)
+    V = short(100 * extension**2 + a * c + a * d)
+    assert sympy.sstr(V) == "a*(c + d) + 100*(Abs(x - 0.5) - 0.1)**2"
+    grip = -c * (sympy.Abs(x) - b) * (k * sympy.Abs(x) + a * y - b)
+    found = short(grip + l * x * y + l * x * d)
+    assert found.count_ops() <= (grip + l * x * (y + d)).count_ops()
+    assert (found - grip - l * x * (y + d)).expand() == 0
+
+
 def test_springs_keep_their_extension() -> None:
     r, l0, g, theta_dot = sympy.symbols("r l0 g theta_dot")
     assert sympy.sstr(short(m * g * cos(A) + m * r * theta_dot**2 - k * (r - l0), rates=["theta_dot"])) == (
