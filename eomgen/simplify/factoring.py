@@ -108,17 +108,19 @@ class Factoring:
 
     def _merged(self, poly: Poly) -> Poly:
         """Terms that share a factored sum are taken together: a F + b F = (a + b) F."""
-        uses: dict[int, list[Monomial]] = {}
-        for monomial in poly:
-            for atom, _ in monomial:
-                if self.atoms.table[atom].kind == "factor":
-                    uses.setdefault(atom, []).append(monomial)
-        for monomials in uses.values():
-            if len(monomials) > 1:
-                inside = {m: poly[m] for m in monomials}
-                rest = {m: x for m, x in poly.items() if m not in inside}
-                return self._merged(add(rest, self.product(inside)))
+        while (together := self._sharing(poly)) is not None:
+            rest = {m: x for m, x in poly.items() if m not in together}
+            poly = add(rest, self.product({m: poly[m] for m in together}))
         return poly
+
+    def _sharing(self, poly: Poly) -> list[Monomial] | None:
+        """Terms that share a factored sum, above or below; None where there are no two."""
+        uses: dict[tuple[int, bool], list[Monomial]] = {}
+        for monomial in poly:
+            for atom, n in monomial:
+                if self.atoms.table[atom].kind == "factor":
+                    uses.setdefault((atom, n > 0), []).append(monomial)
+        return next((monomials for monomials in uses.values() if len(monomials) > 1), None)
 
     def _divisors(self, poly: Poly) -> list[Monomial]:
         """Common factors of two or more terms, the one that saves most first."""

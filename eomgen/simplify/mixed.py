@@ -1,8 +1,8 @@
 """Stage simplify: nodes -> sums of products that are kept as they were formed and of what is multiplied out.
 
 A damper's force c r' (r - s) / r^2 reads best as the product that it is, the inertia beside it with its terms
-collected.  Products of sums in which lengths stand, as those of springs and dampers, are kept where multiplying them out
-makes them longer; what is inertia may cancel with other inertia.
+collected.  Products of sums in which lengths stand, as those of springs and dampers, are kept where multiplying them
+out makes them longer; what is inertia may cancel with other inertia.
 """
 
 from __future__ import annotations

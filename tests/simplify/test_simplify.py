@@ -14,7 +14,8 @@ from eomgen.graph.core import Graph
 from eomgen.graph.evaluate import evaluate
 from eomgen.graph.sympy_lower import lower as lower_by
 from eomgen.simplify import WHOLE, simplify
-from eomgen.simplify.atoms import Work
+from eomgen.simplify.atoms import Atoms, Work, freeze, join
+from eomgen.simplify.factoring import Factoring
 from eomgen.simplify.form import WORK
 
 A, B, C = sympy.symbols("A B C")
@@ -288,3 +289,15 @@ def test_long_roots_that_repeat_have_names() -> None:
     values = {a: 0.7, l: 1.3, A: 0.4, x: 2.0, y: -1.1, b: 0.2}
     for shown, wanted in zip(found, given, strict=True):
         assert float(shown.subs(name, root).subs(values)) == pytest.approx(float(wanted.subs(values)), rel=1e-14)
+
+
+def test_terms_above_and_below_one_sum_are_not_taken_together() -> None:
+    """a F + b / F share no factor; c F + a F do."""
+    atoms = Atoms()
+    one, other, third = (((atoms.id("sym", name), 1),) for name in "abc")
+    sum_ = atoms.id("factor", freeze({((atoms.id("sym", "x"), 1),): 1, ((atoms.id("sym", "y"), 1),): 1}))
+    above, below = ((sum_, 1),), ((sum_, -1),)
+    poly = {join(one, above): 1, join(other, below): 1, join(third, above): 1}
+    found = Factoring(atoms, Work(WORK)).factored(poly)
+    assert len(found) == 2
+    assert join(other, below) in found
