@@ -61,7 +61,7 @@ class Factoring:
     def product(self, poly: Poly, one_term: bool = False) -> Poly:
         """With all that is common taken out; numbers alone stay in the terms unless it has to be one term."""
         amount, monomial = readable_content(list(poly.values())), reduce(common, poly)
-        if one_term and ONE in poly and any(abs(ratio(x, amount)) > max(1, abs(x)) for x in poly.values()):
+        if one_term and ONE in poly and amount < 1 and not all(-1 <= ratio(x, amount) <= 1 for x in poly.values()):
             amount = 1  # x - 1/10, not (10 x - 1)/10
         if all(x < 0 for x in poly.values()):
             amount = -amount
