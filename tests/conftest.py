@@ -18,6 +18,7 @@ PROGRAMS = {
     "chromium": (("chromium", "chromium-browser", "google-chrome"), "chromium"),
     "gcc for ARM": (("arm-none-eabi-gcc",), "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
     "gcc for RISC-V": (("riscv64-linux-gnu-gcc",), "gcc-riscv64-linux-gnu libc6-dev-riscv64-cross"),
+    "octave": (("octave-cli", "octave"), "octave"),
     "qemu": (("qemu-arm",), "qemu-user"),
 }
 #: The same for libraries of Python: name -> its module, and how it is installed.

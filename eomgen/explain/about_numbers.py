@@ -105,6 +105,6 @@ def difference(found: Difference | None, reason: str) -> Section:
         f"Each of these formulas was evaluated through SymPy at {found.states} random consistent states and "
         f"compared with the "
         f"module that is generated from the same equations. The largest difference, as a share of the largest entry or "
-        f"term, is {found.largest:.1e}."
+        f"term, is {found.largest:.1e}. Numbers of more digits than are printed are compared with all of them."
     )
     return Section(title, (Sentence(text), Table(("formula", "largest difference"), rows)))

@@ -9,6 +9,8 @@ from .document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentenc
 from .printer import Printer
 
 PICTURE = "mechanism.png"  #: the file that a document with a picture takes it from
+LINE = 84  #: characters of a line of the document
+LEAST = 0.25  #: part of a line that the last column of a table has at least
 _HEAD = r"""\documentclass[11pt,a4paper]{article}
 \usepackage[T1]{fontenc}
 \usepackage[utf8]{inputenc}
@@ -76,7 +78,7 @@ def _piece(piece: Piece, printer: Printer, picture: str | None) -> str:
         case FormulaLine():
             return rf"\fitted{{{formula_body(piece, printer)}}}"
         case Table():
-            columns = " ".join(["l"] * (len(piece.head) - 1) + [r">{\raggedright\arraybackslash}p{0.45\linewidth}"])
+            columns = _columns(piece)
             rows = [" & ".join(map(_text, row)) + r" \\" for row in piece.rows]
             head = " & ".join(map(_text, piece.head)) + r" \\ \hline"
             return "\n".join([rf"\begin{{longtable}}{{{columns}}}", head, *rows, r"\end{longtable}"])
@@ -88,3 +90,13 @@ def _piece(piece: Piece, printer: Printer, picture: str | None) -> str:
         case Folded():
             inner = [_piece(part, printer, picture) for part in piece.pieces]
             return "\n".join([rf"\textit{{{_text(piece.title)}}}" + "\n", *inner])
+
+
+def _columns(table: Table) -> str:
+    """Columns as wide as their cells; the last one of a wide table gets the rest of the line."""
+    *sizes, last = (max(map(len, column)) + 2 for column in zip(table.head, *table.rows, strict=True))
+    others = ["l"] * len(sizes)
+    if sum(sizes) + last <= LINE:
+        return " ".join([*others, "l"])
+    rest = max(1 - sum(sizes) / LINE, LEAST)
+    return " ".join([*others, rf">{{\raggedright\arraybackslash}}p{{{rest:.2f}\linewidth}}"])

@@ -12,6 +12,7 @@ _FUNCTIONS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "delta": "δ
 _RELATIONS = {"<=": "≤", ">=": "≥", "and": "\u2227", "or": "\u2228"}
 MINUS_SIGN = "\u2212"
 MINUS = f"<mo>{MINUS_SIGN}</mo>"
+TALL = ("<mfrac", "<mtable", "<msqrt")  #: what is higher than a line
 _THIN = "<mspace width='0.17em'/>"
 
 
@@ -32,8 +33,9 @@ def row(*parts: str) -> str:
 
 
 def fenced(inside: str, left: str = "(", right: str = ")") -> str:
-    """In parentheses that grow with what they hold."""
-    return row(f"<mo>{left}</mo>", inside, f"<mo>{right}</mo>")
+    """In parentheses that grow with what they hold; in a line of text they are those of the font."""
+    grows = "" if any(tag in inside for tag in TALL) else " stretchy='false'"
+    return row(f"<mo{grows}>{left}</mo>", inside, f"<mo{grows}>{right}</mo>")
 
 
 def table(rows: list[list[str]], style: str = "") -> str:

@@ -27,7 +27,9 @@ from .formula_tree import (
 
 _SIGNS = {"StrictLessThan": "<", "StrictGreaterThan": ">", "LessThan": "<=", "GreaterThan": ">=", "Equality": "="}
 _LOGIC = {"And": "and", "Or": "or"}
-DIGITS = 15  #: of a decimal
+DIGITS = 15  #: of a decimal that is meant as it stands
+PRINTED = 8  #: digits up to which a decimal is printed in full
+ROUNDED = 6  #: digits of one with more
 _NAMES = {"Abs": "abs", "Max": "max", "Min": "min", "log": "ln", "ceiling": "ceil"}
 
 
@@ -39,10 +41,16 @@ class Formulas:
     order : Order
     numbers : mapping of str to float, optional
         Numbers that stand in the places of names.
+
+    Attributes
+    ----------
+    rounded : bool
+        Whether a number has more digits than are printed, in what was made up to now.
     """
 
     def __init__(self, order: Order, numbers: Mapping[str, float] | None = None) -> None:
         self.order = order
+        self.rounded = False
         self._made: dict[Any, Formula] = {sympy.Symbol(name): number(x) for name, x in (numbers or {}).items()}
 
     def __call__(self, expression: Any) -> Formula:
@@ -95,7 +103,7 @@ class Formulas:
         number = -number if subtracted else number
         upper, lower = self._factors(above), self._factors(below)
         if not number.is_Rational:
-            upper = (_decimal(number), *upper)
+            upper = (self._decimal(number), *upper)
         elif number.q == 1:
             upper = (NumberPart(str(number)), *upper) if number != 1 or not upper else upper
         elif decimal := _as_decimal(number):
@@ -106,6 +114,15 @@ class Formulas:
         else:
             upper = (Quotient(NumberPart(str(number.p)), NumberPart(str(number.q))), *upper)
         return subtracted, Quotient(_product(upper), _product(lower)) if lower else _product(upper)
+
+    def _decimal(self, x: Any) -> Formula:
+        if not x.is_Float or not x.is_finite:
+            return Words(str(x), sympy.latex(x))
+        full = number(float(x), DIGITS)
+        if isinstance(full, NumberPart) and len(full.digits.replace(".", "").lstrip("0")) <= PRINTED:
+            return full
+        self.rounded = True
+        return number(float(x), ROUNDED)
 
     def _factors(self, factors: list[Any]) -> tuple[Formula, ...]:
         return tuple(self(factor) for factor in self.order.factors(factors))
@@ -146,12 +163,6 @@ def _as_decimal(number: Any) -> str:
         return ""
     shown = f"{Decimal(int(number.p)) / Decimal(int(number.q)):f}"
     return shown if len(shown) <= DIGITS else ""
-
-
-def _decimal(x: Any) -> Formula:
-    if not x.is_Float or not x.is_finite:
-        return Words(str(x), sympy.latex(x))
-    return number(float(x), DIGITS)
 
 
 def number(value: float, digits: int = 6) -> Formula:

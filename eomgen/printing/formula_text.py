@@ -11,7 +11,6 @@ from .formula_writer import FormulaWriter
 
 #: Between factors and within arguments of functions: lines are broken between terms before they are broken there.
 TIGHT = "\u00a0"
-LONGEST_LINE = 90  #: characters after which a sum goes on in the next line
 _RELATIONS = {"<=": "≤", ">=": "≥"}
 
 
@@ -24,22 +23,6 @@ def text(formula: tree.Formula, names: Notation) -> str:
     names : Notation
     """
     return _TextWriter(names).write(formula)
-
-
-def sums_in_lines(formula: tree.Formula, names: Notation, room: int = LONGEST_LINE) -> list[tree.Formula]:
-    """A sum as sums that are at most about ``room`` characters long; anything else alone."""
-    if not isinstance(formula, tree.SumOf):
-        return [formula]
-    lines: list[list[tuple[bool, tree.Formula]]] = [[]]
-    used = 0
-    for subtracted, term in formula.terms:
-        size = len(text(term, names)) + 3
-        if used and used + size > room:
-            lines.append([])
-            used = 0
-        lines[-1].append((subtracted, term))
-        used += size
-    return [tree.SumOf(tuple(line)) for line in lines]
 
 
 class _TextWriter(FormulaWriter):

@@ -11,7 +11,6 @@ from ..printing import given_mathml, mathml, sums_in_lines
 from ..printing.formula_mathml import fenced, row
 from ..printing.formula_tree import Formula, MatrixOf, Name, SumOf, is_group
 from ..texts import html_text
-from .equations_latex import WIDE
 from .printed_equations import PrintedEntry, PrintedEquations
 from .printed_parts import PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
@@ -29,10 +28,18 @@ def equations_html(equations: Readable) -> str:
     """Formulas of the equations of motion."""
     printed = PrintedEquations(equations)
     if equations.mobility.n_dof == 0:
+<<<<<<< HEAD
         still = "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
         return "".join([still, *_states(printed)])
     motion = parts_html(PrintedParts(printed)) if printed.is_long else [*_motion(printed), *_intermediates(printed)]
     return "".join([*motion, *_states(printed)])
+=======
+        return "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
+    whole = "".join(
+        parts_html(PrintedParts(printed)) if printed.is_long else [*_motion(printed), *_intermediates(printed)]
+    )
+    return whole + (f"<p {LEFT}>{told}</p>" if (told := printed.told_of_numbers) else "")
+>>>>>>> w/read15
 
 
 def facts_html(equations: Readable) -> str:
@@ -86,23 +93,22 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
         return mathml(formula, printed.names)
 
     rates = [shown(x) for x in printed.accelerations]
-    of_mass, of_force = printed.size
     M, f = printed.mass_matrix, printed.force
     equals = "<mo>=</mo>"
-    if printed.is_one_equation and of_mass + of_force <= WIDE:
+    if printed.is_one_equation and printed.fits:
         factor = "" if printed.text(M[0][0]) == "1" else fenced(shown(M[0][0])) if is_group(M[0][0]) else shown(M[0][0])
         yield _block(row(factor, "<mspace width='0.17em'></mspace>", rates[0], equals, shown(f[0])))
         return
     v = shown(MatrixOf(tuple((x,) for x in printed.accelerations)))
     right, left = shown(MatrixOf(tuple((x,) for x in f))), shown(MatrixOf(tuple(map(tuple, M))))
-    if len(rates) > 1 and of_mass + of_force <= WIDE:
+    if len(rates) > 1 and printed.fits:
         yield _block(row(left, v, equals, right))
         return
     mass, _, force = map(given_mathml, printed.letters)
     yield _block(row(mass, rates[0] if printed.is_one_equation else v, equals, force))
     if told := ", ".join(f"{_math(given_mathml(letter))} is {what}" for letter, what in printed.letters_told):
         yield f"<p {LEFT}>{told}; the usual letters are names of the model.</p>"
-    whole = len(rates) > 1 and of_mass <= WIDE
+    whole = len(rates) > 1 and printed.mass_matrix_fits
     if whole:
         yield _block(row(mass, equals, left))
     elif len(rates) > 1:

@@ -10,8 +10,6 @@ from .printed_equations import PrintedEquations
 from .printed_parts import PrintedGroup, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
-WIDE = 150  #: characters of text up to which a matrix equation stands in one line
-
 
 def latex_lines(equations: Readable) -> list[str]:
     """Each formula of the equations of motion, without dollars: M v' = f, what its names stand for, what was put in."""
@@ -20,7 +18,12 @@ def latex_lines(equations: Readable) -> list[str]:
         lines = [*_parts(PrintedParts(printed))]
     else:
         lines = [*_motion(printed), *(_broken(printed, printed.names.latex(n), x) for n, x in printed.intermediates)]
+<<<<<<< HEAD
     lines += [_broken(printed, latex(rate, printed.names), x) for rate, x in printed.states]
+=======
+    if told := printed.told_of_numbers:
+        lines.append(rf"\text{{{told.replace('_', chr(92) + '_')}}}")
+>>>>>>> w/read15
     values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
     return [*lines, rf"\text{{with }} {values}"] if values else lines
 
@@ -41,8 +44,7 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
     if not rates:
         yield r"n = 0"
         return
-    of_mass, of_force = printed.size
-    if printed.is_one_equation and of_mass + of_force <= WIDE:
+    if printed.is_one_equation and printed.fits:
         M, f = printed.mass_matrix[0][0], printed.force[0]
         factor = rf"\left({shown(M)}\right)" if is_group(M) else shown(M)
         yield f"{'' if shown(M) == '1' else factor + ' '}{rates[0]} = {shown(f)}"
@@ -50,12 +52,12 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
     left = shown(MatrixOf(tuple(map(tuple, printed.mass_matrix))))
     right = shown(MatrixOf(tuple((x,) for x in printed.force)))
     v = shown(MatrixOf(tuple((x,) for x in printed.accelerations)))
-    if len(rates) > 1 and of_mass + of_force <= WIDE:
+    if len(rates) > 1 and printed.fits:
         yield f"{left} {v} = {right}"
         return
     mass, _, right = printed.letters
     yield rf"{mass}\, {rates[0] if printed.is_one_equation else v} = {right}"
-    whole = len(rates) > 1 and of_mass <= WIDE
+    whole = len(rates) > 1 and printed.mass_matrix_fits
     if whole:
         yield f"{mass} = {left}"
     for entry in printed.entries():

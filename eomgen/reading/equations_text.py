@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 
 from ..files.terminal import fold
@@ -21,6 +22,7 @@ HIGH = "".join(map(chr, SUPERSCRIPTS.values()))  #: digits of a power between a 
 LINES = 60  #: of formulas; how to get the others is said
 ENTRIES = (SHORT, 8, 5, 2)  #: characters of entries of a matrix, tried until the matrix fits
 DEEP = 9  #: parentheses in parentheses
+SHORT_GROUP = re.compile(r"\([^()]{1,16}\)")  #: parentheses that stay in one line
 #: Where lines end, the best first: the kind of space, and within how many parentheses, and of arguments among them.
 #: Between terms, between terms within parentheses, the outer ones first, between factors, and within arguments at last.
 BREAKS = (*((" ", deep, 0) for deep in range(DEEP)), (TIGHT, DEEP, 0), (TIGHT, DEEP, DEEP))
@@ -54,9 +56,14 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
             where = "eqs.tree_system" if printed.of_loops else "eqs.mass_matrix, eqs.force, eqs.intermediates"
             rest = f"... and {len(shown) - lines} lines more: {where}"
             found += [rest, "or in a shell: eomgen derive MODEL --format text"]
+<<<<<<< HEAD
     if printed.states:
         found += ["", "first-order states"]
         found += [x for a, f in printed.states for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
+=======
+        if told := printed.told_of_numbers:
+            found += ["", *fold(told, columns, "", "  ")]
+>>>>>>> w/read15
     found += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
     return "\n".join(found)
 
@@ -211,7 +218,8 @@ def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
     """A formula in lines that end where ``BREAKS`` says."""
     margin = " " * min(len(label) + 2, 12)
     line = f"  {label}"
-    for part in _fitting(shown, columns - len(margin), BREAKS):
+    together = SHORT_GROUP.sub(lambda group: group[0].replace(" ", TIGHT), shown)
+    for part in _fitting(together, columns - len(margin), BREAKS):
         if len(line) + len(part) > columns and line.strip():
             yield plain(line.rstrip())
             line = margin

@@ -10,10 +10,11 @@ from ..graph.core import Expr
 from ..graph.substitute import symbols_of
 from ..kinematics.state import acceleration_name
 from ..notation.notation import Notation
-from ..printing import Formulas, Order, number, text
+from ..printing import PAGE, Formulas, Order, number, text, width
 from ..printing.factor_order import COORDINATE, GRAVITY, INERTIA, INPUT, MASS, PARAMETER, RATE
+from ..printing.formula_of import ROUNDED
 from ..printing.formula_text import TIGHT
-from ..printing.formula_tree import Formula, Name, NumberPart, Relation
+from ..printing.formula_tree import Formula, MatrixOf, Name, NumberPart, Relation
 from .readable import Readable
 from .tree_system import MANY
 
@@ -188,18 +189,31 @@ class PrintedEquations:
         """Whether entries of M vanish."""
         return any(x == NumberPart("0") for row in self.mass_matrix for x in row)
 
+    @property
+    def told_of_numbers(self) -> str:
+        """What is said of numbers when all formulas have been made; empty where all of their digits are printed."""
+        if not self.formula.rounded:
+            return ""
+        kept = "eqs.tree_system has" if self.of_loops else "eqs.mass_matrix and eqs.force have"
+        return f"Long numbers are rounded to {ROUNDED} digits; {kept} all of them."
+
     def text(self, formula: Formula) -> str:
         """A formula in text."""
         return text(formula, self.names)
 
-    def width(self, columns: list[list[Formula]]) -> int:
-        """Characters of a matrix given by its columns."""
-        return sum(max(len(self.text(x)) for x in column) + 2 for column in columns)
+    @property
+    def fits(self) -> bool:
+        """Whether M v' = f fits on a line of a page, M and f written out."""
+        columns = ([[x] for x in column] for column in (self.accelerations, self.force))
+        return self._width(self.mass_matrix) + sum(map(self._width, columns)) <= PAGE
 
     @property
-    def size(self) -> tuple[int, int]:
-        """Characters of M and of f side by side, in text."""
-        return self.width([list(c) for c in zip(*self.mass_matrix, strict=True)]), self.width([self.force])
+    def mass_matrix_fits(self) -> bool:
+        """Whether M fits on a line of a page."""
+        return self._width(self.mass_matrix) <= PAGE
+
+    def _width(self, rows: list[list[Formula]]) -> float:
+        return width(MatrixOf(tuple(map(tuple, rows))), self.names)
 
     @property
     def coordinates(self) -> list[PrintedCoordinate]:

@@ -200,7 +200,8 @@ class WritesQuantities(ABC):
         Returns
         -------
         intermediates : list of (sympy.Symbol, sympy.Expr)
-            In an order in which each uses only those before it; empty where the quantity is written out.
+            Those that the quantity needs, in an order in which each uses only those before it; empty where it is
+            written out.
         value : sympy.Expr or sympy.Matrix
             What the attribute gives.
 
@@ -231,7 +232,8 @@ class WritesQuantities(ABC):
             whole = value[part]
             return self._named[f"{name}.{part if part in tuple(value) else self._plain(part)}"], whole
         if part is None:
-            return self._named[name], value
+            named = self._named[name]  # those of the mass matrix and the force are chosen together
+            return needed(named, value) if name in ("mass_matrix", "force") else named, value
         if not isinstance(value, NamedSum):
             raise UsageError(f"{name!r} has no parts; leave {part!r} out")
         return needed(self._named[name], value[part]), value[part]

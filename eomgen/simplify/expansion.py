@@ -40,6 +40,8 @@ class Expansion:
     atoms : Atoms
     angles : JoinedAngles
         Simplifies sines and cosines.
+    under_roots : set of int
+        Sums of which roots were taken.
     """
 
     def __init__(self, graph: Graph, work: Work) -> None:
@@ -47,6 +49,7 @@ class Expansion:
         self.work = work
         self.atoms = Atoms()
         self.angles = JoinedAngles(self.atoms, work)
+        self.under_roots: set[int] = set()
         self._of: dict[int, Poly] = {}
 
     def expand(self, i: int) -> Poly:
@@ -75,7 +78,7 @@ class Expansion:
         if kind == "mul":
             return self.times(*parts)
         if kind == "div":
-            return self._over(*parts)
+            return self.quotient(*parts)
         if kind == "sqrt":
             return self._root(parts[0])
         if kind in ("sin", "cos"):
@@ -117,7 +120,8 @@ class Expansion:
             result = add(result, done) if result else done
         return result
 
-    def _over(self, a: Poly, b: Poly) -> Poly:
+    def quotient(self, a: Poly, b: Poly) -> Poly:
+        """a / b"""
         b = self.angles.simplified(b)
         if not b:
             return self.atoms.poly("div", (freeze(a), freeze(b)))
@@ -139,7 +143,9 @@ class Expansion:
         if x == 1 and all(n % 2 == 0 for _, n in monomial):  # the root of a square
             base = tuple((atom, n // 2) for atom, n in monomial)
             return self.atoms.poly("abs", (freeze({base: 1}),))
-        return {((self.atoms.id("sum", freeze(a)), Fraction(1, 2)),): 1}
+        atom = self.atoms.id("sum", freeze(a))
+        self.under_roots.add(atom)
+        return {((atom, Fraction(1, 2)),): 1}
 
 
 def content(values: Sequence[Number]) -> Number:

@@ -11,6 +11,7 @@ from collections.abc import Collection, Iterable
 from functools import reduce
 
 from .atoms import (
+    ONE,
     Atoms,
     Frozen,
     Monomial,
@@ -51,21 +52,23 @@ class Factoring:
         """The shortest form found: a product, or a sum of terms that share nothing worth while."""
         if len(poly) < 2:
             return poly
-        together = self._product(poly)
+        together = self.product(poly)
         if not reduce(common, poly):
             return together
         apart = self._sum(poly)
         return together if self.costs.of_terms(together) <= self.costs.of_terms(apart) else apart
 
-    def _product(self, poly: Poly) -> Poly:
-        """With all that is common taken out."""
+    def product(self, poly: Poly, one_term: bool = False) -> Poly:
+        """With all that is common taken out; numbers alone stay in the terms unless it has to be one term."""
         amount, monomial = readable_content(list(poly.values())), reduce(common, poly)
+        if one_term and ONE in poly and amount < 1 and not all(-1 <= ratio(x, amount) <= 1 for x in poly.values()):
+            amount = 1  # x - 1/10, not (10 x - 1)/10
         if all(x < 0 for x in poly.values()):
             amount = -amount
         found = self._sum(multiply(poly, {inverse(monomial): ratio(1, amount)}))
         if len(found) == 1:
             return multiply(found, {monomial: amount})
-        return self._wrapped(found, monomial, amount) if monomial else scaled(found, amount)
+        return self._wrapped(found, monomial, amount) if monomial or one_term else scaled(found, amount)
 
     def _sum(self, poly: Poly) -> Poly:
         """The shortest form found with what all terms share left in each of them."""
@@ -83,9 +86,10 @@ class Factoring:
     def _primitive(self, poly: Poly) -> Poly:
         if len(poly) < 2:
             return poly
-        square = self._square(poly)
-        if square is not None:
-            return square
+        for sign in (1, -1):
+            square = self._square(scaled(poly, sign))
+            if square is not None:
+                return scaled(square, sign)
         candidates = self._divisors(poly)
         best, cost = poly, self.costs.of_terms(poly)
         whole = reduce(common, poly)
@@ -104,17 +108,19 @@ class Factoring:
 
     def _merged(self, poly: Poly) -> Poly:
         """Terms that share a factored sum are taken together: a F + b F = (a + b) F."""
-        uses: dict[int, list[Monomial]] = {}
-        for monomial in poly:
-            for atom, _ in monomial:
-                if self.atoms.table[atom].kind == "factor":
-                    uses.setdefault(atom, []).append(monomial)
-        for monomials in uses.values():
-            if len(monomials) > 1:
-                inside = {m: poly[m] for m in monomials}
-                rest = {m: x for m, x in poly.items() if m not in inside}
-                return self._merged(add(rest, self._product(inside)))
+        while (together := self._sharing(poly)) is not None:
+            rest = {m: x for m, x in poly.items() if m not in together}
+            poly = add(rest, self.product({m: poly[m] for m in together}))
         return poly
+
+    def _sharing(self, poly: Poly) -> list[Monomial] | None:
+        """Terms that share a factored sum, above or below; None where there are no two."""
+        uses: dict[tuple[int, bool], list[Monomial]] = {}
+        for monomial in poly:
+            for atom, n in monomial:
+                if self.atoms.table[atom].kind == "factor":
+                    uses.setdefault((atom, n > 0), []).append(monomial)
+        return next((monomials for monomials in uses.values() if len(monomials) > 1), None)
 
     def _divisors(self, poly: Poly) -> list[Monomial]:
         """Common factors of two or more terms, the one that saves most first."""
@@ -160,7 +166,8 @@ class Factoring:
             base[monomial] = x if cross > 0 else -x
         if multiply(base, base) != poly:
             return None
-        return {((self.atoms.id("factor", freeze(self.factored(base))), 2),): 1}
+        ((monomial, amount),) = self.product(base, one_term=True).items()  # a^2 (1 + b)^2 of (a + a b)^2
+        return {tuple((atom, 2 * n) for atom, n in monomial): amount * amount}
 
 
 def readable_content(values: list[Number]) -> Number:

@@ -18,11 +18,13 @@ from ..graph.traverse import LEAVES, common_graph, operands, reachable
 from ..operations import CONDITION, operations_with
 from ..records import dataclass
 from .atoms import ONE, TURNS, Frozen, Poly, TooLongError, Work, freeze, scaled
+from .exact_quotients import without_exact_quotients
 from .expansion import Expansion
 from .factoring import Factoring
 from .good_names import GoodNames
 from .inline import EACH, NAME, Named, inlined, is_plain
 from .literal import Literal
+from .mixed import Mixed
 
 WHOLE = (10**9,)
 SIZES = (1, 6, 16, 40, 120, *WHOLE)
@@ -217,6 +219,7 @@ class _Attempt:
         self.expansion = Expansion(graph, work)
         self.literal = Literal(self.expansion)
         self.factoring = Factoring(self.expansion.atoms, work, rates)
+        self.mixed = Mixed(self.expansion, self.factoring, self._simplified)
         self.named: Named = []
         for name in sorted(node[1] for node in graph.nodes if node[0] == "sym"):  # so that ties fall alike
             self.expansion.atoms.id("sym", name)
@@ -239,6 +242,7 @@ class _Attempt:
             alike = scaled(alike, sign)
             self.expansion.put(i, alike)
             self.literal.put(i, alike)
+            self.mixed.put(i, alike)
         polys = [self._shortest(x.id) for x in exprs]
         fixed = {self.expansion.atoms.id("name", name) for name, _ in given}
         self.work.left = max(self.work.left, LATER)
@@ -251,7 +255,18 @@ class _Attempt:
         cost = self.factoring.costs.of_terms(as_formed)
         try:
             with self.work.at_most(EACH * cost):
-                expanded = self.factoring.factored(self.expansion.angles.simplified(self.expansion.expand(i)))
+                expanded = self.factoring.factored(self._simplified(self.expansion.expand(i)))
         except TooLongError:
             return as_formed
-        return expanded if self.factoring.costs.of_terms(expanded) <= cost else as_formed
+        shortest = expanded if self.factoring.costs.of_terms(expanded) <= cost else as_formed
+        cost = self.factoring.costs.of_terms(shortest)
+        try:
+            with self.work.at_most(EACH * cost):
+                mixed = self.mixed.form(i)
+        except TooLongError:
+            return shortest
+        return mixed if mixed is not None and self.factoring.costs.of_terms(mixed) < cost else shortest
+
+    def _simplified(self, poly: Poly) -> Poly:
+        """With fractions that can be divided divided, and sines and cosines joined."""
+        return self.expansion.angles.simplified(without_exact_quotients(poly, self.expansion.atoms))

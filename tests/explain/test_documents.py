@@ -15,11 +15,13 @@ import pytest
 import eomgen as eg
 from eomgen.equations import METHODS
 from eomgen.errors import MissingDependencyError, UsageError
+from eomgen.explain import about_mechanism
 from eomgen.explain.document import Folded, FormulaLine, Sentence, Table
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.yaml"))
 KINDS = ("double_pendulum", "slider_crank", "car_axis")
+METHODS_BY_NAME = tuple(METHODS)
 VOID = {"meta", "img", "mspace", "br", "hr"}
 
 
@@ -110,6 +112,17 @@ def test_rolling(method: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_every_example_in_short(name: str) -> None:
     check(explained(name, "auto", "short"))
+
+
+#: Each example by two methods more, so that each method comes to ten of them.
+PAIRS = [(name, METHODS_BY_NAME[(k + step) % len(METHODS_BY_NAME)]) for k, name in enumerate(NAMES) for step in (0, 3)]
+
+
+@pytest.mark.parametrize(("name", "method"), PAIRS)
+def test_every_example_by_other_methods(name: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In short, and without the pictures, which are drawn above."""
+    monkeypatch.setattr(about_mechanism, "_picture", lambda module: Sentence("No picture."))
+    check(explained.__wrapped__(name, method, "short"))
 
 
 def test_a_bare_lagrangian() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy
+from shown_numbers import random_state, state_values
 
 import eomgen as eg
 from eomgen.reading.formats import write_format
@@ -76,6 +77,26 @@ def test_array_languages_give_the_compiled_equations(form: str, pendulum: Any) -
     known = evaluated(right, numbers)
     assert [known[f"M_{i}_{j}"] for i in (1, 2) for j in (1, 2)] == pytest.approx(M.ravel(), rel=1e-12)
     assert [known["f_1"], known["f_2"]] == pytest.approx(f, rel=1e-12)
+
+
+@pytest.mark.needs("octave")
+@pytest.mark.parametrize("name", ["four_bar", "flyball_governor"])
+def test_octave_gives_the_compiled_equations(name: str, tmp_path: Path) -> None:
+    """A function with named parts, and one with long numbers, run by Octave itself."""
+    equations = eg.load(EXAMPLES / f"{name}.yaml").derive()
+    module: Any = equations.compile("numpy")
+    x = random_state(module, 4)
+    values, free = state_values(module, x, 0.0), list(module.layout.metadata["independent"])
+    text = write_format(equations, "octave")
+    (tmp_path / f"{name}_equations.m").write_text(text)
+    arguments = re.findall(r"\w+", re.findall(rf"{name}_equations\((.*)\)", text)[0])
+    given = ", ".join(f"{values[argument]:.17g}" for argument in arguments)
+    program = f'[M, f] = {name}_equations({given}); printf("%.17g\\n", M\', f);'
+    words = [shutil.which("octave-cli") or "octave", "--no-gui", "--norc", "--quiet", "--eval", program]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    M = module.embedded_mass_matrix(x[: module.n_q])
+    wanted = [*M.ravel(), *(M @ module.rhs(0.0, x)[module.n_q :][free])]
+    assert [float(line) for line in done.stdout.split()] == pytest.approx(wanted, rel=1e-10, abs=1e-10 * abs(M).max())
 
 
 @pytest.mark.parametrize("form", FORMATS)

@@ -14,7 +14,8 @@ from eomgen.graph.core import Graph
 from eomgen.graph.evaluate import evaluate
 from eomgen.graph.sympy_lower import lower as lower_by
 from eomgen.simplify import WHOLE, simplify
-from eomgen.simplify.atoms import Work
+from eomgen.simplify.atoms import Atoms, Work, freeze, join
+from eomgen.simplify.factoring import Factoring
 from eomgen.simplify.form import WORK
 
 A, B, C = sympy.symbols("A B C")
@@ -82,6 +83,31 @@ def test_roots_of_squares_have_no_sign() -> None:
     form = simplify([root], sizes=WHOLE)
     assert form is not None
     assert form.sympy()[1] == [sympy.Abs(cos(A))]
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        ((2 * a + a * b + 4 * x + 2 * b * x) / (2 + b), "a + 2*x"),  # together
+        (x * a / (a + b) + x * b / (a + b), "x"),  # in two terms
+        (cos(A) * a**2 / (a + b) - cos(A) * b**2 / (a + b) + x, "x + (a - b)*cos(A)"),  # beside others
+        ((5 + d) * ((5 + d / 2) / (5 + d)) ** 2 - d**2 / 4 / (5 + d), "5"),  # Steiner's term of a point on a rod
+        (-(a**2) + 2 * a * x - x**2, "-(a - x)**2"),
+    ],
+)
+def test_exact_quotients_and_squares(given: Any, wanted: str) -> None:
+    assert sympy.sstr(short(given)) == wanted
+
+
+def test_products_of_lengths_stay_products() -> None:
+    """The potential of a spring of numbers, and a product of lengths beside terms that are collected."""
+    extension = sympy.Abs(x - sympy.Rational(1, 2)) - sympy.Rational(1, 10)
+    V = short(100 * extension**2 + a * c + a * d)
+    assert sympy.sstr(V) == "a*(c + d) + 100*(Abs(x - 0.5) - 0.1)**2"
+    grip = -c * (sympy.Abs(x) - b) * (k * sympy.Abs(x) + a * y - b)
+    found = short(grip + l * x * y + l * x * d)
+    assert found.count_ops() <= (grip + l * x * (y + d)).count_ops()
+    assert (found - grip - l * x * (y + d)).expand() == 0
 
 
 def test_springs_keep_their_extension() -> None:
@@ -263,3 +289,15 @@ def test_long_roots_that_repeat_have_names() -> None:
     values = {a: 0.7, l: 1.3, A: 0.4, x: 2.0, y: -1.1, b: 0.2}
     for shown, wanted in zip(found, given, strict=True):
         assert float(shown.subs(name, root).subs(values)) == pytest.approx(float(wanted.subs(values)), rel=1e-14)
+
+
+def test_terms_above_and_below_one_sum_are_not_taken_together() -> None:
+    """a F + b / F share no factor; c F + a F do."""
+    atoms = Atoms()
+    one, other, third = (((atoms.id("sym", name), 1),) for name in "abc")
+    sum_ = atoms.id("factor", freeze({((atoms.id("sym", "x"), 1),): 1, ((atoms.id("sym", "y"), 1),): 1}))
+    above, below = ((sum_, 1),), ((sum_, -1),)
+    poly = {join(one, above): 1, join(other, below): 1, join(third, above): 1}
+    found = Factoring(atoms, Work(WORK)).factored(poly)
+    assert len(found) == 2
+    assert join(other, below) in found
