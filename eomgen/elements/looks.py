@@ -197,3 +197,11 @@ ARROW: tuple[Points, ...] = (
     ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((0.82, 0.7, 0.0), (1.0, 0.0, 0.0), (0.82, -0.7, 0.0)),
 )
+#: a law of the model's own between two points: a plain box
+LAW_BOX: tuple[Points, ...] = (
+    ((0.0, 0.0, 0.0), (0.4, 0.0, 0.0)),
+    _square(0.4, 0.6, 0.5),
+    ((0.6, 0.0, 0.0), (1.0, 0.0, 0.0)),
+)
+#: and about an axis
+LAW_RING: tuple[Points, ...] = (_arc(1.9, 0, 360, 24),)

@@ -88,7 +88,10 @@ def player_html(motion: ShownMotion, curves: Sequence[Any], title: str) -> str:
     """Style and elements, to stand at the beginning of a page's body."""
     plot = curves_html(motion, curves) if curves else ""
     below = BAR + (PLOT if curves else 0)
-    speeds = "".join(f'<option value="{s}"{" selected" if s == 1.0 else ""}>x{s:g}</option>' for s in SPEEDS)
+    # the values are seconds of the animation in one of the clock; what is read: seconds of the mechanism in one of it
+    speeds = "".join(
+        f'<option value="{s}"{" selected" if s == 1.0 else ""}>x{s * motion.speed:.2g}</option>' for s in SPEEDS
+    )
     clock = motion.clock
     return f"""<style>
 #canvasTarget {{ height: calc(100% - {below}px) !important; top: 0; }}
@@ -112,7 +115,7 @@ def player_html(motion: ShownMotion, curves: Sequence[Any], title: str) -> str:
 }})();</script>
 <div id="player"><button id="play" title="play or pause">&#10074;&#10074;</button>
 <input id="time" type="range" min="0" max="{float(clock[-1])!r}" step="any" value="0" aria-label="time">
-<span id="words"></span><select id="speed" title="speed">{speeds}</select></div>
+<span id="words"></span><select id="speed" title="speed; x1 is that of the mechanism">{speeds}</select></div>
 """
 
 
