@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..constraints import CONSTRAINTS
@@ -99,7 +99,8 @@ def build(description: Description) -> Mechanism:
     outputs = read_outputs()
     events = build_events(reader, sections["events"])
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
-    initial = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity"))
+    starts = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity", "output"))
+    moving = set(reader.names.of("coordinate", "velocity"))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
     independent = _independent(reader, values.get("independent", ()))
     simulation = _simulation(reader, values.get("simulation", {}))
@@ -134,7 +135,8 @@ def build(description: Description) -> Mechanism:
         events=events,
         quantities=dict(reader.quantities),
         element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked},
-        initial=initial,
+        initial={name: value for name, value in starts.items() if name in moving},
+        initial_outputs={name: value for name, value in starts.items() if name not in moving},
         guess=guess,
         independent=independent,
         simulation=simulation,
@@ -218,7 +220,7 @@ def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
 
 
 def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -> dict[str, Expr]:
-    """Values by coordinate (or rate): expressions in parameters."""
+    """Values by coordinate (or rate, or output): expressions in parameters."""
     if not isinstance(given, Mapping):
         reader.wrong(section, given, "table")
         return {}
@@ -229,12 +231,16 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
         if name in known:
             result[name] = reader.expression(path, value)
         else:
-            remedy = nearest(shown(name), known, " and ".join(_PLURAL[kind] for kind in kinds))
-            reader.faults.add(path, f"no {' or '.join(kinds)} {quoted(name)}", remedy)
+            remedy = nearest(shown(name), known, _listed([_PLURAL[kind] for kind in kinds], "and"))
+            reader.faults.add(path, f"no {_listed(kinds, 'or')} {quoted(name)}", remedy)
     return result
 
 
-_PLURAL = {"coordinate": "coordinates", "velocity": "velocities"}
+def _listed(words: Sequence[str], last: str) -> str:
+    return f"{', '.join(words[:-1])} {last} {words[-1]}" if words[1:] else words[0]
+
+
+_PLURAL = {"coordinate": "coordinates", "velocity": "velocities", "output": "outputs"}
 
 
 def _independent(reader: Reader, given: Any) -> tuple[str, ...]:

@@ -194,7 +194,8 @@ class Assembled:
 
 def initial_of(kernels: Kernels, t: float, names: Iterable[str]) -> Initial:
     """The assembly of a model to values of these names; outputs and places of markers may be among them."""
-    if not any("(" in name or name in kernels.layout.y for name in without_dots(dict.fromkeys(map(str, names)))):
+    asked = bool(kernels.layout.initial_outputs)
+    if not asked and not any("(" in name or name in kernels.layout.y for name in without_dots(dict.fromkeys(map(str, names)))):
         return Initial(kernels, t)
     from .wanted_outputs import WantedInitial
 

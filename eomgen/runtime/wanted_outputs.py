@@ -39,7 +39,7 @@ class WantedRate(NamedTuple):
 
 
 class WantedInitial(Initial):
-    """Assembly that can also hold the outputs and places of markers among some names.
+    """Assembly that can also hold the outputs and places of markers among some names, and the outputs declared.
 
     Parameters
     ----------
@@ -56,7 +56,8 @@ class WantedInitial(Initial):
 
     def __init__(self, kernels: Kernels, t: float, names: Iterable[str]) -> None:
         super().__init__(kernels, t)
-        found = [one for one in (find_wanted(kernels, name, t) for name in names) if one is not None]
+        wanted = dict.fromkeys([*names, *self.layout.initial_outputs])
+        found = [one for one in (find_wanted(kernels, name, t) for name in wanted) if one is not None]
         self.wanted_rates = {one.name: one for one in found if isinstance(one, WantedRate)}
         positions = [one for one in found if isinstance(one, WantedPosition)]
         self.wanted_positions = frozenset(one.name for one in positions)
@@ -69,6 +70,9 @@ class WantedInitial(Initial):
         positions = places | {name: value for name, value in others.items() if name in self.wanted_positions}
         given = super().sort({n: x for n, x in others.items() if n not in positions and n not in rates})
         return Given(given.positions | positions, given.rates | rates)
+
+    def declared(self) -> Given:
+        return self.sort({**self.layout.initial, **self.layout.initial_outputs})
 
     def rate_equation(self, q: Array, name: str) -> tuple[Array, float, float]:
         wanted = self.wanted_rates.get(name)
