@@ -1,6 +1,6 @@
 """Stage emit: generated files of a package -> the files of eomgen that they can import, so that it stands alone.
 
-Imports are read from the text, those in functions too; tables that name files as text (``CALLS``, ``FORMS``) count as
+Imports are read from the text, those in functions too; tables that name files as text (``CALLS``, ``FORMS``, ``PARTS``) count as
 imports.
 """
 
@@ -14,11 +14,11 @@ from importlib.resources import files
 #: What runs without models, equations and SymPy: files of the root, and folders.  Imports of anything else are for
 #: modules that know their equations, which those of a package do not.
 ALONE = ("errors", "kernel_table", "suggestions", "texts", "analysis", "api", "ensembles", "files", "limits",
-         "notation", "numeric", "operations", "runtime", "simulation", "verification")  # fmt: skip
+         "notation", "numeric", "operations", "runtime", "show", "simulation", "verification")  # fmt: skip
 
 _TYPES = re.compile(r"^if TYPE_CHECKING:.*\n(?:(?: {4}.*)?\n)+", re.M)
 _IMPORT = re.compile(r"^( *)from (\.+)([\w.]*) import (?:\(([^)]*)\)|(.*))$", re.M)
-_TABLE = re.compile(r"^(?:CALLS|FORMS)\b.* = \{\n((?:    .*\n)+)\}", re.M)
+_TABLE = re.compile(r"^(?:CALLS|FORMS|PARTS)\b.* = \{\n((?:    .*\n)+)\}", re.M)
 _ROW = re.compile(r'^    "\w+": "([\w.]+)",$', re.M)
 
 

@@ -32,8 +32,6 @@ from .kernels import Kernels
 from .late_rank import require_rank
 from .near_names import UnknownNameError, unknown, without_dots
 
-MANY = 16  #: branches; when more are known, the search ends
-
 
 class Given(NamedTuple):
     """Values by the name of a coordinate, its rate, a loop coordinate or its rate."""
@@ -78,10 +76,6 @@ class Initial:
         positions = {n: x for n, x in values.items() if n in self.coordinates}
         return Given(self.system.settle(positions), {n: x for n, x in values.items() if n in rates})
 
-    def declared(self) -> Given:
-        """The declared initial values."""
-        return self.sort(self.layout.initial)
-
     # functions of q
 
     def rate(self, q: Array) -> Array:
@@ -101,7 +95,7 @@ class Initial:
         """The reference position, closed again for these parameters and this time."""
         if (later := self.later()) is not None:
             return later
-        declared = self.declared().positions
+        declared = self.sort(self.layout.initial).positions
         try:
             return self.system.close(self.layout.q_reference, declared, restarts=2).q
         except AssemblyError:
@@ -133,7 +127,7 @@ class Initial:
         Warns where that leaves the branch of the reference position, unless the values are a ``rough`` guess.
         """
         layout = self.layout
-        declared = self.declared().positions
+        declared = self.sort(layout.initial).positions
         if not layout.n_h and not any(name in self.system.cut.names for name in (*declared, *given)):
             return self.system.with_values(self.system.with_values(layout.q_reference, declared), given)
         if not given:
@@ -174,7 +168,7 @@ class Initial:
         if set(guess) <= set(favoured):
             with suppress(AssemblyError):
                 return self.assembled(guess, rough=True)
-        declared = {**self.sort(layout.guess).positions, **self.declared().positions}
+        declared = {**self.sort(layout.guess).positions, **self.sort(layout.initial).positions}
         start = self.system.with_values(self.system.with_values(layout.q_reference, declared), guess)
         soft = self.compatible(start, {}, {**ordered, **{k: v for k, v in declared.items() if k not in guess}})
         for held in (soft, {k: v for k, v in soft.items() if k in guess}):
@@ -182,22 +176,23 @@ class Initial:
                 return self.system.close(start, held, restarts=0).q
         return self.system.close(start, {}).q
 
-    def branches(self, given: Mapping[str, float], first: Array, tries: int = 60) -> list[Array]:
-        """Every position found that holds the given values and, if they leave freedom, further ones of `first`."""
+    def branches(self, given: Mapping[str, float], first: Array, tries: int = 60, many: int = 16) -> list[Array]:
+        """Every position found that holds the given values and, if they leave freedom, further ones of `first`.
+
+        Each is searched around too, until there are more than `many`.
+        """
         layout, found = self.layout, [first]
-        here = dict(zip(layout.q, first.tolist(), strict=True))
-        favoured = [n for i in layout.independent if (n := layout.velocity_labels[i]) in here]
-        rest = {} if given else self.declared().positions
-        more = self.compatible(first, given, rest | {n: here[n] for n in (*favoured, *layout.q)})
+        there = dict(zip(layout.q, first.tolist(), strict=True))
+        favoured = [n for i in layout.independent if (n := layout.velocity_labels[i]) in there]
+        rest = {} if given else self.sort(layout.initial).positions
+        more = self.compatible(first, given, rest | {n: there[n] for n in (*favoured, *layout.q)})
         room = max(layout.n_q - layout.n_h - len(given), 0)  # a singular position seems to have more freedom
         system = self.system.closure({**given, **dict([*more.items()][:room])})
-        k = 0
-        while k < len(found) <= MANY or not k:  # around each branch found: the legs of a platform flip one by one
-            for start in starts(found[k], system.free, self.place, tries):
+        for here in found:  # which grows: the legs of a platform flip one by one
+            for start in starts(here, system.free, self.place, tries if len(found) <= many or here is first else 0):
                 q, residual = close(system, start)
                 if closed(residual) and self.system.aligned(q) and all(self._apart(q, other) for other in found):
                     found.append(q)
-            k += 1
         return found
 
     def _apart(self, a: Array, b: Array) -> bool:
@@ -223,7 +218,7 @@ class Initial:
         """Velocities with the given rates exact, and the declared ones where they leave room; None: declared exact."""
         if self.layout.n_c:
             require_rank(self.kernels, self.scales.jacobian(self._C_q(q, t=self.t)))
-        declared = self.declared().rates
+        declared = self.sort(self.layout.initial).rates
         if given is None:
             return self._solve_rates(q, declared).v
         self._require_motion(q, given)

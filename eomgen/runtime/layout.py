@@ -107,8 +107,6 @@ class Layout:
         self.loop_lengths = np.array([kind == "length" for kind in self.loop_kinds], dtype=bool)
         self.loop_scales = np.where(self.loop_lengths, self.length, 1.0)
         self.initial: dict[str, float] = {k: float(v) for k, v in data.get("initial", {}).items() if v is not None}
-        outputs = data.get("initial_outputs", {})
-        self.initial_outputs: dict[str, float] = {k: float(v) for k, v in outputs.items() if v is not None}
         self.guess: dict[str, float] = {k: float(v) for k, v in data.get("guess", {}).items() if v is not None}
         self.limits: dict[str, dict[str, float]] = data.get("limits", {})
         reference = data.get("q_reference")

@@ -7,6 +7,7 @@ velocities, such as ``vx(rod.tip)``, of the velocities.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -56,7 +57,9 @@ class WantedInitial(Initial):
 
     def __init__(self, kernels: Kernels, t: float, names: Iterable[str]) -> None:
         super().__init__(kernels, t)
-        wanted = dict.fromkeys([*names, *self.layout.initial_outputs])
+        self.layout = copy(kernels.layout)
+        self.layout.initial = declared_values(kernels.layout)
+        wanted = dict.fromkeys([*names, *self.layout.initial])
         found = [one for one in (find_wanted(kernels, name, t) for name in wanted) if one is not None]
         self.wanted_rates = {one.name: one for one in found if isinstance(one, WantedRate)}
         positions = [one for one in found if isinstance(one, WantedPosition)]
@@ -71,9 +74,6 @@ class WantedInitial(Initial):
         given = super().sort({n: x for n, x in others.items() if n not in positions and n not in rates})
         return Given(given.positions | positions, given.rates | rates)
 
-    def declared(self) -> Given:
-        return self.sort({**self.layout.initial, **self.layout.initial_outputs})
-
     def rate_equation(self, q: Array, name: str) -> tuple[Array, float, float]:
         wanted = self.wanted_rates.get(name)
         return super().rate_equation(q, name) if wanted is None else (*wanted.evaluate(q, self.t), wanted.scale)
@@ -83,6 +83,11 @@ class WantedInitial(Initial):
             return super().gradients(q, name)
         row, _, scale = self.rate_equation(q, name)
         return [row * self.scales.q / scale]
+
+
+def declared_values(layout: Layout) -> dict[str, float]:
+    """All declared initial values, outputs included."""
+    return {**layout.initial, **layout.metadata.get("initial_outputs", {})}
 
 
 def find_wanted(kernels: Kernels, name: str, t: float) -> WantedPosition | WantedRate | None:
@@ -148,7 +153,7 @@ def _scale(layout: Layout, unit: str, slopes: Array) -> float:
 
 def _place(kernels: Kernels, name: str, marker: str, axis: int) -> WantedPosition:
     layout, poses = kernels.layout, kernels.state("poses")
-    data = load_show("data", "initial values at markers").read_picture(layout.metadata, kernels.context.p)
+    data = load_show("data").read_picture(layout.metadata, kernels.context.p)
     if marker not in data.markers:
         raise unknown("marker", marker, data.markers)
     frame = data.markers[marker]

@@ -83,7 +83,7 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
     layout = module.layout
     initial = Initial(module.kernels, t)
     q, found = x[: layout.n_q], []
-    wanted = [*(given or ()), *layout.initial_outputs]
+    wanted = [*(given or ()), *layout.metadata.get("initial_outputs", ())]
     if outputs := [name for name in wanted if (name in layout.y and name not in layout.x) or place_of_marker(name)]:
         raise UsageError(
             f"derivatives need a start with held coordinates and rates, not {', '.join(outputs)}; give the "

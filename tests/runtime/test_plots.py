@@ -37,6 +37,19 @@ def pendulum(theta: float = 0.01, end: float = 8.0) -> Any:
     return m.compile(target="numpy").simulate(end, initial={"theta": theta}, rtol=1e-10, atol=1e-12)
 
 
+@pytest.mark.parametrize(("times", "curved"), [([0.0, 60.0], False), (np.linspace(0.0, 8.0, 41), True)])
+def test_points_far_apart_are_joined_by_straight_lines(times: Any, curved: bool) -> None:
+    """A pendulum that swings every two seconds: of a minute between two points nothing is known."""
+    run = pendulum(0.5, 60.0 if not curved else 8.0)
+    few = run.module.simulate((0, times[-1]), initial={"theta": 0.5}, t_eval=times) if hasattr(run, "module") else None
+    assert few is not None
+    ax = few.plot("theta")
+    t, theta = ax.lines[0].get_data()
+    straight = np.interp(t, few.t, few["theta"])
+    assert (np.abs(theta - straight).max() > 0.02) == curved
+    assert np.abs(theta).max() <= 0.51
+
+
 def test_shape_against_shape_is_the_path_of_the_point(run: Any) -> None:
     ax = run.plot(x="pin_x", y="s")
     line = ax.lines[0].get_xydata()
