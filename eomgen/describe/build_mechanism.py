@@ -105,6 +105,8 @@ def build(description: Description) -> Mechanism:
     independent = _independent(reader, values.get("independent", ()))
     simulation = _simulation(reader, values.get("simulation", {}))
     doc = reader.text("doc", values.get("doc", ""))
+    limits_told = _limits_told(reader, values.get("limits"))
+    check_inertia = reader.check_word("check_inertia", values.get("check_inertia", True))
 
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
@@ -147,8 +149,8 @@ def build(description: Description) -> Mechanism:
         doc=doc,
         latex=dict(reader.latex),
         instances=dict(description.instances),
-        check_inertia=reader.check_word("check_inertia", values.get("check_inertia", True)),
-        limits_told=_limits_told(reader, values.get("limits")),
+        check_inertia=check_inertia,
+        limits_told=limits_told,
         negative=negative,
         named_markers=tuple(marker for label, marker in reader.markers.items() if "." in label),
         body_shapes=tuple(
@@ -162,6 +164,10 @@ def build(description: Description) -> Mechanism:
 
 
 def _limits_told(reader: Reader, given: Any) -> bool:
+    if given == "stop":
+        remedy = "add a force of type stop for each joint; allowed here: note, off"
+        reader.faults.add("limits", "'stop' is an option of robot files: eg.load(file, limits='stop')", remedy)
+        return True
     return given is None or reader.choice("limits", given, MODEL["limits"]) != "off"
 
 

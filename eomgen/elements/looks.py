@@ -205,3 +205,5 @@ LAW_BOX: tuple[Points, ...] = (
 )
 #: and about an axis
 LAW_RING: tuple[Points, ...] = (_arc(1.9, 0, 360, 24),)
+#: a part of the plane on which something rolls or stands, across the axis that points out of the solid
+PLANE: tuple[Points, ...] = (((12.0, 12.0), (-12.0, 12.0), (-12.0, -12.0), (12.0, -12.0), (12.0, 12.0)),)
