@@ -1,7 +1,7 @@
 """Stage emit: generated files of a package -> the files of eomgen that they can import, so that it stands alone.
 
-Imports are read from the text, those in functions too; tables that name files as text (``CALLS``, ``FORMS``, ``PARTS``) count as
-imports.
+Imports are read from the text, those in functions too; tables that name files as text (``CALLS``, ``FORMS``,
+``PARTS``) count as imports.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import MissingDependencyError, UsageError
 from ..texts import shown
 
-_SHOWS = "animate animation film gif movie play plot show video view".split()
+_SHOWS = ("animate", "animation", "film", "gif", "movie", "play", "plot", "show", "video", "view")
 _SHOWN = "simulate(...) returns a run, which has animate() and plot(); a module has draw() and explore()"
 _PLACE = re.compile(r"([xyz])\((\w+(?:\.\w+)*)\)")
 

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from .columns import Columns
 
 FINE = 1000  #: points of a smooth curve, about
-#: Error of the trapezoidal rule, in sizes of its terms, above which points are too far apart for a curve.  For a sine it
-#: is 0.05 at most over one radian and 0.22 over two; beyond that a curve is a guess.
+#: Error of the trapezoidal rule, in sizes of its terms, above which points are too far apart for a curve.  For a sine
+#: it is 0.05 at most over one radian and 0.22 over two; beyond that a curve is a guess.
 APART = 0.5
 ENERGIES = ("T", "V", "energy")  #: columns of every run, unless the model has these names for its own
 
@@ -23,8 +23,8 @@ def cubic_between(t: Array, x: Array, slopes: Array | None, times: Array) -> Arr
     """States (n, k) at times (k,) within a run: cubics through the states and slopes of its steps.
 
     Without slopes straight lines, and likewise where the slopes say nothing of what is between two points that are far
-    apart (``t_eval=[0, 60]``): where they are not those of a curve from one state to the other.  Where a time stands twice, as at an event that resets the state, the second state
-    begins the next piece.
+    apart (``t_eval=[0, 60]``): where they are not those of a curve from one state to the other.  Where a time stands
+    twice, as at an event that resets the state, the second state begins the next piece.
 
     Parameters
     ----------

@@ -103,7 +103,8 @@ def player_html(motion: ShownMotion, curves: Sequence[Any], title: str) -> str:
 #curves img {{ height: 100%; }}
 #missing {{ position: fixed; top: 40%; left: 10%; right: 10%; font: 16px sans-serif; text-align: center; z-index: 6; }}
 #cursor {{ position: absolute; top: 2%; bottom: 20%; width: 1px; background: #333; }}
-#title {{ position: fixed; left: 14px; top: 10px; font: 15px sans-serif; white-space: pre; z-index: 5; pointer-events: none; }}
+#title {{ position: fixed; left: 14px; top: 10px; font: 15px sans-serif; white-space: pre; z-index: 5;
+  pointer-events: none; }}
 </style>
 <div id="title">{escape(title)}</div>{plot}
 <script>(function () {{

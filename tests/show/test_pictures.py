@@ -162,7 +162,8 @@ def test_a_law_between_two_points_is_seen() -> None:
     m.revolute("A", m.ground, arm)
     m.element("sling", m.ground.at(0, 1, 0), arm.at(1, 0, 0), law="-10*max(0, length - 0.5)")
     [line] = [item.points for item in scene_of(m.compile(target="numpy")).items if item.role == "force"]
-    assert np.allclose(line[0], (0, 1, 0)) and np.allclose(line[-1], (1, 0, 0))
+    assert np.allclose(line[0], (0, 1, 0))
+    assert np.allclose(line[-1], (1, 0, 0))
 
 
 @pytest.mark.parametrize("name", sorted(file.name for file in EXAMPLES.glob("*.yaml")))
