@@ -217,7 +217,7 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
 
 
 def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
-    """Note quantities asked of force elements that do not act along a path."""
+    """Report faults: quantities such as ``length(k1)`` of force elements that do not act along a path."""
     known = {force.name: force for force in forces}
     for (quantity, name), path in reader.asked.items():
         if quantity != "power" and name in known and not known[name].acts_along:
