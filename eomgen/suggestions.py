@@ -20,7 +20,8 @@ SYNONYMS = {
     "linearise": "linearize", "ensemble sweep batch monte_carlo montecarlo": "simulate_many ensemble",
     "plot graph": "run", "statics static trim": "equilibrium", "validate lint": "check",
     "build codegen export": "generate compile", "inverse_dynamics id": "inverse driving_forces",
-    "com": "center_of_mass", "forward_dynamics": "rhs", "M": "mass_matrix",
+    "com": "center_of_mass", "forward_dynamics": "rhs", "M": "mass_matrix", "joint": "coordinate",
+    "point_mass particle": "body",
 }  # fmt: skip
 _MEANT = {word: meant.split() for words, meant in SYNONYMS.items() for word in words.split()}
 MOST = 2000  #: names beyond which a comparison with each takes long

@@ -165,7 +165,7 @@ class Modes:
         return self._show().animate_mode(self._module, self.linear.x, self._shown(mode - 1), file, **options)
 
     def _show(self) -> Any:
-        return load_show("mode_shapes", "an animation")
+        return load_show("mode_shapes")
 
     def _shown(self, k: int) -> tuple[Array, str]:
         """The displacements q' of a mode, and what is written above it."""

@@ -167,7 +167,7 @@ def _require_setuptools() -> None:
 
 
 def _refuse_native() -> None:
-    """A wheel is for other computers too; a processor without an instruction in it ends the program."""
+    """Refuse instructions of one processor: a wheel is installed on others, where they would end the program."""
     for name in FLAGS:
         if found := [word for word in NATIVE if word in os.environ.get(name, "").split()]:
             raise UsageError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..constraints import CONSTRAINTS
@@ -103,11 +103,14 @@ def build(description: Description) -> Mechanism:
     events = build_events(reader, sections["events"])
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
     kinds = ("coordinate", "velocity", *(("state",) if declared else ()))
-    initial = begun | _initial(reader, "initial", values.get("initial", {}), kinds)
+    starts = _initial(reader, "initial", values.get("initial", {}), (*kinds, "output"))
+    moving = set(reader.names.of(*kinds))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
     independent = _independent(reader, values.get("independent", ()))
     simulation = _simulation(reader, values.get("simulation", {}))
     doc = reader.text("doc", values.get("doc", ""))
+    limits_told = _limits_told(reader, values.get("limits"))
+    check_inertia = reader.check_word("check_inertia", values.get("check_inertia", True))
 
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
@@ -139,7 +142,8 @@ def build(description: Description) -> Mechanism:
         events=events,
         quantities=dict(reader.quantities),
         element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked},
-        initial=initial,
+        initial=begun | {name: value for name, value in starts.items() if name in moving},
+        initial_outputs={name: value for name, value in starts.items() if name not in moving},
         guess=guess,
         independent=independent,
         simulation=simulation,
@@ -150,8 +154,8 @@ def build(description: Description) -> Mechanism:
         doc=doc,
         latex=dict(reader.latex),
         instances=dict(description.instances),
-        check_inertia=reader.check_word("check_inertia", values.get("check_inertia", True)),
-        limits_told=_limits_told(reader, values.get("limits")),
+        check_inertia=check_inertia,
+        limits_told=limits_told,
         negative=negative,
         named_markers=tuple(marker for label, marker in reader.markers.items() if "." in label),
         body_shapes=tuple(
@@ -165,6 +169,10 @@ def build(description: Description) -> Mechanism:
 
 
 def _limits_told(reader: Reader, given: Any) -> bool:
+    if given == "stop":
+        remedy = "add a force of type stop for each joint; allowed here: note, off"
+        reader.faults.add("limits", "'stop' is an option of robot files: eg.load(file, limits='stop')", remedy)
+        return True
     return given is None or reader.choice("limits", given, MODEL["limits"]) != "off"
 
 
@@ -214,7 +222,7 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
 
 
 def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
-    """Note quantities asked of force elements that do not act along a path."""
+    """Report faults: quantities such as ``length(k1)`` of force elements that do not act along a path."""
     known = {force.name: force for force in forces}
     for (quantity, name), path in reader.asked.items():
         if quantity != "power" and name in known and not known[name].acts_along:
@@ -223,7 +231,7 @@ def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
 
 
 def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -> dict[str, Expr]:
-    """Values by coordinate (or rate): expressions in parameters."""
+    """Values by coordinate (or rate, or output): expressions in parameters."""
     if not isinstance(given, Mapping):
         reader.wrong(section, given, "table")
         return {}
@@ -234,12 +242,16 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
         if name in known:
             result[name] = reader.expression(path, value)
         else:
-            remedy = nearest(shown(name), known, " and ".join(_PLURAL[kind] for kind in kinds))
-            reader.faults.add(path, f"no {' or '.join(kinds)} {quoted(name)}", remedy)
+            remedy = nearest(shown(name), known, _listed([_PLURAL[kind] for kind in kinds], "and"))
+            reader.faults.add(path, f"no {_listed(kinds, 'or')} {quoted(name)}", remedy)
     return result
 
 
-_PLURAL = {"coordinate": "coordinates", "velocity": "velocities", "state": "states"}
+def _listed(words: Sequence[str], last: str) -> str:
+    return f"{', '.join(words[:-1])} {last} {words[-1]}" if words[1:] else words[0]
+
+
+_PLURAL = {"coordinate": "coordinates", "velocity": "velocities", "state": "states", "output": "outputs"}
 
 
 def _independent(reader: Reader, given: Any) -> tuple[str, ...]:

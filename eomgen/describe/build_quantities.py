@@ -108,7 +108,7 @@ class Outputs:
         return tuple(self._at(k)[0] for k in range(len(self._entries)))
 
     def expression(self, name: str) -> Expr:
-        """What an output of this name is, in SI units."""
+        """The expression of the output with this name, in SI units."""
         return self._at(self._places[name])[1] if name in self._places else self._reader.stand_in
 
     def _at(self, k: int) -> tuple[Output, Expr]:

@@ -365,7 +365,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         super().__setattr__(name, value)
 
     def _near(self, name: str) -> str:
-        """What may be meant by a name that is not there."""
+        """A suggestion for a name that does not exist."""
         known = (*dir(type(self)), *JOINTS, *FORCES, *CONSTRAINTS)
         return hint(name, [n for n in known if not n.startswith("_")]) or (
             f"joints: {', '.join(JOINTS)}; forces: {', '.join(FORCES)}; constraints: {', '.join(CONSTRAINTS)}"

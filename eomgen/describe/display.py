@@ -28,6 +28,9 @@ def _summary(entry: DescribedEntry) -> str:
             parts.append("markers " + ", ".join(map(shown, names)))
         elif entry.path.startswith("functions.") and key in ("x", "y", "z"):
             parts.append(f"{len(items(value) or ())} {key}")
+        elif key in ("display", "solids") and all(isinstance(one, Mapping) for one in items(value) or ("",)):
+            words = (text_of(one.get("shape", one.get("type"))) for one in items(value) or ())
+            parts.append(f"{key} " + ", ".join(words))
         elif key in ("type", "value", "expression"):
             parts.append(text_of(value))
         elif key in ("between", "marker", "body", "joint"):

@@ -38,6 +38,7 @@ _WITH_UNIT = re.compile(r"\s*([0-9.]+(?:e[+-]?[0-9]+)?)\s*(°|%|[A-Za-zµμ][A-Z
 #: Keywords of motions that Python does not allow as such, and what stands for them in its tree.
 _KEYWORDS = {"in": "_n", "from": "_rom"}
 _KEYWORD = re.compile(r"\b(in|from)(?=\s*=(?!=))")
+_UNFINISHED = "close the bracket; between { } of a model file an expression with commas must stand in quotes"
 _HINTS = {
     "^": "write ** for powers",
     "%": "there is no remainder operator",
@@ -125,7 +126,8 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     except SyntaxError as error:
         _refuse_unit(text)
         column = (error.offset or 1) + start
-        raise ExpressionError(f"not a valid expression ({error.msg})", column, allowed(), text) from None
+        remedy = _UNFINISHED if "never closed" in error.msg else allowed()
+        raise ExpressionError(f"not a valid expression ({error.msg})", column, remedy, text) from None
     except (ValueError, MemoryError, RecursionError):
         raise ExpressionError("nested too deeply", 1, f"at most {DEPTH} levels", text) from None
     body = tree.body

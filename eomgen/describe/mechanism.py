@@ -257,6 +257,7 @@ class Mechanism:
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
     element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element
     initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate, ``<coordinate>_dot`` or state
+    initial_outputs: Mapping[str, Expr] = field(default_factory=dict)  #: by output, in its unit
     guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts
     independent: tuple[str, ...] = ()
     simulation: Simulation = Simulation()

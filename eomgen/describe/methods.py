@@ -157,7 +157,9 @@ def method_of(section: str, found: ElementType) -> Callable[..., Any]:
         try:
             bound = signature.bind(self, *args, **keys).arguments
         except TypeError as error:
-            raise TypeError(f"{found.name}() {error}") from None
+            twin = f"joint_{found.name}" if section == "forces" else ""
+            more = f"; on the coordinate of a joint use {twin}" if hasattr(type(self), twin or "-") else ""
+            raise TypeError(f"{found.name}() {error}{more}") from None
         kept = {key: value for key, value in bound.items() if value is not None or key in found.ends}
         given = {key: value for key, value in kept.items() if key not in ("self", "name")}
         values = {"type": found.name, **_entry(self, found, bound["name"], given)}

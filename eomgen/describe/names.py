@@ -90,7 +90,9 @@ def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
     if not isinstance(name, str):
         return f"{quoted(name)} is not a name", IDENTIFIER_RULE
     if not _IDENTIFIER.match(name):
-        return f"{quoted(name)} is not an identifier", IDENTIFIER_RULE
+        cut = name.count(")") > name.count("(")  # by a comma: {shake: hypot(x, y)}
+        remedy = "an expression with commas must stand in quotes between { }; " if cut else ""
+        return f"{quoted(name)} is not an identifier", remedy + IDENTIFIER_RULE
     if len(name) > LONGEST:
         return f"a name of {len(name)} characters is too long", f"at most {LONGEST} characters"
     if keyword.iskeyword(name):

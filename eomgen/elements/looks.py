@@ -197,3 +197,13 @@ ARROW: tuple[Points, ...] = (
     ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((0.82, 0.7, 0.0), (1.0, 0.0, 0.0), (0.82, -0.7, 0.0)),
 )
+#: a law of the model's own between two points: a plain box
+LAW_BOX: tuple[Points, ...] = (
+    ((0.0, 0.0, 0.0), (0.4, 0.0, 0.0)),
+    _square(0.4, 0.6, 0.5),
+    ((0.6, 0.0, 0.0), (1.0, 0.0, 0.0)),
+)
+#: and about an axis
+LAW_RING: tuple[Points, ...] = (_arc(1.9, 0, 360, 24),)
+#: a part of the plane on which something rolls or stands, across the axis that points out of the solid
+PLANE: tuple[Points, ...] = (((12.0, 12.0), (-12.0, 12.0), (-12.0, -12.0), (12.0, -12.0), (12.0, 12.0)),)

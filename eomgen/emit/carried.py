@@ -1,7 +1,7 @@
 """Stage emit: generated files of a package -> the files of eomgen that they can import, so that it stands alone.
 
-Imports are read from the text, those in functions too; tables that name files as text (``CALLS``, ``FORMS``) count as
-imports.
+Imports are read from the text, those in functions too; tables that name files as text (``CALLS``, ``FORMS``,
+``PARTS``) count as imports.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from importlib.resources import files
 #: What runs without models, equations and SymPy: files of the root, and folders.  Imports of anything else are for
 #: modules that know their equations, which those of a package do not.
 ALONE = ("errors", "kernel_table", "suggestions", "targets", "texts", "analysis", "api", "device", "ensembles", "files",
-         "identification", "limits", "notation", "numeric", "operations", "runtime", "simulation", "verification")  # fmt: skip
+         "identification", "limits", "notation", "numeric", "operations", "runtime", "show", "simulation",
+         "verification")  # fmt: skip
 
 _TYPES = re.compile(r"^if TYPE_CHECKING:.*\n(?:(?: {4}.*)?\n)+", re.M)
 _IMPORT = re.compile(r"^( *)from (\.+)([\w.]*) import (?:\(([^)]*)\)|(.*))$", re.M)
-_TABLE = re.compile(r"^(?:CALLS|FORMS)\b.* = \{\n((?:    .*\n)+)\}", re.M)
+_TABLE = re.compile(r"^(?:CALLS|FORMS|PARTS)\b.* = \{\n((?:    .*\n)+)\}", re.M)
 _ROW = re.compile(r'^    "\w+": "([\w.]+)",$', re.M)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from textwrap import fill
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 from ..errors import UsageError
 from ..layer import read_layer
 from ..program import Program
+from ..runtime.layout import Layout
 from ..targets import PRECISIONS, find_target
 from ..texts import summary_text
 from .c import emit_c
@@ -24,7 +26,8 @@ from .sources import SourceSet, metadata_json, number_texts, render
 #: Annotated attributes of the package, all of its default module.
 ANNOTATED: tuple[tuple[str, str], ...] = (
     *((name, "Timed") for name in ("rhs", "jacobian", "bias", "outputs", "input_jacobian", "parameter_jacobian")),
-    *((name, "State") for name in ("mass_matrix", "embedded_mass_matrix", "energy", "project", "poses")),
+    *((name, "State") for name in ("mass_matrix", "embedded_mass_matrix", "energy", "poses")),
+    ("project", "Projection"),
     *((name, "State") for name in ("center_of_mass", "com_jacobian", "momentum", "centroidal_inertia")),
     ("inverse_dynamics", "Motion"),
     *((name, "Rows") for name in ("constraints", "constraint_jacobian", "velocity_constraints")),
@@ -129,11 +132,20 @@ def _python_files(context: dict[str, Any], core: Mapping[str, str]) -> dict[str,
     return {"py.typed": "", **own, **about, **found}
 
 
+def _forms(metadata: Mapping[str, Any]) -> tuple[str, ...]:
+    """Other forms of the equations that the default module has."""
+    found = ["dae"]
+    with suppress(UsageError):
+        Layout(metadata).require_minimal_form()
+        found.insert(0, "minimal")
+    return (*found, *(["canonical"] if metadata.get("method") == "hamilton" else []))
+
+
 def _context(program: Program, slim: bool) -> dict[str, Any]:
     metadata = program.metadata
     doc = str(metadata.get("doc") or "").strip()
     calls, methods = describe_calls(program), SLIM_METHODS if slim else METHODS
-    attributes, forms = [*(name for name, _ in ANNOTATED), *methods], () if slim else ("minimal",)
+    attributes, forms = [*(name for name, _ in ANNOTATED), *methods], () if slim else _forms(metadata)
     return {
         "name": program.name,
         "slim": slim,
@@ -149,6 +161,7 @@ def _context(program: Program, slim: bool) -> dict[str, Any]:
         "attributes": attributes,
         "listed": fill(", ".join(f'"{name}"' for name in (*attributes, *forms)), 110).splitlines(),
         "annotations": ANNOTATED,
+        "forms": forms,
         "methods": methods,
         "p_values": number_texts(metadata.get("p_values")),
         "u_values": number_texts(metadata.get("u_values")),

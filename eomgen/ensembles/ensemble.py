@@ -278,7 +278,8 @@ class Ensemble:
         """Write the arrays to an .npz file that NumPy alone reads; ``header`` in it is ``metadata`` as JSON."""
         target = as_path("path", path)
         if target.suffix not in ("", ".npz"):
-            raise UsageError(f"an ensemble is saved as .npz, not as {target.suffix}: {target}")
+            remedy = "to_pandas() gives a table, which has to_csv(...)"
+            raise UsageError(f"an ensemble is saved as .npz, not as {target.suffix}: {target}; {remedy}")
         target = target.with_suffix(".npz")
         arrays: dict[str, Any] = {
             name: np.asarray(value) for name, value in self.reduced.items() if not isinstance(value, list)

@@ -9,7 +9,7 @@ from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field, Fields
-from ..elements.looks import Seen, Wheel
+from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
@@ -103,7 +103,8 @@ class SpherePlane(Contact):
     radius: Expr
 
     def drawn(self) -> list[Seen]:
-        return [] if self.radius.is_zero else [Wheel(self.second, self.radius)]
+        ground: list[Seen] = [Drawn((self.first,), about=PLANE)]
+        return ground if self.radius.is_zero else [*ground, Wheel(self.second, self.radius)]
 
     def touch(self, view: View) -> Touch:
         normal = vec.transpose(view.rotation(self.first))[2]

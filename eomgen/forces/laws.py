@@ -9,6 +9,7 @@ from ..elements.dimensions import ENERGY, LENGTH, NONE, PUSH, RATE, SPIN, Dimens
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field, Fields
+from ..elements.looks import LAW_BOX, LAW_RING, Seen
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.substitute import substitute
@@ -45,6 +46,10 @@ class GeneralElement(Force):
 
     def along(self, value: Expr, rate: Expr) -> Expr:
         return self._at(value, rate, self.law - gradient(self.energy, [self.value])[0])
+
+    def drawn(self) -> list[Seen]:
+        seen = self.path.drawn(LAW_BOX, LAW_RING)
+        return [seen._replace(along=()) if seen.coordinate else seen]  # a slide's own symbol says that it moves
 
     def loads(self, view: View) -> list[Load]:
         return self.path.loads(view, self.along(*self.path.measure(view)))

@@ -1,4 +1,4 @@
-"""Limits: parameters that measured motions tell."""
+"""Limits of the identification: which parameters the measured motions determine."""
 
 from __future__ import annotations
 

@@ -240,6 +240,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "redundant_rows": [i for i in range(len(c.labels)) if i not in rows],
         "q_reference": list(mobility.q_reference),
         "initial": _numbers(kinematics, "initial"),
+        **({"initial_outputs": _numbers(kinematics, "initial_outputs")} if m.initial_outputs else {}),
         "guess": _numbers(kinematics, "guess"),
         "length_scale": mobility.length_scale,
         **({} if m.limits_told else {"limits_told": False}),

@@ -28,18 +28,11 @@ def equations_html(equations: Readable) -> str:
     """Formulas of the equations of motion."""
     printed = PrintedEquations(equations)
     if equations.mobility.n_dof == 0:
-<<<<<<< HEAD
         still = "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
         return "".join([still, *_states(printed)])
     motion = parts_html(PrintedParts(printed)) if printed.is_long else [*_motion(printed), *_intermediates(printed)]
-    return "".join([*motion, *_states(printed)])
-=======
-        return "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
-    whole = "".join(
-        parts_html(PrintedParts(printed)) if printed.is_long else [*_motion(printed), *_intermediates(printed)]
-    )
-    return whole + (f"<p {LEFT}>{told}</p>" if (told := printed.told_of_numbers) else "")
->>>>>>> w/read15
+    told = f"<p {LEFT}>{printed.told_of_numbers}</p>" if printed.told_of_numbers else ""
+    return "".join([*motion, *_states(printed), told])
 
 
 def facts_html(equations: Readable) -> str:

@@ -18,12 +18,9 @@ def latex_lines(equations: Readable) -> list[str]:
         lines = [*_parts(PrintedParts(printed))]
     else:
         lines = [*_motion(printed), *(_broken(printed, printed.names.latex(n), x) for n, x in printed.intermediates)]
-<<<<<<< HEAD
     lines += [_broken(printed, latex(rate, printed.names), x) for rate, x in printed.states]
-=======
     if told := printed.told_of_numbers:
         lines.append(rf"\text{{{told.replace('_', chr(92) + '_')}}}")
->>>>>>> w/read15
     values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
     return [*lines, rf"\text{{with }} {values}"] if values else lines
 

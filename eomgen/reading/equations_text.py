@@ -56,14 +56,11 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
             where = "eqs.tree_system" if printed.of_loops else "eqs.mass_matrix, eqs.force, eqs.intermediates"
             rest = f"... and {len(shown) - lines} lines more: {where}"
             found += [rest, "or in a shell: eomgen derive MODEL --format text"]
-<<<<<<< HEAD
+        if told := printed.told_of_numbers:
+            found += ["", *fold(told, columns, "", "  ")]
     if printed.states:
         found += ["", "first-order states"]
         found += [x for a, f in printed.states for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
-=======
-        if told := printed.told_of_numbers:
-            found += ["", *fold(told, columns, "", "  ")]
->>>>>>> w/read15
     found += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
     return "\n".join(found)
 

@@ -194,7 +194,8 @@ class Assembled:
 
 def initial_of(kernels: Kernels, t: float, names: Iterable[str]) -> Initial:
     """The assembly of a model to values of these names; outputs and places of markers may be among them."""
-    if not any("(" in name or name in kernels.layout.y for name in without_dots(dict.fromkeys(map(str, names)))):
+    names = [*map(str, names), *kernels.layout.metadata.get("initial_outputs", ())]
+    if not any("(" in name or name in kernels.layout.y for name in without_dots(dict.fromkeys(names))):
         return Initial(kernels, t)
     from .wanted_outputs import WantedInitial
 

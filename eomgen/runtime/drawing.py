@@ -1,7 +1,4 @@
-"""Stage runtime, pictures: calls of a module that draw -> :mod:`eomgen.show`, loaded when asked for.
-
-A generated package has no copy of that: its pictures need eomgen beside it.
-"""
+"""Stage runtime, pictures: calls of a module that draw -> :mod:`eomgen.show`, loaded when asked for."""
 
 from __future__ import annotations
 
@@ -57,7 +54,7 @@ def draw(
     AssemblyError
         The loops do not close with these values.
     """
-    return load_show("draw", "draw").draw(model, x, ax, t=t, names=names, axes=axes)
+    return load_show("draw").draw(model, x, ax, t=t, names=names, axes=axes)
 
 
 def explore(model: BoundModel, /, x: Any = None) -> Any:
@@ -82,8 +79,8 @@ def explore(model: BoundModel, /, x: Any = None) -> Any:
     UsageError
         The model has no bodies, or x does not fit.
     """
-    start = load_show("draw", "explore").position(model, x, 0.0)
-    return load_show("explore", "explore").explore(model, start)
+    start = load_show("draw").position(model, x, 0.0)
+    return load_show("explore").explore(model, start)
 
 
 def draw_branches(
@@ -109,4 +106,4 @@ def draw_branches(
     array of matplotlib Axes
         In the order of ``module.branches``.
     """
-    return load_show("draw", "draw_branches").draw_branches(model, values, t=t, names=names, named=named)
+    return load_show("draw").draw_branches(model, values, t=t, names=names, named=named)

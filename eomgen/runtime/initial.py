@@ -176,19 +176,23 @@ class Initial:
                 return self.system.close(start, held, restarts=0).q
         return self.system.close(start, {}).q
 
-    def branches(self, given: Mapping[str, float], first: Array, tries: int = 60) -> list[Array]:
-        """Every position found that holds the given values and, if they leave freedom, further ones of `first`."""
+    def branches(self, given: Mapping[str, float], first: Array, tries: int = 60, many: int = 16) -> list[Array]:
+        """Every position found that holds the given values and, if they leave freedom, further ones of `first`.
+
+        Each is searched around too, until there are more than `many`.
+        """
         layout, found = self.layout, [first]
-        here = dict(zip(layout.q, first.tolist(), strict=True))
-        favoured = [n for i in layout.independent if (n := layout.velocity_labels[i]) in here]
+        there = dict(zip(layout.q, first.tolist(), strict=True))
+        favoured = [n for i in layout.independent if (n := layout.velocity_labels[i]) in there]
         rest = {} if given else self.sort(layout.initial).positions
-        more = self.compatible(first, given, rest | {n: here[n] for n in (*favoured, *layout.q)})
+        more = self.compatible(first, given, rest | {n: there[n] for n in (*favoured, *layout.q)})
         room = max(layout.n_q - layout.n_h - len(given), 0)  # a singular position seems to have more freedom
         system = self.system.closure({**given, **dict([*more.items()][:room])})
-        for start in starts(first, system.free, self.place, tries):
-            q, residual = close(system, start)
-            if closed(residual) and self.system.aligned(q) and all(self._apart(q, other) for other in found):
-                found.append(q)
+        for here in found:  # which grows: the legs of a platform flip one by one
+            for start in starts(here, system.free, self.place, tries if len(found) <= many or here is first else 0):
+                q, residual = close(system, start)
+                if closed(residual) and self.system.aligned(q) and all(self._apart(q, other) for other in found):
+                    found.append(q)
         return found
 
     def _apart(self, a: Array, b: Array) -> bool:

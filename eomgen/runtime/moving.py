@@ -52,7 +52,7 @@ def poses(trajectory: Any, model: BoundModel | None = None) -> Array:
 def position(trajectory: Any, name: str, model: BoundModel | None = None) -> Array:
     """See :meth:`.trajectory.Trajectory.position`."""
     module = module_of(trajectory, model, "position")
-    data = load_show("data", "position").read_picture(module.metadata, module.p)
+    data = load_show("data").read_picture(module.metadata, module.p)
     every = poses(trajectory, module)
     if name in data.markers:
         frame = data.markers[name]
@@ -69,7 +69,7 @@ def position(trajectory: Any, name: str, model: BoundModel | None = None) -> Arr
 def animate(trajectory: Any, file: Path | str | None, model: BoundModel | None, options: dict[str, Any]) -> Any:
     """See :meth:`.trajectory.Trajectory.animate`."""
     module = module_of(trajectory, model, "an animation")
-    show = load_show("animate", "an animation")
+    show = load_show("animate")
     return show.animate(
         trajectory,
         module,

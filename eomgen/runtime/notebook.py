@@ -32,7 +32,7 @@ def mechanism_html(module: BoundModel) -> str:
     """A small picture of the mechanism at its declared initial position; nothing without bodies."""
     if module.metadata.get("picture") is None:
         return ""
-    return picture_html(lambda: load_show("draw", "a picture").small_figure(module))
+    return picture_html(lambda: load_show("draw").small_figure(module))
 
 
 def _quantities(module: BoundModel) -> str:

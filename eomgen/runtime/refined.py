@@ -13,14 +13,18 @@ if TYPE_CHECKING:
     from .columns import Columns
 
 FINE = 1000  #: points of a smooth curve, about
+#: Error of the trapezoidal rule, in sizes of its terms, above which points are too far apart for a curve.  For a sine
+#: it is 0.05 at most over one radian and 0.22 over two; beyond that a curve is a guess.
+APART = 0.5
 ENERGIES = ("T", "V", "energy")  #: columns of every run, unless the model has these names for its own
 
 
 def cubic_between(t: Array, x: Array, slopes: Array | None, times: Array) -> Array:
     """States (n, k) at times (k,) within a run: cubics through the states and slopes of its steps.
 
-    Without slopes straight lines.  Where a time stands twice, as at an event that resets the state, the second state
-    begins the next piece.
+    Without slopes straight lines, and likewise where the slopes say nothing of what is between two points that are far
+    apart (``t_eval=[0, 60]``): where they are not those of a curve from one state to the other.  Where a time stands
+    twice, as at an event that resets the state, the second state begins the next piece.
 
     Parameters
     ----------
@@ -39,7 +43,10 @@ def cubic_between(t: Array, x: Array, slopes: Array | None, times: Array) -> Arr
     # Hermite's basis on [0, 1]
     start, end = (1.0 + 2.0 * s) * (1.0 - s) ** 2, s * s * (3.0 - 2.0 * s)
     cubic: Array = start * x[:, k] + end * x[:, k + 1]
-    return cubic + h * (s * (1.0 - s) ** 2 * slopes[:, k] - s * s * (1.0 - s) * slopes[:, k + 1])
+    cubic += h * (s * (1.0 - s) ** 2 * slopes[:, k] - s * s * (1.0 - s) * slopes[:, k + 1])
+    gone, told = x[:, k + 1] - x[:, k], 0.5 * h * (slopes[:, k] + slopes[:, k + 1])
+    far = abs(gone - told) > APART * (abs(gone) + 0.5 * abs(h) * (abs(slopes[:, k]) + abs(slopes[:, k + 1])))
+    return np.where(far, x[:, k] + s * gone, cubic)
 
 
 def states_at(trajectory: Any, module: BoundModel, times: Array) -> tuple[Array, Array | None]:

@@ -7,6 +7,7 @@ velocities, such as ``vx(rod.tip)``, of the velocities.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +40,7 @@ class WantedRate(NamedTuple):
 
 
 class WantedInitial(Initial):
-    """Assembly that can also hold the outputs and places of markers among some names.
+    """Assembly that can also hold the outputs and places of markers among some names, and the outputs declared.
 
     Parameters
     ----------
@@ -56,7 +57,10 @@ class WantedInitial(Initial):
 
     def __init__(self, kernels: Kernels, t: float, names: Iterable[str]) -> None:
         super().__init__(kernels, t)
-        found = [one for one in (find_wanted(kernels, name, t) for name in names) if one is not None]
+        self.layout = copy(kernels.layout)
+        self.layout.initial = declared_values(kernels.layout)
+        wanted = dict.fromkeys([*names, *self.layout.initial])
+        found = [one for one in (find_wanted(kernels, name, t) for name in wanted) if one is not None]
         self.wanted_rates = {one.name: one for one in found if isinstance(one, WantedRate)}
         positions = [one for one in found if isinstance(one, WantedPosition)]
         self.wanted_positions = frozenset(one.name for one in positions)
@@ -79,6 +83,11 @@ class WantedInitial(Initial):
             return super().gradients(q, name)
         row, _, scale = self.rate_equation(q, name)
         return [row * self.scales.q / scale]
+
+
+def declared_values(layout: Layout) -> dict[str, float]:
+    """All declared initial values, outputs included."""
+    return {**layout.initial, **layout.metadata.get("initial_outputs", {})}
 
 
 def find_wanted(kernels: Kernels, name: str, t: float) -> WantedPosition | WantedRate | None:
@@ -144,7 +153,7 @@ def _scale(layout: Layout, unit: str, slopes: Array) -> float:
 
 def _place(kernels: Kernels, name: str, marker: str, axis: int) -> WantedPosition:
     layout, poses = kernels.layout, kernels.state("poses")
-    data = load_show("data", "initial values at markers").read_picture(layout.metadata, kernels.context.p)
+    data = load_show("data").read_picture(layout.metadata, kernels.context.p)
     if marker not in data.markers:
         raise unknown("marker", marker, data.markers)
     frame = data.markers[marker]

@@ -11,10 +11,11 @@ from .colors import color_of, style_of
 from .data import Array
 from .flat import joined_limits
 from .label_places import NAME_STYLE, NAMES, name_offsets
+from .plane import page_axes
 from .scene import Item, Scene, passed
 from .solids import Triangles
 
-ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees)
+ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees), from the axis that runs to the right
 ZOOM = 0.88  #: leaves room for the names of the axes
 IN_FRONT = 1e6  #: place of names over solids, of which each has a place of its own
 
@@ -33,10 +34,11 @@ class Axes3DPicture:
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
         self.scene, self.ax = scene, ax
-        vertical = int(np.argmax(np.abs(scene.up)))
+        vertical, right = page_axes(scene.up)
+        depth = 3 - vertical - right
         limits = [(scene.low[k], scene.high[k]) for k in range(3)]
         if scene.up[vertical] < 0.0:  # two axes are turned round, so that right hands stay right
-            for k in (vertical, (vertical + 1) % 3):
+            for k in (vertical, depth):
                 limits[k] = limits[k][::-1]
         limits = joined_limits(ax, "xyz", limits)
         self.artists: list[tuple[Item, Any, Triangles | None]] = []
@@ -58,13 +60,15 @@ class Axes3DPicture:
             collection.set_edgecolor("none")
             ax.add_collection3d(collection)
             self.artists.append((item, collection, item.faces))
+        # matplotlib counts azimuths from the axis after the vertical one
+        azimuth = AZIMUTH if right == (vertical + 1) % 3 else 90.0 + AZIMUTH
+        ax.view_init(ELEVATION, azimuth, vertical_axis="xyz"[vertical])  # first: the shape of the box is set for it
         ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
         ax.set_box_aspect(np.abs(np.diff(limits)[:, 0]), zoom=ZOOM)
         ax.set_xlabel("x (m)", fontsize=8)
         ax.set_ylabel("y (m)", fontsize=8)
         ax.set_zlabel("z (m)", fontsize=8)
         ax.tick_params(labelsize=7)
-        ax.view_init(ELEVATION, AZIMUTH, vertical_axis="xyz"[vertical])
         ax.locator_params(nbins=5)
         self.labels = self._names()
 

@@ -12,6 +12,7 @@ import numpy as np
 from .colors import color_of, style_of
 from .data import Array
 from .optional import k3d
+from .plane import page_axes
 from .player import WIDE, player_html, player_script
 from .scene import Item, Scene
 from .shown_motion import ShownMotion
@@ -55,9 +56,9 @@ def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 60
         reach = float(max(span[1], WIDE * span[0])) * 1.75
     else:
         up = scene.up
-        side = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
-        other = np.cross(up, side)
-        toward = 0.75 * side + 0.45 * other + 0.4 * up
+        depth = np.cross(np.eye(3)[page_axes(up)[1]], up)
+        depth = depth / np.linalg.norm(depth)
+        toward = 0.75 * depth + 0.45 * np.cross(up, depth) + 0.4 * up
         toward = toward / np.linalg.norm(toward)
         reach = float(np.linalg.norm(span)) * 1.7
     plot.camera = [*(middle + reach * toward), *middle, *up]

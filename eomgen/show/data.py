@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..graph.core import Expr, Graph
-from ..graph.evaluate import compile_evaluator
-from ..operations import OPERATIONS
+from ..operations.table import OPERATIONS
 
 Array = NDArray[np.float64]
 GROUND = -1
@@ -72,19 +70,8 @@ def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData
             else "it was compiled by an earlier version of eomgen; compile it again"
         )
         raise UsageError(f"there is nothing to draw of model {metadata['name']!r}: {why}")
-    code, numbers, out = data["tape"]
-    graph = Graph()
-    nodes: list[Expr] = []
-    for kind, a, b, c in code:
-        if kind == "const":
-            nodes.append(graph.constant(numbers[a]))
-        elif kind in ("p", "s"):
-            nodes.append(graph.symbol(f"{kind}{a}"))
-        else:
-            nodes.append(graph.apply(kind, *(nodes[k] for k in (a, b, c)[: OPERATIONS[kind].arity])))
-    names = [*(f"p{k}" for k in range(len(p))), "s0", "s1"]
-    every = compile_evaluator([nodes[k] for k in out], names) if out else None
-    values = [] if every is None else [float(x) for x in every([*map(float, p), 0.0, 0.0])]
+    tape = data["tape"]
+    values = [float(x) for x in _evaluate(tape, p, 0.0, 0.0)]
 
     def plain(x: Any) -> Any:
         if isinstance(x, dict):
@@ -104,8 +91,7 @@ def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData
                     at = np.linspace(x["low"], x["high"], len(x["samples"]))
                     found[:, axis] = np.interp(s0, at, x["samples"])
                 elif isinstance(x, dict):
-                    evaluate = compile_evaluator([nodes[out[x["at"]]]], names)
-                    found[:, axis] = evaluate([*map(float, p), s0, s1])[0]
+                    found[:, axis] = _evaluate(tape, p, s0, s1)[x["at"]]
                 else:
                     found[:, axis] = x
             return found
@@ -156,3 +142,19 @@ def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData
         elements,
         frozenset(data["hidden"]),
     )
+
+
+def _evaluate(tape: Sequence[Any], p: Sequence[float], s0: Any, s1: Any) -> list[Any]:
+    """The values of a tape: parameters p, and numbers or arrays of what runs along curves and surfaces."""
+    code, numbers, out = tape
+    runs, values = (s0, s1), list[Any]()
+    with np.errstate(all="ignore"):
+        for kind, a, b, c in code:
+            if kind == "const":
+                values.append(numbers[a])
+            elif kind in ("p", "s"):
+                values.append(float(p[a]) if kind == "p" else runs[a])
+            else:
+                row = OPERATIONS[kind]
+                values.append(row.array(*(values[k] for k in (a, b, c)[: row.arity])))
+    return [values[k] for k in out]

@@ -47,7 +47,7 @@ class Frames:
         grid = figure.add_gridspec(2 if curves else 1, 1, height_ratios=[height, below] if curves else [1])
         spatial = {} if scene.view is not None else {"projection": "3d"}
         frames = cls(figure, motion)
-        letters = len(f"{scene.name}  {motion.words[0]}   {scene.note}")
+        letters = len(f"{scene.name}  {motion.words[0]}{motion.pace}   {scene.note}")
         note = f"{'   ' if LETTER * letters < width else chr(10)}{scene.note}" if scene.note else ""
         frames.add_scene(scene, figure.add_subplot(grid[0], **spatial), f"{scene.name}  {{}}{note}")
         if curves:
@@ -62,7 +62,7 @@ class Frames:
 
         def update(k: int) -> None:
             artist.show(k)
-            above.set_text(title.replace("{}", self.motion.words[k]))
+            above.set_text(title.replace("{}", self.motion.words[k] + self.motion.pace))
 
         self.updates.append(update)
         self.titles.append(above)

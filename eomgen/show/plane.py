@@ -71,3 +71,9 @@ def _page(normal: Array, gravity: Array) -> Array:
     if right[int(np.argmax(np.abs(right)))] < 0.0:
         right = -right
     return np.array([right, up, np.cross(right, up)])
+
+
+def page_axes(up: Array) -> tuple[int, int]:
+    """Of a picture in space: the axis that is nearest to the vertical, and the one that runs to the right."""
+    vertical = int(np.argmax(np.abs(up)))
+    return vertical, 1 if vertical == 0 else 0

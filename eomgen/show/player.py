@@ -88,7 +88,10 @@ def player_html(motion: ShownMotion, curves: Sequence[Any], title: str) -> str:
     """Style and elements, to stand at the beginning of a page's body."""
     plot = curves_html(motion, curves) if curves else ""
     below = BAR + (PLOT if curves else 0)
-    speeds = "".join(f'<option value="{s}"{" selected" if s == 1.0 else ""}>x{s:g}</option>' for s in SPEEDS)
+    # the values are seconds of the animation in one of the clock; what is read: seconds of the mechanism in one of it
+    speeds = "".join(
+        f'<option value="{s}"{" selected" if s == 1.0 else ""}>x{s * motion.speed:.2g}</option>' for s in SPEEDS
+    )
     clock = motion.clock
     return f"""<style>
 #canvasTarget {{ height: calc(100% - {below}px) !important; top: 0; }}
@@ -100,7 +103,8 @@ def player_html(motion: ShownMotion, curves: Sequence[Any], title: str) -> str:
 #curves img {{ height: 100%; }}
 #missing {{ position: fixed; top: 40%; left: 10%; right: 10%; font: 16px sans-serif; text-align: center; z-index: 6; }}
 #cursor {{ position: absolute; top: 2%; bottom: 20%; width: 1px; background: #333; }}
-#title {{ position: fixed; left: 14px; top: 10px; font: 15px sans-serif; z-index: 5; pointer-events: none; }}
+#title {{ position: fixed; left: 14px; top: 10px; font: 15px sans-serif; white-space: pre; z-index: 5;
+  pointer-events: none; }}
 </style>
 <div id="title">{escape(title)}</div>{plot}
 <script>(function () {{
@@ -112,7 +116,7 @@ def player_html(motion: ShownMotion, curves: Sequence[Any], title: str) -> str:
 }})();</script>
 <div id="player"><button id="play" title="play or pause">&#10074;&#10074;</button>
 <input id="time" type="range" min="0" max="{float(clock[-1])!r}" step="any" value="0" aria-label="time">
-<span id="words"></span><select id="speed" title="speed">{speeds}</select></div>
+<span id="words"></span><select id="speed" title="speed; x1 is that of the mechanism">{speeds}</select></div>
 """
 
 

@@ -37,7 +37,7 @@ class ShownMotion(NamedTuple):
         Seconds of the run in one of the animation.
     fps : float
     words : list of str
-        What is written above each frame.
+        What is written above each frame: its time, or the coordinate that is led.
     over : (k,) array
         Time, or the coordinate that is led where time stands still.
     across : str
@@ -52,6 +52,11 @@ class ShownMotion(NamedTuple):
     words: list[str]
     over: Array
     across: str = TIME
+
+    @property
+    def pace(self) -> str:
+        """What is written beside the time of a film that runs slower or faster than the mechanism."""
+        return "" if abs(self.speed - 1.0) < ROUNDED else f"  x{self.speed:.2g}"
 
     @property
     def clock(self) -> Array:
@@ -92,9 +97,8 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
             f"{span * fps / FRAMES:.3g} or more, a lower fps, or a shorter run"
         )
     times = np.linspace(start, end, max(count, 2))
-    slow = "" if abs(speed - 1.0) < ROUNDED else f"  x{speed:.2g}"
     digits = max(2, 2 - int(np.floor(np.log10(span))))
-    return ShownMotion(times, *states(times), speed, fps, [f"t = {now:.{digits}f} s{slow}" for now in times], times)
+    return ShownMotion(times, *states(times), speed, fps, [f"t = {now:.{digits}f} s" for now in times], times)
 
 
 def moving_scene(module: Any, motion: ShownMotion, names: bool | None, axes: bool, trace: Sequence[str]) -> Scene:

@@ -37,7 +37,7 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     if isinstance(span, str) or (pair is not None and not pair.ndim):
         return 0.0, read_value("the end of the span", span)
     if pair is None or pair.shape != (2,) or not np.isfinite(pair).all():
-        raise UsageError(f"span must be (start, end) in seconds, not {shown(span)}")
+        raise UsageError(f"span must be (start, end) in seconds, not {shown(span)}; t_eval= chooses times to keep")
     return float(pair[0]), float(pair[1])
 
 

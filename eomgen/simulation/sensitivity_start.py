@@ -83,7 +83,8 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
     layout = module.layout
     initial = Initial(module.kernels, t)
     q, found = x[: layout.n_q], []
-    if outputs := [name for name in given or () if name in layout.y or place_of_marker(name)]:
+    starts = [*(given or ()), *layout.metadata.get("initial_outputs", ())]
+    if outputs := [name for name in starts if (name in layout.y and name not in layout.x) or place_of_marker(name)]:
         raise UsageError(
             f"derivatives need a start with held coordinates and rates, not {', '.join(outputs)}; give the "
             "coordinates that x0(...) finds for it"

@@ -86,7 +86,7 @@ def _record(module: BoundModel, call: str, case: Case, number: int) -> dict[str,
 
 
 def _nudge(values: Array, rng: np.random.Generator) -> Array:
-    """The same numbers a few roundings away, relative to the largest."""
+    """The numbers with errors of a few roundings added, relative to the largest number."""
     return np.asarray(values + 4.0 * EPS * rng.uniform(-1.0, 1.0, values.shape) * np.abs(values).max(initial=0.0))
 
 

@@ -167,7 +167,7 @@ BROKEN = [
     ("stiffness: 200", "stiffnes: 200", 22, "forces.k1.stiffnes", "unknown key", "did you mean 'stiffness'?"),
     ("independent: [theta]", "independent: [tetha]", 24, "independent[0]", "no coordinate 'tetha'", "'theta'"),
     ("independent: [theta]", "independent: [theta, theta]", 24, "independent[1]", "named twice", "once"),
-    ("theta_dot: 10", "thetadot: 10", 25, "initial.thetadot", "no coordinate or velocity", "'theta_dot'"),
+    ("theta_dot: 10", "thetadot: 10", 25, "initial.thetadot", "no coordinate, velocity or output", "'theta_dot'"),
     ("theta_dot: 10", "theta_dot: q", 25, "initial.theta_dot", "unknown name 'q'", ""),
     ("end: 5", "end: -5", 26, "simulation.end", "-5 is not a number greater than 0", ""),
     ("method: DOP853", "method: DOP85", 26, "simulation.method", "'DOP85' is not known", "did you mean 'DOP853'?"),

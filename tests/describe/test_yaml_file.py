@@ -156,5 +156,5 @@ def test_a_file_needs_no_sympy(slider_crank_text: str, write) -> None:
     )
     first, second, third = result.stdout.splitlines()
     assert first == "slider_crank ('theta',) True"
-    assert second.startswith(f"{path}:25: initial.oops: no coordinate or velocity 'oops'")
+    assert second.startswith(f"{path}:25: initial.oops: no coordinate, velocity or output 'oops'")
     assert third == "False"

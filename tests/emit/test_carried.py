@@ -9,10 +9,13 @@ import sys
 from pathlib import Path
 
 import models
+import numpy as np
 import pytest
 
-from eomgen.api.module import CALLS
+import eomgen as eg
+from eomgen.api.module import CALLS, FORMS
 from eomgen.generation import generate
+from eomgen.runtime.show_parts import PARTS
 
 GENERATED = {"__init__.py", "__init__.pyi", "_core.py", "selftest.py", "setup.py"}
 
@@ -30,7 +33,10 @@ def imports_of(folder: Path, file: Path) -> set[Path]:
                 inner = (home / one.name).with_suffix(".py")
                 found.add(inner if inner.is_file() else home.with_suffix(".py"))
     if file == folder / "api/module.py":
-        found |= {folder.joinpath(*home.split(".")).with_suffix(".py") for home in CALLS.values()}
+        homes = (*CALLS.values(), *FORMS.values())
+        found |= {folder.joinpath(*home.split(".")).with_suffix(".py") for home in homes}
+    if file == folder / "runtime/show_parts.py":
+        found |= {folder.joinpath(*home.split(".")).with_suffix(".py") for home in PARTS.values()}
     return {one for one in found if one.is_file()}
 
 
@@ -76,3 +82,49 @@ def test_every_file_and_call_is_there_without_eomgen(tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 100
+
+
+DRAWS = """
+import sys
+sys.modules["eomgen"] = sys.modules["sympy"] = None
+import matplotlib
+matplotlib.use("agg")
+import slider_crank as package
+ax = package.draw({"theta": 1.0})
+ax.figure.savefig("alone.png")
+assert len(package.draw_branches()) == 2
+run = package.simulate(0.1)
+run.animate("alone.gif", fps=20, dpi=40, trace="rod.tip", plot="theta")
+print(package.x0({"x(rod.tip)": 0.42})[2], len(str(run.animate())))
+"""
+
+
+def test_a_package_draws_and_animates_without_eomgen(tmp_path: Path) -> None:
+    """The same picture as eomgen's, dot by dot."""
+    import matplotlib.pyplot as plt
+
+    generate(models.build("slider_crank"), tmp_path, target="numpy")
+    done = subprocess.run([sys.executable, "-c", DRAWS], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    place, size = done.stdout.split()
+    assert float(place) == pytest.approx(0.42)
+    assert int(size) > 1e6
+    ax = models.build("slider_crank").compile(target="numpy").draw({"theta": 1.0})
+    ax.figure.savefig(tmp_path / "here.png")
+    np.testing.assert_array_equal(plt.imread(tmp_path / "here.png"), plt.imread(tmp_path / "alone.png"))
+    plt.close("all")
+    assert (tmp_path / "alone.gif").read_bytes()[:6] == b"GIF89a"
+
+
+@pytest.mark.parametrize(("example", "forms"), [("satellite", {"dae"}), ("pendulum", {"minimal", "dae"})])
+def test_a_package_lists_the_forms_that_it_has(example: str, forms: set[str], tmp_path: Path) -> None:
+    """A model turned by Euler parameters has no minimal form."""
+    folder = generate(eg.load_example(example), tmp_path, target="numpy")
+    listed = f"import {example} as one; print(*(name for name in one.__all__ if getattr(one, name) is not None))"
+    done = subprocess.run([sys.executable, "-c", listed], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    every = {"minimal", "canonical", "dae"}
+    assert every & set(done.stdout.split()) == forms
+    stub = (folder / "__init__.pyi").read_text()
+    assert {name for name in every if f"\n{name}: " in stub} == forms
+    assert "\nproject: Projection\n" in stub

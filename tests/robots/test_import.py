@@ -26,7 +26,10 @@ def values(model: Any, section: str) -> dict[str, Any]:
 
 
 def test_limits_and_shapes_travel_to_the_module_and_back(tmp_path: Path) -> None:
-    model = eg.load(ARM)
+    mesh = '<mesh filename="package://arm/meshes/forearm.stl"/>'
+    file = tmp_path / "arm.urdf"
+    file.write_text(ARM.read_text().replace('<box size="0.26 0.03 0.03"/>', mesh))
+    model = eg.load(file)
     module = model.compile(target="numpy", kernels=["mass_matrix"])
     assert module.limits["elbow"] == {"lower": -0.1, "upper": 2.6, "velocity": 3.0, "effort": 10.0}
     assert module.limits["yaw"] == {"velocity": 2.0, "effort": 20.0}

@@ -99,3 +99,21 @@ def test_mimics_are_tied(tmp_path: Path) -> None:
     mod = tied.compile(target="numpy")
     x = dict(zip(mod.x_names, mod.x0(ja=0.1, ja_dot=1.0), strict=True))
     assert (x["jb"], x["jb_dot"]) == (pytest.approx(-0.15), pytest.approx(-2.0))
+
+
+@pytest.mark.parametrize(
+    ("word", "told"),
+    [
+        ("limits: stop", "limits: 'stop' is an option of robot files"),
+        ("limits: stops", "limits: 'stops' is not known"),
+        ("check_inertia: maybe", "check_inertia: 'maybe' is not true or false, error, note or off"),
+    ],
+)
+def test_a_word_that_does_nothing_in_a_model_file_is_refused(word: str, told: str, tmp_path: Path) -> None:
+    file = tmp_path / "rod.yaml"
+    file.write_text(
+        f"name: rod\n{word}\nbodies: {{rod: {{mass: 1, inertia: {{zz: 1}}}}}}\n"
+        "joints: {A: {type: revolute, between: [ground, rod], limits: {lower: -1, upper: 1}}}\n"
+    )
+    with pytest.raises(eg.ModelError, match=told):
+        eg.load(file).check()

@@ -30,11 +30,22 @@ def run() -> Any:
     return eg.load(EXAMPLES / "slider_crank.yaml").compile(target="numpy").simulate(1.0)
 
 
-def pendulum(theta: float = 0.01, end: float = 8.0) -> Any:
+def pendulum(theta: float = 0.01, end: float = 8.0, **options: Any) -> Any:
     m = eg.Model("pendulum", gravity=(0, -9.81, 0))
     bob = m.body("bob", mass=1, com=(0, -1, 0))
     m.revolute("hinge", m.ground, bob, coordinate="theta")
-    return m.compile(target="numpy").simulate(end, initial={"theta": theta}, rtol=1e-10, atol=1e-12)
+    return m.compile(target="numpy").simulate(end, initial={"theta": theta}, rtol=1e-10, atol=1e-12, **options)
+
+
+@pytest.mark.parametrize(("times", "curved"), [([0.0, 60.0], False), (np.linspace(0.0, 8.0, 41), True)])
+def test_points_far_apart_are_joined_by_straight_lines(times: Any, curved: bool) -> None:
+    """A pendulum that swings every two seconds: of a minute between two points nothing is known."""
+    few = pendulum(0.5, times[-1], t_eval=times)
+    ax = few.plot("theta")
+    t, theta = ax.lines[0].get_data()
+    straight = np.interp(t, few.t, few["theta"])
+    assert (np.abs(theta - straight).max() > 0.02) == curved
+    assert np.abs(theta).max() <= 0.51
 
 
 def test_shape_against_shape_is_the_path_of_the_point(run: Any) -> None:

@@ -141,3 +141,58 @@ def test_an_output_is_one_of_velocities_wherever_it_begins(start: float) -> None
     if not start:
         with pytest.raises(AssemblyError):
             mod.x0(theta=0.0, rise=0.3)
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_a_model_declares_outputs_among_its_initial_values(target: str) -> None:
+    """Two links that reach a point: the elbow's angle is that of the triangle, on the side that the guess says."""
+    m = eg.Model("arm", gravity=(0, -9.81, 0))
+    upper, fore = (
+        m.body(name, mass=1, com=(0.2, 0, 0), inertia={"zz": 0.02}, markers={"end": (0.5, 0, 0)})
+        for name in ("upper", "fore")
+    )
+    m.revolute("A", m.ground, upper, coordinate="a")
+    m.revolute("B", upper.at(0.5, 0, 0), fore, coordinate="b")
+    m.output("tip_x", "x(fore.end)", unit="cm")
+    m.output("tip_y", "y(fore.end)")
+    m.output("speed", "vx(fore.end)")
+    m.guess(b=-0.5)
+    m.initial(tip_x=60, tip_y="0.6/2", speed=0.1)
+    mod = m.compile(target=target)
+    x = mod.x0()
+    assert mod.outputs(0.0, x) == pytest.approx([60.0, 0.3, 0.1], abs=1e-9)
+    assert x[1] == pytest.approx(-np.arccos((0.6**2 + 0.3**2 - 2 * 0.25) / (2 * 0.25)))
+    other = mod.x0(tip_x=50.0)  # the others stay
+    assert mod.outputs(0.0, other)[:2] == pytest.approx([50.0, 0.3], abs=1e-9)
+    turned = mod.x0(a=0.1)  # leaves room for the first alone
+    assert mod.outputs(0.0, turned)[0] == pytest.approx(60.0)
+    assert turned[0] == 0.1
+    assert mod.simulate(0.01)["tip_y"][0] == pytest.approx(0.3)
+    runs = mod.simulate_many((0, 0.01), inputs=None, parameters=None, initial={"speed": [0.0, 0.2]}, t_eval=[0.0])
+    assert runs["tip_x"][0] == pytest.approx([60.0, 60.0])
+    assert runs["speed"][0] == pytest.approx([0.0, 0.2])
+    with pytest.raises(UsageError, match="not tip_x, tip_y, speed; give the coordinates"):
+        mod.sensitivities(["m"], 0.1)
+
+
+def test_outputs_among_initial_values_are_read_and_verified(tmp_path: Path) -> None:
+    file = tmp_path / "pendulum.yaml"
+    file.write_text(PENDULUM.replace("INITIAL", "height: -0.6"))
+    m = eg.load(file)
+    assert m.compile(target="numpy").x0()[0] == pytest.approx(np.arccos(0.6))
+    again = tmp_path / "again.yaml"
+    m.save(again)
+    assert eg.load(again).compile(target="numpy").x0()[0] == pytest.approx(np.arccos(0.6))
+    file.write_text(PENDULUM.replace("INITIAL", "heigth: -0.6"))
+    with pytest.raises(eg.ModelError, match="no coordinate, velocity or output 'heigth'; did you mean 'height'"):
+        eg.load(file).check()
+
+
+PENDULUM = """
+name: pendulum
+bodies: {rod: {mass: 1, com: [0, -1, 0], inertia: {zz: 1}}}
+joints: {A: {type: revolute, between: [ground, rod], coordinate: phi}}
+outputs: {height: -cos(phi)}
+guess: {phi: 0.5}
+initial: {INITIAL}
+"""

@@ -160,6 +160,13 @@ def test_a_page_holds_all_it_needs(run: Any, tmp_path: Path) -> None:
     assert "<title>slider_crank</title>" in text
 
 
+def test_the_speeds_of_a_page_are_those_of_the_mechanism(module: Any) -> None:
+    text = str(module.simulate(0.3).animate(speed=0.25))
+    assert '<option value="1.0" selected>x0.25</option><option value="2.0">x0.5</option>' in text
+    assert "t = 0.000 s" in text
+    assert "s  x0.25" not in text
+
+
 @pytest.mark.needs("chromium")
 def test_a_page_plays_and_its_slider_moves_it_without_a_network(run: Any, tmp_path: Path) -> None:
     page = run.animate(tmp_path / "run.html", fps=10, trace="rod.tip", plot=["theta", "energy"], forces=True)

@@ -48,6 +48,7 @@ def test_model_module_report_and_run_show_themselves(model: Any, module: Any) ->
     assert "rhs(t, x)" in module._repr_html_()
     assert "<td>6</td>" in module._repr_html_()  # six states
     assert "0 .. 0.3 s" in run._repr_html_()
+    assert "markers pin; display cylinder<" in eg.load(EXAMPLES / "engine.yaml")._repr_html_()
 
 
 def test_an_ensemble_shows_its_columns_and_its_failures(module: Any) -> None:

@@ -130,6 +130,42 @@ def test_down_is_down() -> None:
     assert low > high
 
 
+@pytest.mark.parametrize("gravity", [(0, 0, -1), (0, -1, 0), (-1, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0)])
+def test_a_picture_in_space_has_one_scale_and_right_hands(gravity: tuple[int, int, int]) -> None:
+    """Seen without perspective, three equal axes at right angles give three columns with J J^T = s^2 I (Gauss)."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    m = eg.Model("flight", gravity=gravity)
+    body = m.body("body", mass=1, inertia=(1, 1, 1), display=[{"shape": "box", "size": (3, 1, 0.4)}])
+    m.free("fly", m.ground, body)
+    ax = m.compile(target="numpy").draw({"fly_x": 2.0, "fly_y": 0.5})
+    ax.set_proj_type("ortho")
+    ax.figure.canvas.draw()
+    low = np.array([ax.get_xlim3d()[0], ax.get_ylim3d()[0], ax.get_zlim3d()[0]])
+
+    def page(point: np.ndarray) -> np.ndarray:
+        return np.array(ax.transData.transform(proj_transform(*point, ax.get_proj())[:2]))
+
+    J = np.column_stack([page(low + step) - page(low) for step in np.eye(3)])
+    assert pytest.approx(np.eye(2), abs=1e-3) == 2.0 * J @ J.T / np.trace(J @ J.T)
+    up = -np.array(gravity, dtype=float)
+    assert J[1] @ up > 0.0  # what falls falls on the page
+    eye = np.cross(J[0], J[1])  # of right hands: right x up points at the reader
+    assert eye @ up > 0.0  # from above
+    right = np.eye(3)[1 if gravity[0] else 0]
+    assert J[0] @ right > 0.5 * np.linalg.norm(J[0])
+
+
+def test_a_law_between_two_points_is_seen() -> None:
+    m = eg.Model("sling", gravity=(0, -9.81, 0))
+    arm = m.body("arm", mass=1, com=(0.5, 0, 0), inertia={"zz": 0.1})
+    m.revolute("A", m.ground, arm)
+    m.element("sling", m.ground.at(0, 1, 0), arm.at(1, 0, 0), law="-10*max(0, length - 0.5)")
+    [line] = [item.points for item in scene_of(m.compile(target="numpy")).items if item.role == "force"]
+    assert np.allclose(line[0], (0, 1, 0))
+    assert np.allclose(line[-1], (1, 0, 0))
+
+
 @pytest.mark.parametrize("name", sorted(file.name for file in EXAMPLES.glob("*.yaml")))
 def test_every_example_draws_all_bodies_in_the_page(name: str) -> None:
     module = compiled(name)

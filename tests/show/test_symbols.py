@@ -144,3 +144,15 @@ def test_pulleys_are_drawn_with_the_radii_that_are_given(crossed: bool, given: s
     discs = [points[:, :2] for points in lines(mod, "wheel", "belt", a=0.3) if np.isfinite(points).all()]
     for disc, centre, radius in zip(discs, ([0, 0], [0.4, 0]), (0.06, 0.1), strict=True):
         assert np.linalg.norm(disc - centre, axis=1).max() == pytest.approx(radius, rel=1e-9)
+
+
+def test_the_plane_of_a_contact_is_seen() -> None:
+    m = eg.Model("ball", gravity=(0, -9.81, 0))
+    ball = m.body("ball", mass=1, inertia={"zz": 0.01})
+    m.planar("fall", m.ground, ball, coordinates=["x", "y", "turn"])
+    m.sphere_plane("touch", m.ground.at(0.2, -0.1, 0, rpy=(-np.pi / 2, 0, 0)), ball, radius=0.1, stiffness=1e5)
+    plane, *_ = lines(m.compile(target="numpy"), "force", "touch", y=0.3)
+    np.testing.assert_allclose(plane[:, 1], -0.1, atol=1e-12)
+    assert np.ptp(plane[:, 0]) > 0.1
+    assert np.ptp(plane[:, 2]) > 0.1
+    assert (plane[:, 0].max() + plane[:, 0].min()) / 2 == pytest.approx(0.2)

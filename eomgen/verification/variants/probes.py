@@ -28,6 +28,9 @@ def with_probes(description: Description) -> tuple[Description, dict[str, str]]:
         for the model's own.
     """
     made, kinds = copied(description), dict[str, str]()
+    outputs = {entry.name for entry in made.sections["outputs"]} - {*kinds_of(made), *velocities_of(made)}
+    if initial := made.values.get("initial"):  # of outputs: they belong to runs, and have other names here
+        made.values["initial"] = {name: value for name, value in initial.items() if name not in outputs}
     for entry in made.sections["outputs"]:  # an output that bears a coordinate's name could be that coordinate only
         kinds[f"result_{entry.name}"] = "result"
         entry.name = f"result_{entry.name}"
