@@ -327,11 +327,11 @@ class Forcing:
             return np.asarray(found)
         u = np.repeat(self.base[:, None], len(t), axis=1)
         tables = {i: signal for i, signal in self.varying.items() if isinstance(signal, Tabulated)}
-        if len(self.varying) > len(tables):
-            for j in range(len(t)):
-                u[:, j] = self(float(t[j]), x[:, j])
+        for j in range(len(t) if len(self.varying) > len(tables) else 0):
+            u[:, j] = self(float(t[j]), x[:, j])
+        edges = None if self.span is None else _inside(*self.span)
         for i, signal in tables.items():
-            inner = t if self.span is None else np.clip(t, *_inside(*self.span))
+            inner = t if edges is None else np.clip(t, *edges)
             u[i] = signal(t) if isinstance(signal, Signal) else signal.beside(t, inner)
         return u
 
