@@ -201,9 +201,8 @@ class Trajectory:
         MissingDependencyError
             pandas is not installed.
         """
-        module = require("pandas", "pandas", "to_pandas")
-        data = {name: self[name] for name in names or self.names}
-        frame: pandas.DataFrame = module.DataFrame(data, index=module.Index(self.t, name="t"))
+        made = require("pandas", "pandas", "to_pandas").DataFrame
+        frame: pandas.DataFrame = made({name: self[name] for name in names or self.names}, self.t).rename_axis("t")
         frame.attrs = {"model": self.name, "units": dict(self.units)}
         return frame
 
