@@ -1,8 +1,8 @@
-"""Stage numeric: loops that did not close from a guess -> why: what is open, what contradicts, what is near."""
+"""Stage numeric: loops that did not close, velocities that cannot be -> why: what is open, contradicts, is near."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -118,3 +118,30 @@ class AssemblyFailure(NamedTuple):
         worst = np.argsort(-np.abs(e), kind="stable")[:3].tolist()
         order = [i for i in worst if not abs(e[i]) <= CONTRADICTION] or worst[:1]
         return [(labels[i], abs(float(found[i]))) for i in order]
+
+
+def describe_contradiction(
+    given: Mapping[str, float], e: Array, row_scales: Array, labels: Sequence[str], limit: float, J: Array
+) -> str:
+    """Why velocities cannot be assembled.
+
+    Parameters
+    ----------
+    given : mapping of str to float
+        The rates to be held.
+    e, row_scales, labels : (m,) arrays, sequence of str
+        Scaled residuals of the rows, their scales and names.
+    limit : float
+        Scaled residuals up to which rows are fulfilled.
+    J : array
+        Scaled Jacobian of the constraints.
+    """
+    order = [i for i in np.argsort(-np.abs(e), kind="stable")[:3] if not abs(e[i]) <= limit]
+    dof = J.shape[1] - rank(J).rank
+    where = ", ".join(f"{labels[i]} {abs(e[i] * row_scales[i]):.3g}/s" for i in order)
+    values = ", ".join(f"{name} = {value:.6g}" for name, value in given.items())
+    return (
+        f"{f'the given velocities {values}' if given else 'the driven constraints'} are inconsistent with {dof} "
+        f"degree{'s' if dof != 1 else ''} of freedom at this position: the largest residuals are {where}; give fewer "
+        "or other velocities"
+    )

@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError
+from ..errors import AssemblyError, UnavailableError
 from ..limits.constraints import CONTRADICTION, GIVEN
 from . import algebra
-from .ranks import rank
 from .scales import Array, Indices, Scales
 
 
@@ -97,16 +96,10 @@ def assemble_velocity(
         k = int(np.argmax(bad))
         one = None if equations is None else equations._replace(values=equations.values[:, k])
         return assemble_velocity(C_q, C_t, scales, v[:, k], held, one, names, labels)
-    velocity_names = names or [f"v[{i}]" for i in range(len(v))]
-    given = [f"{velocity_names[i]} = {v[i]:.6g}" for i in held]
-    if equations is not None:
-        given += [f"{name} = {value:.6g}" for name, value in zip(equations.names, equations.values, strict=True)]
-    gaps = e * row_scales
-    order = [i for i in np.argsort(-np.abs(e), kind="stable")[:3] if not abs(e[i]) <= CONTRADICTION * speed]
-    dof = len(v) - rank(scales.jacobian(C_q)).rank
-    where = ", ".join(f"{all_labels[i]} {abs(gaps[i]):.3g}/s" for i in order)
-    what = f"the given velocities {', '.join(given)}" if given else "the driven constraints"
-    raise AssemblyError(
-        f"{what} are inconsistent with {dof} degree{'s' if dof != 1 else ''} of freedom at this position: "
-        f"the largest residuals are {where}; give fewer or other velocities"
-    )
+    try:
+        from .assembly_failure import describe_contradiction
+    except UnavailableError:
+        raise AssemblyError("the given velocities are inconsistent with the constraints; give others") from None
+    given = {names[i] if names else f"v[{i}]": v[i] for i in held}
+    given |= {} if equations is None else dict(zip(equations.names, equations.values, strict=True))
+    raise AssemblyError(describe_contradiction(given, e, row_scales, all_labels, CONTRADICTION * speed, J[: len(C_t)]))

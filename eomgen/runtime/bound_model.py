@@ -18,7 +18,6 @@ from .argument_names import both_names
 from .assembled import Assembled
 from .kernels import Kernels, Projection, Rows
 from .layout import Layout
-from .mechanical import Mechanical
 from .momenta import Momenta
 from .refusals import Refusal
 from .room import read_numbers
@@ -85,7 +84,11 @@ class BoundModel(Assembled, Momenta):
         self.energy, self.poses = kernels.state("energy"), kernels.state("poses")
         self.project = Projection(kernels.state("project"))
         self.constraints = kernels.constraints
-        mechanical = kernels if not self.n_s else Mechanical(kernels)
+        mechanical: Any = kernels
+        if self.n_s:
+            from .mechanical import Mechanical
+
+            mechanical = Mechanical(kernels)
         self.mass_matrix, self.embedded_mass_matrix = mechanical.mass_matrix, mechanical.embedded_mass_matrix
         self.bias, self.inverse_dynamics = mechanical.bias, mechanical.inverse_dynamics
         self.constraint_jacobian = mechanical.constraint_jacobian
