@@ -7,24 +7,54 @@ called; the rest of a file goes.
 from __future__ import annotations
 
 import ast
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from .uses import Import, SourceText, Uses
 
 
 class Sources(dict[str, SourceText]):
-    """Files without their endings, each read when it is first needed."""
+    """Files without their endings, each read when it is first needed, and without statements that never run.
 
-    def __init__(self, texts: Mapping[str, str]) -> None:
+    Parameters
+    ----------
+    texts : mapping of str to str
+    left_out : collection of str
+        Files whose import raises an error, so that what follows it in its block does not run.
+    """
+
+    def __init__(self, texts: Mapping[str, str], left_out: Collection[str]) -> None:
         super().__init__()
         self.texts = {name.removesuffix(".py"): text for name, text in texts.items()}
+        self.left_out = left_out
 
     def __contains__(self, name: object) -> bool:
         return name in self.texts
 
     def __missing__(self, name: str) -> SourceText:
-        self[name] = found = SourceText(name, self.texts[name])
+        found = SourceText(name, self.texts[name])
+        if idle := list(self._idle(found)):
+            lines = found.text.splitlines()
+            for node in idle:
+                lines[node.lineno - 1 : node.end_lineno] = [""] * ((node.end_lineno or node.lineno) - node.lineno + 1)
+            found = SourceText(name, "\n".join(lines) + "\n")
+        self[name] = found
         return found
+
+    def _idle(self, source: SourceText) -> Iterator[ast.stmt]:
+        """Statements of functions that stand behind an import of a file that is left out."""
+        functions = (node for node in ast.walk(source.tree) if isinstance(node, ast.FunctionDef))
+        for block in (inner for node in functions for inner in ast.walk(node)):
+            for statements in (getattr(block, part, None) for part in ("body", "orelse")):
+                if isinstance(statements, list):
+                    end = next((k for k, node in enumerate(statements, 1) if self._ends(source, node)), None)
+                    yield from statements[end:] if end is not None else ()
+
+    def _ends(self, source: SourceText, node: ast.stmt) -> bool:
+        """Whether what follows a statement never runs."""
+        if isinstance(node, ast.Try):
+            leaving = all(isinstance(handler.body[-1], ast.Raise | ast.Return) for handler in node.handlers)
+            return leaving and not node.orelse and any(self._ends(source, one) for one in node.body)
+        return any(one.home in self.left_out for one in source.read(node))
 
 
 class Selection:
@@ -51,7 +81,7 @@ class Selection:
     """
 
     def __init__(self, texts: Mapping[str, str], left_out: Collection[str]) -> None:
-        self.sources = Sources(texts)
+        self.sources = Sources(texts, left_out)
         self.left_out = left_out
         self.files: set[str] = set()
         self.kept: set[tuple[str, str]] = set()
