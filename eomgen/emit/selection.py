@@ -11,6 +11,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from .uses import Import, SourceText, Uses
 
+#: In place of what ends a block that never comes so far.
+NOT_REACHED = "raise  # not reached"
+
 
 class Sources(dict[str, SourceText]):
     """Files without their endings, each read when it is first needed, and without statements that never run.
@@ -36,18 +39,24 @@ class Sources(dict[str, SourceText]):
             lines = found.text.splitlines()
             for node in idle:
                 lines[node.lineno - 1 : node.end_lineno] = [""] * ((node.end_lineno or node.lineno) - node.lineno + 1)
+                if isinstance(node, ast.Return | ast.Raise):  # so that type checkers miss no result
+                    lines[node.lineno - 1] = f"{' ' * node.col_offset}{NOT_REACHED}"
             found = SourceText(name, "\n".join(lines) + "\n")
         self[name] = found
         return found
 
     def _idle(self, source: SourceText) -> Iterator[ast.stmt]:
-        """Statements of functions that stand behind an import of a file that is left out."""
-        functions = (node for node in ast.walk(source.tree) if isinstance(node, ast.FunctionDef))
-        for block in (inner for node in functions for inner in ast.walk(node)):
+        """Statements of functions that stand behind an import of a file that is left out.
+
+        Those stay that give a value to what others use, which type checkers would miss.
+        """
+        functions = [node for node in ast.walk(source.tree) if isinstance(node, ast.FunctionDef)]
+        for function, block in ((node, inner) for node in functions for inner in ast.walk(node)):
             for statements in (getattr(block, part, None) for part in ("body", "orelse")):
                 if isinstance(statements, list):
-                    end = next((k for k, node in enumerate(statements, 1) if self._ends(source, node)), None)
-                    yield from statements[end:] if end is not None else ()
+                    end = next((k for k, node in enumerate(statements, 1) if self._ends(source, node)), len(statements))
+                    behind = [node for node in statements[end:] if not isinstance(node, ast.ImportFrom)]
+                    yield from () if _gives(function, behind) else behind
 
     def _ends(self, source: SourceText, node: ast.stmt) -> bool:
         """Whether what follows a statement never runs."""
@@ -199,3 +208,13 @@ class Selection:
             return True
         inner = f"{one.home}/{one.name}" if one.home else one.name
         return inner in self.files or (one.home, one.name) in self.kept
+
+
+def _gives(function: ast.FunctionDef, statements: list[ast.stmt]) -> bool:
+    """Whether statements of a function set an attribute, or a name that is read elsewhere in it."""
+    parts = [part for node in statements for part in ast.walk(node)]
+    stored = {part.id for part in parts if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)}
+    inside = set(map(id, parts))
+    read = (part for part in ast.walk(function) if isinstance(part, ast.Name) and id(part) not in inside)
+    attributes = any(isinstance(part, ast.Attribute) and isinstance(part.ctx, ast.Store) for part in parts)
+    return attributes or not stored.isdisjoint(part.id for part in read)

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..analysis.linear import output_derivatives
 from ..limits.identification import QUADRATURE
+from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.input_kinds import Expressed, Tabulated
 from ..runtime.signals import Forcing
@@ -31,7 +32,7 @@ POWERS = np.arange(1, 5)
 #: Of the tolerances of the run whose steps are taken: a law that bends within a step, such as smoothed friction, weighs
 #: more in the derivatives than in the run.
 TIGHTER = 0.1
-MATRIX = np.linalg.solve(
+MATRIX = algebra.solve(
     NODES[None, :] ** (POWERS[:, None] - 1), (NODES[None, :] ** POWERS[:, None]) / POWERS[:, None]
 ).T
 
@@ -135,7 +136,7 @@ def _linear(h: Array, J: Array, by: Array, start: Array) -> Array:
     system = -np.einsum("m,ij,mipq->mipjq", h, MATRIX, J).reshape(count, s * n, s * n)
     system[:, range(s * n), range(s * n)] += 1.0
     right = np.concatenate([J, by], axis=-1).reshape(count, s * n, -1)
-    K = np.linalg.solve(system, right).reshape(count, s, n, -1)
+    K = algebra.solve(system, right).reshape(count, s, n, -1)
     gain = h[:, None, None] * np.einsum("i,mipq->mpq", WEIGHTS, K)
     found = np.empty((count + 1, *start.shape))
     found[0] = start

@@ -72,26 +72,20 @@ def assemble_velocity(
     free = np.ones(len(v), dtype=bool)
     free[held] = False
     column = (slice(None), *[None] * (v.ndim - 1))
-    J, row_scales, offset = scales.jacobian(C_q), scales.c, C_t[column]
-    all_labels = list(labels) or [f"C[{i}]" for i in range(len(C_t))]
+    size, J, offset = scales.q[column], scales.jacobian(C_q), (C_t / scales.c)[column]
     if equations is not None:
         J = np.vstack([J, equations.y_q * scales.q / equations.scales[:, None]])
-        row_scales = np.concatenate([row_scales, equations.scales])
-        wanted = equations.y_t[column] - equations.values
+        wanted = (equations.y_t[column] - equations.values) / equations.scales[column]
         offset = np.concatenate([np.broadcast_to(offset, (len(C_t), *v.shape[1:])), wanted])
-        all_labels += list(equations.names)
-    size, row_size = scales.q[column], row_scales[column]
     inverse = algebra.pinv(J[:, free], rcond=GIVEN)
     for _ in range(2):
-        e = J @ (v / size) + offset / row_size
-        v[free] -= size[free] * (inverse @ e)
-    e = J @ (v / size) + offset / row_size
-    rates = np.concatenate([scales.moving(v), np.broadcast_to(offset / row_size, e.shape)])
-    worst = np.abs(e).max(axis=0, initial=0.0)
+        v[free] -= size[free] * (inverse @ (J @ (v / size) + offset))
+    e = J @ (v / size) + offset
+    rates = np.concatenate([scales.moving(v), np.broadcast_to(offset, e.shape)])
     speed = np.abs(rates).max(axis=0, initial=1.0)
-    bad = ~(worst <= CONTRADICTION * speed)
+    bad = ~(np.abs(e).max(axis=0, initial=0.0) <= CONTRADICTION * speed)
     if not bad.any():
-        return Rates(v, float(worst.max(initial=0.0)))
+        return Rates(v, float(np.abs(e).max(initial=0.0)))
     if v.ndim > 1:  # the first that cannot be says why
         k = int(np.argmax(bad))
         one = None if equations is None else equations._replace(values=equations.values[:, k])
@@ -101,5 +95,8 @@ def assemble_velocity(
     except UnavailableError:
         raise AssemblyError("the given velocities are inconsistent with the constraints; give others") from None
     given = {names[i] if names else f"v[{i}]": v[i] for i in held}
-    given |= {} if equations is None else dict(zip(equations.names, equations.values, strict=True))
+    row_scales, all_labels = scales.c, list(labels) or [f"C[{i}]" for i in range(len(C_t))]
+    if equations is not None:
+        given |= dict(zip(equations.names, equations.values, strict=True))
+        row_scales, all_labels = np.concatenate([row_scales, equations.scales]), [*all_labels, *equations.names]
     raise AssemblyError(describe_contradiction(given, e, row_scales, all_labels, CONTRADICTION * speed, J[: len(C_t)]))

@@ -76,8 +76,7 @@ class BoundModel(Assembled, Momenta):
         self.body_names, self.loop_names = layout.bodies, layout.loops
         self.n_q, self.n_v, self.n_s, self.n_x = layout.n_q, moving, len(layout.states), layout.n_x
         self.n_u, self.n_p, self.n_y, self.n_bodies = layout.n_u, layout.n_p, layout.n_y, layout.n_bodies
-        self.n_dof = layout.n_dof - self.n_s
-        self.n_c, self.n_rows = len(layout.rows), layout.n_c
+        self.n_dof, self.n_c, self.n_rows = layout.n_dof - self.n_s, len(layout.rows), layout.n_c
         jacobian: Any = kernels.timed("jacobian")
         self.rhs, self.jacobian, jacobian.others = kernels.timed("rhs"), jacobian, partial(getattr, self)
         self.outputs = kernels.timed("outputs")

@@ -54,8 +54,7 @@ class Layout:
         self.quaternion_slots: tuple[tuple[int, int], ...] = tuple(
             (int(i), int(j)) for i, j in data.get("quaternion_slots", ())
         )
-        #: first-order states, which are the last of the velocities
-        self.states: tuple[str, ...] = tuple(data.get("states", ()))
+        self.states: tuple[str, ...] = tuple(data.get("states", ()))  #: of first order, the last of the velocities
         self.n_states = len(self.states)
         self.moving = self.n_v - self.n_states  #: velocities of the mechanism
         self.space = Space.of(self.n_v, self.quaternion_slots, self.n_states)
@@ -97,8 +96,7 @@ class Layout:
         rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
         self.scales = Scales.of_kinds(self.velocity_kinds, rows, self.length, self.space)
         self.row_lengths = np.array([kind == "length" for kind in data.get("constraint_kinds", ())], dtype=bool)
-        #: independent velocities of the mechanism
-        self.independent_moving = self.independent[self.independent < self.moving]
+        self.independent_moving = self.independent[self.independent < self.moving]  #: of the mechanism
         #: coordinates of the independent velocities, where each is the rate of one
         self.independent_q = self.scales.coordinates(self.independent)
         #: the scales of coordinates and holonomic rows, where they are not those of the velocities

@@ -11,7 +11,6 @@ from ..errors import MissingDependencyError, UsageError
 from ..texts import shown
 
 _SHOWS = ("animate", "animation", "film", "gif", "movie", "play", "plot", "show", "video", "view")
-_SHOWN = "simulate(...) returns a run, which has animate() and plot(); a module has draw() and explore()"
 _PLACE = re.compile(r"([xyz])\((\w+(?:\.\w+)*)\)")
 
 
@@ -59,7 +58,8 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
     if (own := next((vars(base)[name] for base in type(one).__mro__ if name in vars(base)), None)) is not None:
         return own.__get__(one, type(one))
     public = sorted(n for n in {*dir(type(one)), *vars(one)} if not n.startswith("_"))
-    meant = _SHOWN if name in _SHOWS else _hint(name, public, len(public))
+    answer = "simulate(...) returns a run, which has animate() and plot(); a module has draw() and explore()"
+    meant = answer if name in _SHOWS else _hint(name, public, len(public))
     raise AttributeError(f"{kind} has no attribute {name!r}; {meant}", name=name)
 
 

@@ -17,13 +17,14 @@ import pytest
 import eomgen as eg
 from eomgen.api.module import CALLS
 from eomgen.emit.carried import _names as carried_names
+from eomgen.emit.selection import NOT_REACHED
 from eomgen.emit.slim import LEFT_OUT
 from eomgen.errors import UsageError
 from eomgen.generation import generate
 
 ROOT = Path(eg.__file__).parent
 #: Lines of Python, blank ones, comments and stubs included, setup.py and the numpy target's own equations apart.
-MOST = {"cython": 5369, "numpy": 6861}
+MOST = {"cython": 5414, "numpy": 6948}
 
 
 def bouncing() -> eg.Model:
@@ -224,7 +225,7 @@ def test_what_is_left_out_is_there_and_asked_for(package: Path) -> None:
     assert LEFT_OUT.keys() <= carried_names()
     refusals = {file for file in package.rglob("*.py") if "\nraise left_out(" in file.read_text()}
     asked = {str(file.relative_to(package).with_suffix("")) for file in refusals}
-    assert asked == LEFT_OUT.keys() | {"runtime/tapes"}  # the model declares no input over time
+    assert asked == LEFT_OUT.keys() | {"runtime/tapes", "runtime/mechanical"}  # no input over time, no states
     for file in package.rglob("*.py"):
         for home in re.findall(r"^from (\.[\w.]+) import", file.read_text(), re.M):
             up = len(home) - len(home.lstrip("."))
@@ -245,7 +246,8 @@ def headers(text: str) -> dict[str, set[int]]:
 
 
 def test_what_is_kept_is_the_text_of_eomgen(package: Path) -> None:
-    """Line by line; only imports and signatures are put together anew, and documentation is shortened."""
+    """Line by line; only imports and signatures are put together anew, documentation is shortened, and ends of blocks
+    that stand behind an import of what is left out are marked."""
     compared = signatures = 0
     for file in package.rglob("*.py"):
         original = ROOT / file.relative_to(package)
@@ -262,6 +264,7 @@ def test_what_is_kept_is_the_text_of_eomgen(package: Path) -> None:
         for line in lines:
             text = line.strip().removesuffix('"""').rstrip()
             fine = {text, f'{text}"""', line.strip()} & known or text.startswith(("from ", "import ")) or not text
+            fine = fine or text == NOT_REACHED
             assert fine, f"{file.name}: {line}"
             compared += 1
     assert compared > 3000
@@ -300,7 +303,7 @@ def test_names_hold_together(package: Path) -> None:
     command = [sys.executable, "-m", "mypy", "--config-file=", package.name]
     done = subprocess.run(command, cwd=package.parent, capture_output=True, text=True, timeout=120)
     assert "checked" in done.stdout
-    refused = [name.replace("/", ".") for name in (*LEFT_OUT, "runtime/tapes")]
+    refused = [name.replace("/", ".") for name in (*LEFT_OUT, "runtime/tapes", "runtime/mechanical")]
     for line in done.stdout.splitlines()[:-1]:
         named = re.search(r'Module "slider_crank\.([\w.]+)" has no attribute', line)
         parser = bool(re.search(r"slider_crank.runtime.(formulas|constant_texts)\b", line))
