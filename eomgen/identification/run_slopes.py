@@ -32,9 +32,7 @@ POWERS = np.arange(1, 5)
 #: Of the tolerances of the run whose steps are taken: a law that bends within a step, such as smoothed friction, weighs
 #: more in the derivatives than in the run.
 TIGHTER = 0.1
-MATRIX = algebra.solve(
-    NODES[None, :] ** (POWERS[:, None] - 1), (NODES[None, :] ** POWERS[:, None]) / POWERS[:, None]
-).T
+MATRIX = algebra.solve(NODES[None, :] ** (POWERS[:, None] - 1), (NODES[None, :] ** POWERS[:, None]) / POWERS[:, None]).T
 
 
 def run_slopes(
