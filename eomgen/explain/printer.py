@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..printing import Formulas, given_mathml, latex, mathml, number, sums_in_lines, text
+from ..printing.formula_of import ROUNDED
 from ..printing.formula_tree import Formula, MatrixOf, SumOf
 from ..reading.printed_equations import order_of
 from .document import FormulaLine, PutIn
@@ -18,7 +19,7 @@ class Printer:
 
     def __init__(self, equations: Any) -> None:
         self.names = equations.notation
-        self._formula = Formulas(order_of(equations))
+        self._formula = Formulas(order_of(equations), digits=ROUNDED)
 
     def meet(self, names: Iterable[str]) -> None:
         """Keep names of intermediates apart from those of the model, as they are printed."""
@@ -57,7 +58,7 @@ class Printer:
         if isinstance(side, float | int):
             return number(side)
         if isinstance(side, PutIn):
-            return Formulas(self._formula.order, side.numbers)(side.expression)
+            return Formulas(self._formula.order, side.numbers, ROUNDED)(side.expression)
         return self._formula(side)
 
 

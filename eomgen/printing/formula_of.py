@@ -29,7 +29,7 @@ _SIGNS = {"StrictLessThan": "<", "StrictGreaterThan": ">", "LessThan": "<=", "Gr
 _LOGIC = {"And": "and", "Or": "or"}
 DIGITS = 15  #: of a decimal that is meant as it stands
 PRINTED = 8  #: digits up to which a decimal is printed in full
-ROUNDED = 6  #: digits of one with more
+ROUNDED = 6  #: digits of one with more, in displays
 _NAMES = {"Abs": "abs", "Max": "max", "Min": "min", "log": "ln", "ceiling": "ceil"}
 
 
@@ -41,6 +41,8 @@ class Formulas:
     order : Order
     numbers : mapping of str to float, optional
         Numbers that stand in the places of names.
+    digits : int, optional
+        Of decimals that have more than ``PRINTED``; all of them by default.
 
     Attributes
     ----------
@@ -48,8 +50,8 @@ class Formulas:
         Whether a number has more digits than are printed, in what was made up to now.
     """
 
-    def __init__(self, order: Order, numbers: Mapping[str, float] | None = None) -> None:
-        self.order = order
+    def __init__(self, order: Order, numbers: Mapping[str, float] | None = None, digits: int = DIGITS) -> None:
+        self.order, self.digits = order, digits
         self.rounded = False
         self._made: dict[Any, Formula] = {sympy.Symbol(name): number(x) for name, x in (numbers or {}).items()}
 
@@ -119,10 +121,12 @@ class Formulas:
         if not x.is_Float or not x.is_finite:
             return Words(str(x), sympy.latex(x))
         full = number(float(x), DIGITS)
-        if isinstance(full, NumberPart) and len(full.digits.replace(".", "").lstrip("0")) <= PRINTED:
+        part = full if isinstance(full, NumberPart) else full.terms[0][1] if isinstance(full, SumOf) else None
+        kept = not isinstance(part, NumberPart) or len(part.digits.replace(".", "").lstrip("0")) <= PRINTED
+        if kept or self.digits >= DIGITS:
             return full
         self.rounded = True
-        return number(float(x), ROUNDED)
+        return number(float(x), self.digits)
 
     def _factors(self, factors: list[Any]) -> tuple[Formula, ...]:
         return tuple(self(factor) for factor in self.order.factors(factors))

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 from ..printing import given_mathml, mathml, sums_in_lines
 from ..printing.formula_mathml import fenced, row
+from ..printing.formula_of import ROUNDED
 from ..printing.formula_tree import Formula, MatrixOf, Name, SumOf, is_group
 from ..texts import html_text
 from .printed_equations import PrintedEntry, PrintedEquations
@@ -26,7 +27,7 @@ _FONT = "font-family:Latin Modern Math,STIX Two Math,Cambria Math,TeX Gyre Terme
 
 def equations_html(equations: Readable) -> str:
     """Formulas of the equations of motion."""
-    printed = PrintedEquations(equations)
+    printed = PrintedEquations(equations, ROUNDED)
     if equations.mobility.n_dof == 0:
         still = "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
         return "".join([still, *_states(printed)])

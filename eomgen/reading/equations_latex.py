@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..printing import latex, sums_in_lines
+from ..printing.formula_of import DIGITS, ROUNDED
 from ..printing.formula_tree import Formula, MatrixOf, is_group
 from .printed_equations import PrintedEquations
 from .printed_parts import PrintedGroup, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
 
-def latex_lines(equations: Readable) -> list[str]:
+def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
     """Each formula of the equations of motion, without dollars: M v' = f, what its names stand for, what was put in."""
-    printed = PrintedEquations(equations)
+    printed = PrintedEquations(equations, digits)
     if printed.is_long:
         lines = [*_parts(PrintedParts(printed))]
     else:
@@ -27,7 +28,7 @@ def latex_lines(equations: Readable) -> list[str]:
 
 def equations_latex(equations: Readable) -> str:
     """The same as Jupyter prints it, each formula in a line of its own."""
-    lines = latex_lines(equations)
+    lines = latex_lines(equations, ROUNDED)
     if len(lines) == 1:
         return f"$\\displaystyle {lines[0]}$"
     return "\n\n".join(f"$$\n{line}\n$$" for line in lines)

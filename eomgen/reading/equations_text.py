@@ -10,6 +10,7 @@ from ..notation import read_latex
 from ..notation.printing import text_form
 from ..notation.signs import SUPERSCRIPTS
 from ..printing import text
+from ..printing.formula_of import ROUNDED
 from ..printing.formula_text import TIGHT
 from ..printing.formula_tree import MatrixOf, times
 from ..texts import visible
@@ -28,7 +29,7 @@ SHORT_GROUP = re.compile(r"\([^()]{1,16}\)")  #: parentheses that stay in one li
 BREAKS = (*((" ", deep, 0) for deep in range(DEEP)), (TIGHT, DEEP, 0), (TIGHT, DEEP, DEEP))
 
 
-def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LINES) -> str:
+def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LINES, digits: int = ROUNDED) -> str:
     """Coordinates and equations, in matrix form where it fits, else entry by entry.
 
     Parameters
@@ -38,12 +39,14 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
         Longest line.
     lines : int
         Of formulas; what is beyond is left out, and how to get it is said.
+    digits : int
+        Of long numbers.
 
     Returns
     -------
     str
     """
-    printed = PrintedEquations(equations)
+    printed = PrintedEquations(equations, digits)
     name = visible(equations.kinematics.mechanism.name, lines=False)
     found = [f"equations of motion of {name}", f"  {printed.title}"]
     found += [*_values(printed, columns), *_coordinates(printed, columns)]

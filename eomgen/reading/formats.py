@@ -16,6 +16,7 @@ from sympy.printing.c import reserved_words as c_words
 from sympy.printing.mathematica import MCodePrinter
 
 from ..errors import UnavailableError
+from ..printing.formula_of import DIGITS
 from ..runtime.near_names import unknown
 from ..targets import FORMATS
 from .equations_latex import latex_lines
@@ -89,7 +90,7 @@ def write_format(equations: Readable, form: str) -> str:
     if form == "latex":
         return "\n".join(f"\\[\n{line}\n\\]" for line in latex_lines(equations)) + "\n"
     if form == "text":
-        return equations_text(equations, COLUMNS, 1_000_000) + "\n"
+        return equations_text(equations, COLUMNS, 1_000_000, DIGITS) + "\n"
     return _Code(equations, LANGUAGES[form], form).file()
 
 

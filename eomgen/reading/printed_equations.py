@@ -12,7 +12,7 @@ from ..kinematics.state import acceleration_name
 from ..notation.notation import Notation
 from ..printing import PAGE, Formulas, Order, number, text, width
 from ..printing.factor_order import COORDINATE, GRAVITY, INERTIA, INPUT, MASS, PARAMETER, RATE
-from ..printing.formula_of import ROUNDED
+from ..printing.formula_of import DIGITS
 from ..printing.formula_text import TIGHT
 from ..printing.formula_tree import Formula, MatrixOf, Name, NumberPart, Relation
 from .readable import Readable
@@ -98,14 +98,17 @@ class PrintedEquations:
     Parameters
     ----------
     equations : Readable
+    digits : int, optional
+        Of long numbers; all of them by default.
     """
 
-    def __init__(self, equations: Readable) -> None:
+    def __init__(self, equations: Readable, digits: int = DIGITS) -> None:
         self.equations = equations.in_plain_symbols()
+        self.digits = digits
         self.of_time = self.equations is not equations
         self.of_loops = equations.has_long_loops  #: whether the parts of B^T M_t B are shown
         self.names: Notation = equations.notation.with_names(str(name) for name, _ in self.named)
-        self.formula = Formulas(order_of(equations))
+        self.formula = Formulas(order_of(equations), digits=digits)
 
     @cached_property
     def named(self) -> list[tuple[Any, Any]]:
@@ -195,7 +198,7 @@ class PrintedEquations:
         if not self.formula.rounded:
             return ""
         kept = "eqs.tree_system has" if self.of_loops else "eqs.mass_matrix and eqs.force have"
-        return f"Long numbers are rounded to {ROUNDED} digits; {kept} all of them."
+        return f"Long numbers are rounded to {self.digits} digits; {kept} all of them."
 
     def text(self, formula: Formula) -> str:
         """A formula in text."""

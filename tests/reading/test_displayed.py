@@ -16,6 +16,7 @@ from eomgen.notation import Notation
 from eomgen.printing import Formulas, Order, latex, mathml, text
 from eomgen.printing.factor_order import COORDINATE, GRAVITY, INPUT, MASS, PARAMETER, RATE
 from eomgen.reading.equations_html import equations_html, facts_html
+from eomgen.reading.formats import write_format
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NAMES = sorted(file.stem for file in EXAMPLES.glob("*.yaml"))
@@ -109,3 +110,19 @@ def test_factors_and_terms_stand_in_the_order_of_textbooks(given: str) -> None:
     notation = Notation(ORDER.kinds)
     assert (text(formula, notation).replace("\u00a0", " "), latex(formula, notation)) == CASES[given]
     ElementTree.fromstring(f"<math>{mathml(formula, notation)}</math>")
+
+
+def test_long_numbers_are_rounded_where_they_are_shown_alone() -> None:
+    """M_33 of the governor: 5 kg m^2 of the ball, and rho (0.01^2/3 + 0.01^4/12) of the arm."""
+    equations = derived("flyball_governor")
+    rho = sympy.Symbol("rho")
+    assert equations.mass_matrix[2, 2].coeff(rho) == pytest.approx(1e-4 / 3 + 1e-8 / 12, rel=1e-14)
+    assert "M_33 = 5 + 3.33342e-5 " in str(equations)
+    assert "Long numbers are rounded to 6 digits" in str(equations)
+    assert "rounded to 6 digits" in equations._repr_html_()
+    assert r"3.33342 \cdot 10^{-5}" in equations._repr_latex_()
+    for form in ("text", "latex"):
+        written = write_format(equations, form)
+        assert "3.33341666666667" in written
+        assert "rounded" not in written
+    assert "rounded" not in str(derived("double_pendulum"))
