@@ -20,7 +20,6 @@ def describe_layouts(program: Program) -> list[tuple[str, list[str]]]:
         independent = ("v_i, the independent velocities", _entries(metadata, "v_i", [v[i] for i in preferred]))
     sections = [
         (f"x = [q; v{'; s' if program.n_states else ''}], the state", _entries(metadata, "x", [*q, *v])),
-        ("v in all functions: velocities, then the states s, of unit inertia", list(program.velocities[moving:])),
         ("p, the parameters", _entries(metadata, "p", program.parameters, metadata.get("p_values"))),
         ("u, the inputs", _entries(metadata, "u", program.inputs, metadata.get("u_values"))),
         ("y, the outputs", _entries(metadata, "y", metadata.get("y_names", ()))),

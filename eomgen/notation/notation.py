@@ -62,7 +62,7 @@ class Notation:
     @classmethod
     def of(cls, metadata: Mapping[str, Any]) -> Notation:
         """The notation of a module or a trajectory, from its metadata."""
-        keys = ("q_names", "v_names", "loop_names", "u_names", "p_names", "parameters", "y_names")
+        keys = ("q_names", "v_names", "s_names", "loop_names", "u_names", "p_names", "parameters", "y_names")
         names = [name for key in keys for name in metadata.get(key, ())]
         return cls(names, metadata.get("latex"), metadata.get("instances"))
 

@@ -155,7 +155,8 @@ def _described(layout: Layout) -> dict[str, Any]:
     return {
         "name": layout.name,
         "q_names": list(layout.q),
-        "v_names": list(layout.v),
+        "v_names": list(layout.v[: layout.moving]),
+        **({"s_names": list(layout.states)} if layout.states else {}),
         "x_names": list(layout.x),
         "loop_names": list(layout.loops),
         "y_names": list(layout.y),

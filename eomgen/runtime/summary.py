@@ -25,9 +25,10 @@ def facts(module: BoundModel) -> list[tuple[str, str]]:
     lines = [
         ("degrees of freedom", str(layout.n_dof - len(layout.states))),
         ("coordinates", listed(layout.q)),
+        *([("states", listed(layout.states))] if layout.states else []),
     ]
     if layout.n_c:
-        lines.append(("independent", listed([layout.velocity_labels[i] for i in layout.independent])))
+        lines.append(("independent", listed([layout.velocity_labels[i] for i in layout.independent_moving])))
         lines.append(("cut joints", listed(data.get("loop_joint_names", ()))))
         redundant = [layout.constraint_labels[i] for i in data.get("redundant_rows", ())]
         rows = f"{layout.n_c}" + (f", redundant at the reference: {listed(redundant)}" if redundant else "")

@@ -117,7 +117,12 @@ class Trajectory:
     @property
     def v(self) -> Array:
         """Velocities of the tree (n_v, n_t)."""
-        return self.x[len(self.metadata["q_names"]) :]
+        return self.x[len(self.metadata["q_names"]) : len(self.x) - len(self.metadata.get("s_names", ()))]
+
+    @property
+    def s(self) -> Array:
+        """First-order states (n_s, n_t)."""
+        return self.x[len(self.x) - len(self.metadata.get("s_names", ())) :]
 
     @property
     def x_names(self) -> tuple[str, ...]:

@@ -45,7 +45,7 @@ class Compared:
         n = self.module.n_q + self.module.n_v
         self.q, self.v = self.x[: self.module.n_q], self.x[self.module.n_q : n]
         self.a = self.module.rhs(0.0, self.x)[self.module.n_q : n]
-        self.free = list(self.module.layout.metadata["independent"])
+        self.free = self.module.layout.independent_moving.tolist()
 
     def shown(self, name: str, part: str | None = None) -> Any:
         """The number, vector or matrix of a quantity."""

@@ -177,3 +177,10 @@ def test_an_impact_leaves_states_alone() -> None:
     before = solve_ivp(flight, (0, fall), [1, 0, 0], rtol=1e-11, atol=1e-13).y[:, -1]
     after = solve_ivp(flight, (fall, 1), [0, -0.8 * before[1], before[2]], rtol=1e-11, atol=1e-13).y[:, -1]
     np.testing.assert_allclose(traj.x[:, -1], after, atol=1e-8)
+
+
+def test_parts_of_a_trajectory() -> None:
+    traj = compiled().simulate(0.2)
+    np.testing.assert_array_equal(traj.s[0], traj["a"])
+    np.testing.assert_array_equal(traj.v[0], traj["s_dot"])
+    assert (traj.q.shape[0], traj.v.shape[0], traj.s.shape[0]) == (1, 1, 1)
