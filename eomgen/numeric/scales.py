@@ -78,14 +78,10 @@ class Scales(NamedTuple):
         """q' = N(q) v."""
         return v if self.space is None else self.space.rates(q, v)
 
-    def moving(self, v: Array) -> Array:
-        """The scaled velocities of v (n,) or (n, k), first-order states left out."""
-        moving = len(self.q) if self.space is None else len(self.q) - self.space.n_states
-        return v[:moving] / self.q[(slice(moving), *[None] * (v.ndim - 1))]
-
     def speed(self, v: Array) -> float:
         """The largest scaled velocity of v (n,), first-order states left out."""
-        return float(np.abs(self.moving(v)).max(initial=0.0))
+        moving = len(self.q) if self.space is None else len(self.q) - self.space.n_states
+        return float(np.abs(v[:moving] / self.q[:moving]).max(initial=0.0))
 
     def coordinates(self, velocities: Sequence[int] | Indices) -> Indices:
         """The coordinates that stand still when these velocities do."""

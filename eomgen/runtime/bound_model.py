@@ -6,9 +6,9 @@ What every analysis and every run takes.  :class:`~..api.module.Module` is the s
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self, cast
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,6 @@ from .assembled import Assembled
 from .kernels import Kernels, Projection, Rows
 from .layout import Layout
 from .momenta import Momenta
-from .refusals import Refusal
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -78,7 +77,7 @@ class BoundModel(Assembled, Momenta):
         self.n_u, self.n_p, self.n_y, self.n_bodies = layout.n_u, layout.n_p, layout.n_y, layout.n_bodies
         self.n_dof, self.n_c, self.n_rows = layout.n_dof - self.n_s, len(layout.rows), layout.n_c
         jacobian: Any = kernels.timed("jacobian")
-        self.rhs, self.jacobian, jacobian.others = kernels.timed("rhs"), jacobian, partial(getattr, self)
+        self.rhs, self.jacobian, jacobian.others = kernels.timed("rhs"), jacobian, kernels.derivative
         self.outputs = kernels.timed("outputs")
         self.energy, self.poses = kernels.state("energy"), kernels.state("poses")
         self.project = Projection(kernels.state("project"))
@@ -155,7 +154,7 @@ class BoundModel(Assembled, Momenta):
     @cached_property
     def input_jacobian(self) -> Timed:
         """``input_jacobian(t, x)`` -> (n_x, n_u), the derivative of the complete rhs by the inputs."""
-        return self._derivative("input_jacobian")
+        return self.kernels.derivative("input_jacobian")
 
     @cached_property
     def parameter_jacobian(self) -> Timed:
@@ -164,12 +163,7 @@ class BoundModel(Assembled, Momenta):
         The projection is part of the rhs: where parameters move the constraints, the state is taken along to the
         nearest one on them.  Exact at states on the constraints; others are projected first.
         """
-        return self._derivative("parameter_jacobian")
-
-    def _derivative(self, name: str) -> Timed:
-        layout = self.kernels.layout
-        refused = layout.given_rates or not layout.projects
-        return cast("Timed", Refusal(layout)) if refused else self.kernels.timed(name)
+        return self.kernels.derivative("parameter_jacobian")
 
     # kinematics
 

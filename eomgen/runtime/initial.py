@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import AssemblyError
 from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
-from ..numeric.assembly_velocity import Rates, VelocityEquations, assemble_velocity
+from ..numeric.assembly_velocity import VelocityEquations, assemble_velocity
 from ..numeric.closure import close, closed
 from ..numeric.constraint_system import RESTARTS
 from ..numeric.held_path import follow
@@ -223,10 +223,10 @@ class Initial:
             require_rank(self.kernels, self.scales.jacobian(self._C_q(q, t=self.t)))
         declared = self.sort(self.layout.initial).rates
         if given is None:
-            return self._solve_rates(q, declared).v
+            return self._solve_rates(q, declared)
         self._require_motion(q, given)
         rest = {name: value for name, value in declared.items() if name not in given}
-        return self._solve_rates(q, {**given, **(self.compatible(q, given, rest, positions=False) if rest else {})}).v
+        return self._solve_rates(q, {**given, **(self.compatible(q, given, rest, positions=False) if rest else {})})
 
     def _require_motion(self, q: Array, given: Mapping[str, float | Array]) -> None:
         """Refuse the rate of a coordinate that stands still at q, whatever moves: it would need boundless rates.
@@ -240,7 +240,7 @@ class Initial:
             return
         J = self.scales.jacobian(self._C_q(q, t=self.t))
         basis = algebra.svd(J)[2][rank(J).rank :]
-        driven = self._solve_rates(q, {}).v / self.scales.q  # what driven constraints impose
+        driven = self._solve_rates(q, {}) / self.scales.q  # what driven constraints impose
         for name, values in given.items():
             value = max(np.ravel(values).tolist(), key=abs)
             scale = self.scales.q[layout.v.index(name)] if name in layout.v else self.rate_equation(q, name)[2]
@@ -257,15 +257,15 @@ class Initial:
                     f"at a dead centre or across a blade{place(layout.q, q)}; {remedy}"
                 )
 
-    def _solve_rates(self, q: Array, held: Mapping[str, float | Array]) -> Rates:
+    def _solve_rates(self, q: Array, held: Mapping[str, float | Array]) -> Array:
         layout = self.layout
         columns = np.broadcast_shapes(*map(np.shape, held.values()))
         v = np.zeros((layout.n_v, *columns))
         indices = [layout.v.index(name) for name in held if name in layout.v]
-        v[indices] = [np.broadcast_to(held[name], columns) for name in held if name in layout.v]
+        v[indices] = np.reshape([np.broadcast_to(held[layout.v[i]], columns) for i in indices], v[indices].shape)
         others = [name for name in held if name not in layout.v]
         if not (layout.n_c or others):
-            return Rates(v, 0.0)
+            return v
         equations = None
         if others:
             y_q, y_t, scales = map(np.array, zip(*(self.rate_equation(q, name) for name in others), strict=True))

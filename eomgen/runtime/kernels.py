@@ -7,7 +7,7 @@ makers ``timed``, ``state`` and ``motion``; see :class:`~.protocols.Core`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from ..errors import UnavailableError, UsageError
 from ..numeric.scales import Array
 from .failure import Fail
 from .layout import Layout
+from .refusals import Refusal
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ class Kernels:
     """The calls of one model, sharing one set of parameters and inputs.
 
     Here the velocities are [v; s], first-order states among them; :mod:`.mechanical` leaves these out for users.
+    Kernels that are properties are made anew when asked for: what is kept lives as long as Fail, which refers back.
 
     Parameters
     ----------
@@ -55,9 +57,19 @@ class Kernels:
         self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
         self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)
         self.velocity_constraints = Rows(self.state("velocity_constraints"), layout.rows)
-        self.mass_matrix, self.bias = self.state("mass_matrix"), self.timed("bias")
-        self.embedded_mass_matrix = self.state("embedded_mass_matrix")
-        self.inverse_dynamics = self.motion("inverse_dynamics")
+        self._derivatives: dict[str, Timed] = {}
+
+    mass_matrix: State = cast("State", property(lambda self: self.state("mass_matrix")))
+    embedded_mass_matrix: State = cast("State", property(lambda self: self.state("embedded_mass_matrix")))
+    bias: Timed = cast("Timed", property(lambda self: self.timed("bias")))
+    inverse_dynamics: Motion = cast("Motion", property(lambda self: self.motion("inverse_dynamics")))
+
+    def derivative(self, name: str) -> Timed:
+        """The kernel ``input_jacobian`` or ``parameter_jacobian``, made once."""
+        if name not in self._derivatives:
+            refused = self.layout.given_rates or not self.layout.projects
+            self._derivatives[name] = cast("Timed", Refusal(self.layout)) if refused else self.timed(name)
+        return self._derivatives[name]
 
     def _unscaled(self, *_: Any) -> None:
         """Refuse parameters whose lengths and masses scale nothing."""

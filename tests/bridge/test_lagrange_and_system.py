@@ -185,7 +185,7 @@ def test_names_are_checked() -> None:
         eg.from_sympy(lagrange(m * x.diff() ** 2 / 2, [x]), parameters={"mass": 1.0})
     with pytest.raises(eg.ModelError, match="the equations do not contain 'F'"):
         eg.from_sympy(lagrange(m * x.diff() ** 2 / 2, [x]), inputs={"F": 1.0})
-    with pytest.raises(eg.ModelError, match="no coordinate or velocity 'z'"):
+    with pytest.raises(eg.ModelError, match="no coordinate, velocity or output 'z'"):
         eg.from_sympy(lagrange(m * x.diff() ** 2 / 2, [x]), initial={"z": 1.0}).mechanism()
     with pytest.raises(eg.UsageError, match=r"specified takes functions of time f\(t\)"):
         eg.from_sympy(lagrange(m * x.diff() ** 2 / 2, [x]), specified={m: 1.0})

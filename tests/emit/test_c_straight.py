@@ -109,7 +109,7 @@ def test_the_table_describes_the_model(systems, compiled):
     library = compiled(system)
     assert library.table.abi == 3
     assert library.table.name == b"crank"
-    lanes = ["mass_matrix", "bias", "inverse_dynamics", "energy"]
+    lanes = ["rhs", "mass_matrix", "bias", "inverse_dynamics", "energy"]
     series = {"series": False, "no_series": "its closed loops are solved at every state"}
     assert library.metadata == {**system.program().metadata, "lanes": lanes, **series}
     assert library.metadata["kernels"]["rhs"] == [6]

@@ -24,6 +24,7 @@ PLACES: dict[tuple[str, str], str | None] = {
     ("PARAMETER", "doc"): "parameters.l.doc",
     ("INPUT", "doc"): "inputs.tau.doc",
     ("OUTPUT_FIELDS", "doc"): "outputs.y.doc",
+    ("STATE", "doc"): "states.z.doc",
     ("EVENT", "doc"): "events.low.doc",
     ("DISPLAY", "file"): "bodies.rod.display[0].file",
     ("COMPONENT", "doc"): None,  # nothing of it stands in the model that a component becomes
@@ -53,6 +54,7 @@ def described(text: str, name: str = "held") -> dict[str, Any]:
         },
         "joints": {"A": {"type": "revolute", "between": ["ground", "rod"], "coordinate": "theta", "axis": "z"}},
         "forces": {"motor": {"type": "torque", "joint": "A", "value": "tau"}},
+        "states": {"z": {"rate": "-z", "doc": text}},
         "outputs": {"y": {"expression": "y(rod.tip)", "unit": "m", "doc": text}},
         "events": {"low": {"expression": "y(rod.tip)", "doc": text}},
         "initial": {"theta": 0.3},

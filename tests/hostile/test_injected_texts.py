@@ -188,7 +188,7 @@ def test_what_is_shown_shows_the_text_and_obeys_none_of_it(key: str) -> None:
         own = {"table", "tr", "td", "th", "b", "p", "pre", "div", "details", "summary", "code", "i"}
         if page is formulas:  # MathML of names and operations, which runs nothing
             own |= {"math", "mrow", "mi", "mn", "mo", "mtext", "mfrac", "msub", "msup", "msubsup", "msqrt", "mover"}
-            own |= {"mtable", "mtr", "mtd", "mspace", "displaystyle", "accent", "mathvariant"}
+            own |= {"mtable", "mtr", "mtd", "mspace", "displaystyle", "accent", "mathvariant", "stretchy"}
         assert found.tags <= own | {"img", "src", "alt", "width"}
         assert len(found.sources) <= 1  # the picture, which is in the page
         assert all(re.fullmatch(r"data:image/png;base64,[A-Za-z0-9+/=]+", str(one)) for one in found.sources)

@@ -24,7 +24,7 @@ THETAS = [0.0, 0.7, np.pi / 2, 2.5, np.pi, -1.2]
 def on_manifold(crank, theta, rate=10.0):
     q = crank.closed(theta)
     C_q = crank.position(q)[1]
-    v = assemble_velocity(C_q, crank.rate(q), crank.scales, guess=np.array([rate, 0, 0]), held=[0]).v
+    v = assemble_velocity(C_q, crank.rate(q), crank.scales, guess=np.array([rate, 0, 0]), held=[0])
     return q, v
 
 

@@ -45,8 +45,9 @@ def test_runs_and_ensembles_start_there(crank: Any) -> None:
     run = crank.simulate(0.05, initial={"pin_x": 0.40})
     assert run["pin_x"][0] == pytest.approx(0.40, abs=1e-12)
     many = crank.simulate_many(0.05, initial={"pin_x": np.array([0.40, 0.42])})
-    np.testing.assert_array_equal(many.x[:, 0], run.x[:, -1])
-    np.testing.assert_array_equal(many.x[:, 1], crank.simulate(0.05, initial={"pin_x": 0.42}).x[:, -1])
+    near = 1e-9 if hasattr(crank.core, "take_lanes") else 0.0  # lanes have the tolerance and not the bits of one run
+    np.testing.assert_allclose(many.x[:, 0], run.x[:, -1], rtol=near)
+    np.testing.assert_allclose(many.x[:, 1], crank.simulate(0.05, initial={"pin_x": 0.42}).x[:, -1], rtol=near)
 
 
 def test_what_cannot_be_held_is_refused(crank: Any) -> None:
