@@ -158,6 +158,7 @@ import crank
 x = crank.x0(theta=0.3, theta_dot=10.0)
 values = {
     "t": 0.0, "x": x, "q": x[:3], "v": x[3:], "a": x[3:], "q_i": x[:1], "v_i": x[3:4], "a_i": x[3:4],
+    "w": np.ones(3), "d": np.ones(9),
     "x_min": [0.3, 10.0], "span": 1.0, "y": np.ones(crank.dae.n_y), "yp": np.ones(crank.dae.n_y), "cj": 2.0,
 }
 tried = 0
