@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from ..runtime.kernels import fitting
+from ..runtime.kernels import into
 from ..runtime.room import read_numbers
 
 if TYPE_CHECKING:
@@ -101,11 +101,7 @@ def regressor(
     for k in range(0, count, width):
         some = slice(k, k + width)
         result[:, :, some] = _columns(module, q[:, some], v[:, some], a[:, some], values, t)
-    result = result[..., 0] if single else result
-    if out is None:
-        return np.ascontiguousarray(result)
-    fitting(out, result.shape)[...] = result
-    return out
+    return into(out, np.ascontiguousarray(result[..., 0] if single else result))
 
 
 def inertial_remainder(
@@ -132,11 +128,7 @@ def inertial_remainder(
     """
     pi = np.array(list(standard_parameters(module, p).values()))
     whole = module.inverse_dynamics(q, v, a, p=_values(module, p), u=_inputs(module, u), t=t)
-    result = whole - np.tensordot(pi, regressor(module, q, v, a, p=p, t=t), (0, 1))
-    if out is None:
-        return np.asarray(result)
-    fitting(out, result.shape)[...] = result
-    return out
+    return into(out, whole - np.tensordot(pi, regressor(module, q, v, a, p=p, t=t), (0, 1)))
 
 
 def _values(module: BoundModel, p: Any) -> Any:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric import algebra
 from ..numeric.scales import Array
-from .kernels import fitting
+from .kernels import into
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -75,11 +75,7 @@ class DaeForm:
         self, t: float, y: ArrayLike, yp: ArrayLike, res: Array | None = None, u: ArrayLike | None = None
     ) -> Array:
         """F(t, y, y') (n_y,), written into ``res`` if it is given; u (n_u,) as bound by default."""
-        result = self._residual(t, self._full(y, yp), u=u)[self._equations]
-        if res is None:
-            return np.asarray(result)
-        fitting(res, result.shape)[...] = result
-        return res
+        return into(res, self._residual(t, self._full(y, yp), u=u)[self._equations])
 
     def jacobian(
         self,
@@ -92,11 +88,7 @@ class DaeForm:
     ) -> Array:
         """dF/dy + cj dF/dy' (n_y, n_y), exact, written into ``out`` if it is given."""
         every = self._jacobian(t, self._full(y, yp, cj), u=u)
-        result = every[np.ix_(self._equations, self._unknowns)]
-        if out is None:
-            return np.asarray(result)
-        fitting(out, result.shape)[...] = result
-        return out
+        return into(out, every[np.ix_(self._equations, self._unknowns)])
 
     def initial(self, x: ArrayLike | None = None, t: float = 0.0, u: ArrayLike | None = None) -> tuple[Array, Array]:
         """Consistent y and y' (n_y,) of a state x, the declared initial one by default; x is projected first.

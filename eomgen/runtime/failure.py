@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -62,6 +63,11 @@ class Fail:
         self.layout = layout
         self.culprit = culprit
         self.poses = poses
+
+    def vector(self, label: str, given: Any, bound: Array) -> Any:
+        """The p or u of a call, as an array where it is given by name; the others are as bound."""
+        what, names = ("parameter", self.layout.p) if label == "p" else ("input", self.layout.u)
+        return self.layout.values(what, names, given, bound) if isinstance(given, Mapping) else given
 
     def trouble(self, x: Array, t: float = 0.0, p: Array | None = None) -> tuple[str, str] | None:
         """What is wrong at a state with a rolling disc or with how a rotation is described, and the remedy."""

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UnavailableError, UsageError
 from ..numeric.scales import Array
+from .argument_names import both_names
 from .failure import Fail
 from .layout import Layout
 from .refusals import Refusal
@@ -81,9 +82,8 @@ class Kernels:
         """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""
         shape = self.layout.shape(name)
         if name not in self.core.names and 0 in shape:
-            return Nothing(np.zeros(shape), self.layout.inputs(name))
-        kernel: Timed = self._make(self.core.timed, name, nan)
-        return kernel
+            return cast("Timed", Nothing(np.zeros(shape), self.layout.inputs(name)))
+        return cast("Timed", self._make(self.core.timed, name, nan))
 
     def rows(self, name: str, chosen: Any, t: float, x: Array, u: Array | None = None) -> Array:
         """Rows of a timed kernel at one state; the others need not be numbers there."""
@@ -95,20 +95,19 @@ class Kernels:
     def state(self, name: str, nan: bool = False) -> State:
         """A kernel called as ``f(x, p=None, u=None, out=None, t=0.0)``."""
         layout = self.layout
+        kernel: object = None
         if name not in self.core.names:
             if layout.shape(name)[0] == 0:
-                return Constant(np.zeros(layout.shape(name)), layout.inputs(name))
-            if layout.n_c == 0 and name == "project":
-                return Identity(layout.n_x, [i for i, _ in layout.quaternion_slots])
-            if layout.rank == 0 and name == "embedded_mass_matrix":
-                return Selected(self.state("mass_matrix", nan), layout.independent)
-        kernel: State = self._make(self.core.state, name, nan)
-        return kernel
+                kernel = Constant(np.zeros(layout.shape(name)), layout.inputs(name))
+            elif layout.n_c == 0 and name == "project":
+                kernel = Identity(layout.n_x, [i for i, _ in layout.quaternion_slots])
+            elif layout.rank == 0 and name == "embedded_mass_matrix":
+                kernel = Selected(self.state("mass_matrix", nan), layout.independent)
+        return cast("State", self._make(self.core.state, name, nan) if kernel is None else kernel)
 
     def motion(self, name: str) -> Motion:
         """A kernel called as ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
-        kernel: Motion = self._make(self.core.motion, name, False)
-        return kernel
+        return cast("Motion", self._make(self.core.motion, name, False))
 
     def _make(self, maker: Callable[..., Any], name: str, nan: bool) -> Any:
         if name not in self.core.names:
@@ -153,16 +152,16 @@ class Rows:
     """A constraint kernel that gives the independent rows, or all of them."""
 
     def __init__(self, every: State, independent: Sequence[int] | np.ndarray[Any, Any]) -> None:
-        self.every = every
-        self.independent = independent
+        self.every, self.independent = every, independent
 
+    @both_names
     def __call__(
         self,
         q: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
+        p: Any = None,
+        u: Any = None,
         out: Array | None = None,
-        t: ArrayLike = 0.0,
+        t: Any = 0.0,
         rows: str = "independent",
     ) -> Array:
         """Evaluate.
@@ -180,7 +179,7 @@ class Rows:
         if not isinstance(rows, str) or rows != "independent":
             raise UsageError(f"rows must be 'independent' or 'all', not {rows!r}")
         result = self.every(q, p=p, u=u, t=t)[self.independent]
-        return result if out is None else _write(out, result)
+        return into(out, result)
 
 
 class Projection:
@@ -189,6 +188,7 @@ class Projection:
     def __init__(self, kernel: State) -> None:
         self.kernel = kernel
 
+    @both_names
     def __call__(
         self,
         x: ArrayLike,
@@ -222,17 +222,10 @@ class Constant:
     failure: tuple[int, float, Array] | None = None
 
     def __init__(self, value: Array, n_in: int) -> None:
-        self.value = value
-        self.n_in = n_in
+        self.value, self.n_in = value, n_in
 
-    def __call__(
-        self,
-        x: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
-        out: Array | None = None,
-        t: ArrayLike = 0.0,
-    ) -> Array:
+    @both_names
+    def __call__(self, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0) -> Array:
         """An empty array, with a last axis for a batch."""
         shape = read_numbers("x", x).shape
         if shape[:1] != (self.n_in,) or len(shape) > 2:
@@ -241,24 +234,15 @@ class Constant:
         return np.zeros(expected) if out is None else fitting(out, expected)
 
 
-class Nothing:
+class Nothing(Constant):
     """A kernel of time and state whose result has no entries."""
 
-    failure: tuple[int, float, Array] | None = None
-
-    def __init__(self, value: Array, n_in: int) -> None:
-        self.constant = Constant(value, n_in)
-
-    def __call__(
-        self,
-        t: ArrayLike,
-        x: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
-        out: Array | None = None,
+    @both_names
+    def __call__(  # type: ignore[override]
+        self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
     ) -> Array:
         """An empty array, with a last axis for a batch."""
-        return self.constant(x, p=p, u=u, out=out)
+        return super().__call__(x, out=out)
 
 
 class Identity(Constant):
@@ -268,16 +252,10 @@ class Identity(Constant):
         super().__init__(np.zeros(n_in), n_in)
         self.quaternion_slots = quaternion_slots
 
-    def __call__(
-        self,
-        x: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
-        out: Array | None = None,
-        t: ArrayLike = 0.0,
-    ) -> Array:
+    @both_names
+    def __call__(self, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0) -> Array:
         """A copy of x."""
-        result = _write(super().__call__(x, out=out), read_numbers("x", x))
+        result = into(super().__call__(x, out=out), read_numbers("x", x))
         for i in self.quaternion_slots:
             result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
         return result
@@ -289,25 +267,20 @@ class Selected:
     failure: tuple[int, float, Array] | None = None
 
     def __init__(self, every: State, order: np.ndarray[Any, Any]) -> None:
-        self.every = every
-        self.order = order
+        self.every, self.order = every, order
 
-    def __call__(
-        self,
-        x: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
-        out: Array | None = None,
-        t: ArrayLike = 0.0,
-    ) -> Array:
+    @both_names
+    def __call__(self, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0) -> Array:
         """The matrix of the chosen coordinates."""
         result = self.every(x, p=p, u=u, t=t)[np.ix_(self.order, self.order)]
-        return result if out is None else _write(out, result)
+        return into(out, result)
 
 
-def _write(out: Array, result: Array) -> Array:
-    fitting(out, result.shape)[...] = result
-    return out
+def into(out: Array | None, result: Array) -> Array:
+    """A result, in the array that was given for it."""
+    if out is not None:
+        fitting(out, result.shape)[...] = result
+    return result if out is None else out
 
 
 def fitting(out: Array, shape: tuple[int, ...]) -> Array:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..kernel_table import NAMED
 from ..numeric.scales import Array
+from .argument_names import both_names
 
 if TYPE_CHECKING:
     from .protocols import Core
@@ -98,6 +99,7 @@ class LateKernel:
 class LateTimed(LateKernel):
     """A kernel of time and state."""
 
+    @both_names
     def __call__(self, t: Any, x: Any, p: Any = None, u: Any = None, out: Any = None) -> Any:
         """Evaluate."""
         return self.kernel(t, x, p, u, out)
@@ -106,6 +108,7 @@ class LateTimed(LateKernel):
 class LateState(LateKernel):
     """A kernel of the state alone."""
 
+    @both_names
     def __call__(self, x: Any, p: Any = None, u: Any = None, out: Any = None, t: Any = 0.0) -> Any:
         """Evaluate."""
         return self.kernel(x, p, u, out, t)
@@ -114,6 +117,7 @@ class LateState(LateKernel):
 class LateMotion(LateKernel):
     """A kernel of coordinates, velocities and accelerations."""
 
+    @both_names
     def __call__(self, q: Any, v: Any, a: Any, p: Any = None, u: Any = None, out: Any = None, t: Any = 0.0) -> Any:
         """Evaluate."""
         return self.kernel(q, v, a, p, u, out, t)

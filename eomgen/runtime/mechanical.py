@@ -11,7 +11,8 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .kernels import fitting
+from .argument_names import both_names
+from .kernels import into
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class MechanicalPart:
 
     def __call__(self, *args: Any, out: Array | None = None, **options: Any) -> Array:
         """Evaluate; arguments are those of the function."""
-        return _into(out, self.function(*args, **options)[self.kept])
+        return into(out, np.array(self.function(*args, **options)[self.kept]))
 
     def __repr__(self) -> str:
         return repr(self.function)
@@ -57,6 +58,7 @@ class MechanicalInverse:
     def __init__(self, kernels: Kernels, n: int) -> None:
         self.layout, self.function, self.n = kernels.layout, kernels.inverse_dynamics, n
 
+    @both_names
     def __call__(self, q: Any, v: Any, a: Any, p: Any = None, u: Any = None, out: Any = None, t: Any = 0.0) -> Array:
         """Evaluate at q (n_q,), [v; s] (n_v + n_s,) and a (n_v,), or with a last axis k.
 
@@ -75,15 +77,7 @@ class MechanicalInverse:
             )
         if rates.shape[:1] == (self.n,):
             rates = np.concatenate([rates, np.zeros((whole - self.n, *rates.shape[1:]))])
-        return _into(out, self.function(q, given, rates, p=p, u=u, t=t)[: self.n])
+        return into(out, np.array(self.function(q, given, rates, p=p, u=u, t=t)[: self.n]))
 
     def __repr__(self) -> str:
         return repr(self.function)
-
-
-def _into(out: Array | None, found: Array) -> Array:
-    """A result, in the array that was given for it."""
-    if out is None:
-        return np.array(found)
-    fitting(out, found.shape)[...] = found
-    return out

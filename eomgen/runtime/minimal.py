@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import PartitionError, UsageError
 from ..numeric.scales import Array
+from .argument_names import both_names
 from .room import read_number, read_numbers
 from .tree_motion import STEP, DependentMotion
 
@@ -134,6 +135,7 @@ class Minimal:
         self._memory.recent = []
         return result
 
+    @both_names
     def rhs(self, t: float, x: ArrayLike, p: Any = None, u: ArrayLike | None = None) -> Array:
         """Derivative (n_x,) of x = [q_i; v_i].
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from functools import cached_property
 from math import prod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .kernels import fitting
+from .argument_names import both_names
+from .kernels import into
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ class Part:
         self.layout, self.name, self.start, self.shape, self.n_in = kernels.layout, name, start, shape, n_in
         self.whole: State = kernels.state("centroidal")
 
+    @both_names
     def __call__(
         self,
         x: ArrayLike,
@@ -66,11 +68,7 @@ class Part:
         if self.n_in != layout.n_x:
             state = np.concatenate([state, np.zeros((layout.n_x - self.n_in, *state.shape[1:]))])
         every = self.whole(state, p=p, u=u, t=t)
-        result = every[self.start : self.start + prod(self.shape)].reshape(self.shape + state.shape[1:])
-        if out is None:
-            return result
-        fitting(out, result.shape)[...] = result
-        return out
+        return into(out, every[self.start : self.start + prod(self.shape)].reshape(self.shape + state.shape[1:]))
 
 
 class Momenta:
@@ -83,7 +81,7 @@ class Momenta:
 
     def _part(self, name: str, start: int, *shape: int, rates: bool = False) -> State:
         layout = self.kernels.layout
-        return Part(self.kernels, name, start, shape, layout.n_x if rates else layout.n_q)
+        return cast("State", Part(self.kernels, name, start, shape, layout.n_x if rates else layout.n_q))
 
     @cached_property
     def center_of_mass(self) -> State:

@@ -18,6 +18,7 @@ from ..errors import STATUS, EvaluationError, NonFiniteError
 from ..kernel_table import NAMED
 from ..numeric.scales import Array
 from ..texts import shown
+from .argument_names import both_names
 from .layout import Layout
 from .numpy_drivers import Drivers
 from .room import as_real, read_vector
@@ -25,8 +26,6 @@ from .room import as_real, read_vector
 #: f(t, x, u, c) -> out
 Block: TypeAlias = Callable[[Any, Array, Array, Array], Array]
 
-#: For values by name where a call takes an array.
-BY_NAME = "{0} of a call must be an array in the order of {0}_names; to give values by name use bind({0}={{...}})"
 CODES = {error: status for status, error in STATUS.items()}
 NON_FINITE = CODES[NonFiniteError]
 
@@ -164,8 +163,6 @@ class NumpyKernel:
         found = as_real(value)
         if found is not None:
             return found
-        if label in ("p", "u") and isinstance(value, Mapping):
-            raise self.error(BY_NAME.format(label))
         wanted = "be a real number, or (k,)" if label == "t" else f"hold real numbers, ({n},) or ({n}, k)"
         raise self.error(f"{self.label(label)} of {self.name} must {wanted}, not {shown(value)}")
 
@@ -180,11 +177,16 @@ class NumpyKernel:
         """What users call an argument: the x of some kernels is q."""
         return "q" if label == "x" and self.name in NAMED and NAMED[self.name].inputs == ("q",) else label
 
+    def by_name(self, label: str, given: Any, bound: Array) -> Any:
+        """Values by name as an array, the others as bound, where who asked for the kernel knows names."""
+        return self.fail.vector(label, given, bound) if hasattr(self.fail, "vector") else given
+
     def evaluate(self, t: Any, x: Array, p: Any, u: Any, out: Array | None) -> Array:
         """One state or a batch."""
         layout = self.core.layout
         if x.shape[:1] != (self.n_in,) or x.ndim > 2:
             raise self.misfit("x", self.n_in, x)
+        p, u = self.by_name("p", p, self.context.p), self.by_name("u", u, self.context.u)
         c = self.context.c
         if p is not None:
             c = self.core.constants(_vector(p, layout.n_p, "p", self.error), self.error)
@@ -247,6 +249,7 @@ class NumpyTimed(NumpyKernel):
 
     others: Any = None
 
+    @both_names
     def __call__(
         self, t: Any, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None, wrt: str | None = None
     ) -> Array:
@@ -263,6 +266,7 @@ class NumpyTimed(NumpyKernel):
 class NumpyState(NumpyKernel):
     """A kernel of the state alone."""
 
+    @both_names
     def __call__(self, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0) -> Array:
         """Evaluate at state x; arguments as for :class:`NumpyTimed`."""
         return self.evaluate(t, self.read(x, "x", self.n_in), p, u, out)
@@ -271,6 +275,7 @@ class NumpyState(NumpyKernel):
 class NumpyMotion(NumpyKernel):
     """A kernel of coordinates, velocities and accelerations."""
 
+    @both_names
     def __call__(
         self,
         q: ArrayLike,
@@ -309,6 +314,4 @@ def _declared(values: Any) -> list[float]:
 
 
 def _vector(value: object, n: int, label: str, error: Any) -> Array:
-    if isinstance(value, Mapping):
-        raise error(BY_NAME.format(label))
     return np.array(read_vector(label, value, n, error))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from numpy.typing import ArrayLike
 
@@ -10,6 +11,10 @@ from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from .layout import Layout
+
+
+#: Parameters or inputs of a call: an array of all, or values by name, where the others are as bound.
+Given: TypeAlias = ArrayLike | Mapping[str, Any] | None
 
 
 class Timed(Protocol):
@@ -21,9 +26,12 @@ class Timed(Protocol):
         self,
         t: ArrayLike,
         x: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
+        p: Given = None,
+        u: Given = None,
         out: Array | None = None,
+        *,
+        parameters: Given = None,
+        inputs: Given = None,
     ) -> Array: ...
 
 
@@ -34,10 +42,13 @@ class JacobianCall(Timed, Protocol):
         self,
         t: ArrayLike,
         x: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
+        p: Given = None,
+        u: Given = None,
         out: Array | None = None,
         wrt: str | None = None,
+        *,
+        parameters: Given = None,
+        inputs: Given = None,
     ) -> Array: ...
 
 
@@ -49,10 +60,13 @@ class State(Protocol):
     def __call__(
         self,
         x: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
+        p: Given = None,
+        u: Given = None,
         out: Array | None = None,
         t: ArrayLike = 0.0,
+        *,
+        parameters: Given = None,
+        inputs: Given = None,
     ) -> Array: ...
 
 
@@ -64,10 +78,13 @@ class Motion(Protocol):
         q: ArrayLike,
         v: ArrayLike,
         a: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
+        p: Given = None,
+        u: Given = None,
         out: Array | None = None,
         t: ArrayLike = 0.0,
+        *,
+        parameters: Given = None,
+        inputs: Given = None,
     ) -> Array: ...
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, UsageError
 from ..numeric.scales import Array
+from ..runtime.argument_names import both_names
 from ..runtime.late import eager
 from ..runtime.near_names import check_names
 from ..runtime.room import read_number, read_vector, require_steps
@@ -95,6 +96,7 @@ class Integrator:
         else:
             choose_solver(method)
 
+    @both_names
     def __call__(
         self, t: float, x: ArrayLike, h: float, p: ArrayLike | None = None, u: ArrayLike | None = None,
         out: Array | None = None,
@@ -107,7 +109,7 @@ class Integrator:
             Time, and how long to go on (s); backwards if negative.
         x : (n_x,) array
             Brought onto the constraints before anything else.
-        p, u : (n_p,) and (n_u,) arrays, optional
+        p, u : (n_p,) and (n_u,) arrays or mappings of names, optional
             Parameters, and inputs held over the whole call; those bound by default.
         out : (n_x,) array, optional
             Takes the result; it may be x.
@@ -134,6 +136,8 @@ class Integrator:
                 raise ValueError(f"h = {h} is too small at t = {t}: t + h equals t in double precision")
             if "max_step" in self._options:
                 require_steps("max_step" if self._step is None else "step", self._options["max_step"], t, end)
+            read, bound = self.module.kernels.fail.vector, self.module
+            p, u = read("p", p, bound.p), read("u", u, bound.u)
             advance = self._plainly if self._compiled is None else self._compiled.advance
             result, trouble = advance(t, x, h, p, u, out)
         except ValueError as error:

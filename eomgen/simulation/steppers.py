@@ -146,8 +146,8 @@ def step(
     t, h : float
         Time and size of the step (s).
     x : (n_x,) array
-    u : (n_u,) array, optional
-        Inputs, held over the step.
+    u : (n_u,) array or mapping of names, optional
+        Inputs, held over the step; those bound by default.
     out : (n_x,) array, optional
         Takes the result; it may be x.
 
@@ -167,7 +167,7 @@ def step(
         raise UsageError(
             f"events of {module.name} reset its state, and a single step finds no events; simulate over (t, t + h)"
         )
-    core = eager(module.core)
+    core, u = eager(module.core), module.kernels.fail.vector("u", u, module.u)
     if hasattr(core, "march"):
         status, result = core.march(module.kernels.context, t, h, x, u, out, UsageError)
         if status == 0:

@@ -46,15 +46,26 @@ cdef extern from "Python.h":
 ctypedef object (*ternary)(object, object, object)
 
 
+cdef object one_of(object error, str name, object given, str other, object same):
+    """An argument that has two names."""
+    if same is None:
+        return given
+    if given is not None:
+        raise error(f"{name} and {other} are the same argument; give one of them")
+    return same
+
+
 cdef class Timed(Kernel):
     """A kernel of time and state: ``f(t, x, p=None, u=None, out=None)``."""
 
-    def __call__(self, t, x, p=None, u=None, out=None, wrt=None):
+    def __call__(self, t, x, p=None, u=None, out=None, wrt=None, parameters=None, inputs=None):
         """Evaluate at time t, a float or (k,), and state x, (n,) or (n, k) for k states as columns.
 
-        p (n_p,) and u, (n_u,) or (n_u, k), replace the context's; out is a float64 array of the result's shape,
-        ``shape`` or ``(*shape, k)``. ``wrt`` is for a jacobian: 'x', 'u' or 'p', by which it is.
+        p (n_p,) and u, (n_u,) or (n_u, k), replace the context's, a mapping those that it names; they are called
+        parameters and inputs as well. out is a float64 array of the result's shape, ``shape`` or ``(*shape, k)``.
+        ``wrt`` is for a jacobian: 'x', 'u' or 'p', by which it is.
         """
+        p, u = one_of(self.error, "p", p, "parameters", parameters), one_of(self.error, "u", u, "inputs", inputs)
         if wrt is not None:
             if self.others is None:
                 raise TypeError(f"{self.name} has no argument wrt")
@@ -68,16 +79,18 @@ cdef class Timed(Kernel):
 cdef class State(Kernel):
     """A kernel of the state alone: ``f(x, p=None, u=None, out=None, t=0.0)``."""
 
-    def __call__(self, x, p=None, u=None, out=None, t=0.0):
+    def __call__(self, x, p=None, u=None, out=None, t=0.0, parameters=None, inputs=None):
         """Evaluate at state x; arguments as for Timed."""
+        p, u = one_of(self.error, "p", p, "parameters", parameters), one_of(self.error, "u", u, "inputs", inputs)
         return self.evaluate(t, x, p, u, out)
 
 
 cdef class Motion(Kernel):
     """A kernel of coordinates, velocities, accelerations: ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
 
-    def __call__(self, q, v, a, p=None, u=None, out=None, t=0.0):
+    def __call__(self, q, v, a, p=None, u=None, out=None, t=0.0, parameters=None, inputs=None):
         """Evaluate at q (n_q,), v and a (n_v,), or with a last axis k; other arguments as for Timed."""
+        p, u = one_of(self.error, "p", p, "parameters", parameters), one_of(self.error, "u", u, "inputs", inputs)
         cdef int n_v = _FACTS.get("n_v", self.n_in // 3)
         return self.general(t, [("q", self.n_in - 2 * n_v, q), ("v", n_v, v), ("a", n_v, a)], p, u, out)
 

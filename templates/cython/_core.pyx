@@ -291,6 +291,7 @@ cdef class Kernel:
         cdef int i, status = 0
         cdef double now = 0
         cdef list held = []
+        p, u = self.by_name("p", p, self.context.p), self.by_name("u", u, self.context.u)
         batch.call, batch.c, batch.nan = self.call, self.c, self.tolerant
         batch.n_pieces, batch.n_in, batch.n_out = len(values), self.n_in, self.n_out
         batch.lanes = NULL
@@ -341,6 +342,12 @@ cdef class Kernel:
         if out is not None and out is not result:
             out[...] = result
         return result if out is None else out
+
+    cdef object by_name(self, str label, object given, object bound):
+        """Values by name as an array, the others as bound, where who asked for the kernel knows names."""
+        if given is not None and not isinstance(given, np.ndarray) and hasattr(self.fail, "vector"):
+            return self.fail.vector(label, given, bound)
+        return given
 
     cdef int wait_for_lanes(self, cnp.npy_intp columns) except -1:
         """Count columns that lanes could take, and have the lanes made when there were many."""

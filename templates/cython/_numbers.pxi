@@ -40,8 +40,6 @@ cdef cnp.ndarray converted(object value, str label, object error, str name, int 
         raise
     except Exception:  # of an object's own __array__, __float__, ...
         pass
-    if label in ("p", "u") and isinstance(value, dict):
-        raise error(f"{label} of a call must be an array in the order of {label}_names; to give values by name use bind({label}={{...}})")
     if n == SCALAR:
         wanted = "be a number" if name is None else "be a real number, or (k,)"
     else:

@@ -95,15 +95,14 @@ def test_calls_with_the_wrong_shape_of_values_are_told() -> None:
 
 
 @pytest.mark.parametrize("target", ["numpy", "cython"])
-def test_a_mapping_of_parameters_in_a_call_is_told_of_bind(target: str) -> None:
+def test_a_mapping_of_parameters_in_a_call_is_read_and_checked(target: str) -> None:
     m = eg.Model("calls")
     m.parameter("l", 1.0)
     m.revolute("q", m.ground, m.body("a", mass=1, com=(0, "-l", 0)))
     module = m.compile(target=target)
-    with pytest.raises(
-        UsageError, match=r"array in the order of p_names; to give values by name use bind\(p=\{\.\.\.\}\)"
-    ):
-        module.rhs(0, [0.0, 0.0], p={"l": 1})
+    assert module.rhs(0, [0.1, 0.0], p={"l": 2}).tolist() == module.rhs(0, [0.1, 0.0], p=[2.0]).tolist()
+    with pytest.raises(UsageError, match="ll"):
+        module.rhs(0, [0.0, 0.0], p={"ll": 1})
 
 
 def test_markers_without_their_names_are_told(tmp_path: Path) -> None:
