@@ -12,7 +12,7 @@ import click
 from ..analysis.tables import without_noise
 from ..errors import UsageError
 from ..limits.descriptions import RESTING
-from ..runtime.near_names import place_of_marker
+from ..marker_places import place_of_marker
 from ..runtime.storage import RUNS
 from .failures import after_integration, reports_failures
 from .number_option import NumberRange

@@ -12,6 +12,7 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.shown import quoted, shown
+from ..marker_places import place_of_marker
 from .body_shapes import read_shapes
 from .build_cam_points import declare_contacts
 from .build_elements import build_elements
@@ -241,10 +242,23 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
         path = f"{section}.{name}"
         if name in known:
             result[name] = reader.expression(path, value)
+        elif section == "initial" and (place := place_of_marker(name)):
+            result[f"{place[0]}({place[1]})"] = reader.expression(path, value)
+            _check_place(reader, path, place[1])
         else:
             remedy = nearest(shown(name), known, _listed([_PLURAL[kind] for kind in kinds], "and"))
             reader.faults.add(path, f"no {_listed(kinds, 'or')} {quoted(name)}", remedy)
     return result
+
+
+def _check_place(reader: Reader, path: str, label: str) -> None:
+    """Note what is wrong with a marker whose place is an initial value."""
+    marker = reader.markers.get(label) if "." in label else None
+    if marker is None:
+        named = [known for known, marker in reader.markers.items() if "." in known and marker.body != GROUND]
+        reader.faults.add(path, f"no marker {quoted(label)}", nearest(label, named, "markers"))
+    elif marker.body == GROUND:
+        reader.faults.add(path, "is a position on the ground, which does not move", "name a marker of another body")
 
 
 def _listed(words: Sequence[str], last: str) -> str:

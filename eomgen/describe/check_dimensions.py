@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 from ..elements.dimensions import ENERGY, FORCE, INERTIA, LENGTH, MASS, NONE, SPEED, SPIN, STIFFNESS, TIME, Dimension
 from ..graph.core import Expr, Graph
 from ..graph.traverse import reachable
+from ..marker_places import place_of_marker
 from ..operations import OPERATIONS
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MODEL, Field, acts_on_length, fields_of, part_fields
@@ -89,7 +90,7 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
         if section == "states" and entry is not None and entry.path in units:
             wanted = units[entry.path].dimension.times(TIME, -1 if steps[0] == "rate" else 0)
         if steps and steps[0] in ("initial", "guess", "reset"):
-            wanted = names.get(str(steps[-1]), Known(None)).dimension
+            wanted = LENGTH if place_of_marker(steps[-1]) else names.get(str(steps[-1]), Known(None)).dimension
         certain = section == "outputs" and check.is_certain(expression)
         mass = _plain_mass(entry) if wanted == INERTIA and section == "bodies" else 0.0
         for message, remedy in check.faults(expression, wanted, certain, mass):

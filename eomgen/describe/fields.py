@@ -262,7 +262,7 @@ MODEL: Fields = {
     "lagrangian": Field("table", "a bare Lagrangian, instead of bodies and joints"),
     "equations": Field("table", "equations of motion M v' = f, instead of bodies and joints"),
     "independent": Field("names", "independent coordinates of a mechanism with loops", default=()),
-    "initial": Field("table", "initial values by coordinate, <coordinate>_dot or output"),
+    "initial": Field("table", "initial values by coordinate, <coordinate>_dot, output or place of a marker"),
     "guess": Field("table", "rough values of coordinates, from which loops are closed"),
     "simulation": Field("table", "defaults of a simulation"),
     "limits": Field(

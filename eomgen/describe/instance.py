@@ -14,7 +14,7 @@ from .names import nearest
 from .placed_on import is_constant
 from .repetition import Fault
 from .units import UnitError, read_unit
-from .visit import Slot, visit_entry
+from .visit import Slot, started, visit_entry
 
 
 @dataclass
@@ -247,11 +247,13 @@ def _add_starts(target: Description, component: Component, instance: Instance, r
     """Initial values and guesses; those of the model itself come after them, and before them in force."""
     for key, given in (("initial", instance.initial), ("guess", instance.guess)):
         own = component.description.values.get(key, {})
-        made = {
-            renaming.prefix + str(name): renaming.scalar(value, Slot("", "", key, (name,)))
-            for name, value in (own.items() if isinstance(own, Mapping) else ())
-        }
-        made |= {renaming.prefix + str(name): value for name, value in given.items()}
+
+        def inside(name: Any, slot: Slot) -> Any:
+            return started(name, lambda plain: renaming.prefix + plain, renaming, slot)
+
+        slots = {name: Slot("", "", key, (name,)) for name in (own if isinstance(own, Mapping) else ())}
+        made = {inside(name, slot): renaming.scalar(own[name], slot) for name, slot in slots.items()}
+        made |= {inside(name, Slot("", "", key, (name,))): value for name, value in given.items()}
         if made:
             kept = target.values.get(key, {})
             whole = {**made, **kept} if isinstance(kept, Mapping) else made

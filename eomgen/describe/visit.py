@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from ..marker_places import place_of_marker
 from .description import GROUND_NAME, DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MARKER, Field, Fields, fields_of
 
@@ -86,8 +87,8 @@ def visit(description: Description, visitor: Visitor) -> Description:
     for key in ("initial", "guess"):
         if isinstance(values.get(key), Mapping):
             values[key] = {
-                _named(name, visitor.coordinate): visitor.scalar(value, Slot("", "", key, (name,)))
-                for name, value in values[key].items()
+                started(name, visitor.coordinate, visitor, slot): visitor.scalar(value, slot)
+                for name, value, slot in ((n, x, Slot("", "", key, (n,))) for n, x in values[key].items())
             }
     if isinstance(values.get("independent"), list | tuple):
         values["independent"] = [_named(name, visitor.coordinate) for name in values["independent"]]
@@ -95,6 +96,13 @@ def visit(description: Description, visitor: Visitor) -> Description:
         if isinstance(values.get(key), Mapping):
             values[key] = _values(values[key], fields, Slot(key, "", ""), visitor)
     return made
+
+
+def started(name: Any, change: Callable[[str], str], visitor: Visitor, slot: Slot) -> Any:
+    """The name of an initial value or a guess: a place of a marker, or what else changes by ``change``."""
+    if place := place_of_marker(name):
+        return f"{place[0]}({visitor.marker(place[1], slot)})"
+    return _named(name, change)
 
 
 def _named(name: Any, change: Callable[[str], str]) -> Any:

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import EomgenError, UsageError
+from ..marker_places import place_of_marker
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.assembled import initial_of
 from ..runtime.given_start import last_state
-from ..runtime.near_names import check_names, place_of_marker
+from ..runtime.near_names import check_names
 from ..runtime.room import read_numbers, require_room
 from ..simulation.run_arguments import find_state
 

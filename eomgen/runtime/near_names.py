@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from types import ModuleType
 from typing import Any
@@ -11,7 +10,6 @@ from ..errors import MissingDependencyError, UsageError
 from ..texts import shown
 
 _SHOWS = ("animate", "animation", "film", "gif", "movie", "play", "plot", "show", "video", "view")
-_PLACE = re.compile(r"([xyz])\((\w+(?:\.\w+)*)\)")
 
 
 class UnknownNameError(UsageError, KeyError):
@@ -30,12 +28,6 @@ def plain_name(name: object, known: Container[str]) -> Any:
     """The name, or that of ``leg1.hip`` as ``leg1_hip``, if only this is known."""
     plain = name.replace(".", "_") if isinstance(name, str) else name
     return plain if name not in known and plain in known else name
-
-
-def place_of_marker(name: object) -> tuple[str, str] | None:
-    """Direction and marker of a place such as ``x(rod.tip)``; None for other names."""
-    found = _PLACE.fullmatch(name.replace(" ", "")) if isinstance(name, str) else None
-    return (found[1], found[2]) if found else None
 
 
 def unknown(what: str, name: object, allowed: Iterable[str]) -> UnknownNameError:

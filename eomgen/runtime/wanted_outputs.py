@@ -14,12 +14,13 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.runs import DIFFERENCE
+from ..marker_places import place_of_marker
 from ..numeric.constraint_system import ConstraintSystem, CutJoints
 from ..numeric.scales import Array
 from .initial import Given, Initial
 from .kernels import Kernels
 from .layout import Layout
-from .near_names import UnknownNameError, place_of_marker, unknown, without_dots
+from .near_names import UnknownNameError, unknown, without_dots
 from .show_parts import load_show
 
 

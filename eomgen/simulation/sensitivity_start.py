@@ -14,11 +14,11 @@ import numpy as np
 from ..analysis.balance import assembly_jacobian
 from ..errors import UsageError
 from ..limits.constraints import CONTRADICTION, STATE
+from ..marker_places import place_of_marker
 from ..numeric import algebra
 from ..numeric.projection import minimum_norm
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
-from ..runtime.near_names import place_of_marker
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -176,6 +176,59 @@ def test_a_model_declares_outputs_among_its_initial_values(target: str) -> None:
         mod.sensitivities(["m"], 0.1)
 
 
+LEGS = """
+name: legs
+components:
+  leg:
+    attachments: [hip]
+    bodies:
+      thigh: {mass: 1, markers: {knee: {at: [0, -0.4, 0]}}}
+      shank: {mass: 0.5, com: [0, -0.2, 0], inertia: {zz: 0.01}, markers: {foot: {at: [0, -0.4, 0]}}}
+    joints:
+      hip: {type: revolute, between: [hip, thigh]}
+      knee: {type: revolute, between: [thigh.knee, shank]}
+    initial: {x(shank.foot): 0.3}
+add:
+  left: {component: leg, at: {hip: ground}}
+  right: {component: leg, at: {hip: ground}, initial: {x(shank.foot): 0.1 + 0.1, y(shank.foot): -0.6}}
+"""
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_a_file_declares_places_of_markers_among_its_initial_values(target: str, tmp_path: Path) -> None:
+    (tmp_path / "legs.yaml").write_text(LEGS)
+    eg.load(tmp_path / "legs.yaml").save(tmp_path / "plain.yaml")
+    for file in ("legs.yaml", "plain.yaml"):
+        module = eg.load(tmp_path / file).compile(target=target)
+        start = module.simulate(0.01, t_eval=[0.0, 0.01]).x[:, 0]
+        hip, knee = start[0:4:2], start[1:4:2]  # angles about z from hanging straight down, links of 0.4 m
+        foot = 0.4 * np.array([sin(hip) + sin(hip + knee), -cos(hip) - cos(hip + knee)])
+        assert foot[:, 1] == pytest.approx([0.2, -0.6], abs=1e-9)
+        assert foot[0, 0] == pytest.approx(0.3, abs=1e-9)
+        elsewhere = module.x0({"x(left_shank.foot)": -0.1})[:2]
+        assert 0.4 * (sin(elsewhere[0]) + sin(elsewhere.sum())) == pytest.approx(-0.1, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("x(shank.toe)", r"initial.x\(shank.toe\): no marker 'shank.toe'; did you mean 'shank.foot'"),
+        ("x(shank)", "no marker 'shank'"),
+        ("y(ground.wall)", "is a position on the ground, which does not move; name a marker of another body"),
+        ("w(shank.foot)", "no coordinate, velocity or output"),
+    ],
+)
+def test_places_that_cannot_be_initial_are_told(name: str, told: str) -> None:
+    m = eg.Model("one")
+    m.ground.marker("wall", at=(1, 0, 0))
+    shank = m.body("shank", mass=1, inertia={"zz": 0.1})
+    shank.marker("foot", at=(0, -0.4, 0))
+    m.revolute("knee", m.ground, shank)
+    m.initial[name] = 0.1
+    with pytest.raises(eg.ModelError, match=told):
+        m.check()
+
+
 def test_outputs_among_initial_values_are_read_and_verified(tmp_path: Path) -> None:
     file = tmp_path / "pendulum.yaml"
     file.write_text(PENDULUM.replace("INITIAL", "height: -0.6"))
