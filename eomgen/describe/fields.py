@@ -126,9 +126,9 @@ DISPLAY: Fields = {
     "shape": Field("choice", "kind of shape", required=True, choices=SHAPES),
     "file": Field("text", "file of a mesh (STL or OBJ), read when the model is drawn"),
     "scale": Field("vector", "scale of a mesh"),
-    "size": Field("vector", "edges of a box (m)"),
-    "radius": Field("number", "radius (m)"),
-    "length": Field("number", "length along z (m)"),
+    "size": Field("vector", "edges of a box (m)", dimension=LENGTH),
+    "radius": Field("expression", "radius (m)", dimension=LENGTH),
+    "length": Field("expression", "length along z (m)", dimension=LENGTH),
     **MARKER,
 }
 LIMITS: Fields = {

@@ -94,7 +94,7 @@ def check_display(reader: Reader, path: str, given: Any) -> None:
                         f"a scale of 0 {what}",
                         "give three numbers other than 0; negative ones mirror",
                     )
-            elif field.kind == "number":
-                reader.number(f"{place}.{key}", value)
+            elif field.kind == "expression":
+                reader.expression(f"{place}.{key}", value)
             else:
                 reader.text(f"{place}.{key}", value)

@@ -241,6 +241,20 @@ def test_a_flywheel_is_round() -> None:
     assert area == pytest.approx(np.pi * 0.085**2, rel=0.005)
 
 
+def test_sizes_of_shapes_follow_the_parameters() -> None:
+    m = eg.Model("disc")
+    m.parameter("r", 0.2)
+    shapes = [{"shape": "cylinder", "radius": "r", "length": "r/4"}]
+    m.revolute("A", m.ground, m.body("disc", mass=1.0, inertia={"zz": 1.0}, display=shapes), coordinate="turn")
+    module = m.compile(target="numpy")
+    for bound, r in ((module, 0.2), (module.bind({"r": 0.5}), 0.5)):
+        (disc,) = [item for item in scene_of(bound).items if (item.role, item.name) == ("shape", "disc")]
+        assert np.ptp(disc.points, axis=0) == pytest.approx([2 * r, 2 * r, r / 4], rel=0.02)
+    m.body("other", mass=1.0, inertia={"zz": 1.0}, display=[{"shape": "sphere", "radius": "turn"}])
+    with pytest.raises(eg.ModelError, match="the coordinate 'turn' cannot be used here"):
+        m.check()
+
+
 def test_branches_are_drawn_side_by_side() -> None:
     module = compiled("four_bar.yaml")
     panels = module.draw_branches()
