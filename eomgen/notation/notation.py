@@ -77,6 +77,16 @@ class Notation:
         twin._keep_apart(more)
         return twin
 
+    def with_latex(self, latex: Mapping[str, str]) -> Notation:
+        """The same with other LaTeX for some of its names, which no other name has."""
+        if not latex:
+            return self
+        twin = copy(self)
+        twin.given = {**self.given, **latex}
+        twin._sources = {**self._sources, **latex}
+        twin._used = self._used | {(form, _printed(form, x)) for x in latex.values() for form in ("latex", "text", "html")}
+        return twin
+
     def is_free(self, latex: str, with_numbers: bool = False) -> bool:
         r"""Whether no name is printed as a letter, ``M``; nor, on request, as the letter with numbers, ``M_{12}``."""
         text = re.escape(_printed("text", latex))

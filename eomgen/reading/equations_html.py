@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..notation.notation import Notation
 from ..printing import given_mathml, mathml, sums_in_lines
 from ..printing.formula_mathml import fenced, row
 from ..printing.formula_of import ROUNDED
@@ -109,7 +110,7 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
         zeros = "; entries that are not shown are 0" if printed.vanishing else ""
         yield f"<p {LEFT}>The mass matrix is symmetric{zeros}.</p>"
     entries = [
-        _line(printed, _label(entry, len(rates)), entry.formula)
+        _line(printed.names, _label(entry, len(rates)), entry.formula)
         for entry in printed.entries()
         if not (whole and entry.letter == printed.letters.mass)
     ]
@@ -126,14 +127,14 @@ def _label(entry: PrintedEntry, n: int) -> str:
     return f"<msub>{given_mathml(entry.letter)}<mn>{comma.join(map(str, entry.place))}</mn></msub>"
 
 
-def _line(printed: PrintedEquations, label: str, formula: Formula) -> str:
+def _line(names: Notation, label: str, formula: Formula) -> str:
     """A formula; a long sum in lines of its terms, below each other."""
     lines = []
-    for k, part in enumerate(sums_in_lines(formula, printed.names)):
+    for k, part in enumerate(sums_in_lines(formula, names)):
         sign = ""
         if k and isinstance(part, SumOf) and not part.terms[0][0]:
             sign = "<mo form='infix'>+</mo>"
-        lines.append(sign + mathml(part, printed.names))
+        lines.append(sign + mathml(part, names))
     if len(lines) == 1:
         return _block(row(label, "<mo>=</mo>", lines[0]))
     cells = [
@@ -147,13 +148,13 @@ def _line(printed: PrintedEquations, label: str, formula: Formula) -> str:
 def _intermediates(printed: PrintedEquations) -> Iterator[str]:
     if printed.intermediates:
         yield f"<p {LEFT}>where</p>"
-        yield from (_line(printed, mathml(Name(name), printed.names), x) for name, x in printed.intermediates)
+        yield from (_line(printed.names, mathml(Name(name), printed.names), x) for name, x in printed.intermediates)
 
 
 def _states(printed: PrintedEquations) -> Iterator[str]:
     if printed.states:
         yield f"<p {LEFT}>first-order states</p>"
-        yield from (_line(printed, mathml(rate, printed.names), x) for rate, x in printed.states)
+        yield from (_line(printed.names, mathml(rate, printed.names), x) for rate, x in printed.states)
 
 
 def parts_html(parts: PrintedParts) -> Iterator[str]:
@@ -173,6 +174,6 @@ def parts_html(parts: PrintedParts) -> Iterator[str]:
                 yield f"<p {LEFT}>{words(item)}</p>"
             case PrintedGroup():
                 lines = "".join(
-                    _line(parts.printed, mathml(line.left, parts.names), line.right) for line in item.lines[:MOST]
+                    _line(parts.names, mathml(line.left, parts.names), line.right) for line in item.lines[:MOST]
                 )
                 yield f"<details><summary>{words(item.title)}</summary><div style='{_FLOW}'>{lines}</div></details>"
