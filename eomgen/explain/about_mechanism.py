@@ -33,7 +33,7 @@ def mechanism(author: Author, module: Any | None) -> Section:
         pieces.append(Sentence(f"The model is {kind}, so there are no bodies to draw."))
         return Section("Mechanism", tuple(pieces))
     pieces.append(_picture(module))
-    report = eqs.report
+    report = author.source.report
     cut = report.loop_joints
     loops = f"; joint{'s' * (len(cut) > 1)} {_names(cut)} close{'s a loop' if len(cut) == 1 else ' loops'}"
     pieces.append(
@@ -113,14 +113,18 @@ def bodies(author: Author) -> Section | None:
             (
                 f"${author.symbol(p.name)}$",
                 f"`{p.name}`",
-                "none" if p.value is None else f"{p.value:.6g}",
+                _value(author.put_in.get(p.name, p.value)),
                 _plain(p.unit),
-                _plain(p.doc) or kind,
+                (_plain(p.doc) or kind) + (", value put in" if p.name in author.put_in else ""),
             )
             for p, kind in given
         )
         pieces.append(Table(("symbol", "name", "value", "unit", "meaning"), rows))
     return Section("Bodies and parameters" if m.bodies else "Parameters", tuple(pieces)) if pieces else None
+
+
+def _value(value: float | None) -> str:
+    return "none" if value is None else f"{value:.6g}"
 
 
 def coordinates(author: Author) -> Section:
