@@ -8,7 +8,7 @@ from copy import copy
 from functools import cache
 from typing import Any
 
-from .latex_of_names import latex_of, literal, split_rate
+from .latex_of_names import latex_of, literal, rate_of, split_rate
 from .latex_tree import Accent, Group, Node, NotationError, Scripts, head_of, read_latex, spaced
 from .printing import html_form, mathml_form, mathtext_form, text_form
 from .signs import DOTS
@@ -148,6 +148,8 @@ class Notation:
         stem, order = split_rate(name)
         if not order:
             return latex_of(self._with_dots(name))
+        if order == 2 and (rate := rate_of(stem)) in self.given:  # of a rate that is printed as a letter of its own
+            return dotted(self.given[rate], 1)
         return dotted(self._source(stem), order) if order < len(DOTS) else literal(name)
 
     def _with_dots(self, name: str) -> str:
