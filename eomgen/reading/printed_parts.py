@@ -262,12 +262,14 @@ class PrintedParts:
             rows[-1][0] = Words("sym.", r"\text{sym.}")
         return MatrixOf(tuple(map(tuple, rows)))
 
-    def _entries(self, matrix: _Matrix) -> Iterator[PrintedLine]:
-        """What the letters of a matrix stand for, those of named parts left out."""
+    def _entries(self, matrix: _Matrix) -> Iterator[tuple[Any, PrintedLine]]:
+        """What the letters of a matrix stand for, in SymPy and as it is printed, those of named parts left out."""
         for (i, j), place in self._first_places(matrix).items():
             x = matrix.entries[i][j]
-            if not self._stands(matrix, x) and place == (i, j):
-                yield PrintedLine(self._place(matrix, i, j), x)
+            letter = self._place(matrix, i, j)
+            is_part = isinstance(x, Name) and self._entry_letters.get(x.name) == letter
+            if not is_part and not self._stands(matrix, x) and place == (i, j):
+                yield matrix.values[i, j], PrintedLine(letter, x)
 
     @staticmethod
     def _first_places(matrix: _Matrix) -> dict[tuple[int, int], tuple[int, int]]:
@@ -319,11 +321,8 @@ class PrintedParts:
             words: tuple[Piece, ...] = (title,)
             if matrix := matrices.get(meaning):
                 entries = [*self._entries(matrix)]
-                told = {(i, j) for (i, j), place in self._first_places(matrix).items() if place == (i, j)}
-                operations += sum(
-                    operations_of(matrix.values[i, j]) for i, j in told if not self._stands(matrix, matrix.entries[i][j])
-                )
-                lines += entries
+                operations += sum(operations_of(x) for x, _ in entries)
+                lines += [line for _, line in entries]
                 words = (f"{title} ", Letter(matrix.letter))
             if lines:
                 many = f"{len(lines)} formula{'s' * (len(lines) > 1)}"
