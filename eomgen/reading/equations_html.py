@@ -20,6 +20,7 @@ from .readable import Readable
 FOLDED = 12  #: formulas more than which are folded up
 MOST = 1_000  #: intermediates that are shown
 LEFT = "style='text-align:left'"
+CELL = "style='text-align:left;padding:0.15em 1.2em 0.15em 0'"  #: of tables, on pages that do not space cells
 _STYLE = "margin:0.5em 0;padding:0.2em 0;overflow-x:auto;overflow-y:hidden;font-size:1.15em"
 _FLOW = "display:flex;flex-wrap:wrap;column-gap:2.5em;margin-left:1em"  #: short formulas side by side
 #: Fonts with brackets that grow, of the usual systems.
@@ -65,13 +66,13 @@ def _coordinates(printed: PrintedEquations) -> str:
     dependent = any(c.role for c in shown)
     heads = ["coordinate", "name", "joint", "unit", *([""] if dependent else [])]
     rows = "".join(
-        f"<tr><td {LEFT}>{_math(printed.names.mathml(c.name))}</td><td {LEFT}><code>{html_text(c.name)}</code></td>"
-        f"<td {LEFT}>{html_text(c.joint)}</td><td {LEFT}>{html_text(c.unit)}</td>"
-        + (f"<td {LEFT}>{c.role}</td>" if dependent else "")
+        f"<tr><td {CELL}>{_math(printed.names.mathml(c.name))}</td><td {CELL}><code>{html_text(c.name)}</code></td>"
+        f"<td {CELL}>{html_text(c.joint)}</td><td {CELL}>{html_text(c.unit)}</td>"
+        + (f"<td {CELL}>{c.role}</td>" if dependent else "")
         + "</tr>"
         for c in shown
     )
-    whole = f"<table><tr>{''.join(f'<th {LEFT}>{head}</th>' for head in heads)}</tr>{rows}</table>"
+    whole = f"<table><tr>{''.join(f'<th {CELL}>{head}</th>' for head in heads)}</tr>{rows}</table>"
     return whole if len(shown) <= FOLDED else f"<details><summary>{len(shown)} coordinates</summary>{whole}</details>"
 
 
