@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from typing import Any
 
@@ -11,7 +10,7 @@ import sympy
 from ..describe.mechanism import JointSpec
 from ..describe.placement import axis_word
 from ..errors import EomgenError
-from ..files.inline_pictures import DPI, SHOWN
+from ..files.inline_pictures import trimmed_png
 from ..frames import GROUND
 from ..graph.core import Expr
 from .author import Author
@@ -77,10 +76,8 @@ def _picture(module: Any | None) -> Piece:
         figure = small_figure(module)
     except EomgenError as error:
         return Sentence(f"No picture: {_plain(str(error).partition(chr(10))[0])}.")
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI)
-    width = round(SHOWN * figure.get_size_inches()[0] * 1.25)
-    return DrawnPicture(buffer.getvalue(), width, "the mechanism in its initial position")
+    data, width = trimmed_png(figure)
+    return DrawnPicture(data, round(1.25 * width), "the mechanism in its initial position")
 
 
 def bodies(author: Author) -> Section | None:

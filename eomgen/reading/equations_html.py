@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 from ..notation.notation import Notation
 from ..printing import given_mathml, mathml, sums_in_lines
-from ..printing.formula_mathml import fenced, row
+from ..printing.formula_mathml import fenced, row, sum_line
 from ..printing.formula_of import ROUNDED
-from ..printing.formula_tree import Formula, MatrixOf, Name, SumOf, is_group
+from ..printing.formula_tree import Formula, MatrixOf, Name, is_group
 from ..texts import html_text
 from .printed_equations import PrintedEntry, PrintedEquations
 from .printed_parts import PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
@@ -130,12 +130,7 @@ def _label(entry: PrintedEntry, n: int) -> str:
 
 def _line(names: Notation, label: str, formula: Formula) -> str:
     """A formula; a long sum in lines of its terms, below each other."""
-    lines = []
-    for k, part in enumerate(sums_in_lines(formula, names)):
-        sign = ""
-        if k and isinstance(part, SumOf) and not part.terms[0][0]:
-            sign = "<mo form='infix'>+</mo>"
-        lines.append(sign + mathml(part, names))
+    lines = [sum_line(part, names, first=k == 0) for k, part in enumerate(sums_in_lines(formula, names))]
     if len(lines) == 1:
         return _block(row(label, "<mo>=</mo>", lines[0]))
     cells = [
