@@ -24,7 +24,11 @@ def calculation(author: Author, state: Mapping[str, float], reason: str) -> Sect
     eqs = author.equations
     k = eqs.kinematics
     names = [*k.names, *k.velocity_names, *k.state_names, *k.parameter_names, *k.input_names]
-    rows = tuple((f"${author.symbol(name)}$", f"{state[name]:.6g}") for name in names if name in state and name not in author.put_in)
+    rows = tuple(
+        (f"${author.symbol(name)}$", f"{state[name]:.6g}")
+        for name in names
+        if name in state and name not in author.put_in
+    )
     numbers = dict(state)
     pieces: list[Piece] = [
         Sentence(

@@ -84,7 +84,9 @@ class Notation:
         twin = copy(self)
         twin.given = {**self.given, **latex}
         twin._sources = {**self._sources, **latex}
-        twin._used = self._used | {(form, _printed(form, x)) for x in latex.values() for form in ("latex", "text", "html")}
+        twin._used = self._used | {
+            (form, _printed(form, x)) for x in latex.values() for form in ("latex", "text", "html")
+        }
         return twin
 
     def is_free(self, latex: str, with_numbers: bool = False) -> bool:

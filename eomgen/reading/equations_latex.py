@@ -19,7 +19,10 @@ def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
     if printed.is_long:
         lines = [*_parts(PrintedParts(printed))]
     else:
-        lines = [*_motion(printed), *(_broken(printed.names, printed.names.latex(n), x) for n, x in printed.intermediates)]
+        lines = [
+            *_motion(printed),
+            *(_broken(printed.names, printed.names.latex(n), x) for n, x in printed.intermediates),
+        ]
     lines += [_broken(printed.names, latex(rate, printed.names), x) for rate, x in printed.states]
     if told := printed.told_of_numbers:
         lines.append(rf"\text{{{told.replace('_', chr(92) + '_')}}}")

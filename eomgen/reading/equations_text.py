@@ -158,7 +158,11 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
             case PrintedSentence():
                 yield from fold(words(item), columns, "", "  ")
     groups = [item for item in items if isinstance(item, PrintedGroup)]
-    yield from ("", "In groups:", *(line for group in groups for line in fold(words(group.title), columns, "  ", "    ")))
+    yield from (
+        "",
+        "In groups:",
+        *(line for group in groups for line in fold(words(group.title), columns, "  ", "    ")),
+    )
     for group in groups:
         yield from ("", words(group.title))
         yield from (line for one in group.lines for line in equation(one))

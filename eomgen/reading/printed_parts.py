@@ -202,7 +202,9 @@ class PrintedParts:
         yield PrintedRow((PrintedLine(Letter(M.letter), MatrixOf(tuple(map(tuple, rows)))),))
         rows = [
             [
-                Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}") if any(filled[1][i][j] for i in r for j in c) else ZERO
+                Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}")
+                if any(filled[1][i][j] for i in r for j in c)
+                else ZERO
                 for b, c in enumerate(blocks.coordinates)
             ]
             for a, r in enumerate(blocks.equations)

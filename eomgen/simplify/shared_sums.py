@@ -99,7 +99,9 @@ class SharedSums:
         sums = self._sums()
         dicts = {one: dict(one) for one in sums}
         known = {_signed(poly) for _, poly in self.named if len(poly) > 1}
-        candidates = dict.fromkeys([*self._shared(sums), *known, *(_signed(dicts[s]) for s, n in sums.items() if n > 1)])
+        candidates = dict.fromkeys(
+            [*self._shared(sums), *known, *(_signed(dicts[s]) for s, n in sums.items() if n > 1)]
+        )
         holders: defaultdict[Monomial, list[Frozen]] = defaultdict(list)
         for one in sums:
             for monomial, _ in one:

@@ -24,7 +24,11 @@ def parts(name: str) -> PrintedParts:
 
 def matrices(of: PrintedParts) -> dict[str, MatrixOf]:
     lines = [line for item in of.items() if isinstance(item, PrintedRow) for line in item.lines]
-    return {line.left.latex: line.right for line in lines if isinstance(line.right, MatrixOf) and isinstance(line.left, Letter)}
+    return {
+        line.left.latex: line.right
+        for line in lines
+        if isinstance(line.right, MatrixOf) and isinstance(line.left, Letter)
+    }
 
 
 def test_a_platform_on_six_legs_is_shown_in_blocks() -> None:

@@ -258,7 +258,9 @@ def test_a_solution_with_values_is_that_of_a_model_with_numbers(method: str) -> 
     assert solution.difference < 1e-10
     assert "with `l2` = 0.7, `m3` = " in solution.title
     final = next(s for s in solution.sections if s.title == "Equations of motion")
-    shown = [x for piece in final.pieces for side in getattr(piece, "sides", ()) for x in getattr(side, "free_symbols", ())]
+    shown = [
+        x for piece in final.pieces for side in getattr(piece, "sides", ()) for x in getattr(side, "free_symbols", ())
+    ]
     assert shown
     assert {"l2", "m3", "tau3"}.isdisjoint(map(str, shown))
     m2 = {p.name: p.value for p in equations.kinematics.mechanism.parameters}["m2"]
