@@ -23,7 +23,7 @@ MANY = 8  #: bodies from which their masses are folded
 
 def mechanism(author: Author, module: Any | None) -> Section:
     """DrawnPicture, topology, joints and loops."""
-    eqs, m = author.equations, author.mechanism
+    m = author.mechanism
     pieces: list[Piece] = []
     if m.doc:
         pieces.append(Sentence(_plain(m.doc)))

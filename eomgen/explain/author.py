@@ -62,7 +62,7 @@ class Author:
 
     def __init__(self, equations: Any, full: bool) -> None:
         self.equations, self.full = equations, full
-        self.source = equations.source if isinstance(equations, ReadingView) else equations
+        self.source: Any = equations.source if isinstance(equations, ReadingView) else equations
         self.put_in: Mapping[str, float | None] = equations.numbers_put_in()
         self.mechanism = equations.kinematics.mechanism
         self.printer = Printer(equations)

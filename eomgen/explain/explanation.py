@@ -171,7 +171,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
 
 
 def _module(author: Author) -> tuple[Any, str]:
-    """The module of the equations on NumPy, with the values that were put in, at its declared state, or None and why."""
+    """The module of the equations on NumPy, with the values that were put in, or None and why it has no state."""
     equations = author.source
     functions = sorted(equations.kinematics.graph.functions)
     if functions:

@@ -1,7 +1,7 @@
-"""Stage reading, blocks: where a large matrix vanishes -> its rows and columns in groups, between which blocks are zero.
+"""Stage reading, blocks: where a large matrix vanishes -> groups of its rows and columns, most blocks being zero.
 
-Coordinates of one branch of the tree belong together, as those of one leg of a platform do; rows of the constraints that
-are of one joint do too.
+Coordinates of one branch of the tree belong together, as those of one leg of a platform do; rows of the constraints
+that are of one joint do too.
 """
 
 from __future__ import annotations

@@ -187,8 +187,8 @@ class PrintedParts:
         C, M = of.get(PartMeaning.CONSTRAINT), of[PartMeaning.INERTIA]
         if C is None or not M.is_large:
             return
-        filled = [[[x != ZERO for x in row] for row in matrix.entries] for matrix in (M, C)]
-        if (blocks := find_blocks(*filled, self.equations.constraint_names, self._branches)) is None:
+        inertia, held = ([[x != ZERO for x in row] for row in matrix.entries] for matrix in (M, C))
+        if (blocks := find_blocks(inertia, held, self.equations.constraint_names, self._branches)) is None:
             return
         names = [Name(name) for name in self._kinematics.velocity_labels]
         columns = [[names[j] for j in places] for places in blocks.coordinates]
@@ -202,9 +202,7 @@ class PrintedParts:
         yield PrintedRow((PrintedLine(Letter(M.letter), MatrixOf(tuple(map(tuple, rows)))),))
         rows = [
             [
-                Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}")
-                if any(filled[1][i][j] for i in r for j in c)
-                else ZERO
+                Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}") if any(held[i][j] for i in r for j in c) else ZERO
                 for b, c in enumerate(blocks.coordinates)
             ]
             for a, r in enumerate(blocks.equations)
@@ -295,8 +293,9 @@ class PrintedParts:
         for matrix in self._matrices:
             for (i, j), place in self._first_places(matrix).items():
                 x = matrix.entries[i][j]
-                own = isinstance(x, Name) and place == (i, j) and self._meaning.get(x.name) == matrix.meaning
-                if own and x.name not in found and NUMBERED.fullmatch(x.name):
+                if not isinstance(x, Name) or place != (i, j) or x.name in found or not NUMBERED.fullmatch(x.name):
+                    continue
+                if self._meaning.get(x.name) == matrix.meaning:
                     found[x.name] = self._place(matrix, i, j)
         return found
 

@@ -150,7 +150,8 @@ class WritesQuantities(ABC):
     def numbers_put_in(self) -> dict[str, float | None]:
         """Numbers of the names for which values were put in, with declared values of what these hold; None without."""
         m, names = self.kinematics.mechanism, list(dict.fromkeys(name for given in self._put_in for name in given))
-        declared = {x.name: x.value for x in (*m.parameters, *m.inputs) if x.value is not None}
+        quantities: list[Any] = [*m.parameters, *m.inputs]
+        declared = {x.name: x.value for x in quantities if x.value is not None}
         graph = Graph()
         values = self.with_values([graph.symbol(name) for name in names])
         return {

@@ -1,8 +1,7 @@
 """Stage simplify: sums that stand in several others of a form -> a name for each, where that is shorter.
 
-This is the extraction of common cubes' duals, sub-sums, of logic synthesis (R. K. Brayton and C. McMullen, The
-decomposition and factorization of Boolean expressions, ISCAS 1982), greedy, with a length for readers as the cost.  A sum
-that has a name already is found in others too.
+Common sub-sums are taken out greedily, those that save most first, as common factors are in :mod:`.factoring`, with a
+length for readers as the cost.  A sum that has a name already is found in others too.
 """
 
 from __future__ import annotations

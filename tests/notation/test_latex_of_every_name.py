@@ -63,13 +63,13 @@ def model(text: str) -> eg.Model:
 
 
 CASES = {
-    ("bead", "w1"): (r"\nu_1", "ν₁", "<i>ν</i><sub>1</sub>", r"$\nu_{1}$"),
+    ("bead", "w1"): (r"\nu_1", "ν₁", "<i>ν</i><sub>1</sub>", r"$\nu_{1}$"),  # noqa: RUF001
     ("bead", "S"): (r"\Lambda", "Λ", "<i>Λ</i>", r"$\Lambda$"),
     ("bead", "tension"): (r"F_{\rm t}", "F_t", "<i>F</i><sub>t</sub>", r"$F_{\mathrm{t}}$"),
     ("pendulum", "a_dot"): (r"\Omega", "Ω", "<i>Ω</i>", r"$\Omega$"),
     ("servo", "lag"): (r"\tau_{\rm m}", "τ_m", "<i>τ</i><sub>m</sub>", r"$\tau_{\mathrm{m}}$"),
     ("servo", "u"): ("u_c", "u_c", "<i>u</i><sub><i>c</i></sub>", "$u_{c}$"),
-    ("servo", "z"): (r"\sigma_{\rm f}", "σ_f", "<i>σ</i><sub>f</sub>", r"$\sigma_{\mathrm{f}}$"),
+    ("servo", "z"): (r"\sigma_{\rm f}", "σ_f", "<i>σ</i><sub>f</sub>", r"$\sigma_{\mathrm{f}}$"),  # noqa: RUF001
     ("servo", "x"): (r"\xi", "ξ", "<i>ξ</i>", r"$\xi$"),
     ("servo", "x_dot"): ("w", "w", "<i>w</i>", "$w$"),
     ("servo", "o"): ("y_o", "y_o", "<i>y</i><sub><i>o</i></sub>", "$y_{o}$"),
@@ -93,10 +93,10 @@ def test_labels_and_documents_follow_too() -> None:
     assert labels(machine.compile("numpy").simulate((0, 0.1)), "z", "o") == [r"$\sigma_{\mathrm{f}}$", "$y_{o}$"]
     assert r"\nu_1^2" in bead._repr_latex_()
     assert r"m l^2 \dot{\Omega} = -m g l \sin \alpha - \Omega" in pendulum._repr_latex_()  # a'' is the rate of Omega
-    assert "m l² Ω' = -m g l sin(α) - Ω" in str(pendulum)
+    assert "m l² Ω' = -m g l sin(α) - Ω" in str(pendulum)  # noqa: RUF001
     document = machine.explain()
     assert r"\dot{\sigma}_{\rm f} = \frac{u_c - \sigma_{\rm f}}{\tau_{\rm m}}" in document.markdown
-    assert "<mi>σ</mi>" in document.html
+    assert "<mi>σ</mi>" in document.html  # noqa: RUF001
     assert document.difference < 1e-10
 
 
