@@ -164,7 +164,7 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
         *(line for group in groups for line in fold(words(group.title), columns, "  ", "    ")),
     )
     for group in groups:
-        yield from ("", words(group.title))
+        yield from ("", *fold(words(group.title), columns, "", "  "))
         yield from (line for one in group.lines for line in equation(one))
 
 
