@@ -85,9 +85,14 @@ class Equations(Derivation):
         >>> solution.difference < 1e-10
         True
         """
+        return self.explained(self, level)
+
+    @staticmethod
+    def explained(equations: Any, level: str) -> Explanation:
+        """The worked solution of equations or of a view of them; see :meth:`explain`."""
         from ..explain import explain
 
-        return explain(self, level)
+        return explain(equations, level)
 
     def compile(self, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any) -> Module:
         """Generate code, compile it and load it.

@@ -225,7 +225,8 @@ def _cam_contact(e: Entry) -> Constraint | None:
     if "support" in e.values and shape != "flat_face":
         e.fault("support", "only a flat face takes a support function", "give the contour r(theta) instead")
     if shape == "knife_edge" or "support" in e.values:
-        e.refuse("coordinate", "the contact point of this follower needs no coordinate of its own")
+        for key in ("coordinate", "latex"):
+            e.refuse(key, "the contact point of this follower needs no coordinate of its own")
     if axis is None or follower is None or e.at_fault():
         return None
     profile = _profile(e, "support" if "support" in e.values else "contour")
@@ -297,6 +298,7 @@ TYPES = table(
             ),
             "radius": Field("expression", "radius of the roller (m)", dimension=LENGTH),
             "coordinate": Field("name", "name of the polar angle of the contact point (<name>_contact)"),
+            "latex": Field("latex", "how formulas and plots print that angle, in LaTeX (from its name unless given)"),
             "periodic": _PERIODIC,
         },
         _cam_contact,

@@ -10,6 +10,7 @@ from ..graph import vectors as vec
 from ..joints import JOINTS
 from .description import DescribedEntry
 from .mechanism import Body, JointSpec
+from .printed_names import take_latex
 from .sympy_face import name_of
 from .values import Reader
 
@@ -54,4 +55,5 @@ def declare_contacts(reader: Reader, entries: list[DescribedEntry]) -> Contacts:
             path = entry.path if given is None else f"{entry.path}.coordinate"
             reader.names.declare("coordinate", name, path)
             contacts.coordinates[entry.path] = str(name)
+            take_latex(reader, f"{entry.path}.latex", name, entry.values.get("latex", ""))
     return contacts

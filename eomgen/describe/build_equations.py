@@ -58,7 +58,8 @@ def declare_equations(reader: Reader, given: Any, has_others: bool) -> dict[str,
             reader.names.declare("velocity", name, f"{PATH}.velocities[{k}]")
     for k, name in enumerate(values["multipliers"]):
         reader.names.declare("multiplier", name, f"{PATH}.multipliers[{k}]")
-    take_coordinates_latex(reader, f"{PATH}.latex", q, values.get("latex", ()))
+    others = [name for name in (*v, *values["multipliers"]) if name not in q]
+    take_coordinates_latex(reader, f"{PATH}.latex", q, values.get("latex", ()), others)
     return values
 
 

@@ -80,7 +80,10 @@ def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[D
             parameter = k < count and joint.coordinates[k].kind == "parameter"
             reader.names.declare("parameter of rotation" if parameter else "coordinate", name, path)
         if "latex" in entry.values and count and len(names) == count:
-            take_coordinates_latex(reader, f"{entry.path}.latex", names, entry.values["latex"])
+            others = [f"{name}_dot" for name in names] + [
+                entry.name + w.suffix for w in joint.velocities if w.of is None
+            ]
+            take_coordinates_latex(reader, f"{entry.path}.latex", names, entry.values["latex"], others)
         for velocity in joint.velocities:
             if velocity.of is None:
                 reader.names.declare("velocity", entry.name + velocity.suffix, entry.path)

@@ -42,7 +42,8 @@ def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str
     values["coordinates"] = [name_of(q) for q in listed]
     for k, name in enumerate(values["coordinates"]):
         reader.names.declare("coordinate", name, f"lagrangian.coordinates[{k}]")
-    take_coordinates_latex(reader, "lagrangian.latex", values["coordinates"], values.get("latex", ()))
+    rates = [f"{name}_dot" for name in values["coordinates"]]
+    take_coordinates_latex(reader, "lagrangian.latex", values["coordinates"], values.get("latex", ()), rates)
     return values
 
 

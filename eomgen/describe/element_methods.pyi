@@ -197,7 +197,7 @@ class ElementMethods(Described):
         periodic: bool | None = None) -> None:
         """Add a cam with a given lift: the follower's coordinate is a function of the cam's angle."""
     def cam_contact(self, name: str, cam: Any, follower: Any, shape: str, contour: Value = None, support: Value = None,
-        radius: Value = None, coordinate: Any = None, periodic: bool | None = None) -> None:
+        radius: Value = None, coordinate: Any = None, latex: str | None = None, periodic: bool | None = None) -> None:
         """Add a follower that stays in contact with the contour of a plane cam."""
     def rolling(self, name: str, wheel: Any, plane: Any = None, radius: Value = None, shape: str | None = None,
         tube: Value = 0, no_spin: bool | None = None) -> None:

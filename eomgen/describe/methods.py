@@ -40,6 +40,7 @@ ARGUMENTS = {
     "choice": ("str", "str"),
     "shape": ("sequence of three", "Sequence[Value]"),
     "limits": ("mapping", "Mapping[str, float]"),
+    "latex": ("str", "str"),
     "latexes": ("str, sequence or mapping of str", "str | Sequence[str] | Mapping[str, str]"),
     "number": ("float", "float"),
     "axes": ("two of str or three floats", "Sequence[Any]"),

@@ -29,15 +29,20 @@ def take_latex(reader: Reader, path: str, name: Any, given: Any) -> None:
         reader.faults.add(path, f"{name!r} is printed as {quoted(reader.latex[name])} already", "leave one of them out")
 
 
-def take_coordinates_latex(reader: Reader, path: str, coordinates: Sequence[str], given: Any) -> None:
-    """Take in the LaTeX of coordinates: a text for one, a list in their order, or a mapping of their names."""
+def take_coordinates_latex(
+    reader: Reader, path: str, coordinates: Sequence[str], given: Any, others: Sequence[str] = ()
+) -> None:
+    """Take in the LaTeX of coordinates: a text for one, a list in their order, or a mapping of names.
+
+    A mapping may hold other names too, such as those of velocities and multipliers.
+    """
     if isinstance(given, Mapping):
         for key, text in given.items():
             name = name_of(key)
-            if name in coordinates:
+            if name in coordinates or name in others:
                 take_latex(reader, f"{path}.{name}", name, text)
             else:
-                remedy = nearest(shown(name), coordinates, "coordinates")
+                remedy = nearest(shown(name), [*coordinates, *others], f"coordinates{' and velocities' * bool(others)}")
                 reader.faults.add(f"{path}.{shown(name)}", f"no coordinate {quoted(name)}", remedy)
         return
     listed = [given] if isinstance(given, str) else items(given)

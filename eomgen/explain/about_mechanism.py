@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from typing import Any
 
@@ -11,7 +10,7 @@ import sympy
 from ..describe.mechanism import JointSpec
 from ..describe.placement import axis_word
 from ..errors import EomgenError
-from ..files.inline_pictures import DPI, SHOWN
+from ..files.inline_pictures import trimmed_png
 from ..frames import GROUND
 from ..graph.core import Expr
 from .author import Author
@@ -24,7 +23,7 @@ MANY = 8  #: bodies from which their masses are folded
 
 def mechanism(author: Author, module: Any | None) -> Section:
     """DrawnPicture, topology, joints and loops."""
-    eqs, m = author.equations, author.mechanism
+    m = author.mechanism
     pieces: list[Piece] = []
     if m.doc:
         pieces.append(Sentence(_plain(m.doc)))
@@ -33,7 +32,7 @@ def mechanism(author: Author, module: Any | None) -> Section:
         pieces.append(Sentence(f"The model is {kind}, so there are no bodies to draw."))
         return Section("Mechanism", tuple(pieces))
     pieces.append(_picture(module))
-    report = eqs.report
+    report = author.source.report
     cut = report.loop_joints
     loops = f"; joint{'s' * (len(cut) > 1)} {_names(cut)} close{'s a loop' if len(cut) == 1 else ' loops'}"
     pieces.append(
@@ -77,10 +76,8 @@ def _picture(module: Any | None) -> Piece:
         figure = small_figure(module)
     except EomgenError as error:
         return Sentence(f"No picture: {_plain(str(error).partition(chr(10))[0])}.")
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI)
-    width = round(SHOWN * figure.get_size_inches()[0] * 1.25)
-    return DrawnPicture(buffer.getvalue(), width, "the mechanism in its initial position")
+    data, width = trimmed_png(figure)
+    return DrawnPicture(data, round(1.25 * width), "the mechanism in its initial position")
 
 
 def bodies(author: Author) -> Section | None:
@@ -113,14 +110,18 @@ def bodies(author: Author) -> Section | None:
             (
                 f"${author.symbol(p.name)}$",
                 f"`{p.name}`",
-                "none" if p.value is None else f"{p.value:.6g}",
+                _value(author.put_in.get(p.name, p.value)),
                 _plain(p.unit),
-                _plain(p.doc) or kind,
+                (_plain(p.doc) or kind) + (", value put in" if p.name in author.put_in else ""),
             )
             for p, kind in given
         )
         pieces.append(Table(("symbol", "name", "value", "unit", "meaning"), rows))
     return Section("Bodies and parameters" if m.bodies else "Parameters", tuple(pieces)) if pieces else None
+
+
+def _value(value: float | None) -> str:
+    return "none" if value is None else f"{value:.6g}"
 
 
 def coordinates(author: Author) -> Section:

@@ -256,7 +256,7 @@ def final(author: Author) -> Section:
     eqs = author.equations
     rates = ", ".join(f"${author.symbol(name)}$" for name in eqs.acceleration_names)
     if not eqs.acceleration_names:
-        return Section("Equations of motion", (Sentence("The motion is prescribed: no acceleration is unknown."),))
+        return Section("Equations of motion", tuple(_prescribed(author)))
     try:
         named, mass = eqs.written("mass_matrix")
         force = eqs.force
@@ -273,3 +273,21 @@ def final(author: Author) -> Section:
     known = {symbol for symbol, _ in needed(named, mass)}
     pieces += author.formulas(right, force[0] if one else force, named, ("force", None), told=known)
     return Section("Equations of motion", tuple(pieces))
+
+
+def _prescribed(author: Author) -> list[Piece]:
+    """What is left where no degree of freedom is: the forces of the constraints, those of drivers among them."""
+    told = "The motion is prescribed: no acceleration is unknown."
+    named, system = author.equations.written("tree_system")
+    if not any(x != 0 for x in (*system.mass_matrix, *system.force)):
+        return [Sentence(f"{told} Nothing has mass and no forces act, so that the constraints exert none.")]
+    pieces: list[Piece] = [
+        Sentence(
+            f"{told} The constraints exert the forces $\\mathbf{{C}}_q^T \\mathbf{{\\lambda}} = \\mathbf{{M}} "
+            "\\ddot{\\mathbf{q}} - \\mathbf{f}$. Of $\\mathbf{\\lambda}$, one component belongs to each constraint "
+            "equation; that of a driver is the force or torque with which it drives its coordinate."
+        )
+    ]
+    pieces += author.formulas(r"\mathbf{M}", system.mass_matrix, named, ("tree_system", None), True)
+    known = {symbol for symbol, _ in needed(named, system.mass_matrix)}
+    return pieces + author.formulas(r"\mathbf{f}", system.force, named, ("tree_system", None), told=known)

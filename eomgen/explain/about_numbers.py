@@ -24,7 +24,11 @@ def calculation(author: Author, state: Mapping[str, float], reason: str) -> Sect
     eqs = author.equations
     k = eqs.kinematics
     names = [*k.names, *k.velocity_names, *k.state_names, *k.parameter_names, *k.input_names]
-    rows = tuple((f"${author.symbol(name)}$", f"{state[name]:.6g}") for name in names if name in state)
+    rows = tuple(
+        (f"${author.symbol(name)}$", f"{state[name]:.6g}")
+        for name in names
+        if name in state and name not in author.put_in
+    )
     numbers = dict(state)
     pieces: list[Piece] = [
         Sentence(
@@ -86,7 +90,7 @@ def counts(author: Author) -> Section:
     """Operations of each part of the equations."""
     rows = tuple(
         (name, str(c.multiplications), str(c.additions), str(c.divisions), str(c.total))
-        for name, c in author.equations.operations.items()
+        for name, c in author.source.operations.items()
     )
     text = f"Operations of each part, of the equations of the tree, derived by method `{author.equations.method}`."
     head = ("part", "multiplications", "additions", "divisions", "together")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import sympy
@@ -12,7 +12,7 @@ from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
 from ..notation import with_instance
 from ..notation.latex_of_names import literal
-from ..reading import Quantities
+from ..reading import Quantities, ReadingView
 from ..reading.written import Written, needed, write
 from .document import Folded, FormulaLine, Piece, PutIn, Sentence
 from .printer import Printer
@@ -48,13 +48,22 @@ class Author:
 
     Parameters
     ----------
-    equations : Derivation
+    equations : Equations or ReadingView
     full : bool
         Whether every quantity is shown, or only the equations of motion.
+
+    Attributes
+    ----------
+    source : Equations
+        What was derived, of which ``equations`` may be a view.
+    put_in : mapping of str to float or None
+        Parameters and inputs for which values were put in, and these; None where other parameters leave them open.
     """
 
     def __init__(self, equations: Any, full: bool) -> None:
         self.equations, self.full = equations, full
+        self.source: Any = equations.source if isinstance(equations, ReadingView) else equations
+        self.put_in: Mapping[str, float | None] = equations.numbers_put_in()
         self.mechanism = equations.kinematics.mechanism
         self.printer = Printer(equations)
         self.shown: list[Shown] = []
@@ -162,7 +171,7 @@ class Author:
 
     def write(self, what: str, expressions: Sequence[Expr], prefix: str = "z") -> Written:
         """Expressions in SymPy, kept to be compared with what they were."""
-        k = self.equations.kinematics
+        k, expressions = self.equations.kinematics, self.equations.with_values(expressions)
         written = write(expressions, None, prefix, (), self._rates, k.parameter_names, k.euler_parameters)
         self.formed.append((what, expressions, written))
         return written

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import EomgenError, MissingDependencyError, UsageError
 from ..files.writing import write_whole
@@ -17,6 +17,9 @@ from .printer import Printer
 from .write_html import write_html
 from .write_markdown import write_markdown
 from .write_tex import write_tex
+
+if TYPE_CHECKING:
+    from .author import Author
 
 SUFFIXES = (".html", ".md", ".tex", ".pdf")
 LEVELS = ("full", "short")
@@ -145,7 +148,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
         raise UsageError(f"no level {level!r}; there are {', '.join(LEVELS)}")
     full = level == "full"
     author = Author(equations, full)
-    module, reason = _module(equations)
+    module, reason = _module(author)
     sections: list[Section | None] = [about_mechanism.mechanism(author, module)]
     sections += [about_mechanism.bodies(author), about_mechanism.coordinates(author)]
     if full:
@@ -160,20 +163,27 @@ def explain(equations: Any, level: str = "full") -> Explanation:
     found = None if module is None else compare(author, module)
     sections.append(about_numbers.difference(found, reason))
     title = f"Equations of motion of `{equations.name}`, method `{equations.method}`"
+    if author.put_in:
+        values = ("open" if x is None else f"{x:.6g}" for x in author.put_in.values())
+        title += f", with {', '.join(f'`{n}` = {x}' for n, x in zip(author.put_in, values, strict=True))}"
     kept = [section for section in sections if section is not None]
     return Explanation(title, kept, author.printer, None if found is None else found.largest)
 
 
-def _module(equations: Any) -> tuple[Any, str]:
-    """The module of the equations on NumPy at its declared state, or None and why."""
+def _module(author: Author) -> tuple[Any, str]:
+    """The module of the equations on NumPy, with the values that were put in, or None and why it has no state."""
+    equations = author.source
     functions = sorted(equations.kinematics.graph.functions)
     if functions:
         return None, f"The formulas hold tables or functions, which SymPy cannot evaluate: {', '.join(functions)}."
     from ..pipeline import compile_core
     from ..runtime.bound_model import BoundModel
 
+    k = equations.kinematics
     try:
-        module = BoundModel(compile_core(equations, "numpy"))
+        values = {name: value for name, value in author.put_in.items() if value is not None}
+        p, u = ({n: values[n] for n in names if n in values} for names in (k.parameter_names, k.input_names))
+        module = BoundModel(compile_core(equations, "numpy"), p or None, u or None)
         module.x0()
     except EomgenError as error:
         return None, str(error)

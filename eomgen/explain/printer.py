@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..printing import Formulas, given_mathml, latex, mathml, number, sums_in_lines, text
+from ..printing.formula_mathml import sum_line
 from ..printing.formula_of import ROUNDED
 from ..printing.formula_tree import Formula, MatrixOf, SumOf
 from ..reading.printed_equations import order_of
@@ -43,8 +44,7 @@ class Printer:
         """The same in MathML."""
         if isinstance(side, str):
             return [given_mathml(side)]
-        plus = "<mo form='infix'>+</mo>"
-        return [_plus(k, x, plus) + mathml(x, self.names) for k, x in enumerate(self._lines(side))]
+        return [sum_line(x, self.names, first=k == 0) for k, x in enumerate(self._lines(side))]
 
     def is_short(self, formula: FormulaLine) -> bool:
         """Whether all sides go into one line."""

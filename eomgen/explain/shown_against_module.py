@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import sympy
 
+from ..analysis.constrained import multipliers
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate as of_graph
 from ..graph.rounding_bounds import with_bounds
@@ -18,6 +19,7 @@ from .author import Author
 from .shown_values import evaluate, random_state, state_values
 
 STATES = 2
+TIME = 0.137  #: between the states of a mechanism whose motion is prescribed (s)
 SMALLEST = 4096 * EPS  #: entries that count as 0
 
 
@@ -46,6 +48,7 @@ class StateNumbers(NamedTuple):
     x: Any
     values: Mapping[str, float]
     free: list[int]
+    t: float
 
     @property
     def q(self) -> Any:
@@ -57,7 +60,7 @@ class StateNumbers(NamedTuple):
 
     @property
     def a(self) -> Any:
-        return self.module.rhs(0.0, self.x)[self.module.n_q : self.module.n_q + self.module.n_v]
+        return self.module.rhs(self.t, self.x)[self.module.n_q : self.module.n_q + self.module.n_v]
 
 
 def compare(author: Author, module: Any) -> Difference:
@@ -68,18 +71,19 @@ def compare(author: Author, module: Any) -> Difference:
     wanted = {name for name, _ in shown}
     moves = bool(equations.mobility.n_dof)
     for seed in range(STATES):
-        x = random_state(module, seed + 1)
+        t = 0.0 if moves else TIME * (seed + 1)  # the time alone tells where a mechanism is whose motion is prescribed
+        x = random_state(module, seed + 1, t)
         free = module.layout.independent_moving.tolist()
-        state = StateNumbers(module, x, state_values(module, x, 0.0), free)
+        state = StateNumbers(module, x, state_values(module, x, t), free, t)
         for name, of_module in COMPARED.items():
-            if name in wanted and (moves or name in ("T", "V")):
+            if name in wanted and (moves or name in OF_ALL):
                 _note(found, name, _number(equations, name, None, state.values), *of_module(state))
         if "poses" in wanted:
-            for body, pose in zip(module.body_names, module.poses(state.q), strict=True):
+            for body, pose in zip(module.body_names, module.poses(state.q, t=t), strict=True):
                 if ("poses", body) in shown:
                     _note(found, f"poses[{body}]", _number(equations, "poses", body, state.values), pose.ravel(), 1.0)
         for name, compare_sum in SUMS.items():
-            if name in wanted and (moves or name == "velocities"):
+            if name in wanted and (moves or name in OF_ALL):
                 compare_sum(found, equations, state)
         compare_as_formed(found, author, {key for key in shown if key[0] not in COMPARED}, state.values)
     return Difference(found, STATES)
@@ -90,37 +94,37 @@ Wanted = tuple[Any, float]
 
 def _energy(k: int) -> Callable[[StateNumbers], Wanted]:
     def wanted(s: StateNumbers) -> Wanted:
-        energies = s.module.energy(s.x)
+        energies = s.module.energy(s.x, t=s.t)
         return np.array([energies[k]]), float(np.abs(energies).sum())
 
     return wanted
 
 
 def _force(s: StateNumbers) -> Wanted:
-    terms = s.module.embedded_mass_matrix(s.q) * s.a[s.free]
+    terms = s.module.embedded_mass_matrix(s.q, t=s.t) * s.a[s.free]
     return terms.sum(axis=1), float(np.abs(terms).max(initial=0.0))
 
 
 def _gamma(s: StateNumbers) -> Wanted:
-    terms = s.module.constraint_jacobian(s.q) * s.a
+    terms = s.module.constraint_jacobian(s.q, t=s.t) * s.a
     return -terms.sum(axis=1), float(np.abs(terms).max(initial=0.0))
 
 
 def _velocity_constraints(s: StateNumbers) -> Wanted:
-    terms = s.module.constraint_jacobian(s.q) * s.v
-    return s.module.velocity_constraints(s.x), float(np.abs(terms).max(initial=0.0))
+    terms = s.module.constraint_jacobian(s.q, t=s.t) * s.v
+    return s.module.velocity_constraints(s.x, t=s.t), float(np.abs(terms).max(initial=0.0))
 
 
 #: Quantity -> what the module has for it at a state, flat, and the size of the terms that it is a sum of.
 COMPARED: dict[str, Callable[[StateNumbers], Wanted]] = {
     "T": _energy(0),
     "V": _energy(1),
-    "mass_matrix": lambda s: (s.module.embedded_mass_matrix(s.q).ravel(), 0.0),
+    "mass_matrix": lambda s: (s.module.embedded_mass_matrix(s.q, t=s.t).ravel(), 0.0),
     "force": _force,
-    "momenta": lambda s: (s.module.mass_matrix(s.q) @ s.v, 0.0),
-    "constraints": lambda s: (s.module.constraints(s.q), 1.0),
+    "momenta": lambda s: (s.module.mass_matrix(s.q, t=s.t) @ s.v, 0.0),
+    "constraints": lambda s: (s.module.constraints(s.q, t=s.t), 1.0),
     "velocity_constraints": _velocity_constraints,
-    "constraint_jacobian": lambda s: (s.module.constraint_jacobian(s.q).ravel(), 0.0),
+    "constraint_jacobian": lambda s: (s.module.constraint_jacobian(s.q, t=s.t).ravel(), 0.0),
     "gamma": _gamma,
 }
 
@@ -191,7 +195,7 @@ def _compare_velocities(found: dict[str, float], equations: Any, s: StateNumbers
     if any(spec.armature is not None for spec in mechanism.joints):
         return
     T = 0.0
-    for body, pose in zip(mechanism.bodies, s.module.poses(s.q), strict=True):
+    for body, pose in zip(mechanism.bodies, s.module.poses(s.q, t=s.t), strict=True):
         mass, *inertia = of_graph([body.mass, *(x for row in body.inertia for x in row)], s.values)
         angular, _, centre = _number(equations, "velocities", body.name, s.values).reshape(3, 3)
         own = pose[:3, :3].T @ angular
@@ -202,7 +206,7 @@ def _compare_velocities(found: dict[str, float], equations: Any, s: StateNumbers
 def _compare_hamiltonian(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
     """H is p . v - T + V at the momenta p = dT/dv."""
     p = _number(equations, "momenta", None, s.values)
-    T, V = s.module.energy(s.x)
+    T, V = s.module.energy(s.x, t=s.t)
     values = dict(s.values) | dict(zip(map(str, equations.momentum_symbols), p, strict=True))
     size = float(np.abs(p * s.v).sum()) + abs(T) + abs(V)
     _note(found, "hamiltonian", _number(equations, "hamiltonian", None, values), np.array([p @ s.v - T + V]), size)
@@ -255,6 +259,22 @@ def _compare_transformation(found: dict[str, float], equations: Any, s: StateNum
     _note(found, "velocity_transformation", B @ s.v[s.free] + b, s.v, 0.0)
 
 
+def _compare_constraint_forces(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
+    """M_t v' - f_t is what the constraints exert, of which C^T lambda gives each one's part."""
+    written = equations.as_formed("tree_system")
+    numbers = iter(evaluate(written.named, written.flat, s.values))
+    n, m = len(s.v), len(equations.constraint_names)
+    M, f, C = (np.array([next(numbers) for _ in range(a * b)]).reshape(a, b) for a, b in ((n, n), (n, 1), (m, n)))
+    terms = np.column_stack([M * s.a, f])
+    exerted = (M @ s.a) - f[:, 0]
+    wanted = s.module.mass_matrix(s.q, t=s.t) @ s.a + s.module.bias(s.t, s.x)
+    size = float(np.abs(terms).max(initial=0.0))
+    _note(found, "forces of the constraints", exerted, wanted, size)
+    if not equations.mobility.redundant:
+        wanted = -multipliers(s.module, s.t, s.x)[list(equations.mobility.independent_rows)]
+        _note(found, "multipliers", algebra.lstsq(C.T, exerted), wanted, size)
+
+
 #: Quantity -> what compares a sum or a product in which it stands.
 SUMS: dict[str, Callable[[dict[str, float], Any, StateNumbers], None]] = {
     "generalized_forces": _compare_forces,
@@ -263,4 +283,7 @@ SUMS: dict[str, Callable[[dict[str, float], Any, StateNumbers], None]] = {
     "hamiltonian": _compare_hamiltonian,
     "gibbs_function": _compare_gibbs_function,
     "block_system": _compare_block_system,
+    "tree_system": _compare_constraint_forces,
 }
+#: What is compared where no degree of freedom is left too.
+OF_ALL = ("T", "V", "constraints", "velocity_constraints", "constraint_jacobian", "gamma", "velocities", "tree_system")

@@ -11,6 +11,7 @@ from ..errors import EomgenError
 from ..texts import html_text
 
 DPI = 110  #: dots of a picture in an inch of its figure
+MARGIN = 0.06  #: around what is drawn (inch)
 SHOWN = 72  #: dots in which this inch is shown: sharp on fine screens, and small
 
 
@@ -44,9 +45,16 @@ def picture_html(make: Callable[[], Any]) -> str:
     except EomgenError as error:
         first = str(error).partition("\n")[0]
         return f"<p><i>no picture: {html_text(first)}</i></p>"
+    data, width = trimmed_png(figure)
+    return image_html(data, "png", width)
+
+
+def trimmed_png(figure: Any) -> tuple[bytes, int]:
+    """A figure with all of its names and without empty margins, and the width in which it is shown."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI)
-    return image_html(buffer.getvalue(), "png", round(SHOWN * figure.get_size_inches()[0]))
+    figure.savefig(buffer, format="png", dpi=DPI, bbox_inches="tight", pad_inches=MARGIN)
+    data = buffer.getvalue()
+    return data, round(SHOWN / DPI * int.from_bytes(data[16:20], "big"))  # IHDR: width, height
 
 
 def side_by_side(*parts: str) -> str:

@@ -8,7 +8,7 @@ from copy import copy
 from functools import cache
 from typing import Any
 
-from .latex_of_names import latex_of, literal, split_rate
+from .latex_of_names import latex_of, literal, rate_of, split_rate
 from .latex_tree import Accent, Group, Node, NotationError, Scripts, head_of, read_latex, spaced
 from .printing import html_form, mathml_form, mathtext_form, text_form
 from .signs import DOTS
@@ -77,6 +77,18 @@ class Notation:
         twin._keep_apart(more)
         return twin
 
+    def with_latex(self, latex: Mapping[str, str]) -> Notation:
+        """The same with other LaTeX for some of its names, which no other name has."""
+        if not latex:
+            return self
+        twin = copy(self)
+        twin.given = {**self.given, **latex}
+        twin._sources = {**self._sources, **latex}
+        twin._used = self._used | {
+            (form, _printed(form, x)) for x in latex.values() for form in ("latex", "text", "html")
+        }
+        return twin
+
     def is_free(self, latex: str, with_numbers: bool = False) -> bool:
         r"""Whether no name is printed as a letter, ``M``; nor, on request, as the letter with numbers, ``M_{12}``."""
         text = re.escape(_printed("text", latex))
@@ -138,6 +150,8 @@ class Notation:
         stem, order = split_rate(name)
         if not order:
             return latex_of(self._with_dots(name))
+        if order == 2 and (rate := rate_of(stem)) in self.given:  # of a rate that is printed as a letter of its own
+            return dotted(self.given[rate], 1)
         return dotted(self._source(stem), order) if order < len(DOTS) else literal(name)
 
     def _with_dots(self, name: str) -> str:

@@ -19,6 +19,9 @@ _MATHML_STYLES = {
 _MATHTEXT_STYLES = {"text": "rm", "textbf": "bf", "textit": "it"}
 _MATHTEXT_SPACES = {"\\!": "", "\\quad": r"\quad "}
 
+#: Dots over letters, clear of them and heavy enough to be seen from the last row.
+CLEAR = " style='padding-bottom:.1em;font-weight:bold'"
+
 
 def text_form(node: Node) -> str:
     """Unicode for terminals: ``θ₁``, ``m_c``; derivatives by primes, ``θ₁'``.
@@ -130,7 +133,7 @@ def mathml_form(node: Node, style: str = "") -> str:
                 else mathml_form(node.body, node.style)
             )
         case Accent():
-            over = f"<mo>{html_text(OVER[node.accent])}</mo>"
+            over = f"<mo{CLEAR if node.accent in DOTS else ''}>{html_text(OVER[node.accent])}</mo>"
             tag = "munder" if node.accent == "underline" else "mover accent='true'"
             tag = "mover" if node.accent in DOTS else tag  # as accents, browsers set dots on high letters
             return f"<{tag}>{mathml_form(node.body, style)}{over}</{tag.partition(' ')[0]}>"

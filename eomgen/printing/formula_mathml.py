@@ -27,6 +27,15 @@ def mathml(formula: tree.Formula, names: Notation) -> str:
     return _MathMLWriter(names).write(formula)
 
 
+def sum_line(formula: tree.Formula, names: Notation, first: bool) -> str:
+    """A line of a sum; the sign with which a further line begins is spaced as it is between terms."""
+    shown = mathml(formula, names)
+    if first or not isinstance(formula, tree.SumOf):
+        return shown
+    sign = MINUS_SIGN if formula.terms[0][0] else "+"
+    return f"<mo form='infix'>{sign}</mo>{shown.replace(MINUS, '', 1) if formula.terms[0][0] else shown}"
+
+
 def row(*parts: str) -> str:
     """Elements side by side, as one."""
     return f"<mrow>{''.join(parts)}</mrow>"

@@ -3,8 +3,8 @@
 Reading happens in copies of the graph: nothing that is read changes what is compiled.
 """
 
-from .displayed import Displayed
+from .displayed import Displayed, ReadingView
 from .quantities import Quantities
 from .readable import Readable
 
-__all__ = ["Displayed", "Quantities", "Readable"]
+__all__ = ["Displayed", "Quantities", "Readable", "ReadingView"]

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..equations.free_bodies import FreeBodies
-from ..errors import UnavailableError
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -47,8 +46,6 @@ class BodiesApart:
         require_method(quantities, "equations of free bodies", METHODS_OF_BODIES)
         self.quantities = quantities
         self.kinematics, self.graph = quantities.kinematics, quantities.graph
-        if any(spec.armature is not None for spec in self.kinematics.mechanism.joints):
-            raise UnavailableError("equations of free bodies are not written for drives with inertia (armature)")
         self.links = {link.body: k for k, link in enumerate(self.kinematics.links)}
         self.joints = [self.kinematics.mechanism.joints[b.joint].name for b in self.kinematics.topology.branches]
 
@@ -119,7 +116,12 @@ class BodiesApart:
     def _from_cut_joints(self, body: int) -> list[Wrench]:
         """What the joints that close loops do to a body: -lambda dC, and the loads along their coordinates."""
         multipliers = self._multipliers()
-        loads = FreeBodies(self.kinematics).along_cut
+        loads = dict(FreeBodies(self.kinematics).along_cut)
+        loop = self.kinematics.loop_coordinates
+        for spec in self.kinematics.mechanism.joints:  # the inertia of a drive takes a part of what drives the joint
+            if spec.armature is not None and (name := spec.coordinates[0]) in loop.names:
+                rotor = spec.armature * loop.accelerations[loop.names.index(name)]
+                loads[name] = loads.get(name, self.graph.zero) - rotor
         found: list[Wrench] = []
         for cut in JointWrenches(self.kinematics).cut:
             ends = (cut.spec.predecessor.body, cut.spec.successor.body)
@@ -137,18 +139,23 @@ class BodiesApart:
     def along_joint(self, name: str) -> list[tuple[Expr, Expr]]:
         """Along each free direction of a joint of the tree: its component of the reaction, and what drives it.
 
-        Force elements along the coordinate and constraint elements, by their multipliers, drive it.
+        Force elements along the coordinate and constraint elements, by their multipliers, drive it; the inertia of a
+        drive (armature) takes its part of that.
         """
         k = self.joints.index(name)
         link, bodies = self.kinematics.links[k], FreeBodies(self.kinematics)
         rotation = self.kinematics.poses.link(k).rotation
         force, moment = self._unknown(name)
         pulls = self._pulls()
+        armature = self.kinematics.mechanism.joints[self.kinematics.topology.branches[k].joint].armature
         found = []
         for c, (angular, linear) in enumerate(link.columns):
             turn, push = vec.times(rotation, angular), vec.times(rotation, linear)
             j = link.first + c
-            found.append((vec.dot(turn, moment) + vec.dot(push, force), bodies.forces[j] - pulls[j]))
+            drive = bodies.forces[j] - pulls[j]
+            if armature is not None:
+                drive = drive - armature * self.kinematics.a[j]
+            found.append((vec.dot(turn, moment) + vec.dot(push, force), drive))
         return found
 
     def _pulls(self) -> Row:

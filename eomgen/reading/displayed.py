@@ -153,20 +153,34 @@ class ReadingView(Displayed):
         return self.source.method
 
     def explain(self, level: str = "full") -> Any:
-        """The worked solution of the equations that this is a view of; see ``explain`` of the equations.
+        """The worked solution with the values of parameters and inputs that were put in; see ``explain`` of equations.
+
+        The formulas are compared with the compiled module at these values.
 
         Raises
         ------
         UnavailableError
-            Values were put in: the solution would mix them with numbers of the compiled module, which has none of them.
+            A value was put in for a coordinate, a velocity, an acceleration or the time: the steps of a solution
+            differentiate by them.  Or a value holds a name that is no parameter or input of the model.
         """
         if not self._values:
             return self.source.explain(level)  # type: ignore[attr-defined]
-        raise UnavailableError(
-            f"explain has no view with {self._told}: its numbers come from the compiled module, in which these values "
-            "do not stand; call explain of the equations themselves, and give values of parameters and inputs to the "
-            "model before you derive, such as model.parameter('l', 0.5), and those of coordinates by model.initial"
-        )
+        k = self.kinematics
+        known = {*k.parameter_names, *k.input_names}
+        moving = sorted({name for given in self._values for name in given}.difference(known))
+        strange = sorted({*self.names_put_in}.difference(known))
+        if moving:
+            raise UnavailableError(
+                f"explain has no view with {self._told}: the steps of a solution differentiate by {', '.join(moving)}; "
+                "put in values of parameters and inputs alone, and give those of coordinates and velocities by "
+                "model.initial, which the calculation line by line begins with"
+            )
+        if strange:
+            raise UnavailableError(
+                f"explain has no view with {self._told}: the model has no parameter or input {', '.join(strange)}, so "
+                "that the compiled module cannot be compared with it; put in numbers or parameters of the model"
+            )
+        return self.source.explained(self.in_plain_symbols(), level)  # type: ignore[attr-defined]
 
     def _picture_and_facts(self, facts: str) -> str:
         return facts if self._values else self.source._picture_and_facts(facts)

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..notation.notation import Notation
 from ..printing import given_mathml, mathml, sums_in_lines
-from ..printing.formula_mathml import fenced, row
+from ..printing.formula_mathml import fenced, row, sum_line
 from ..printing.formula_of import ROUNDED
-from ..printing.formula_tree import Formula, MatrixOf, Name, SumOf, is_group
+from ..printing.formula_tree import Formula, MatrixOf, Name, is_group
 from ..texts import html_text
 from .printed_equations import PrintedEntry, PrintedEquations
 from .printed_parts import PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
@@ -19,6 +20,7 @@ from .readable import Readable
 FOLDED = 12  #: formulas more than which are folded up
 MOST = 1_000  #: intermediates that are shown
 LEFT = "style='text-align:left'"
+CELL = "style='text-align:left;padding:0.15em 1.2em 0.15em 0'"  #: of tables, on pages that do not space cells
 _STYLE = "margin:0.5em 0;padding:0.2em 0;overflow-x:auto;overflow-y:hidden;font-size:1.15em"
 _FLOW = "display:flex;flex-wrap:wrap;column-gap:2.5em;margin-left:1em"  #: short formulas side by side
 #: Fonts with brackets that grow, of the usual systems.
@@ -64,13 +66,13 @@ def _coordinates(printed: PrintedEquations) -> str:
     dependent = any(c.role for c in shown)
     heads = ["coordinate", "name", "joint", "unit", *([""] if dependent else [])]
     rows = "".join(
-        f"<tr><td {LEFT}>{_math(printed.names.mathml(c.name))}</td><td {LEFT}><code>{html_text(c.name)}</code></td>"
-        f"<td {LEFT}>{html_text(c.joint)}</td><td {LEFT}>{html_text(c.unit)}</td>"
-        + (f"<td {LEFT}>{c.role}</td>" if dependent else "")
+        f"<tr><td {CELL}>{_math(printed.names.mathml(c.name))}</td><td {CELL}><code>{html_text(c.name)}</code></td>"
+        f"<td {CELL}>{html_text(c.joint)}</td><td {CELL}>{html_text(c.unit)}</td>"
+        + (f"<td {CELL}>{c.role}</td>" if dependent else "")
         + "</tr>"
         for c in shown
     )
-    whole = f"<table><tr>{''.join(f'<th {LEFT}>{head}</th>' for head in heads)}</tr>{rows}</table>"
+    whole = f"<table><tr>{''.join(f'<th {CELL}>{head}</th>' for head in heads)}</tr>{rows}</table>"
     return whole if len(shown) <= FOLDED else f"<details><summary>{len(shown)} coordinates</summary>{whole}</details>"
 
 
@@ -109,7 +111,7 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
         zeros = "; entries that are not shown are 0" if printed.vanishing else ""
         yield f"<p {LEFT}>The mass matrix is symmetric{zeros}.</p>"
     entries = [
-        _line(printed, _label(entry, len(rates)), entry.formula)
+        _line(printed.names, _label(entry, len(rates)), entry.formula)
         for entry in printed.entries()
         if not (whole and entry.letter == printed.letters.mass)
     ]
@@ -126,14 +128,9 @@ def _label(entry: PrintedEntry, n: int) -> str:
     return f"<msub>{given_mathml(entry.letter)}<mn>{comma.join(map(str, entry.place))}</mn></msub>"
 
 
-def _line(printed: PrintedEquations, label: str, formula: Formula) -> str:
+def _line(names: Notation, label: str, formula: Formula) -> str:
     """A formula; a long sum in lines of its terms, below each other."""
-    lines = []
-    for k, part in enumerate(sums_in_lines(formula, printed.names)):
-        sign = ""
-        if k and isinstance(part, SumOf) and not part.terms[0][0]:
-            sign = "<mo form='infix'>+</mo>"
-        lines.append(sign + mathml(part, printed.names))
+    lines = [sum_line(part, names, first=k == 0) for k, part in enumerate(sums_in_lines(formula, names))]
     if len(lines) == 1:
         return _block(row(label, "<mo>=</mo>", lines[0]))
     cells = [
@@ -147,13 +144,13 @@ def _line(printed: PrintedEquations, label: str, formula: Formula) -> str:
 def _intermediates(printed: PrintedEquations) -> Iterator[str]:
     if printed.intermediates:
         yield f"<p {LEFT}>where</p>"
-        yield from (_line(printed, mathml(Name(name), printed.names), x) for name, x in printed.intermediates)
+        yield from (_line(printed.names, mathml(Name(name), printed.names), x) for name, x in printed.intermediates)
 
 
 def _states(printed: PrintedEquations) -> Iterator[str]:
     if printed.states:
         yield f"<p {LEFT}>first-order states</p>"
-        yield from (_line(printed, mathml(rate, printed.names), x) for rate, x in printed.states)
+        yield from (_line(printed.names, mathml(rate, printed.names), x) for rate, x in printed.states)
 
 
 def parts_html(parts: PrintedParts) -> Iterator[str]:
@@ -173,6 +170,6 @@ def parts_html(parts: PrintedParts) -> Iterator[str]:
                 yield f"<p {LEFT}>{words(item)}</p>"
             case PrintedGroup():
                 lines = "".join(
-                    _line(parts.printed, mathml(line.left, parts.names), line.right) for line in item.lines[:MOST]
+                    _line(parts.names, mathml(line.left, parts.names), line.right) for line in item.lines[:MOST]
                 )
                 yield f"<details><summary>{words(item.title)}</summary><div style='{_FLOW}'>{lines}</div></details>"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..notation.notation import Notation
 from ..printing import latex, sums_in_lines
 from ..printing.formula_of import DIGITS, ROUNDED
 from ..printing.formula_tree import Formula, MatrixOf, is_group
@@ -18,8 +19,11 @@ def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
     if printed.is_long:
         lines = [*_parts(PrintedParts(printed))]
     else:
-        lines = [*_motion(printed), *(_broken(printed, printed.names.latex(n), x) for n, x in printed.intermediates)]
-    lines += [_broken(printed, latex(rate, printed.names), x) for rate, x in printed.states]
+        lines = [
+            *_motion(printed),
+            *(_broken(printed.names, printed.names.latex(n), x) for n, x in printed.intermediates),
+        ]
+    lines += [_broken(printed.names, latex(rate, printed.names), x) for rate, x in printed.states]
     if told := printed.told_of_numbers:
         lines.append(rf"\text{{{told.replace('_', chr(92) + '_')}}}")
     values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
@@ -62,13 +66,13 @@ def _motion(printed: PrintedEquations) -> Iterator[str]:
         if not (whole and entry.letter == mass):
             comma = "," if len(rates) > 9 else ""
             label = f"{entry.letter}_{{{comma.join(map(str, entry.place))}}}" if len(rates) > 1 else entry.letter
-            yield _broken(printed, label, entry.formula)
+            yield _broken(printed.names, label, entry.formula)
 
 
-def _broken(printed: PrintedEquations, label: str, formula: Formula) -> str:
+def _broken(names: Notation, label: str, formula: Formula) -> str:
     """A formula; a long sum in lines of its terms."""
-    lines = sums_in_lines(formula, printed.names)
-    shown = [latex(line, printed.names) for line in lines]
+    lines = sums_in_lines(formula, names)
+    shown = [latex(line, names) for line in lines]
     if len(shown) == 1:
         return f"{label} = {shown[0]}"
     others = (line if line.startswith("-") else f"+ {line}" for line in shown[1:])
@@ -93,4 +97,4 @@ def _parts(parts: PrintedParts) -> Iterator[str]:
                 yield words(item)
             case PrintedGroup():
                 yield words(item.title)
-                yield from (_broken(parts.printed, shown(line.left), line.right) for line in item.lines)
+                yield from (_broken(parts.names, shown(line.left), line.right) for line in item.lines)

@@ -157,9 +157,15 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
                 yield from (line for one in item.lines for line in equation(one))
             case PrintedSentence():
                 yield from fold(words(item), columns, "", "  ")
-            case PrintedGroup():
-                yield from ("", words(item.title))
-                yield from (line for one in item.lines for line in equation(one))
+    groups = [item for item in items if isinstance(item, PrintedGroup)]
+    yield from (
+        "",
+        "In groups:",
+        *(line for group in groups for line in fold(words(group.title), columns, "  ", "    ")),
+    )
+    for group in groups:
+        yield from ("", *fold(words(group.title), columns, "", "  "))
+        yield from (line for one in group.lines for line in equation(one))
 
 
 def _rows(parts: PrintedParts, line: PrintedLine) -> list[str]:

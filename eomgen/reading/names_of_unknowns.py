@@ -19,6 +19,7 @@ def model_notation(kinematics: Kinematics, more: Iterable[str] = ()) -> Notation
     velocities = [*k.velocity_names, *k.state_names]
     rates = [*velocities, *map(acceleration_name, velocities)]
     outputs = [output.name for output in m.outputs]
+    outputs += m.given.multipliers if m.given is not None else ()
     names = [*k.names, *k.loop_coordinates.names, *k.parameter_names, *k.input_names, *outputs, *rates, *more]
     return Notation(names, m.latex, m.instances)
 
@@ -29,7 +30,10 @@ def momentum_names(kinematics: Kinematics) -> tuple[str, ...]:
 
 
 def multiplier_names(kinematics: Kinematics, count: int) -> tuple[str, ...]:
-    """``lambda_1``, ...: what multipliers of constraint equations are called."""
+    """``lambda_1``, ...: what multipliers of constraint equations are called, unless given equations name them."""
+    given = kinematics.mechanism.given
+    if given is not None and count == len(given.multipliers):
+        return given.multipliers
     return _free(kinematics, ("lambda", "multiplier"), lambda word: [f"{word}_{k + 1}" for k in range(count)])
 
 

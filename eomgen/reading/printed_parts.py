@@ -6,15 +6,20 @@ groups of one meaning.  Of a mechanism with loops these are the parts of M = B^T
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import sympy
+
+from ..frames import GROUND
 from ..kinematics.state import acceleration_name
 from ..notation import dotted
 from ..notation.notation import Notation
 from ..printing import text
 from ..printing.formula_tree import Formula, Letter, MatrixOf, Name, NumberPart, Product, SumOf, Words
+from .matrix_blocks import find_blocks
 from .named_groups import PartMeaning, grouped
 from .printed_equations import PrintedEquations
 
@@ -33,6 +38,7 @@ TITLES = {
     PartMeaning.CONSTRAINT_RATE: "velocity terms of the constraints",
 }
 ZERO = NumberPart("0")
+NUMBERED = re.compile(r"z\d+")  #: names that say nothing
 Piece = str | Formula
 
 
@@ -99,10 +105,8 @@ class PrintedParts:
     def __init__(self, printed: PrintedEquations, short: int = SHORT) -> None:
         self.short = short
         self.printed, self.equations = printed, printed.equations
-        self.names: Notation = printed.names
         self._kinematics = self.equations.kinematics
         self._free = {*self.equations.independent}
-        self._parts = {str(name) for name, _ in printed.named}
 
     def items(self) -> Iterator[PrintedRow | PrintedSentence | PrintedGroup]:
         """All of it."""
@@ -118,6 +122,8 @@ class PrintedParts:
         for matrix in self._matrices:
             if not matrix.is_column and not matrix.is_large:
                 yield PrintedRow((PrintedLine(Letter(matrix.letter), self._pattern(matrix)),))
+        yield from self._rows_of_constraints()
+        yield from self._blocks()
         if zeros := self._zeros:
             names = _listed([Name(name) for name in zeros])
             yield PrintedSentence((M, " and ", f, " do not depend on ", *names, "; below, 0 stands for them."))
@@ -125,6 +131,11 @@ class PrintedParts:
             title = PrintedSentence(("matrices ", *_listed([Letter(m.letter) for m in large])))
             yield PrintedGroup(title, [PrintedLine(Letter(m.letter), self._pattern(m)) for m in large])
         yield from self._groups()
+
+    @cached_property
+    def names(self) -> Notation:
+        """How names are printed: a part that is an entry of a matrix is printed as the letter of the entry."""
+        return self.printed.names.with_latex({name: x.latex for name, x in self._entry_letters.items()})
 
     # -- mechanisms with loops ----------------------------------------------------------------------------------------
     def _embedding(self, M: Letter, v: Letter, f: Letter) -> Iterator[PrintedRow | PrintedSentence]:
@@ -153,13 +164,58 @@ class PrintedParts:
         of_others = (" the others. ", B_d, " and ", a_d, " are the rows of the other accelerations; in the rows of ", v)
         yield PrintedSentence((*of_free, *of_others, ", ", Letter(B), " is the identity and ", Letter(a), " is 0."))
 
+    def _rows_of_constraints(self) -> Iterator[PrintedSentence]:
+        """Of which equations the rows of C are."""
+        labels = self.equations.constraint_names
+        if self.printed.of_loops and len(labels) <= LARGE:
+            C = next(m for m in self._matrices if m.meaning == PartMeaning.CONSTRAINT)
+            yield PrintedSentence(("The rows of ", Letter(C.letter), f" are those of {', '.join(labels)}."))
+
+    @property
+    def _branches(self) -> list[int]:
+        """Of each velocity the first link of its branch of the tree."""
+        found: dict[int, int] = {}
+        root: list[int] = []
+        for k, link in enumerate(self._kinematics.links):
+            root.append(k if link.parent == GROUND else root[link.parent])
+            found |= {link.first + c: root[k] for c in range(len(link.columns))}
+        return [found[j] for j in range(len(self._kinematics.velocity_labels))]
+
+    def _blocks(self) -> Iterator[PrintedRow | PrintedSentence]:
+        """Large matrices in blocks, where many of these vanish."""
+        of = {matrix.meaning: matrix for matrix in self._matrices}
+        C, M = of.get(PartMeaning.CONSTRAINT), of[PartMeaning.INERTIA]
+        if C is None or not M.is_large:
+            return
+        inertia, held = ([[x != ZERO for x in row] for row in matrix.entries] for matrix in (M, C))
+        if (blocks := find_blocks(inertia, held, self.equations.constraint_names, self._branches)) is None:
+            return
+        names = [Name(name) for name in self._kinematics.velocity_labels]
+        columns = [[names[j] for j in places] for places in blocks.coordinates]
+        groups = [x for k, part in enumerate(columns) for x in ("; " if k else "", *_listed(part))]
+        joints = dict.fromkeys(label.partition(".")[0] for label in self.equations.constraint_names)
+        yield PrintedSentence(("In blocks, of the coordinates ", *groups, f", and of the joints {', '.join(joints)}:"))
+        stem = M.letter.removesuffix("_t")
+        rows: list[list[Formula]] = [[ZERO] * len(columns) for _ in columns]
+        for k in range(len(columns)):
+            rows[k][k] = Letter(rf"\mathbf{{{stem}}}_{{{k + 1}}}")
+        yield PrintedRow((PrintedLine(Letter(M.letter), MatrixOf(tuple(map(tuple, rows)))),))
+        rows = [
+            [
+                Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}") if any(held[i][j] for i in r for j in c) else ZERO
+                for b, c in enumerate(blocks.coordinates)
+            ]
+            for a, r in enumerate(blocks.equations)
+        ]
+        yield PrintedRow((PrintedLine(Letter(C.letter), MatrixOf(tuple(map(tuple, rows)))),))
+
     @property
     def _zeros(self) -> tuple[str, ...]:
         return self.equations.tree_system.zeros if self.printed.of_loops else ()
 
     # -- matrices -----------------------------------------------------------------------------------------------------
     def _letter(self, *choice: str) -> str:
-        return self.names.letter(*choice, with_numbers=True)
+        return self.printed.names.letter(*choice, with_numbers=True)
 
     @cached_property
     def _matrices(self) -> list[_Matrix]:
@@ -188,16 +244,16 @@ class PrintedParts:
         """Whether an entry stands in its matrix itself."""
         if entry == ZERO:
             return True
-        part = entry.terms[0][1] if isinstance(entry, SumOf) and len(entry.terms) == 1 else entry
-        if isinstance(part, Name) and part.name in self._parts:
-            return False
+        if (part := self._part(entry)) is not None:
+            return not matrix.is_column and (part in self._entry_letters or self._meaning[part] == PartMeaning.CONSTANT)
         is_sum = isinstance(entry, SumOf) and len(entry.terms) > 1
         return not matrix.is_column and not is_sum and len(text(entry, self.names)) <= self.short
 
     def _pattern(self, matrix: _Matrix) -> MatrixOf:
         """A matrix with letters for its long entries, of a symmetric one the upper half."""
+        first = self._first_places(matrix)
         rows: list[list[Formula]] = [
-            [x if self._stands(matrix, x) else self._place(matrix, i, j) for j, x in enumerate(row)]
+            [x if self._stands(matrix, x) else self._place(matrix, *first[i, j]) for j, x in enumerate(row)]
             for i, row in enumerate(matrix.entries)
         ]
         if matrix.symmetric and len(rows) > 1:
@@ -206,28 +262,78 @@ class PrintedParts:
             rows[-1][0] = Words("sym.", r"\text{sym.}")
         return MatrixOf(tuple(map(tuple, rows)))
 
-    def _entries(self, matrix: _Matrix) -> Iterator[PrintedLine]:
-        """What the letters of a matrix stand for."""
+    def _entries(self, matrix: _Matrix) -> Iterator[tuple[Any, PrintedLine]]:
+        """What the letters of a matrix stand for, in SymPy and as it is printed, those of named parts left out."""
+        for (i, j), place in self._first_places(matrix).items():
+            x = matrix.entries[i][j]
+            letter = self._place(matrix, i, j)
+            is_part = isinstance(x, Name) and self._entry_letters.get(x.name) == letter
+            if not is_part and not self._stands(matrix, x) and place == (i, j):
+                yield matrix.values[i, j], PrintedLine(letter, x)
+
+    @staticmethod
+    def _first_places(matrix: _Matrix) -> dict[tuple[int, int], tuple[int, int]]:
+        """Of each entry the place of the first one that is equal, by rows; entries of a column have their own."""
+        first: dict[Any, tuple[int, int]] = {}
+        found = {}
         for i, row in enumerate(matrix.entries):
             for j, x in enumerate(row):
-                if not self._stands(matrix, x) and not (matrix.symmetric and j < i):
-                    yield PrintedLine(self._place(matrix, i, j), x)
+                found[i, j] = (i, j) if matrix.is_column else first.setdefault(x, (i, j))
+        return found
+
+    def _part(self, entry: Formula) -> str | None:
+        """The named part that an entry is, perhaps subtracted."""
+        part = entry.terms[0][1] if isinstance(entry, SumOf) and len(entry.terms) == 1 else entry
+        return part.name if isinstance(part, Name) and part.name in self._meaning else None
+
+    @cached_property
+    def _entry_letters(self) -> dict[str, Letter]:
+        """Named parts that are entries of the matrix for which alone they are, and the letters of these entries."""
+        found: dict[str, Letter] = {}
+        for matrix in self._matrices:
+            for (i, j), place in self._first_places(matrix).items():
+                x = matrix.entries[i][j]
+                if not isinstance(x, Name) or place != (i, j) or x.name in found or not NUMBERED.fullmatch(x.name):
+                    continue
+                if self._meaning.get(x.name) == matrix.meaning:
+                    found[x.name] = self._place(matrix, i, j)
+        return found
 
     # -- named parts --------------------------------------------------------------------------------------------------
-    def _groups(self) -> Iterator[PrintedGroup]:
+    @cached_property
+    def _found(self) -> dict[PartMeaning, list[tuple[Any, Any]]]:
+        """Named parts by meaning."""
         k = self._kinematics
         outputs = {matrix.meaning: list(matrix.values) for matrix in self._matrices}
         constants = {*k.parameter_names, *self.equations.names_put_in}
-        found = grouped(self.printed.named, outputs, constants, {*k.velocity_names, *k.input_names})
+        return grouped(self.printed.named, outputs, constants, {*k.velocity_names, *k.input_names})
+
+    @cached_property
+    def _meaning(self) -> dict[str, PartMeaning]:
+        """What each named part is."""
+        return {str(name): meaning for meaning, parts in self._found.items() for name, _ in parts}
+
+    def _groups(self) -> Iterator[PrintedGroup]:
         matrices = {matrix.meaning: matrix for matrix in self._matrices}
         for meaning, title in TITLES.items():
-            lines = [PrintedLine(Name(str(name)), self.printed.formula(x)) for name, x in found.get(meaning, ())]
+            parts = self._found.get(meaning, ())
+            lines = [PrintedLine(Name(str(name)), self.printed.formula(x)) for name, x in parts]
+            operations = sum(operations_of(x) for _, x in parts)
             words: tuple[Piece, ...] = (title,)
             if matrix := matrices.get(meaning):
-                lines += self._entries(matrix)
+                entries = [*self._entries(matrix)]
+                operations += sum(operations_of(x) for x, _ in entries)
+                lines += [line for _, line in entries]
                 words = (f"{title} ", Letter(matrix.letter))
             if lines:
-                yield PrintedGroup(PrintedSentence((*words, f" ({len(lines)})")), lines)
+                many = f"{len(lines)} formula{'s' * (len(lines) > 1)}"
+                counted = f", {operations} operation{'s' * (operations > 1)}" if operations else ""
+                yield PrintedGroup(PrintedSentence((*words, f" ({many}{counted})")), lines)
+
+
+def operations_of(x: Any) -> int:
+    """Operations of a SymPy expression as it is written."""
+    return int(sympy.count_ops(x))
 
 
 def _listed(formulas: Sequence[Formula]) -> Iterator[Piece]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,6 +12,7 @@ from ..describe.dotted_names import Undotted
 from ..equations import TreeEquations
 from ..errors import NonFiniteError, UsageError
 from ..graph.core import Expr, Graph
+from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
@@ -137,6 +139,25 @@ class WritesQuantities(ABC):
         if key not in self._all and name not in self._all:  # made before this went through pickle
             return self.again().as_formed(name, part)
         return self._all[key if key in self._all else name]
+
+    def with_values(self, expressions: Sequence[Expr]) -> list[Expr]:
+        """Expressions of the model with what was put in, in a graph of their own; as they are, where nothing was."""
+        found = deepcopy(list(expressions)) if self._put_in else list(expressions)
+        for values in self._put_in:
+            found = put_in(found, values)
+        return found
+
+    def numbers_put_in(self) -> dict[str, float | None]:
+        """Numbers of the names for which values were put in, with declared values of what these hold; None without."""
+        m, names = self.kinematics.mechanism, list(dict.fromkeys(name for given in self._put_in for name in given))
+        quantities: list[Any] = [*m.parameters, *m.inputs]
+        declared = {x.name: x.value for x in quantities if x.value is not None}
+        graph = Graph()
+        values = self.with_values([graph.symbol(name) for name in names])
+        return {
+            name: None if symbols_of([x]).difference(declared) else float(evaluate([x], declared)[0])
+            for name, x in zip(names, values, strict=True)
+        }
 
     @property
     def _told(self) -> str:

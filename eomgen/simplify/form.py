@@ -25,6 +25,7 @@ from .good_names import GoodNames
 from .inline import EACH, NAME, Named, inlined, is_plain
 from .literal import Literal
 from .mixed import Mixed
+from .shared_sums import SharedSums
 
 WHOLE = (10**9,)
 SIZES = (1, 6, 16, 40, 120, *WHOLE)
@@ -173,7 +174,17 @@ def simplify(
         if work.left <= LATER or form.cost > WORSE * best.cost:
             break
     work.left = math.inf  # what stands in sines and denominators is factored as it is written
-    return best
+    return best and _with_shared_sums(best, prefix)
+
+
+def _with_shared_sums(form: Form, prefix: str) -> Form:
+    """Of a form that has names, the same with names for the sums that others share."""
+    if not form.named:
+        return form
+    atoms = form.expansion.atoms
+    taken = {atom.what for atom in atoms.table if atom.kind in ("sym", "name")}
+    named, polys = SharedSums(atoms, form.factoring.costs, form.named, form.polys, taken, prefix).shortened()
+    return Form(form.graph, form.expansion, form.factoring, named, polys)
 
 
 def _shared(graph: Graph, roots: Sequence[int], largest: int) -> tuple[tuple[int, ...], int]:

@@ -174,7 +174,9 @@ def test_html_is_for_people() -> None:
     assert notation.html("s_dot") == "<i>ṡ</i>"
     assert "bend" in notation.html("bend_dot")
     assert "˙" in notation.html("bend_dot")
-    assert notation.mathml("theta1_dot") == ("<msub><mover><mi>θ</mi><mo>˙</mo></mover><mn>1</mn></msub>")
+    assert notation.mathml("theta1_dot") == (
+        "<msub><mover><mi>θ</mi><mo style='padding-bottom:.1em;font-weight:bold'>˙</mo></mover><mn>1</mn></msub>"
+    )
 
 
 def test_sympy_prints_with_it() -> None:
