@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from ..elements.element_type import ElementType, Types
 from ..elements.entry import Found, Meaning
 from ..elements.field import Fields
+from ..forces.contact_shapes import Shape
 from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
@@ -20,6 +21,7 @@ from .description import DescribedEntry, items
 from .fields import CYLINDER
 from .mechanism import Body, JointSpec
 from .names import nearest
+from .read_shapes import read_shapes
 from .scope import ENERGIES, RATES
 from .values import Reader
 
@@ -218,6 +220,9 @@ class ElementEntry:
         field = CYLINDER["sense"]
         sense = reader.choice(f"{path}.sense", value.get("sense", field.default), field)
         return None if marker is None else WrapCylinder(marker, radius, 1 if sense == "positive" else -1)
+
+    def shapes(self, key: str) -> tuple[Shape, ...] | None:
+        return read_shapes(self.reader, self._at(key), self.values[key]) if key in self.values else None
 
     def body(self, key: str = "body") -> tuple[int, Body] | None:
         given, own = self.values.get(key), {body.name: k for k, body in enumerate(self.around.bodies)}

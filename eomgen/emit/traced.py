@@ -17,6 +17,7 @@ from ..numeric.user_functions import Curve, Surface
 from ..program import Program
 from ..targets import TRACED_KERNELS
 from .c_functions import used_calls
+from .pair_sums_used import refuse_sums
 from .example_state import example_state
 from .numpy_text import print_block_of_lists, print_constants_of_lists
 from .sources import render
@@ -156,6 +157,7 @@ def _public(program: Program, minimal: bool) -> list[Traced]:
 
 def _require_traceable(program: Program, library: str) -> None:
     """Refuse what has no form of straight lines and fixed numbers of steps."""
+    refuse_sums(program, f"target {library!r}")
     problems = []
     native = [f.name for f, _ in used_calls(program).values() if f.native is not None]
     if native:
