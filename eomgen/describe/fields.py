@@ -356,7 +356,7 @@ def acts_on_length(section: str, values: Mapping[str, Any], field: Field, is_len
     for key in (field.along, "coordinate"):
         if values.get(key) is not None and section in ("forces", "constraints"):
             return is_length(str(values[key]))
-    return "between" in values or "marker" in values
+    return "between" in values or "marker" in values or "first" in values
 
 
 def solid_fields(type_name: str) -> Fields:

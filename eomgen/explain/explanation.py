@@ -12,6 +12,7 @@ from typing import Any
 
 from ..errors import EomgenError, MissingDependencyError, UsageError
 from ..files.writing import write_whole
+from ..graph.pair_calls import opaque_names
 from .document import DrawnPicture, Folded, Piece, Section
 from .printer import Printer
 from .write_html import write_html
@@ -166,7 +167,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
 
 def _module(equations: Any) -> tuple[Any, str]:
     """The module of the equations on NumPy at its declared state, or None and why."""
-    functions = sorted(equations.kinematics.graph.functions)
+    functions = opaque_names(equations.kinematics.graph)
     if functions:
         return None, f"The formulas hold tables or functions, which SymPy cannot evaluate: {', '.join(functions)}."
     from ..pipeline import compile_core

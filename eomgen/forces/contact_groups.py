@@ -79,6 +79,7 @@ class ContactGroups(Force):
         "penetration $d$ and its rate, and friction against the sliding."
     )
     formula: ClassVar[str] = r"F_n = k d^n (1 + \lambda \dot{d}), \quad d > 0"
+    by_power: ClassVar[bool] = True
     first: tuple[Shape, ...]
     second: tuple[Shape, ...]
     normal_law: HuntCrossley

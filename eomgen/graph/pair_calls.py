@@ -175,6 +175,17 @@ def pair_call(graph: Graph, operation: str) -> PairCall | None:
     return found[0] if found is not None and isinstance(found[0], PairCall) else None
 
 
+def has_pair_sums(graph: Graph) -> bool:
+    """Whether there are sums over pairs among the nodes."""
+    return any(isinstance(function, PairCall) for function, _ in graph.calls.values())
+
+
+def opaque_names(graph: Graph) -> list[str]:
+    """What expressions call that has no formula of its own: declared functions and sums over pairs."""
+    sums = {function.function.name for function, _ in graph.calls.values() if isinstance(function, PairCall)}
+    return sorted({*graph.functions, *sums})
+
+
 def is_pair_item(graph: Graph, operation: str) -> bool:
     """Whether a node is an entry of a list of results."""
     call = pair_call(graph, operation)
