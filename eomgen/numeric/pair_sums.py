@@ -147,7 +147,7 @@ class PairSum:
             square = square - along * along
         size = data[np.maximum(bounds[0], 0)] + data[np.maximum(bounds[1], 0)]
         apart = np.asarray(square > size * size, dtype=bool)
-        apart = apart.reshape(len(i), -1).all(axis=1)
+        apart = apart.all(axis=tuple(range(1, apart.ndim)))
         return np.asarray(~apart | (bounds[0] < 0) | (bounds[1] < 0))
 
 
