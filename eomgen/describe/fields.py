@@ -342,7 +342,11 @@ def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
 @cache
 def part_fields() -> Fields:
     """Keys of the parts of an entry: placements, cylinders of paths, point masses and solids."""
-    return {key: field for own in (*SHAPE_FIELDS.values(), *SOLID.values(), POINT, CYLINDER, MARKER) for key, field in own.items()}
+    return {
+        key: field
+        for own in (*SHAPE_FIELDS.values(), *SOLID.values(), POINT, CYLINDER, MARKER)
+        for key, field in own.items()
+    }
 
 
 def acts_on_length(section: str, values: Mapping[str, Any], field: Field, is_length: Callable[[str], bool]) -> bool:

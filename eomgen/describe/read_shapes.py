@@ -22,7 +22,9 @@ def read_shapes(reader: Reader, path: str, value: Any) -> tuple[Shape, ...] | No
         reader.wrong(path, value, "shapes")
         return None
     if not listed:
-        reader.faults.add(path, "has no shapes", "give at least one shape, such as {shape: circle, on: wheel, radius: 0.1}")
+        reader.faults.add(
+            path, "has no shapes", "give at least one shape, such as {shape: circle, on: wheel, radius: 0.1}"
+        )
         return None
     found: list[Shape] = []
     for k, given in enumerate(listed):

@@ -98,7 +98,12 @@ def _describe(text: str, file: str, origin: _Origin) -> Description:
     for key, value in tree.items():
         if key not in MODEL:
             faults.add(key, "unknown key", nearest(key, MODEL, "allowed"))
-        elif key not in SECTIONS and key not in PARTS and key != "contacts" and (value is not None or MODEL[key].kind != "table"):
+        elif (
+            key not in SECTIONS
+            and key not in PARTS
+            and key != "contacts"
+            and (value is not None or MODEL[key].kind != "table")
+        ):
             description.values[key] = value
     fill(tree, "", description)
     if tree.get("components") is not None or tree.get("add") is not None:

@@ -133,7 +133,11 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "work_at": len(program.parameters) + len(program.hoisted),
         "rank": sizes.n_v - sizes.n_dof,
         "indefinite": int(bool(program.metadata.get("indefinite"))),
-        "helpers": [*used_helpers(program, roots), *declarations(program, used_calls(program)), *pair_declarations(program)],
+        "helpers": [
+            *used_helpers(program, roots),
+            *declarations(program, used_calls(program)),
+            *pair_declarations(program),
+        ],
         "blocks": printed if program.hoisted else printed[1:],
         "drivers": drivers,
         "limits": definitions("".join(drivers)),

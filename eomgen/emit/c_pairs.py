@@ -134,5 +134,3 @@ def _each(name: str, called: str, n: int, results: int, slope: bool) -> str:
         f"        for (int i = 0; i < {results}; i++) {{ EOMGEN_LANE(out[i], k) = plain[{taken} + i]; }}\n"
         "    }\n#endif\n}\n"
     )
-
-

@@ -1,4 +1,4 @@
-"""Stage emit: nodes of sums over pairs of shapes -> the C statements that fill, sum and read lists in the work array."""
+"""Stage emit: nodes of sums over pairs of shapes -> C statements that fill, sum and read lists in the work."""
 
 from __future__ import annotations
 

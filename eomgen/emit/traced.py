@@ -17,9 +17,9 @@ from ..numeric.user_functions import Curve, Surface
 from ..program import Program
 from ..targets import TRACED_KERNELS
 from .c_functions import used_calls
-from .pair_sums_used import refuse_sums
 from .example_state import example_state
 from .numpy_text import print_block_of_lists, print_constants_of_lists
+from .pair_sums_used import refuse_sums
 from .sources import render
 
 STEPS = 6  #: of Newton's iteration: the error of the position is squared by each, so a tenth of a length is enough

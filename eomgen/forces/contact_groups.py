@@ -105,7 +105,7 @@ class ContactGroups(Force):
         ]
 
     def _results(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], list[Expr]]:
-        """The bodies, each as a marker at its origin, and force and torque on each, and the energy; at rest, if asked."""
+        """The bodies as markers at their origins, force and torque on each, and the energy; at rest, if asked."""
         graph = view.graph
         bodies = sorted({shape.marker.body for shape in (*self.first, *self.second)})
         labels = {shape.marker.body: shape.marker.label.partition(".")[0] for shape in (*self.first, *self.second)}
@@ -139,7 +139,13 @@ class ContactGroups(Force):
         return PairFunction(name, len(bodies), data.start + len(data.values), tuple(tables), tuple(kinds))
 
     def _kind(
-        self, kinds: tuple[str, str], tables: tuple[int, int], sizes: tuple[int, int], planar: bool, data: _Data, lost: bool
+        self,
+        kinds: tuple[str, str],
+        tables: tuple[int, int],
+        sizes: tuple[int, int],
+        planar: bool,
+        data: _Data,
+        lost: bool,
     ) -> PairKind:
         """The law of one kind of pair in a graph of its own, with its derivative."""
         graph = Graph()

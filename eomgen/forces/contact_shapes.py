@@ -213,11 +213,14 @@ class Pose(NamedTuple):
 
 
 def touching(
-    kinds: tuple[str, str], markers: tuple[Marker, Marker], sizes: tuple[tuple[Expr, ...], tuple[Expr, ...]], law: Contact
+    kinds: tuple[str, str],
+    markers: tuple[Marker, Marker],
+    sizes: tuple[tuple[Expr, ...], tuple[Expr, ...]],
+    law: Contact,
 ) -> Contact:
     """The contact of one feature with another; ``law`` has the laws."""
     laws = (law.name, *markers, law.normal_law, law.friction)
-    (first, second), radius = sizes, sizes[1][0]
+    first, radius = sizes[0], sizes[1][0]
     if kinds[0] == "round":
         return SphereSphere(*laws, (first[0], radius))
     if kinds[0] == "half":

@@ -151,9 +151,7 @@ def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, 
         elif operation == "neg":
             a = node[1]
             adjoints[a] = sub(adjoints[a], w) if a in adjoints else g.neg(w)
-        elif (row := OPERATIONS.get(operation)) is not None and row.choice is not None:
-            branches.append(i)
-        elif row is None and is_pair_item(g, operation):
+        elif is_pair_item(g, operation) or ((row := OPERATIONS.get(operation)) is not None and row.choice is not None):
             branches.append(i)
         elif operation == "div" and node[2] not in active and nodes[node[2]][0] == "const":
             a, d = node[1], g.div(w, node[2])

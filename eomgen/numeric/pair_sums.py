@@ -13,7 +13,7 @@ import numpy as np
 
 #: Numbers that say how a body or a shape stands and moves: position, rotation by rows, velocity, angular velocity.
 POSE = 18
-#: Numbers that a pair gives: force on the second shape, torques on the first and on the second about their centres, energy.
+#: Numbers that a pair gives: force on the second shape, torques on both about their centres, the first first, energy.
 RESULT = 10
 #: Columns of a row of a table of shapes before the sizes: the body, and where its position and rotation stand.
 PLACE = 13
@@ -147,8 +147,8 @@ class PairSum:
             square = square - along * along
         size = data[np.maximum(bounds[0], 0)] + data[np.maximum(bounds[1], 0)]
         apart = np.asarray(square > size * size, dtype=bool)
-        apart = apart.all(axis=tuple(range(1, apart.ndim)))
-        return np.asarray(~apart | (bounds[0] < 0) | (bounds[1] < 0))
+        every = np.asarray(apart.all(axis=tuple(range(1, apart.ndim))))
+        return np.asarray(~every | (bounds[0] < 0) | (bounds[1] < 0))
 
 
 def _stacked(given: Sequence[Any]) -> np.ndarray:
@@ -169,12 +169,12 @@ def _parts(poses: np.ndarray) -> tuple[Any, Any, Any, Any]:
     return poses[:, 0:3], rotation, poses[:, 12:15], poses[:, 15:18]
 
 
-def _times(m: np.ndarray, a: np.ndarray) -> np.ndarray:
+def _times(m: Any, a: Any) -> Any:
     """Matrices (n, 3, 3, ...) times vectors (n, 3, ...)."""
     return m[:, :, 0] * a[:, None, 0] + m[:, :, 1] * a[:, None, 1] + m[:, :, 2] * a[:, None, 2]
 
 
-def _product(m: np.ndarray, n: np.ndarray) -> np.ndarray:
+def _product(m: Any, n: Any) -> Any:
     return m[:, :, 0, None] * n[:, None, 0] + m[:, :, 1, None] * n[:, None, 1] + m[:, :, 2, None] * n[:, None, 2]
 
 
