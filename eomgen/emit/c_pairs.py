@@ -69,6 +69,7 @@ def _file(program: Program, function: PairFunction, slopes: bool) -> str:
         "pair": RESULT,
         "place": PLACE,
         "results": function.results,
+        "numbers": [repr(0.0 if x is None else x) for x in function.data] or ["0.0"],
         "tables": tables,
         "kinds": kinds,
         "functions": functions,
@@ -105,7 +106,9 @@ def pair_declarations(program: Program) -> list[str]:
 
 def _declared(program: str, function: PairFunction, slopes: bool) -> str:
     prefix, n, results = f"{program}_pairs_{function.name}", function.count, function.results
-    text = f"EOMGEN_PIECE void {prefix}_sum(const double *given, double *out, double *work);\n"
+    text = f"#define each_{function.name}_numbers {prefix}_numbers\n"
+    text += f"EOMGEN_PIECE extern const double {prefix}_numbers[{max(1, len(function.data))}];\n"
+    text += f"EOMGEN_PIECE void {prefix}_sum(const double *given, double *out, double *work);\n"
     text += _each(f"each_{function.name}_sum", f"{prefix}_sum", n, results, False)
     if slopes:
         text += (

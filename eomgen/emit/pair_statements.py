@@ -72,7 +72,13 @@ class PairLists:
         assert call is not None
         function, place, work = call.function, self._places[i], self._work
         if call.part == "given":
-            return [f"w[{place + k}] = {text(x)};" for k, x in enumerate(operands)]
+            start = POSE * function.bodies
+            moving = [(k, x) for k, x in enumerate(operands) if k < start or function.data[k - start] is None]
+            numbers = f"each_{function.name}_numbers[i]"
+            return [
+                f"for (int i = 0; i < {len(function.data)}; i++) {{ w[{place + start} + i] = same({numbers}); }}",
+                *(f"w[{place + k}] = {text(x)};" for k, x in moving),
+            ]
         given = self._places[operands[0]]
         if call.part == "sum":
             return [f"each_{function.name}_sum(w + {given}, w + {place}, w + {work});"]

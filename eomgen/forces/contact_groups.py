@@ -136,7 +136,7 @@ class ContactGroups(Force):
                     sizes = tuple(len(groups[n][kind][0][1].sizes) for n, kind in ((g, first), (h, second)))
                     flat = planar and first != "half"  # which has no extent along its normal to leave out
                     kinds.append(self._kind((first, second), (i, j), (sizes[0], sizes[1]), flat, data, lost))
-        return PairFunction(name, len(bodies), data.start + len(data.values), tuple(tables), tuple(kinds))
+        return PairFunction(name, len(bodies), tuple(x.value for x in data.values), tuple(tables), tuple(kinds))
 
     def _kind(
         self,

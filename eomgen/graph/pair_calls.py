@@ -77,8 +77,8 @@ class PairFunction:
     name : str
     bodies : int
         Ground among them.
-    count : int
-        Operands: ``POSE`` numbers for each body, then the data.
+    data : tuple of float or None
+        Operands that follow the ``POSE`` numbers of each body, where they are numbers.
     tables : tuple
         Of shapes; see :class:`~eomgen.numeric.pair_sums.PairSum`.
     kinds : tuple of PairKind
@@ -86,9 +86,14 @@ class PairFunction:
 
     name: str
     bodies: int
-    count: int
+    data: tuple[float | None, ...]
     tables: tuple[tuple[tuple[int, ...], ...], ...]
     kinds: tuple[PairKind, ...]
+
+    @property
+    def count(self) -> int:
+        """How many operands it has."""
+        return POSE * self.bodies + len(self.data)
 
     @property
     def results(self) -> int:
