@@ -29,6 +29,12 @@ _LEVELS = ("coordinate", "velocity", "acceleration")  #: kinds of names of motio
 _A = {"length": "a length", "angle": "an angle"}
 
 
+def _keys_of_law(found: ElementType) -> set[str]:
+    """The keys of a type that belong to its law: those that follow the key ``law``, and that key."""
+    keys = list(found.keys)
+    return set(keys[keys.index("law") :])
+
+
 class Surroundings(NamedTuple):
     """What the entries of a section look up; ``contacts`` takes in bodies and joints of contact points."""
 
@@ -61,6 +67,9 @@ class ElementEntry:
         if self._misunderstood(found):
             return None
         self.fields = found.fields(what, types)
+        if "law" in found.keys and found.keys["law"].kind == "law" and not self.values.keys() & _keys_of_law(found):
+            self.fault("", "has no law", "give law: {stiffness: ...} and what else the law has")
+            return None
         check_keys(self.path, self.values, self.fields, self.reader.faults)
         present = [key for key in found.one_of if key in self.values]
         if found.one_of and len(present) != 1:

@@ -37,11 +37,13 @@ def test_text_does_not_grow_with_the_pairs(tmp_path: Path) -> None:
         found = {}
         for file in sorted(folder.rglob("*.c")):
             text = re.sub(r"(?s)(static )?const \w+ \w+\[\d+\](\[\d+\])? = \{.*?\n\};", "", file.read_text())
+            text = re.sub(r"(\d+,\s*){25,}", "", text)  # the description of the model, as bytes
             found[file.name] = re.sub(r"\d+", "0", text)
         texts.append(found)
     assert texts[0].keys() == texts[1].keys()
     assert "rows_pairs_touch.c" in texts[0]
     for name, text in texts[0].items():
+        assert len(text) < 200_000
         assert Counter(re.findall(r"\w+|\S", text)) == Counter(re.findall(r"\w+|\S", texts[1][name])), name
 
 

@@ -245,7 +245,9 @@ def random_scene(seed: int) -> tuple[Any, dict[str, float]]:
     group = [on(PLANAR[kind], body) for kind, body in zip(kinds, bodies, strict=True)]
     law = {**LAW, "stiffness": 1e4 * 10 ** rng.uniform(0, 1), "friction": rng.uniform(0, 1)}
     m.contacts("among", group, law=law)
-    m.contacts("floor", group, {"shape": "half_plane", "on": m.ground.at(0, 0, 0, rpy=(0, 0, rng.uniform(-0.2, 0.2)))}, law)
+    m.contacts(
+        "floor", group, {"shape": "half_plane", "on": m.ground.at(0, 0, 0, rpy=(0, 0, rng.uniform(-0.2, 0.2)))}, law
+    )
     start: dict[str, float] = {}
     for k in range(4):
         start |= {f"j{k}_x": 0.4 * (k % 2), f"j{k}_y": 0.3 + 0.4 * (k // 2), f"j{k}_3": rng.uniform(-3, 3)}
