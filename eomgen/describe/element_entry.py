@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from ..elements.element_type import ElementType, Types
 from ..elements.entry import Found, Meaning
 from ..elements.field import Fields
-from ..forces.contact_shapes import Shape
+from ..forces.contact_shapes import ContactShape
 from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
@@ -230,7 +230,7 @@ class ElementEntry:
         sense = reader.choice(f"{path}.sense", value.get("sense", field.default), field)
         return None if marker is None else WrapCylinder(marker, radius, 1 if sense == "positive" else -1)
 
-    def shapes(self, key: str) -> tuple[Shape, ...] | None:
+    def shapes(self, key: str) -> tuple[ContactShape, ...] | None:
         return read_shapes(self.reader, self._at(key), self.values[key]) if key in self.values else None
 
     def body(self, key: str = "body") -> tuple[int, Body] | None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..forces.contact_shapes import CORNERS, SHAPE_FIELDS, Shape
+from ..forces.contact_shapes import CORNERS, SHAPE_FIELDS, ContactShape
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from .checks import check_keys
@@ -15,7 +15,7 @@ from .names import nearest
 from .values import Reader
 
 
-def read_shapes(reader: Reader, path: str, value: Any) -> tuple[Shape, ...] | None:
+def read_shapes(reader: Reader, path: str, value: Any) -> tuple[ContactShape, ...] | None:
     """The shapes of a group; None if anything is wrong with them, which is noted."""
     listed = [value] if isinstance(value, Mapping) else items(value)
     if listed is None:
@@ -26,13 +26,13 @@ def read_shapes(reader: Reader, path: str, value: Any) -> tuple[Shape, ...] | No
             path, "has no shapes", "give at least one shape, such as {shape: circle, on: wheel, radius: 0.1}"
         )
         return None
-    found: list[Shape] = []
+    found: list[ContactShape] = []
     for k, given in enumerate(listed):
         found += _read(reader, f"{path}[{k}]", given)
     return None if reader.faults.under(path) else tuple(found)
 
 
-def _read(reader: Reader, path: str, given: Any) -> list[Shape]:
+def _read(reader: Reader, path: str, given: Any) -> list[ContactShape]:
     if not isinstance(given, Mapping):
         reader.wrong(path, given, "shapes")
         return []
@@ -51,7 +51,7 @@ def _read(reader: Reader, path: str, given: Any) -> list[Shape]:
     places = [(f"{path}.on", on)] if many is None else [(f"{path}.on[{k}]", one) for k, one in enumerate(many)]
     markers = [reader.marker(place, one) for place, one in places]
     sizes = _sizes(reader, path, kind, given)
-    return [] if sizes is None else [Shape(kind, marker, sizes) for marker in markers if marker is not None]
+    return [] if sizes is None else [ContactShape(kind, marker, sizes) for marker in markers if marker is not None]
 
 
 def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tuple[Expr, ...] | None:

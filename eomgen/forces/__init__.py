@@ -7,7 +7,7 @@ from .attraction import PointGravity
 from .bushing import Bushing
 from .contact import Contact, SpherePlane, SphereSphere
 from .contact_groups import ContactGroups
-from .contact_shapes import Shape
+from .contact_shapes import ContactShape
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
 from .friction import Friction, JointFriction
 from .laws import GeneralElement
@@ -29,6 +29,7 @@ __all__ = [
     "Bushing",
     "Contact",
     "ContactGroups",
+    "ContactShape",
     "CoordinateLoad",
     "Damper",
     "ElementType",
@@ -47,7 +48,6 @@ __all__ = [
     "PointForce",
     "PointGravity",
     "Route",
-    "Shape",
     "SpherePlane",
     "SphereSphere",
     "Spring",

@@ -24,7 +24,7 @@ from ..graph.vectors import Vec3
 from ..numeric.pair_sums import POSE
 from ..records import dataclass
 from .contact import SpherePlane
-from .contact_shapes import PLANAR, Feature, Pose, Shape, meet, touching
+from .contact_shapes import PLANAR, ContactShape, Feature, ShapeMotion, meet, touching
 from .force import Force, Load, MarkerLoad, View
 from .friction import FRICTION, Friction, read_friction
 from .normal_laws import NORMAL, HuntCrossley, read_normal_law
@@ -37,10 +37,10 @@ class _PairView:
         self.graph, self._planar = graph, planar
         self._poses = [self._pose(letter) for letter in "ab"]
 
-    def _pose(self, letter: str) -> Pose:
+    def _pose(self, letter: str) -> ShapeMotion:
         x = [self.graph.symbol(f"{letter}{k}") for k in range(POSE)]
         rotation = ((x[3], x[4], x[5]), (x[6], x[7], x[8]), (x[9], x[10], x[11]))
-        return Pose((x[0], x[1], x[2]), rotation, (x[12], x[13], x[14]), (x[15], x[16], x[17]))
+        return ShapeMotion((x[0], x[1], x[2]), rotation, (x[12], x[13], x[14]), (x[15], x[16], x[17]))
 
     def position(self, marker: Marker) -> Vec3:
         position = self._poses[marker.body].position
@@ -80,8 +80,8 @@ class ContactGroups(Force):
     )
     formula: ClassVar[str] = r"F_n = k d^n (1 + \lambda \dot{d}), \quad d > 0"
     by_power: ClassVar[bool] = True
-    first: tuple[Shape, ...]
-    second: tuple[Shape, ...]
+    first: tuple[ContactShape, ...]
+    second: tuple[ContactShape, ...]
     normal_law: HuntCrossley
     friction: Friction | None
 
@@ -117,11 +117,11 @@ class ContactGroups(Force):
             moving = (view.velocity(marker), view.angular_velocity(marker))
             operands += [*view.position(marker), *rotation]
             operands += [graph.zero if still else x for v in moving for x in v]
-        data = _Data(len(operands), graph)
+        data = _SharedData(len(operands), graph)
         function = self._function(f"{self.name}{part}", bodies, data, bool(part))
         return markers, pair_sum(graph, function, [*operands, *data.values])
 
-    def _function(self, name: str, bodies: Sequence[int], data: _Data, lost: bool) -> PairFunction:
+    def _function(self, name: str, bodies: Sequence[int], data: _SharedData, lost: bool) -> PairFunction:
         groups = [_features(self.first), _features(self.second)] if self.second else [_features(self.first)]
         place = {body: k for k, body in enumerate(bodies)}
         keys = [(g, kind) for g, group in enumerate(groups) for kind in group]
@@ -144,7 +144,7 @@ class ContactGroups(Force):
         tables: tuple[int, int],
         sizes: tuple[int, int],
         planar: bool,
-        data: _Data,
+        data: _SharedData,
         lost: bool,
     ) -> PairKind:
         """The law of one kind of pair in a graph of its own, with its derivative."""
@@ -196,7 +196,7 @@ class ContactGroups(Force):
         )
 
 
-class _Data:
+class _SharedData:
     """Different numbers and expressions that shapes and laws need, behind the poses of the bodies."""
 
     def __init__(self, start: int, graph: Graph) -> None:
@@ -217,7 +217,7 @@ class _Data:
         return (body, *(self.place(x) for x in entries), bound)
 
 
-def _features(shapes: Sequence[Shape]) -> dict[str, list[tuple[int, Feature]]]:
+def _features(shapes: Sequence[ContactShape]) -> dict[str, list[tuple[int, Feature]]]:
     """Features of shapes with their bodies, by class."""
     found: dict[str, list[tuple[int, Feature]]] = {}
     for shape in shapes:
@@ -257,7 +257,7 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
     return ContactGroups(e.name, first, second, law, friction)
 
 
-def _refuse_pairs(e: Entry, first: Sequence[Shape], second: Sequence[Shape]) -> None:
+def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
     """Note shapes that cannot meet, and a shape that is in both groups."""
     kinds = sorted({shape.kind for shape in first}), sorted({shape.kind for shape in second or first})
     for a in kinds[0]:
@@ -280,7 +280,7 @@ def _refuse_pairs(e: Entry, first: Sequence[Shape], second: Sequence[Shape]) -> 
         e.fault("", "has shapes on one body only", "shapes of one body do not meet; give shapes on other bodies")
 
 
-def _differ(shapes: Sequence[Shape], kind: str) -> bool:
+def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
     """Whether shapes of a kind are on different bodies."""
     return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
 

@@ -65,7 +65,7 @@ class Feature(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Shape:
+class ContactShape:
     """A shape of a group, fixed to a marker.
 
     Attributes
@@ -203,7 +203,7 @@ def meet(kinds: tuple[str, str]) -> bool:
     return (kinds[0].rstrip("0123456789"), kinds[1]) in MEETINGS
 
 
-class Pose(NamedTuple):
+class ShapeMotion(NamedTuple):
     """A shape's place and motion, ground axes."""
 
     position: Vec3
