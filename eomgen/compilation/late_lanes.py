@@ -96,7 +96,8 @@ def _build(
     """Compile the lanes, and the functions that they call, with the module's flags."""
     words = recipe["flags"][f"{built.name}.c"]
     words = ["-DEOMGEN_LATE", *(w for w in words if not w.startswith("-DEOMGEN_LANES=")), f"-DEOMGEN_LANES={width}"]
-    called = [file for file in sources if file.startswith((f"{built.name}_tables.", f"{built.name}_native_"))]
+    beside = tuple(f"{built.name}_{part}" for part in ("tables.", "native_", "pairs_"))
+    called = [file for file in sources if file.startswith(beside)]
     files = [*late_files(sources, built.name), *(file for file in called if file.endswith(".c"))]
     flags = {**dict.fromkeys(files, words), "": recipe["flags"][""]}
     with cache.attempt(key) as directory:

@@ -36,7 +36,7 @@ _RATIOS = frozenset(
     sign * a / b * turn for sign in (1, -1) for a in (1, 2, 3, 4, 6, 8, 12) for b in (1, 2, 3, 4, 6, 8, 12)
     for turn in (1.0, math.pi, 1 / math.pi)
 )  # fmt: skip
-_NESTED = ("markers", "solids", "points", "marker", "pair", "via", "display")
+_NESTED = ("markers", "solids", "points", "marker", "pair", "via", "display", "shapes")
 _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")
 
 

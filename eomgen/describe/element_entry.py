@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from ..elements.element_type import ElementType, Types
 from ..elements.entry import Found, Meaning
 from ..elements.field import Fields
+from ..forces.contact_shapes import ContactShape
 from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
@@ -20,11 +21,18 @@ from .description import DescribedEntry, items
 from .fields import CYLINDER
 from .mechanism import Body, JointSpec
 from .names import nearest
+from .read_shapes import read_shapes
 from .scope import ENERGIES, RATES
 from .values import Reader
 
 _LEVELS = ("coordinate", "velocity", "acceleration")  #: kinds of names of motions
 _A = {"length": "a length", "angle": "an angle"}
+
+
+def _keys_of_law(found: ElementType) -> set[str]:
+    """The keys of a type that belong to its law: those that follow the key ``law``, and that key."""
+    keys = list(found.keys)
+    return set(keys[keys.index("law") :])
 
 
 class Surroundings(NamedTuple):
@@ -59,6 +67,9 @@ class ElementEntry:
         if self._misunderstood(found):
             return None
         self.fields = found.fields(what, types)
+        if "law" in found.keys and found.keys["law"].kind == "law" and not self.values.keys() & _keys_of_law(found):
+            self.fault("", "has no law", "give law: {stiffness: ...} and what else the law has")
+            return None
         check_keys(self.path, self.values, self.fields, self.reader.faults)
         present = [key for key in found.one_of if key in self.values]
         if found.one_of and len(present) != 1:
@@ -218,6 +229,9 @@ class ElementEntry:
         field = CYLINDER["sense"]
         sense = reader.choice(f"{path}.sense", value.get("sense", field.default), field)
         return None if marker is None else WrapCylinder(marker, radius, 1 if sense == "positive" else -1)
+
+    def shapes(self, key: str) -> tuple[ContactShape, ...] | None:
+        return read_shapes(self.reader, self._at(key), self.values[key]) if key in self.values else None
 
     def body(self, key: str = "body") -> tuple[int, Body] | None:
         given, own = self.values.get(key), {body.name: k for k, body in enumerate(self.around.bodies)}

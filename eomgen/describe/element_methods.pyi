@@ -174,6 +174,12 @@ class ElementMethods(Described):
         friction: Value = None, static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0,
         smoothing: Value = None) -> ForceHandle:
         """Add contact of two spheres, each centred at a marker."""
+    def contacts(self, name: str, first: Sequence[Mapping[str, Any]] | Mapping[str, Any],
+        second: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None, law: Mapping[str, Any] | None = None,
+        stiffness: Value = None, exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None,
+        velocity: Value = None, formula: str | None = None, friction: Value = None, static_friction: Value = None,
+        stribeck: Value = None, viscous_friction: Value = 0, smoothing: Value = None) -> ForceHandle:
+        """Add contact of every shape of a group with every shape of another, by one law."""
     def muscle(self, name: str, a: Any, b: Any, activation: Value, force_max: Value, fiber_length: Value,
         slack_length: Value, velocity_max: Value = None, pennation: Value = 0, damping: Value = 0.1,
         via: Sequence[Any] | None = None) -> ForceHandle:

@@ -22,6 +22,7 @@ from ..elements.field import OUTPUT as OUTPUT
 from ..elements.field import Field as Field
 from ..elements.field import Fields as Fields
 from ..forces import FORCES
+from ..forces.contact_shapes import SHAPE_FIELDS
 from ..joints import JOINTS
 from ..numeric.splines import KINDS as TABLES
 from ..solids import SOLIDS
@@ -252,6 +253,7 @@ MODEL: Fields = {
     "bodies": Field("table", "rigid bodies"),
     "joints": Field("table", "joints between bodies"),
     "forces": Field("table", "force elements"),
+    "contacts": Field("table", "contact between groups of shapes: forces of type contacts"),
     "constraints": Field("table", "equations between coordinates or markers"),
     "states": Field("table", "first-order states: names of quantities with their rates"),
     "outputs": Field("table", "named results"),
@@ -340,7 +342,11 @@ def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
 @cache
 def part_fields() -> Fields:
     """Keys of the parts of an entry: placements, cylinders of paths, point masses and solids."""
-    return {key: field for own in (*SOLID.values(), POINT, CYLINDER, MARKER) for key, field in own.items()}
+    return {
+        key: field
+        for own in (*SHAPE_FIELDS.values(), *SOLID.values(), POINT, CYLINDER, MARKER)
+        for key, field in own.items()
+    }
 
 
 def acts_on_length(section: str, values: Mapping[str, Any], field: Field, is_length: Callable[[str], bool]) -> bool:
@@ -354,7 +360,7 @@ def acts_on_length(section: str, values: Mapping[str, Any], field: Field, is_len
     for key in (field.along, "coordinate"):
         if values.get(key) is not None and section in ("forces", "constraints"):
             return is_length(str(values[key]))
-    return "between" in values or "marker" in values
+    return "between" in values or "marker" in values or "first" in values
 
 
 def solid_fields(type_name: str) -> Fields:

@@ -32,6 +32,8 @@ ARGUMENTS = {
     "value": ("scalar or sequence of three", "Value | Sequence[Value]"),
     "via": ("sequence", "Sequence[Any]"),
     "matrix6": ("sequence", "Sequence[Any]"),
+    "shapes": ("sequence of mapping", "Sequence[Mapping[str, Any]] | Mapping[str, Any]"),
+    "law": ("mapping", "Mapping[str, Any]"),
     "radii": ("sequence of two", "Sequence[Value]"),
     "two": ("sequence of two", "Sequence[Value]"),
     "wheels": ("mapping", "Mapping[str, Value]"),
@@ -202,10 +204,24 @@ def _entry(model: Described, found: ElementType, name: Any, given: dict[str, Any
         entry[key] = [_reference(model, kinds[key], part) for part in (given.pop(first), given.pop(second))]
     elif {"joint", "between"} <= {*found.one_of}:
         entry |= _where(model, given.pop("between", ()), given.pop("joint", None))
+    law = given.pop("law", None) if kinds.get("law") == "law" else None
+    if law is not None:
+        given = {**given, **_law(found, name, law, given)}
     for key in [key for key in kinds if key in given]:
         if not _is_default(given[key], found.keys[key]):
             entry[key] = _converted(model, found, name, key, given[key])
     return {key: value for key, value in entry.items() if value is not None}
+
+
+def _law(found: ElementType, name: Any, law: Any, given: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The keys of a law that is given as a mapping."""
+    if not isinstance(law, Mapping):
+        raise UsageError(f"{found.name} {name!r}: law is {type(law).__name__}, not a mapping of its keys")
+    check_keywords(f"the law of {found.name}", dict(law), [key for key in found.keys if found.keys[key].kind != "law"])
+    twice = sorted(law.keys() & given.keys())
+    if twice:
+        raise UsageError(f"{found.name} {name!r}: {twice[0]} is given in law and beside it; give it once")
+    return law
 
 
 def _is_default(value: Any, field: Field) -> bool:
@@ -240,6 +256,8 @@ def _converted(model: Described, found: ElementType, name: Any, key: str, value:
         return [_reference(model, kind, part) for part in value]
     if kind == "factors" and isinstance(value, Mapping):
         return {_reference(model, kind, part): factor for part, factor in value.items()}
+    if kind == "shapes":
+        return [_on(model, part) for part in ([value] if isinstance(value, Mapping) else value)]
     if kind == "via":
         return [_stop(model, stop) for stop in value] or None
     return value
@@ -250,3 +268,12 @@ def _stop(model: Described, stop: Any) -> Any:
     if not (isinstance(stop, Mapping) and "around" in stop):
         return marker_reference(model, stop)
     return {key: marker_reference(model, x) if key == "around" else x for key, x in stop.items()}
+
+
+def _on(model: Described, shape: Any) -> Any:
+    """A shape whose markers are as a model file refers to them."""
+    if not isinstance(shape, Mapping) or "on" not in shape:
+        return shape
+    on, many = shape["on"], items(shape["on"])
+    placed = marker_reference(model, on) if many is None else [marker_reference(model, one) for one in many]
+    return {**shape, "on": placed}

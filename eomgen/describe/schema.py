@@ -8,6 +8,7 @@ from ..constraints import CONSTRAINTS
 from ..constraints.planetary import WHEELS
 from ..elements.element_type import Types
 from ..forces import FORCES
+from ..forces.contact_shapes import CORNERS, SHAPE_FIELDS
 from ..joints import JOINTS
 from ..numeric.rigid_inertia import CHECKS
 from .fields import (
@@ -92,6 +93,7 @@ def _definitions() -> Schema:
         "points": {"type": "array", "items": _table(POINT)},
         "limits": _object({key: _each(field) for key, field in LIMITS.items()}),
         "display": {"type": "array", "items": _table(DISPLAY)},
+        "contact_shape": {"oneOf": [_contact_shape(name) for name in SHAPE_FIELDS]},
     }
 
 
@@ -182,6 +184,15 @@ _KINDS: dict[str, Schema] = {
         ]
     },
     "rates": {"type": "object", "additionalProperties": _ref("expression")},
+    "shapes": {"anyOf": [_ref("contact_shape"), {"type": "array", "items": _ref("contact_shape"), "minItems": 1}]},
+    "on": {"anyOf": [_ref("marker"), {"type": "array", "items": _ref("marker"), "minItems": 1}]},
+    "corners": {
+        "type": "array",
+        "items": {"type": "array", "items": _ref("expression"), "minItems": 2, "maxItems": 2},
+        "minItems": 3,
+        "maxItems": CORNERS,
+    },
+    "law": {"type": "object"},
     "radii": {"type": "array", "items": _ref("expression"), "minItems": 2, "maxItems": 2},
     "forces": {
         "anyOf": [
@@ -215,6 +226,20 @@ def _table(fields: Fields, without: tuple[str, ...] = ()) -> Schema:
 def _typed(fields: Fields, type_name: str) -> Schema:
     schema = _table(fields)
     schema["properties"]["type"] = {"const": type_name}
+    return schema
+
+
+def _contact_shape(kind: str) -> Schema:
+    schema = _table(SHAPE_FIELDS[kind])
+    schema["properties"]["shape"] = {"const": kind}
+    return schema
+
+
+def _contacts() -> Schema:
+    """An entry of the section contacts: keys of the type, its law one by one or as a mapping."""
+    schema = _element("force", FORCES, "contacts")
+    del schema["properties"]["type"]
+    schema["required"] = ["first"]
     return schema
 
 
@@ -271,6 +296,7 @@ def model_schema() -> dict[str, Any]:
         "bodies": _section(_body(), MODEL["bodies"].doc),
         "joints": _section({"oneOf": [_typed(joint_fields(name), name) for name in JOINTS]}, MODEL["joints"].doc),
         "forces": _section({"oneOf": [_element("force", FORCES, name) for name in FORCES]}, MODEL["forces"].doc),
+        "contacts": _section(_contacts(), MODEL["contacts"].doc),
         "constraints": _section(
             {"oneOf": [_element("constraint", CONSTRAINTS, name) for name in CONSTRAINTS]}, MODEL["constraints"].doc
         ),

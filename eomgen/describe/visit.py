@@ -158,11 +158,23 @@ def _value(value: Any, kind: str, slot: Slot, visitor: Visitor) -> Any:
         return [visitor.latex(part) for part in value] if listed else visitor.latex(value)
     if kind == "body":
         return _named(value, visitor.body)
+    if kind == "shapes":
+        return [_shape(part, slot, visitor) for part in ([value] if isinstance(value, Mapping) else value or ())]
     if kind == "via":
         return [_via(part, slot, visitor) for part in value] if listed else value
     if kind in ("markers", "solids", "points", "about", "display") and slot.entry is not None:
         return _part(value, kind, slot, slot.entry.name, visitor)
     return value
+
+
+def _shape(part: Any, slot: Slot, visitor: Visitor) -> Any:
+    if not isinstance(part, Mapping):
+        return part
+    made = {k: v if k == "shape" else visitor.vector(v, slot.named(k)) for k, v in part.items() if k != "on"}
+    on = part.get("on")
+    if isinstance(on, list | tuple):
+        return {**made, "on": [visitor.marker(one, slot) for one in on]}
+    return made if on is None else {**made, "on": visitor.marker(on, slot)}
 
 
 def _via(part: Any, slot: Slot, visitor: Visitor) -> Any:

@@ -84,6 +84,8 @@ def _describe(text: str, file: str, origin: _Origin) -> Description:
         for key in given:
             if key in SECTIONS:
                 _add_section(target, faults, start, key, given[key], origin)
+            elif key == "contacts" and not start:
+                _add_contacts(target, faults, given[key], origin)
             elif key in ("initial", "guess") and start:
                 if isinstance(given[key], Mapping):
                     target.values[key] = given[key]
@@ -96,7 +98,12 @@ def _describe(text: str, file: str, origin: _Origin) -> Description:
     for key, value in tree.items():
         if key not in MODEL:
             faults.add(key, "unknown key", nearest(key, MODEL, "allowed"))
-        elif key not in SECTIONS and key not in PARTS and (value is not None or MODEL[key].kind != "table"):
+        elif (
+            key not in SECTIONS
+            and key not in PARTS
+            and key != "contacts"
+            and (value is not None or MODEL[key].kind != "table")
+        ):
             description.values[key] = value
     fill(tree, "", description)
     if tree.get("components") is not None or tree.get("add") is not None:
@@ -133,6 +140,40 @@ def _open_part(name: str, file: str, origin: _Origin, faults: Faults) -> Descrip
     return found
 
 
+def _add_contacts(description: Description, faults: Faults, value: Any, origin: _Origin) -> None:
+    """Take in the section ``contacts``: forces of that type, whose law may be a mapping of its own."""
+    if value is None:
+        return
+    if not isinstance(value, Mapping):
+        faults.add("contacts", f"is not {KINDS['table']}", "write the names of the contacts as keys")
+        return
+    for path, place in list(description.lines.items()):
+        if path.startswith("contacts."):
+            description.lines["forces" + path.removeprefix("contacts")] = place
+    forces: dict[str, Any] = {}
+    for name, given in value.items():
+        if isinstance(given, Mapping) and "type" in given:
+            faults.add(f"forces.{name}.type", "is given in the section contacts", "leave it out")
+        forces[name] = {"type": "contacts", **given} if isinstance(given, Mapping) else given
+    _add_section(description, faults, "", "forces", forces, origin)
+
+
+def _spread_law(description: Description, faults: Faults, path: str, values: dict[str, Any]) -> dict[str, Any]:
+    """The keys of contacts with those of their law beside them."""
+    law = values.get("law")
+    if values.get("type") != "contacts" or "law" not in values:
+        return values
+    if not isinstance(law, Mapping):
+        faults.add(f"{path}.law", f"is not {KINDS['law']}", "give stiffness and what else the law has")
+        return values
+    for key in law:
+        if key in values:
+            faults.add(f"{path}.{key}", "is given in law and beside it", "give it once")
+        if f"{path}.law.{key}" in description.lines:
+            description.lines[f"{path}.{key}"] = description.lines[f"{path}.law.{key}"]
+    return {key: x for key, x in values.items() if key != "law"} | dict(law)
+
+
 def _add_section(
     description: Description, faults: Faults, start: str, section: str, value: Any, origin: _Origin
 ) -> None:
@@ -155,5 +196,7 @@ def _add_section(
             else:
                 faults.add(f"{start}{place}", f"is not {KINDS['table']}", "write its keys as {key: value, ...}")
                 values = {}
+        if section == "forces":
+            values = _spread_law(description, faults, place, values)
         entry = description.add(section, name, values)
         entry.trusted, entry.folder = section == "functions" and origin.trusted, origin.folder

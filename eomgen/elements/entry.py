@@ -120,6 +120,9 @@ class Entry(Protocol):
     def coordinate(self, key: str = "joint", kind: str = "") -> Found | None:
         """The coordinate that a joint, or its own name, means; of a kind, if one is asked for."""
 
+    def shapes(self, key: str) -> Any:
+        """The shapes of a group (:class:`~eomgen.forces.contact_shapes.ContactShape`); None where there are faults."""
+
     def body(self, key: str = "body") -> tuple[int, BodyData] | None:
         """The index of a body, and its mass."""
 

@@ -15,6 +15,7 @@ from .c_bounds import operations_of, stack_of, states_beside_change_points
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_files, lane_kernels
 from .c_layout import driver_files, work_areas
+from .c_pairs import pair_declarations, pair_files
 from .c_parts import distribute, part_names
 from .c_series import series_files
 from .c_text import Printed, print_block, print_precompute, used_helpers
@@ -82,6 +83,7 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
         **(lane_files(program, context) if lanes else {}),
         **series,
         **function_files(program, calls),
+        **pair_files(program),
     }
     if precision:
         context["costs"] = _costs(program, sources)
@@ -131,7 +133,11 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "work_at": len(program.parameters) + len(program.hoisted),
         "rank": sizes.n_v - sizes.n_dof,
         "indefinite": int(bool(program.metadata.get("indefinite"))),
-        "helpers": [*used_helpers(program, roots), *declarations(program, used_calls(program))],
+        "helpers": [
+            *used_helpers(program, roots),
+            *declarations(program, used_calls(program)),
+            *pair_declarations(program),
+        ],
         "blocks": printed if program.hoisted else printed[1:],
         "drivers": drivers,
         "limits": definitions("".join(drivers)),

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..graph.functions import Function
+from ..graph.pair_calls import pair_call
 from ..graph.traverse import reachable
 from ..numeric.user_functions import Curve, Orders, Surface, base_orders, difference_step, first_excess, lowered
 from ..program import Program
@@ -26,7 +27,8 @@ def used_calls(program: Program) -> Calls:
     roots = [y.id for block in program.blocks for y in (*block.outputs, *block.checks)]
     operations = {graph.nodes[i][0] for i in reachable(graph, roots)} & set(graph.calls)
     found: Calls = {}
-    for function, orders in sorted((graph.calls[op] for op in operations), key=lambda call: (call[0].name, call[1])):
+    called = [graph.calls[op] for op in operations if pair_call(graph, op) is None]
+    for function, orders in sorted(called, key=lambda call: (call[0].name, call[1])):
         found.setdefault(function.name, (function, []))[1].append(orders)
     return found
 

@@ -13,6 +13,7 @@ from ..limits.in_c import definitions
 from ..program import Block, Program
 from .c_functions import declarations, used_calls
 from .c_layout import space_file
+from .c_pairs import pair_declarations
 from .c_text import used_helpers
 from .sources import read_template, render
 
@@ -77,7 +78,11 @@ def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
     drivers = [read_template(f"c/drivers/{file}.c") for file in files_of_loops]
     inside = {
         **context,
-        "helpers": [*used_helpers(program, roots), *declarations(program, used_calls(program))],
+        "helpers": [
+            *used_helpers(program, roots),
+            *declarations(program, used_calls(program)),
+            *pair_declarations(program),
+        ],
         "blocks": [context["printed"][b] for b in blocks],
         "first": len(first),
         "drivers": drivers,

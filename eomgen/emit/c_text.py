@@ -16,6 +16,7 @@ from ..operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operation
 from ..program import Block, Program
 from .angles import CIRCULAR, gather_angles, print_angles
 from .c_functions import each_lane, each_name
+from .pair_statements import PairLists
 from .straight import Pieces, PrintedFunction, cut, references
 
 SIGNATURE = (
@@ -36,7 +37,9 @@ def literal(value: float) -> str:
 class _CPrinter:
     """Prints the statements of one block; variables are numbered through all its pieces."""
 
-    def __init__(self, program: Program, references: dict[int, str]) -> None:
+    def __init__(self, program: Program, references: dict[int, str], pieces: Pieces) -> None:
+        every = (i for piece in pieces.pieces for i in piece.statements)
+        self.lists = PairLists(program.graph, every, pieces.work)
         self._graph, self._nodes, self._calls = program.graph, program.graph.nodes, program.graph.calls
         self._angles: dict[int, int] = {}  #: angles whose sin and cos are there -> their places
         self._fixed = references
@@ -84,6 +87,9 @@ class _CPrinter:
     def _value(self, i: int, piece: PrintedFunction) -> str:
         node = self._nodes[i]
         kind = node[0]
+        if self.lists.call(i) is not None:
+            self.used.add("w")
+            return self.lists.item(i)
         if kind in self._calls:
             function, orders = self._calls[kind]
             return f"{each_name(function.name, orders)}({', '.join(map(self.real, node[1:]))})"
@@ -114,6 +120,11 @@ class _CPrinter:
         return result
 
     def _statement(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
+        if self.lists.is_list(i):
+            self._load(i, piece, loaded, result)
+            self.used.add("w")
+            result += self.lists.lines(i, self.real)
+            return
         if i not in piece.inlined:
             self._load(i, piece, loaded, result)
             result.append(f"const real {self._name(i)} = {self._value(i, piece)};")
@@ -138,7 +149,7 @@ class _CPrinter:
 
     def _read(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
         """Read a value of an earlier piece, if it is one."""
-        if i in piece.loads and i not in loaded:
+        if i in piece.loads and i not in loaded and not self.lists.is_list(i):
             loaded.add(i)
             self.used.add("w")
             result.append(f"const real {self._name(i)} = w[{piece.loads[i]}];")
@@ -166,7 +177,7 @@ def print_block(program: Program, block: Block) -> Printed:
 
 def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, str]) -> Printed:
     """Print cut statements as one function, or as several and one that calls them."""
-    printer = _CPrinter(program, texts)
+    printer = _CPrinter(program, texts, pieces)
     main = _direct(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
     used = {*printer.used, *(["out"] if pieces.direct else [])}
     functions: list[tuple[str, str]] = []
@@ -181,7 +192,7 @@ def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, s
             part = f"{program.name}_{name}_{k}"
             functions.append((part, _function(f"flag {part}", printer.used, lines)))
             main.append(f"EOMGEN_REJECT({part}(t, x, u, c, out, w))")
-    return Printed(_function(f"static flag {name}", used, main), tuple(functions), pieces.work)
+    return Printed(_function(f"static flag {name}", used, main), tuple(functions), printer.lists.end)
 
 
 def _direct(printer: _CPrinter, pieces: Pieces) -> list[str]:

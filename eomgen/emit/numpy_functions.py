@@ -7,6 +7,8 @@ from ..graph.functions import Function
 from ..numeric.user_functions import Curve, Surface, Twin
 from ..program import Program
 from .c_functions import used_calls
+from .numpy_text import print_pair_sum
+from .pair_sums_used import used_sums
 
 
 def define_functions(program: Program, bundled: bool) -> tuple[list[str], list[str]]:
@@ -35,6 +37,10 @@ def define_functions(program: Program, bundled: bool) -> tuple[list[str], list[s
             imports.append(f"from . import native_{f.name}")
             functions = ", ".join(f"{orders}: native_{f.name}.{name}" for orders, name in f.native.names)
             definitions.append(f"call_{f.name} = Twin({{{functions}}})")
+    sums = used_sums(program)
+    if sums:
+        imports.append("from .numeric.pair_sums import PairSum")
+        definitions += [print_pair_sum(program, function) for function, _ in sums]
     return imports, definitions
 
 

@@ -6,7 +6,9 @@ Every operation means what :mod:`eomgen.graph.evaluate` makes of it on arrays.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from ..graph.pair_calls import PairCall, PairFunction, pair_call
 from ..graph.substitute import symbols_of
 from ..operations import CONDITION, OPERATIONS
 from ..program import Block, Program
@@ -15,7 +17,7 @@ from .straight import Pieces, PrintedFunction, cut, references
 
 class _NumpyPrinter:
     def __init__(self, program: Program, references: dict[int, str]) -> None:
-        self._nodes, self._calls = program.graph.nodes, program.graph.calls
+        self._graph, self._nodes, self._calls = program.graph, program.graph.nodes, program.graph.calls
         self._fixed = references
         self._variables: dict[int, str] = {}
 
@@ -37,6 +39,9 @@ class _NumpyPrinter:
 
     def _value(self, i: int, piece: PrintedFunction) -> str:
         node = self._nodes[i]
+        summed = pair_call(self._graph, node[0])
+        if summed is not None:
+            return _print_pair_node(summed, [self.operand(k) for k in node[1:]])
         if node[0] in self._calls:
             function, orders = self._calls[node[0]]
             return f"call_{function.name}({', '.join([*map(self.operand, node[1:]), *map(str, orders)])})"
@@ -57,6 +62,41 @@ class _NumpyPrinter:
             if i in piece.stores:
                 result.append(f"w[{piece.stores[i]}] = {self._name(i)}")
         return result
+
+
+def _print_pair_node(call: PairCall, operands: Sequence[str]) -> str:
+    """A node of a sum over pairs."""
+    name = f"call_{call.function.name}"
+    if call.part == "given":
+        return f"[{', '.join(operands)}]"
+    if call.part == "sum":
+        return f"{name}({operands[0]})"
+    if call.part == "slope":
+        return f"{name}.slope_along({operands[0]}, {call.numbers}, [{', '.join(operands[1:])}])"
+    return f"{operands[0]}[{call.numbers[0]}]"
+
+
+def print_pair_sum(program: Program, function: PairFunction) -> str:
+    """``call_<name>``, the loops over the pairs of a sum, after the functions of one pair."""
+    texts, kinds = list[str](), list[str]()
+    for kind in function.kinds:
+        names = []
+        for slopes in (False, True):
+            name = f"_{function.name}_{kind.name}{'_slope' * slopes}"
+            outputs = kind.expressions(slopes)
+            graph = outputs[0].graph
+            places = {graph.symbol(symbol).id: f"x[{k}]" for k, symbol in enumerate(kind.symbols)}
+            pieces = cut(graph, outputs, (), frozenset(), program.limits.statements)
+            printer = _NumpyPrinter(replace(program, graph=graph), places)
+            start = ["t = u = c = None", f"out = [0.0] * {len(outputs)}"]
+            text = _print_pieces(printer, name, f"A pair {kind.name}.", pieces, start, ["return out"], by_entry=True)
+            texts.append(text.replace(f"def {name}(t, x, u, c):", f"def {name}(x):"))
+            names.append(name)
+        row = (kind.first, kind.second, kind.planar, kind.law)
+        kinds.append(f"        ({', '.join(map(repr, row))}, {names[0]}, {names[1]}),\n")
+    tables = "".join(f"        {table!r},\n" for table in function.tables)
+    made = f"PairSum(\n    {function.bodies},\n    (\n{tables}    ),\n    (\n{''.join(kinds)}    ),\n)"
+    return "\n\n".join([*texts, f"call_{function.name} = {made}"])
 
 
 def _function(name: str, arguments: str, doc: str, lines: Sequence[str]) -> str:

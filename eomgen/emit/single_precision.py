@@ -16,6 +16,7 @@ from ..limits.rounding import EPS, SINGLE_COARSE, SINGLE_FAR
 from ..operations import FUNCTION, OPERATIONS
 from ..program import Program
 from .c_functions import used_calls
+from .pair_sums_used import refuse_sums
 from .sources import read_template
 
 SINGLE_EPS = 2.0**-23  #: distance from 1 to the next number of single precision
@@ -59,6 +60,7 @@ def refuse_double(program: Program) -> None:
     ------
     UsageError
     """
+    refuse_sums(program, "precision='float'")
     native = sorted({f.name for f, _ in used_calls(program).values() if f.native is not None})
     if native:
         raise UsageError(

@@ -19,6 +19,7 @@ from ..targets import TRACED_KERNELS
 from .c_functions import used_calls
 from .example_state import example_state
 from .numpy_text import print_block_of_lists, print_constants_of_lists
+from .pair_sums_used import refuse_sums
 from .sources import render
 
 STEPS = 6  #: of Newton's iteration: the error of the position is squared by each, so a tenth of a length is enough
@@ -156,6 +157,7 @@ def _public(program: Program, minimal: bool) -> list[Traced]:
 
 def _require_traceable(program: Program, library: str) -> None:
     """Refuse what has no form of straight lines and fixed numbers of steps."""
+    refuse_sums(program, f"target {library!r}")
     problems = []
     native = [f.name for f, _ in used_calls(program).values() if f.native is not None]
     if native:

@@ -14,8 +14,11 @@ from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
 
 
-def form_energies(kinematics: Kinematics) -> tuple[Expr, Expr]:
-    """T and V; of a bare Lagrangian V = -L(v = 0) and T = L + V."""
+def form_energies(kinematics: Kinematics, differentiated: bool = False) -> tuple[Expr, Expr]:
+    """T and V; of a bare Lagrangian V = -L(v = 0) and T = L + V.
+
+    ``differentiated``: without the potentials of elements whose forces enter by virtual power instead.
+    """
     bare = kinematics.mechanism.lagrangian
     graph = kinematics.graph
     if bare is not None:
@@ -36,7 +39,7 @@ def form_energies(kinematics: Kinematics) -> tuple[Expr, Expr]:
         kinetic = kinetic + (link.mass * vec.dot(center, center) + spin)
         potential = potential - link.mass * (height + vec.dot(pull, link.com))
     for force in kinematics.forces:
-        if force.potential is not None:
+        if force.potential is not None and not (differentiated and force.force.by_power):
             potential = potential + force.potential
     return 0.5 * kinetic, potential
 
@@ -50,14 +53,14 @@ def _velocity(kinematics: Kinematics, k: int) -> Vec3:
 
 
 def generalized_forces(kinematics: Kinematics) -> list[Expr]:
-    """Q of everything without a potential, by virtual power: Q = sum F . d(velocity)/dv."""
+    """Q of everything whose potential is not differentiated, by virtual power: Q = sum F . d(velocity)/dv."""
     graph, n = kinematics.graph, len(kinematics.v)
     velocities: list[Expr] = []
     weights: list[Expr] = []
     direct = [graph.zero] * n
     loop = kinematics.loop_coordinates
     for terms in kinematics.forces:
-        for load in terms.marker_remainder:
+        for load in terms.marker_loads if terms.force.by_power else terms.marker_remainder:
             velocities += kinematics.motion.velocity(load.marker)
             weights += load.force
             velocities += kinematics.motion.angular_velocity(load.marker)

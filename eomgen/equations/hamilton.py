@@ -36,7 +36,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     entries = jacobian(momenta, v)
     mass = tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n))
     forces = generalized_forces(kinematics)
-    slopes = gradient(kinetic - potential, list(kinematics.q))
+    slopes = gradient(kinetic - form_energies(kinematics, differentiated=True)[1], list(kinematics.q))
     rates = [s + f for s, f in zip(_turned(kinematics, slopes, momenta), forces, strict=True)]
     drift = jvp(momenta, kinematics.flow | kinematics.clock)
     total = kinematics.total_derivative(momenta)

@@ -24,7 +24,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     momentum = gradient(kinetic, v)
     drift = jvp(momentum, kinematics.flow | kinematics.clock)
     total = kinematics.total_derivative(momentum)
-    slope = gradient(kinetic - potential, q)
+    slope = gradient(kinetic - form_energies(kinematics, differentiated=True)[1], q)
     if kinematics.quaternion_slots:
         slope = vjp(list(kinematics.rates), slope, v)
     for _, j in kinematics.quaternion_slots:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import EomgenError, MissingDependencyError, UsageError
 from ..files.writing import write_whole
+from ..graph.pair_calls import opaque_names
 from .document import DrawnPicture, Folded, Piece, Section
 from .printer import Printer
 from .write_html import write_html
@@ -173,7 +174,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
 def _module(author: Author) -> tuple[Any, str]:
     """The module of the equations on NumPy, with the values that were put in, or None and why it has no state."""
     equations = author.source
-    functions = sorted(equations.kinematics.graph.functions)
+    functions = opaque_names(equations.kinematics.graph)
     if functions:
         return None, f"The formulas hold tables or functions, which SymPy cannot evaluate: {', '.join(functions)}."
     from ..pipeline import compile_core

@@ -1,11 +1,13 @@
 """Force elements: geometry (a path or a marker) times a law; :data:`FORCES` is the table of their types."""
 
 from ..elements.element_type import ElementType, Types
-from . import actuators, attraction, bushing, contact, friction, laws, muscle, springs, stops
+from . import actuators, attraction, bushing, contact, contact_groups, friction, laws, muscle, springs, stops
 from .actuators import Actuator, BodyTorque, PointForce
 from .attraction import PointGravity
 from .bushing import Bushing
 from .contact import Contact, SpherePlane, SphereSphere
+from .contact_groups import ContactGroups
+from .contact_shapes import ContactShape
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
 from .friction import Friction, JointFriction
 from .laws import GeneralElement
@@ -17,7 +19,7 @@ from .springs import Damper, Spring
 from .stops import JointStop
 
 FORCES: Types = {}
-for _home in (actuators, springs, laws, bushing, attraction, friction, stops, contact, muscle):
+for _home in (actuators, springs, laws, bushing, attraction, friction, stops, contact, contact_groups, muscle):
     FORCES |= _home.TYPES
 
 __all__ = [
@@ -26,6 +28,8 @@ __all__ = [
     "BodyTorque",
     "Bushing",
     "Contact",
+    "ContactGroups",
+    "ContactShape",
     "CoordinateLoad",
     "Damper",
     "ElementType",

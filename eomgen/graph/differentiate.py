@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from ..operations import OPERATIONS, operations_with
 from .core import Expr, Graph
+from .pair_calls import is_pair_item, pair_call, push_pairs
 from .slopes import half_power_slope, partials
 from .traverse import LEAVES, common_graph, reachable
 
@@ -86,6 +87,11 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
             d = g.make("select", c, tangents.get(a, zero), tangents.get(b, zero))
         elif row is not None and not row.slopes:
             continue
+        elif row is None and pair_call(g, operation) is not None:
+            found_slope = push_pairs(g, i, tangents)
+            if found_slope is None:
+                continue
+            d = found_slope
         elif row is not None and len(node) == 2:
             da = tangent(node[1])
             if da is None:
@@ -145,7 +151,7 @@ def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, 
         elif operation == "neg":
             a = node[1]
             adjoints[a] = sub(adjoints[a], w) if a in adjoints else g.neg(w)
-        elif (row := OPERATIONS.get(operation)) is not None and row.choice is not None:
+        elif is_pair_item(g, operation) or ((row := OPERATIONS.get(operation)) is not None and row.choice is not None):
             branches.append(i)
         elif operation == "div" and node[2] not in active and nodes[node[2]][0] == "const":
             a, d = node[1], g.div(w, node[2])
@@ -304,7 +310,7 @@ def _reverse_is_cheaper(g: Graph, roots: Sequence[int], wrt: Sequence[Expr]) -> 
         mask, node = rows[i], nodes[i]
         if node[0] in LEAVES:
             continue
-        if node[0] in branching:
+        if node[0] in branching or is_pair_item(g, node[0]):
             return False
         cost = 1 if node[0] in ("add", "sub", "neg") else 2
         for k in node[1:]:

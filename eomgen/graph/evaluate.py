@@ -90,8 +90,9 @@ class Evaluator:
     def _add_step(self, operation: str, places: list[int], first: int, last: dict[int, int]) -> int:
         """Append a step, after steps that pack the arguments of a call of more than three; returns its slot."""
         if len(places) > 3:
-            while len(places) > 1:
-                places = [self._add_step("pack", places[:3], first, last), *places[3:]]
+            while len(places) > 1:  # in a balanced tree, so that the work is of the order of their number
+                parts = [places[k : k + 3] for k in range(0, len(places), 3)]
+                places = [self._add_step("pack", part, first, last) for part in parts]
         a, b, c = (*places, -1, -1)[:3]
         self._steps.append((operation, a, b, c))
         for s in places:

@@ -66,6 +66,9 @@ def _spread(
                 bounds[i] = 0.0 if given else abs(found[i])
                 continue
             y, row = found[i], OPERATIONS.get(operation)
+            if isinstance(y, list):  # of a sum over pairs, whose entries are nodes of their own
+                bounds[i] = 0.0
+                continue
             bound = 0.0 if given or (row is not None and row.exact) else abs(y)
             if row is not None and row.rates:  # a table or a function in C knows its value
                 try:

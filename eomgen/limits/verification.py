@@ -5,6 +5,9 @@ from __future__ import annotations
 # -- differences -----------------------------------------------------------------------------------------------------
 #: Relative step by which a slope is estimated where only its size matters: the root of its rounding, and more.
 NUDGE = 1e-6
+#: Rounding of a sum over pairs of shapes, as a change of what is given, in units of one node: a pair takes some ten
+#: operations in a row from the poses to its force, each of which is as a change of what it is given.
+PAIR_ROUNDING = 16.0
 #: Added to limits, relative to the size of the result: truncation of first differences in sixty digits is 1e-32, of
 #: second differences 1e-24.
 FIRST_DIFFERENCE, SECOND_DIFFERENCE = 1e-30, 1e-24

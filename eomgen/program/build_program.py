@@ -12,6 +12,7 @@ from typing import Any
 
 from ..errors import UsageError
 from ..graph.count import count
+from ..graph.pair_calls import has_pair_sums
 from ..graph.substitute import symbols_of
 from ..kernel_table import KERNELS, Kernel, Sizes
 from ..suggestions import hint, joined
@@ -73,6 +74,8 @@ def build_program(
         has |= dict.fromkeys(SHIFTS, False)
     if terms.given_rates or metadata.get("no_inertia") or metadata.get("indefinite"):
         has["rhs_hessian_product"] = False
+    if kernels is None and has_pair_sums(terms.graph):  # second derivatives of these are not made
+        has |= dict.fromkeys(LONG, False)
     if terms.given_rates:
         has |= {"dae_residual": False, "dae_jacobian": False}
     wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]

@@ -7,11 +7,15 @@ has 30 of them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from math import factorial
 from typing import Any
 
+import numpy as np
+
 from ..errors import MissingDependencyError
 from ..graph.core import Expr
+from ..graph.pair_calls import PairCall
 from ..graph.traverse import common_graph, reachable
 from ..operations import OPERATIONS
 
@@ -59,6 +63,7 @@ class Digits:
         slot = {i: k for k, i in enumerate(order)}
         self._outputs = [slot[y.id] for y in outputs]
         self._steps: list[tuple[str | None, Any, tuple[int, ...]]] = []  # name of a symbol, or operation and operands
+        loops: dict[Any, Any] = {}
         for i in order:
             assert graph is not None
             operation, *args = graph.nodes[i]
@@ -71,7 +76,12 @@ class Digits:
                 self._steps.append((None, getattr(mp, row.digits, row.value), tuple(slot[k] for k in args)))
             else:
                 function, orders = graph.calls[operation]
-                call = _Local(mp, function, orders)
+                if isinstance(function, PairCall):
+                    if function.function not in loops:
+                        loops[function.function] = function.function.evaluator(partial(_each, mp))
+                    call = _flat(function, loops[function.function])
+                else:
+                    call = _Local(mp, function, orders)
                 self._steps.append((None, call, tuple(slot[k] for k in args)))
 
     def __call__(self, values: Mapping[str, Number]) -> Numbers:
@@ -159,3 +169,24 @@ def solve(matrix: list[Numbers], right: list[Numbers]) -> list[Numbers]:
                 values = [x - row[j] * y for x, y in zip(values, solution[j], strict=True)]
         solution[i] = [x / row[i] for x in values]
     return solution
+
+
+def _flat(call: PairCall, loops: Any) -> Any:
+    """A node of a sum over pairs on numbers of many digits."""
+    return call.on_numbers(loops)
+
+
+def _each(mp: Any, outputs: list[Expr], names: Sequence[str]) -> Any:
+    """The law of a pair on arrays of such numbers: one pair after the other."""
+    evaluate = Digits(mp, outputs)
+
+    def value(given: Sequence[Any]) -> list[Any]:
+        rows = np.broadcast_arrays(*given)
+        shape = rows[0].shape
+        found = [evaluate(dict(zip(names, one, strict=True))) for one in zip(*(r.ravel() for r in rows), strict=True)]
+        made = np.empty((len(outputs), len(found)), dtype=object)
+        for k, column in enumerate(found):
+            made[:, k] = column
+        return [row.reshape(shape) for row in made]
+
+    return value

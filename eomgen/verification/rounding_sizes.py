@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from ..graph.core import Expr
+from ..graph.pair_calls import PairCall
 from ..graph.traverse import common_graph, reachable
 from ..limits.rounding import EPS
-from ..limits.verification import NUDGE
+from ..limits.verification import NUDGE, PAIR_ROUNDING
 from ..numeric.scales import Array
 from ..operations import OPERATIONS, Operation
 
@@ -75,6 +76,9 @@ def bounded(outputs: Sequence[Expr], values: Mapping[str, Array], count: int) ->
                 found[i] = _apply(OPERATIONS[operation], [found[k] for k in args])
             else:
                 function, orders = graph.calls[operation]
+                if isinstance(function, PairCall):
+                    found[i] = _of_pairs(function, [found[k] for k in args])
+                    continue
                 found[i] = _called(function.implementation(orders), [found[k] for k in args])
     return np.array([found[y.id][0] for y in outputs]), np.array([found[y.id][1] for y in outputs])
 
@@ -89,3 +93,28 @@ def _called(function: Callable[..., Any], given: Sequence[Pair]) -> tuple[Any, A
         up, down = (np.asarray(function(*at[:k], a + s, *at[k + 1 :]), dtype=float) for s in (shift, -shift))
         bound = bound + abs(up - down) / (2.0 * shift) * error
     return value, bound
+
+
+def _of_pairs(call: PairCall, given: Sequence[Any]) -> Any:
+    """A node of a sum over pairs: lists of values and bounds, whose slopes are estimated by differences."""
+    if call.part == "given":
+        return list(given)
+    if call.part == "item":
+        return given[0][call.numbers[0]]
+    operands = [*given[0], *given[1:]]  # of a slope the rates follow
+    function = call.implementation(())
+    count = len(given[0])
+
+    def value(at: Sequence[Any]) -> np.ndarray:
+        return np.asarray(function(list(at[:count]), *at[count:]), dtype=float)
+
+    at = [a for a, _ in operands]
+    found = value(at)
+    bounds = PAIR_ROUNDING * UNIT * abs(found)
+    for k, (a, own) in enumerate(operands):
+        error = own + PAIR_ROUNDING * UNIT * abs(a)
+        if np.any(error):
+            shift = NUDGE * (1.0 + abs(a))
+            up, down = (value([*at[:k], a + s, *at[k + 1 :]]) for s in (shift, -shift))
+            bounds = bounds + abs(up - down) / (2.0 * shift) * error
+    return list(zip(found, bounds, strict=True))

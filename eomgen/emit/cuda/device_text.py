@@ -19,6 +19,7 @@ from ..c import count_constants, emit_c
 from ..c_functions import used_calls
 from ..c_text import print_precompute
 from ..example_state import example_state
+from ..pair_sums_used import refuse_sums
 from ..sources import render
 from ..straight import cut
 
@@ -44,6 +45,7 @@ def emit_device_text(program: Program) -> str:
     UsageError
         The model calls functions in C, which may use what a device does not have.
     """
+    refuse_sums(program, "target 'cuda'")
     native = [f.name for f, _ in used_calls(program).values() if f.native is not None]
     if native:
         raise UsageError(

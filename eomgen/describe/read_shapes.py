@@ -1,0 +1,150 @@
+"""Stage describe, shapes of contacts: a list of mappings {shape, on, sizes} -> the shapes, one for each marker."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..forces.contact_shapes import CORNERS, SHAPE_FIELDS, ContactShape
+from ..graph.core import Expr
+from ..graph.shown import quoted, shown
+from .checks import check_keys
+from .description import items
+from .names import nearest
+from .values import Reader
+
+
+def read_shapes(reader: Reader, path: str, value: Any) -> tuple[ContactShape, ...] | None:
+    """The shapes of a group; None if anything is wrong with them, which is noted."""
+    listed = [value] if isinstance(value, Mapping) else items(value)
+    if listed is None:
+        reader.wrong(path, value, "shapes")
+        return None
+    if not listed:
+        reader.faults.add(
+            path, "has no shapes", "give at least one shape, such as {shape: circle, on: wheel, radius: 0.1}"
+        )
+        return None
+    found: list[ContactShape] = []
+    for k, given in enumerate(listed):
+        found += _read(reader, f"{path}[{k}]", given)
+    return None if reader.faults.under(path) else tuple(found)
+
+
+def _read(reader: Reader, path: str, given: Any) -> list[ContactShape]:
+    if not isinstance(given, Mapping):
+        reader.wrong(path, given, "shapes")
+        return []
+    kind = given.get("shape")
+    if not isinstance(kind, str) or kind not in SHAPE_FIELDS:
+        message = "is missing" if kind is None else f"no shape {quoted(kind)}"
+        reader.faults.add(f"{path}.shape", message, nearest(shown(kind), SHAPE_FIELDS, "shapes"))
+        return []
+    check_keys(path, given, SHAPE_FIELDS[kind], reader.faults)
+    if reader.faults.under(path):
+        return []
+    on = given["on"]
+    many = items(on)
+    if many is not None and not many:
+        reader.faults.add(f"{path}.on", "names no marker", "give a body or a marker, or a list of them")
+    places = [(f"{path}.on", on)] if many is None else [(f"{path}.on[{k}]", one) for k, one in enumerate(many)]
+    markers = [reader.marker(place, one) for place, one in places]
+    sizes = _sizes(reader, path, kind, given)
+    return [] if sizes is None else [ContactShape(kind, marker, sizes) for marker in markers if marker is not None]
+
+
+def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tuple[Expr, ...] | None:
+    if kind in ("half_plane", "half_space"):
+        return ()
+    if kind == "box":
+        size = _several(reader, f"{path}.size", given["size"], 2)
+        if size is None:
+            return None
+        for k, x in enumerate(size):
+            _positive(reader, f"{path}.size[{k}]", x)
+        x, y = 0.5 * size[0], 0.5 * size[1]
+        return (-x, -y, x, -y, x, y, -x, y)
+    if kind == "polygon":
+        return _corners(reader, f"{path}.points", given["points"])
+    names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius",)
+    sizes = [reader.expression(f"{path}.{name}", given.get(name, 0)) for name in names]
+    for name, x in zip(names, sizes, strict=True):
+        if name in given:
+            _positive(reader, f"{path}.{name}", x, kind == "segment" and name == "radius")
+    return tuple(sizes)
+
+
+def _several(reader: Reader, path: str, value: Any, count: int) -> list[Expr] | None:
+    listed = items(value)
+    if listed is None or len(listed) != count:
+        reader.wrong(path, value, "two")
+        return None
+    return [reader.expression(f"{path}[{k}]", x) for k, x in enumerate(listed)]
+
+
+def _positive(reader: Reader, path: str, x: Expr, or_zero: bool = False) -> None:
+    number = reader.known(x)
+    if number is not None and (number < 0 if or_zero else number <= 0):
+        reader.faults.add(path, f"is {number:g}", "must be 0 or greater" if or_zero else "must be greater than 0")
+
+
+def _corners(reader: Reader, path: str, value: Any) -> tuple[Expr, ...] | None:
+    """Corners of a polygon, counterclockwise."""
+    listed = items(value)
+    if listed is None or not 3 <= len(listed) <= CORNERS:
+        reader.faults.add(path, "is no outline", f"give 3 to {CORNERS} corners [x, y]")
+        return None
+    corners = [_several(reader, f"{path}[{k}]", point, 2) for k, point in enumerate(listed)]
+    points = [(corner[0], corner[1]) for corner in corners if corner is not None]
+    if len(points) < len(corners):
+        return None
+    known = [(reader.known(x), reader.known(y)) for x, y in points]
+    numbers = [(x, y) for x, y in known if x is not None and y is not None]
+    if len(numbers) == len(points):
+        turned = _outline(reader, path, numbers)
+        if turned is None:
+            return None
+        if turned < 0:
+            points.reverse()
+    return tuple(x for point in points for x in point)
+
+
+def _outline(reader: Reader, path: str, points: Sequence[tuple[float, float]]) -> int | None:
+    """1 where a convex outline runs counterclockwise, -1 where clockwise; None where it is none, which is noted."""
+    n, turns, total = len(points), set[bool](), 0.0
+    for k in range(n):
+        (x0, y0), (x1, y1), (x2, y2) = points[k - 1], points[k], points[(k + 1) % n]
+        a, b = (x1 - x0, y1 - y0), (x2 - x1, y2 - y1)
+        cross, along = a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]
+        if cross == 0:
+            reader.faults.add(
+                f"{path}[{k}]", "lies on a line with the corners beside it, or on one of them", "leave it out"
+            )
+            return None
+        turns.add(cross > 0)
+        total += math.atan2(cross, along)
+    if crossing := _crossing(points):
+        message = f"the edges that begin at corners {crossing[0]} and {crossing[1]} cross each other"
+        reader.faults.add(path, message, "give the corners in their order around the outline")
+        return None
+    if len(turns) > 1:
+        reader.faults.add(path, "is not convex", "make it of several convex polygons on the same marker")
+        return None
+    return 1 if total > 0 else -1
+
+
+def _crossing(points: Sequence[tuple[float, float]]) -> tuple[int, int] | None:
+    """The first two edges of an outline that cross."""
+    n = len(points)
+
+    def side(p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]) -> float:
+        return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+
+    for i in range(n):
+        p, q = points[i], points[(i + 1) % n]
+        for j in range(i + 2, n - (i == 0)):
+            r, s = points[j], points[(j + 1) % n]
+            if side(p, q, r) * side(p, q, s) < 0 and side(r, s, p) * side(r, s, q) < 0:
+                return i, j
+    return None

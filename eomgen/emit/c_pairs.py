@@ -1,0 +1,139 @@
+"""Stage emit: sums over pairs of shapes -> a C file of loops for each, and the statements that call them.
+
+A list of operands or results lies in the work array of a block, behind the values that cross between its pieces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from ..graph.pair_calls import PairFunction, PairKind
+from ..numeric.pair_sums import PLACE, POSE, RESULT
+from ..program import Program
+from .c_text import print_pieces, used_helpers
+from .pair_sums_used import used_sums
+from .sources import render
+from .straight import cut
+
+
+def _table(k: int, rows: Sequence[Sequence[int]], start: int) -> dict[str, Any]:
+    sizes = len(rows[0]) - PLACE - 1
+    length = POSE + sizes + 4
+    return {"k": k, "rows": rows, "columns": len(rows[0]), "sizes": sizes, "length": length, "start": start}
+
+
+def _tables(function: PairFunction) -> list[dict[str, Any]]:
+    """The tables of shapes, and where the shapes stand in the work array."""
+    found: list[dict[str, Any]] = []
+    start = 0
+    for k, rows in enumerate(function.tables):
+        found.append(_table(k, rows, start))
+        start += len(rows) * found[-1]["length"]
+    return found
+
+
+def pair_files(program: Program) -> dict[str, str]:
+    """The C files of the sums that a program uses."""
+    return {f"{program.name}_pairs_{f.name}.c": _file(program, f, slopes) for f, slopes in used_sums(program)}
+
+
+def _file(program: Program, function: PairFunction, slopes: bool) -> str:
+    tables = _tables(function)
+    functions: list[str] = []
+    helpers: list[str] = []
+    kinds = []
+    for kind in function.kinds:
+        named = f"{function.name}_{kind.name}"
+        for sloped in (False, True) if slopes else (False,):
+            text, needed = _law(program, kind, f"{named}{'_slope' * sloped}", sloped, tables)
+            functions.append(text)
+            helpers += [helper for helper in needed if helper not in helpers]
+        kinds.append(
+            {
+                "name": kind.name,
+                "function": named,
+                "first": tables[kind.first],
+                "second": tables[kind.second],
+                "planar": int(kind.planar),
+                "law": kind.law,
+            }
+        )
+    context = {
+        "name": program.name,
+        "sum": function.name,
+        "prefix": f"{program.name}_pairs_{function.name}",
+        "bodies": function.bodies,
+        "pose": POSE,
+        "pair": RESULT,
+        "place": PLACE,
+        "results": function.results,
+        "numbers": [repr(0.0 if x is None else x) for x in function.data] or ["0.0"],
+        "tables": tables,
+        "kinds": kinds,
+        "functions": functions,
+        "helpers": helpers,
+        "slopes": slopes,
+        "scratch": sum(len(table["rows"]) * table["length"] for table in tables),
+    }
+    return render("c/pairs.c.j2", context)
+
+
+def _law(
+    program: Program, kind: PairKind, name: str, slopes: bool, tables: Sequence[dict[str, Any]]
+) -> tuple[str, list[str]]:
+    """The function of one pair and the helpers that it needs."""
+    outputs = kind.expressions(slopes)
+    graph = outputs[0].graph
+    places: dict[int, str] = {}
+    count = len(kind.plain)
+    for k, symbol in enumerate(kind.symbols):
+        rate = k >= count
+        plain = symbol.removeprefix("d_")
+        letter, number = plain[0], int(plain[1:])
+        step = len(kind.law) if letter == "l" else tables[kind.first if letter == "a" else kind.second]["length"]
+        places[graph.symbol(symbol).id] = f"{'xuc'['abl'.index(letter)]}[{number + rate * step}]"
+    own = replace(program, graph=graph)
+    pieces = cut(graph, outputs, (), frozenset(), len(graph.nodes) + 1)
+    return print_pieces(own, name, pieces, places).text, used_helpers(own, outputs)
+
+
+def pair_declarations(program: Program) -> list[str]:
+    """Declarations of the sums, in every lane, for the files that call them."""
+    return [_declared(program.name, function, slopes) for function, slopes in used_sums(program)]
+
+
+def _declared(program: str, function: PairFunction, slopes: bool) -> str:
+    prefix, n, results = f"{program}_pairs_{function.name}", function.count, function.results
+    text = f"#define each_{function.name}_numbers {prefix}_numbers\n"
+    text += f"EOMGEN_PIECE extern const double {prefix}_numbers[{max(1, len(function.data))}];\n"
+    text += f"EOMGEN_PIECE void {prefix}_sum(const double *given, double *out, double *work);\n"
+    text += _each(f"each_{function.name}_sum", f"{prefix}_sum", n, results, False)
+    if slopes:
+        text += (
+            f"EOMGEN_PIECE void {prefix}_slope(const double *given, const double *rates, double *out, double *work, "
+            "int low, int high);\n"
+        )
+        text += _each(f"each_{function.name}_slope", f"{prefix}_slope", n, results, True)
+    return text
+
+
+def _each(name: str, called: str, n: int, results: int, slope: bool) -> str:
+    """The function that calls a sum in every lane."""
+    rates, ends = (", const real *rates", ", int low, int high") if slope else ("", "")
+    passed, bounds = (", rates", ", low, high") if slope else ("", "")
+    taken = 2 * n if slope else n
+    also = f" plain[{n} + i] = EOMGEN_LANE(rates[i], k);" if slope else ""
+    lanes = f"plain, plain + {n}" if slope else "plain"
+    return (
+        f"EOMGEN_SHARED inline void {name}(const real *given{rates}, real *out, real *work{ends})\n{{\n"
+        f"#ifdef EOMGEN_PLAIN\n    {called}(given{passed}, out, work{bounds});\n#else\n"
+        "    typedef double __attribute__((may_alias)) number;\n"
+        "    number *const plain = (number *)work;\n"
+        "    for (int k = 0; k < EOMGEN_WIDTH; k++) {\n"
+        f"        for (int i = 0; i < {n}; i++) {{ plain[i] = EOMGEN_LANE(given[i], k);{also} }}\n"
+        f"        {called}({lanes}, plain + {taken}, plain + {taken + results}{bounds});\n"
+        f"        for (int i = 0; i < {results}; i++) {{ EOMGEN_LANE(out[i], k) = plain[{taken} + i]; }}\n"
+        "    }\n#endif\n}\n"
+    )

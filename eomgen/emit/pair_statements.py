@@ -1,0 +1,97 @@
+"""Stage emit: nodes of sums over pairs of shapes -> C statements that fill, sum and read lists in the work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+from ..graph.core import Graph
+from ..graph.pair_calls import PairCall, PairFunction, pair_call
+from ..numeric.pair_sums import PLACE, POSE
+
+
+def work_of(function: PairFunction) -> int:
+    """Numbers that a sum works with: its shapes and their rates, and in lanes copies of what is given and found."""
+    shapes = sum(len(rows) * (POSE + len(rows[0]) - PLACE + 3) for rows in function.tables)
+    return 2 * shapes + 2 * function.count + function.results
+
+
+class PairLists:
+    """The lists of one block, behind the rest of its work.
+
+    Parameters
+    ----------
+    graph : Graph
+    statements : iterable of int
+        All nodes of the block.
+    start : int
+        Where the work of the block ends without them.
+
+    Attributes
+    ----------
+    end : int
+        Where it ends with them.
+    """
+
+    def __init__(self, graph: Graph, statements: Iterable[int], start: int) -> None:
+        self._graph = graph
+        self._places: dict[int, int] = {}
+        self._rates: dict[str, int] = {}
+        end = start
+        work = 0
+        for i in statements:
+            call = self.call(i)
+            if call is None or call.part == "item":
+                continue
+            function = call.function
+            self._places[i] = end
+            end += function.count if call.part == "given" else function.results
+            if call.part == "slope" and function.name not in self._rates:
+                self._rates[function.name] = end
+                end += function.count
+            work = max(work, work_of(function))
+        self._work = end
+        self.end = end + work
+
+    def call(self, i: int) -> PairCall | None:
+        """What a node does, if it is one of a sum."""
+        return pair_call(self._graph, self._graph.nodes[i][0])
+
+    def is_list(self, i: int) -> bool:
+        """Whether a node is a list, which has no variable."""
+        return i in self._places
+
+    def item(self, i: int) -> str:
+        """An entry of a list."""
+        call = self.call(i)
+        assert call is not None
+        return f"w[{self._places[self._graph.nodes[i][1]] + call.numbers[0]}]"
+
+    def lines(self, i: int, text: Callable[[int], str]) -> list[str]:
+        """The statements that make a list; ``text`` writes an operand."""
+        call, operands = self.call(i), self._graph.nodes[i][1:]
+        assert call is not None
+        function, place, work = call.function, self._places[i], self._work
+        if call.part == "given":
+            start = POSE * function.bodies
+            moving = [(k, x) for k, x in enumerate(operands) if k < start or function.data[k - start] is None]
+            numbers = f"each_{function.name}_numbers[i]"
+            return [
+                f"for (int i = 0; i < {len(function.data)}; i++) {{ w[{place + start} + i] = same({numbers}); }}",
+                *(f"w[{place + k}] = {text(x)};" for k, x in moving),
+            ]
+        given = self._places[operands[0]]
+        if call.part == "sum":
+            return [f"each_{function.name}_sum(w + {given}, w + {place}, w + {work});"]
+        rates = self._rates[function.name]
+        low, high = _moved(function, call.numbers)
+        return [
+            f"for (int i = 0; i < {function.count}; i++) {{ w[{rates} + i] = same(0.0); }}",
+            *(f"w[{rates + k}] = {text(x)};" for k, x in zip(call.numbers, operands[1:], strict=True)),
+            f"each_{function.name}_slope(w + {given}, w + {rates}, w + {place}, w + {work}, {low}, {high});",
+        ]
+
+
+def _moved(function: PairFunction, numbers: Sequence[int]) -> tuple[int, int]:
+    """The first and the last body that have rates; all where the data have some."""
+    bodies = [k // POSE for k in numbers]
+    return (0, function.bodies - 1) if max(bodies) >= function.bodies else (min(bodies), max(bodies))

@@ -1,0 +1,314 @@
+"""Force elements, contact in bulk: every shape of one group against every shape of another, by one law.
+
+The law of one kind of pair is derived once, in a graph of its own; the sum over all pairs is one operation of the
+model's graph (:mod:`~eomgen.graph.pair_calls`), so that equations do not grow with the number of pairs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from ..elements.dimensions import LENGTH
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import Field
+from ..elements.looks import Seen
+from ..frames import Frame, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph
+from ..graph.differentiate import jvp
+from ..graph.pair_calls import PairFunction, PairKind, pair_sum
+from ..graph.traverse import reachable
+from ..graph.vectors import Vec3
+from ..numeric.pair_sums import POSE
+from ..records import dataclass
+from .contact import SpherePlane
+from .contact_shapes import PLANAR, ContactShape, Feature, ShapeMotion, meet, touching
+from .force import Force, Load, MarkerLoad, View
+from .friction import FRICTION, Friction, read_friction
+from .normal_laws import NORMAL, HuntCrossley, read_normal_law
+
+
+class _PairView:
+    """The motion of two shapes, as symbols of the graph of their law."""
+
+    def __init__(self, graph: Graph, planar: bool) -> None:
+        self.graph, self._planar = graph, planar
+        self._poses = [self._pose(letter) for letter in "ab"]
+
+    def _pose(self, letter: str) -> ShapeMotion:
+        x = [self.graph.symbol(f"{letter}{k}") for k in range(POSE)]
+        rotation = ((x[3], x[4], x[5]), (x[6], x[7], x[8]), (x[9], x[10], x[11]))
+        return ShapeMotion((x[0], x[1], x[2]), rotation, (x[12], x[13], x[14]), (x[15], x[16], x[17]))
+
+    def position(self, marker: Marker) -> Vec3:
+        position = self._poses[marker.body].position
+        if marker.body and self._planar:  # in the plane of the first
+            first = self._poses[0]
+            normal = vec.transpose(first.rotation)[2]
+            height = vec.dot(normal, vec.sub(position, first.position))
+            return vec.sub(position, vec.scale(height, normal))
+        return position
+
+    def rotation(self, marker: Marker) -> vec.Mat3:
+        return self._poses[marker.body].rotation
+
+    def velocity(self, marker: Marker) -> Vec3:
+        return self._poses[marker.body].velocity
+
+    def angular_velocity(self, marker: Marker) -> Vec3:
+        return self._poses[marker.body].angular_velocity
+
+    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
+        raise NotImplementedError  # no contact asks for it
+
+    def coordinate(self, name: str) -> tuple[Expr, Expr]:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class ContactGroups(Force):
+    """Contact of two groups of shapes, or of the shapes of one group among themselves (``second`` is empty then).
+
+    The force of a pair is that of :class:`~.contact.Contact`.  Shapes of one body do not meet.
+    """
+
+    sentence: ClassVar[str] = (
+        "Contact of every shape of one group with every shape of another: a force along the normal from the "
+        "penetration $d$ and its rate, and friction against the sliding."
+    )
+    formula: ClassVar[str] = r"F_n = k d^n (1 + \lambda \dot{d}), \quad d > 0"
+    by_power: ClassVar[bool] = True
+    first: tuple[ContactShape, ...]
+    second: tuple[ContactShape, ...]
+    normal_law: HuntCrossley
+    friction: Friction | None
+
+    def drawn(self) -> list[Seen]:
+        return [seen for shape in (*self.first, *self.second) for seen in shape.drawn()]
+
+    def loads(self, view: View) -> list[Load]:
+        return self._loads(view, "")
+
+    def potential(self, view: View) -> Expr | None:
+        return self._results(view, "", still=True)[1][-1]
+
+    def remainder(self, view: View) -> list[Load]:
+        return self._loads(view, "_lost")
+
+    def _loads(self, view: View, part: str) -> list[Load]:
+        markers, results = self._results(view, part)
+        return [
+            MarkerLoad(marker, _vector(results[6 * k : 6 * k + 3]), _vector(results[6 * k + 3 : 6 * k + 6]))
+            for k, marker in enumerate(markers)
+        ]
+
+    def _results(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], list[Expr]]:
+        """The bodies as markers at their origins, force and torque on each, and the energy; at rest, if asked."""
+        graph = view.graph
+        bodies = sorted({shape.marker.body for shape in (*self.first, *self.second)})
+        labels = {shape.marker.body: shape.marker.label.partition(".")[0] for shape in (*self.first, *self.second)}
+        frame = Frame(vec.identity(graph), vec.zero(graph))
+        markers = [Marker(body, frame, labels[body]) for body in bodies]
+        operands: list[Expr] = []
+        for marker in markers:
+            rotation = [x for row in view.rotation(marker) for x in row]
+            moving = (view.velocity(marker), view.angular_velocity(marker))
+            operands += [*view.position(marker), *rotation]
+            operands += [graph.zero if still else x for v in moving for x in v]
+        data = _SharedData(len(operands), graph)
+        function = self._function(f"{self.name}{part}", bodies, data, bool(part))
+        return markers, pair_sum(graph, function, [*operands, *data.values])
+
+    def _function(self, name: str, bodies: Sequence[int], data: _SharedData, lost: bool) -> PairFunction:
+        groups = [_features(self.first), _features(self.second)] if self.second else [_features(self.first)]
+        place = {body: k for k, body in enumerate(bodies)}
+        keys = [(g, kind) for g, group in enumerate(groups) for kind in group]
+        tables = [tuple(data.row(place[body], f) for body, f in groups[g][kind]) for g, kind in keys]
+        planar = any(shape.kind in PLANAR for shape in (*self.first, *self.second))
+        kinds = []
+        for i, (g, first) in enumerate(keys):
+            for j, (h, second) in enumerate(keys):
+                apart = g != h or len(groups) == 1
+                twice = first == second and i > j  # round beside round, once
+                if apart and not twice and meet((first, second)):
+                    sizes = tuple(len(groups[n][kind][0][1].sizes) for n, kind in ((g, first), (h, second)))
+                    flat = planar and first != "half"  # which has no extent along its normal to leave out
+                    kinds.append(self._kind((first, second), (i, j), (sizes[0], sizes[1]), flat, data, lost))
+        return PairFunction(name, len(bodies), tuple(x.value for x in data.values), tuple(tables), tuple(kinds))
+
+    def _kind(
+        self,
+        kinds: tuple[str, str],
+        tables: tuple[int, int],
+        sizes: tuple[int, int],
+        planar: bool,
+        data: _SharedData,
+        lost: bool,
+    ) -> PairKind:
+        """The law of one kind of pair in a graph of its own, with its derivative."""
+        graph = Graph()
+        view = _PairView(graph, planar)
+        places: list[int] = []
+
+        def own(x: Expr | None) -> Expr | None:
+            if x is None or x.value is not None:
+                return None if x is None else graph.constant(x.value or 0.0)
+            places.append(data.place(x))
+            return graph.symbol(f"l{len(places) - 1}")
+
+        law, frame = self.normal_law, Frame(vec.identity(graph), vec.zero(graph))
+        normal = HuntCrossley(*(_there(own(x)) for x in (law.stiffness, law.exponent, law.dissipation)))
+        dry = self.friction
+        friction = None
+        if dry is not None:
+            level, smoothing, viscous = (_there(own(x)) for x in (dry.dynamic, dry.smoothing, dry.viscous))
+            friction = Friction(level, smoothing, viscous, own(dry.static), own(dry.stribeck))
+        markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
+        given = [
+            tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
+        ]
+        bare = SpherePlane(self.name, *markers, normal, friction, graph.zero)
+        contact = touching(kinds, markers, (given[0], given[1]), bare)
+        on_second, on_first = contact.remainder(view) if lost else contact.loads(view)
+        assert isinstance(on_second, MarkerLoad)
+        assert isinstance(on_first, MarkerLoad)
+        energy = graph.zero if lost else contact.potential(view)
+        assert energy is not None
+        results = [*on_second.force, *on_first.torque, *on_second.torque, energy]
+        names = [f"a{k}" for k in range(POSE + sizes[0])] + [f"b{k}" for k in range(POSE + sizes[1])]
+        names += [f"l{k}" for k in range(len(places))]
+        seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
+        slopes = jvp(results, seeds)
+        nodes, renamed = _kept(graph, [*results, *slopes])
+        ids = [renamed[x.id] for x in (*results, *slopes)]
+        rates = [f"d_{name}" for name in names]
+        return PairKind(
+            f"{kinds[0]}_{kinds[1]}_{tables[0]}_{tables[1]}",
+            *tables,
+            planar,
+            tuple(places),
+            nodes,
+            (*names, *rates),
+            tuple(ids[: len(results)]),
+            tuple(ids[len(results) :]),
+        )
+
+
+class _SharedData:
+    """Different numbers and expressions that shapes and laws need, behind the poses of the bodies."""
+
+    def __init__(self, start: int, graph: Graph) -> None:
+        self.start, self.graph, self.values = start, graph, list[Expr]()
+        self._places: dict[Expr, int] = {}
+
+    def place(self, x: Expr) -> int:
+        if x not in self._places:
+            self._places[x] = self.start + len(self.values)
+            self.values.append(x)
+        return self._places[x]
+
+    def row(self, body: int, feature: Feature) -> tuple[int, ...]:
+        """A row of a table of shapes; see :class:`~eomgen.numeric.pair_sums.PairSum`."""
+        frame = feature.frame
+        entries = [*frame.position, *(x for row in frame.rotation for x in row), *feature.sizes]
+        bound = -1 if feature.bound is None else self.place(feature.bound)
+        return (body, *(self.place(x) for x in entries), bound)
+
+
+def _features(shapes: Sequence[ContactShape]) -> dict[str, list[tuple[int, Feature]]]:
+    """Features of shapes with their bodies, by class."""
+    found: dict[str, list[tuple[int, Feature]]] = {}
+    for shape in shapes:
+        for feature in shape.features():
+            found.setdefault(feature.kind, []).append((shape.marker.body, feature))
+    return found
+
+
+def _kept(graph: Graph, results: Sequence[Expr]) -> tuple[tuple[tuple[object, ...], ...], dict[int, int]]:
+    """The nodes of some results alone, the numbers 0 and 1 first as in every graph; their ids by the old ones."""
+    order = sorted({graph.zero.id, graph.one.id, *reachable(graph, (x.id for x in results))})
+    renamed = {old: new for new, old in enumerate(order)}
+    nodes = []
+    for i in order:
+        operation, *rest = graph.nodes[i]
+        nodes.append((operation, *(rest if operation in ("const", "sym") else (renamed[k] for k in rest))))
+    return tuple(nodes), renamed
+
+
+def _there(x: Expr | None) -> Expr:
+    assert x is not None
+    return x
+
+
+def _vector(x: Sequence[Expr]) -> Vec3:
+    return x[0], x[1], x[2]
+
+
+# -- reading ----------------------------------------------------------------------------------------------------------
+def _contact_groups(e: Entry) -> ContactGroups | None:
+    first = e.shapes("first")
+    second = e.shapes("second") if "second" in e.values else ()
+    law, friction = read_normal_law(e), read_friction(e, "friction", "static_friction", "viscous_friction")
+    if first is None or second is None or e.at_fault():
+        return None
+    _refuse_pairs(e, first, second)
+    return ContactGroups(e.name, first, second, law, friction)
+
+
+def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
+    """Note shapes that cannot meet, and a shape that is in both groups."""
+    kinds = sorted({shape.kind for shape in first}), sorted({shape.kind for shape in second or first})
+    for a in kinds[0]:
+        for b in kinds[1]:
+            if (a in PLANAR) != (b in PLANAR):
+                e.fault("second", f"{a} and {b} do not meet", _ALLOWED)
+            elif a.startswith("half") and b.startswith("half") and (second or _differ(first, a)):
+                e.fault("second", f"two shapes {a} do not meet", _ALLOWED)
+            elif a == b == "capsule" and (second or _differ(first, a)):
+                e.fault("second", "two shapes capsule do not meet", _ALLOWED)
+    both = {shape.marker.label for shape in first if shape in second}
+    if both:
+        e.fault(
+            "second",
+            f"the shape on {sorted(both)[0]} is in both groups",
+            "give second only what is not in first; without second the shapes of first meet among themselves",
+        )
+    bodies = {shape.marker.body for shape in (*first, *second)}
+    if len(bodies) == 1:
+        e.fault("", "has shapes on one body only", "shapes of one body do not meet; give shapes on other bodies")
+
+
+def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
+    """Whether shapes of a kind are on different bodies."""
+    return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
+
+
+_ALLOWED = (
+    "circle, segment, box, polygon meet each other and half_plane; sphere meets sphere, capsule, half_space; capsule "
+    "meets sphere, half_space"
+)
+
+_SHAPES = "shapes {shape, on, ...} of the "
+
+TYPES = table(
+    ElementType(
+        "contacts",
+        "contact of every shape of a group with every shape of another, by one law.  Shapes are mappings of shape "
+        "(circle, segment, box, polygon, half_plane; sphere, capsule, half_space), on (a marker or a list of markers) "
+        "and sizes.  Shapes of one body do not meet.",
+        {
+            "first": Field("shapes", _SHAPES + "first group", required=True, dimension=LENGTH),
+            "second": Field(
+                "shapes",
+                _SHAPES + "second group; without it those of the first meet among themselves",
+                dimension=LENGTH,
+            ),
+            "law": Field("law", "the keys that follow as a mapping, instead of one by one"),
+            **NORMAL,
+            **FRICTION,
+        },
+        _contact_groups,
+    )
+)

@@ -1,0 +1,257 @@
+"""Stage graph: the sum over pairs of shapes as nodes: one that holds all operands, one that sums, one for each result.
+
+The law of one kind of pair is a small graph of its own (:class:`PairKind`), so that the nodes of a sum do not grow with
+the number of pairs.  ``<name>(given)`` holds the operands, ``<name>(sum)`` and ``<name>(slope)`` are lists of results
+and of their directional derivatives, ``<name>(k)`` is one entry of such a list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+from ..errors import UsageError
+from ..numeric.pair_sums import POSE, PairSum
+from ..records import dataclass
+from .core import Expr, Graph
+from .nodes import Node
+
+
+@dataclass(frozen=True)
+class PairKind:
+    """How two shapes act on each other.
+
+    Attributes
+    ----------
+    name : str
+        Such as ``round_half``.
+    first, second : int
+        Tables of the shapes.
+    planar : bool
+        Whether distances count across the z axis of the first shape only.
+    law : tuple of int
+        Places of the law's numbers in the data.
+    nodes : tuple
+        The nodes of its graph, whose symbols are named in ``symbols`` by their order.
+    symbols : tuple of str
+        Numbers of the first shape, of the second, of the law, and then their rates.
+    outputs, slopes : tuple of int
+        What a pair exerts (:data:`~eomgen.numeric.pair_sums.RESULT` nodes), and its directional derivative.
+    """
+
+    name: str
+    first: int
+    second: int
+    planar: bool
+    law: tuple[int, ...]
+    nodes: tuple[Node, ...]
+    symbols: tuple[str, ...]
+    outputs: tuple[int, ...]
+    slopes: tuple[int, ...]
+
+    def graph(self) -> Graph:
+        """Its nodes as a graph."""
+        graph = Graph()
+        graph.nodes = list(self.nodes)
+        graph._ids = {node: i for i, node in enumerate(self.nodes)}
+        return graph
+
+    def expressions(self, slopes: bool = False) -> list[Expr]:
+        """Its results, or their derivatives."""
+        graph = self.graph()
+        return [Expr(graph, i) for i in (self.slopes if slopes else self.outputs)]
+
+    @property
+    def plain(self) -> tuple[str, ...]:
+        """The symbols that its results depend on."""
+        return self.symbols[: len(self.symbols) // 2]
+
+
+@dataclass(frozen=True, eq=False)
+class PairFunction:
+    """A sum over pairs.
+
+    Attributes
+    ----------
+    name : str
+    bodies : int
+        Ground among them.
+    data : tuple of float or None
+        Operands that follow the ``POSE`` numbers of each body, where they are numbers.
+    tables : tuple
+        Of shapes; see :class:`~eomgen.numeric.pair_sums.PairSum`.
+    kinds : tuple of PairKind
+    """
+
+    name: str
+    bodies: int
+    data: tuple[float | None, ...]
+    tables: tuple[tuple[tuple[int, ...], ...], ...]
+    kinds: tuple[PairKind, ...]
+
+    @property
+    def count(self) -> int:
+        """How many operands it has."""
+        return POSE * self.bodies + len(self.data)
+
+    @property
+    def results(self) -> int:
+        """How many numbers it gives: six for each body and the energy."""
+        return 6 * self.bodies + 1
+
+    @cached_property
+    def touching(self) -> tuple[frozenset[int], ...]:
+        """For each body those with which it may be in contact."""
+        found: list[set[int]] = [set() for _ in range(self.bodies)]
+        for kind in self.kinds:
+            first, second = ({row[0] for row in self.tables[k]} for k in (kind.first, kind.second))
+            for body in first:
+                found[body] |= second
+            for body in second:
+                found[body] |= first
+        return tuple(frozenset(bodies - {k}) for k, bodies in enumerate(found))
+
+    def evaluator(self, made: Callable[[list[Expr], Sequence[str]], Callable[[Any], Any]]) -> PairSum:
+        """Its loops on numbers, with an evaluator of expressions for the laws."""
+        kinds = [
+            (k.first, k.second, k.planar, k.law, made(k.expressions(), k.plain), made(k.expressions(True), k.symbols))
+            for k in self.kinds
+        ]
+        return PairSum(self.bodies, self.tables, kinds)
+
+    @cached_property
+    def in_floats(self) -> PairSum:
+        """Its loops on floats and arrays."""
+        from .evaluate import compile_evaluator
+
+        return self.evaluator(compile_evaluator)
+
+
+@dataclass(frozen=True, eq=False)
+class PairCall:
+    """What one node of a sum over pairs does.
+
+    Attributes
+    ----------
+    function : PairFunction
+    part : {'given', 'sum', 'slope', 'item'}
+    numbers : tuple of int
+        Of a slope the operands that have rates; of an item its place.
+    """
+
+    function: PairFunction
+    part: str
+    numbers: tuple[int, ...] = ()
+    native: None = None
+    evaluator: None = None
+
+    @property
+    def name(self) -> str:
+        """Its name in formulas."""
+        return "_".join([self.function.name, self.part, *map(str, self.numbers[:1])])
+
+    def implementation(self, orders: tuple[int, ...]) -> Callable[..., Any]:
+        """Its value as a function of floats or arrays."""
+        return self.on_numbers(self.function.in_floats)
+
+    def on_numbers(self, loops: PairSum) -> Callable[..., Any]:
+        """Its value as a function of numbers, by given loops."""
+
+        def given(*operands: Any) -> Any:
+            return list(_unpacked(operands))
+
+        def slope(*operands: Any) -> Any:
+            flat = operands if len(operands) == 1 + len(self.numbers) else tuple(_unpacked(operands))
+            return loops.slope_along(flat[0], self.numbers, flat[1:])
+
+        made: dict[str, Callable[..., Any]] = {"given": given, "sum": loops, "slope": slope}
+        return made[self.part] if self.part in made else lambda listed: listed[self.numbers[0]]
+
+
+def _unpacked(operands: Sequence[Any]) -> Sequence[Any]:
+    """Operands as they are, or from one tuple of them."""
+    return operands[0] if len(operands) == 1 and isinstance(operands[0], tuple) else operands
+
+
+def pair_call(graph: Graph, operation: str) -> PairCall | None:
+    """What a node does, if it is one of a sum over pairs."""
+    found = graph.calls.get(operation)
+    return found[0] if found is not None and isinstance(found[0], PairCall) else None
+
+
+def has_pair_sums(graph: Graph) -> bool:
+    """Whether there are sums over pairs among the nodes."""
+    return any(isinstance(function, PairCall) for function, _ in graph.calls.values())
+
+
+def opaque_names(graph: Graph) -> list[str]:
+    """What expressions call that has no formula of its own: declared functions and sums over pairs."""
+    sums = {function.function.name for function, _ in graph.calls.values() if isinstance(function, PairCall)}
+    return sorted({*graph.functions, *sums})
+
+
+def is_pair_item(graph: Graph, operation: str) -> bool:
+    """Whether a node is an entry of a list of results."""
+    call = pair_call(graph, operation)
+    return call is not None and call.part == "item"
+
+
+def _node(graph: Graph, call: PairCall, operation: str, ids: Sequence[int]) -> int:
+    graph.calls[operation] = (call, ())  # type: ignore[assignment]
+    return graph._node((operation, *ids))
+
+
+def _item(graph: Graph, function: PairFunction, listed: int, k: int) -> int:
+    return _node(graph, PairCall(function, "item", (k,)), f"{function.name}({k})", [listed])
+
+
+def pair_sum(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -> list[Expr]:
+    """The results of a sum over pairs as expressions."""
+    ids = [x.id for x in operands]
+    given = _node(graph, PairCall(function, "given"), f"{function.name}(given)", ids)
+    total = _node(graph, PairCall(function, "sum"), f"{function.name}(sum)", [given])
+    return [Expr(graph, _item(graph, function, total, k)) for k in range(function.results)]
+
+
+def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
+    """The tangent of a node of a sum over pairs from those of the nodes before it; None where there is none.
+
+    Raises
+    ------
+    UsageError
+        It is a derivative already.
+    """
+    operation, *ids = graph.nodes[i]
+    call = pair_call(graph, operation)
+    assert call is not None
+    function = call.function
+    if call.part == "item":
+        slope = tangents.get(ids[0])
+        if slope is None:
+            return None
+        moving = graph.calls[graph.nodes[slope][0]][0]
+        assert isinstance(moving, PairCall)
+        return _item(graph, function, slope, call.numbers[0]) if _acts(function, moving, call.numbers[0]) else None
+    if call.part == "given":
+        return None
+    if call.part == "slope":
+        raise UsageError(
+            f"contacts {function.name!r}: second derivatives of contacts between groups are not made; use point_plane, "
+            "sphere_plane or sphere_sphere, or do without second-order sensitivities"
+        )
+    operands = graph.nodes[ids[0]][1:]
+    moving_numbers = tuple(k for k, j in enumerate(operands) if j in tangents)
+    if not moving_numbers:
+        return None
+    name = f"{function.name}(slope {' '.join(map(str, moving_numbers))})"
+    rates = [tangents[operands[k]] for k in moving_numbers]
+    return _node(graph, PairCall(function, "slope", moving_numbers), name, [ids[0], *rates])
+
+
+def _acts(function: PairFunction, moving: PairCall, item: int) -> bool:
+    """Whether a result can change with what moves."""
+    if item == function.results - 1 or any(k >= POSE * function.bodies for k in moving.numbers):
+        return True
+    body = item // 6
+    return any(k // POSE == body or k // POSE in function.touching[body] for k in moving.numbers)

@@ -1,0 +1,255 @@
+"""Contact between groups of shapes: geometry in NumPy, one-to-one contacts, momentum, energy, closed forms."""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+from typing import Any
+
+import contact_scenes as scenes
+import numpy as np
+import pytest
+from contact_scenes import ELASTIC, LAW, PLANAR, on
+
+import eomgen as eg
+
+G = 9.81
+
+
+def heap(bulk: bool) -> eg.Model:
+    """Three circles on the floor and on each other."""
+    m, bodies = scenes.planar("heap", 3)
+    r, mu = m.parameter("r", 0.1), m.parameter("mu", 0.3)
+    law = {**LAW, "friction": mu}
+    if bulk:
+        circles = [{"shape": "circle", "on": bodies, "radius": r}]
+        m.contacts("floor", circles, {"shape": "half_plane", "on": m.ground}, law)
+        m.contacts("among", circles, law=law)
+        return m
+    for i, body in enumerate(bodies):
+        m.sphere_plane(f"f{i}", m.ground.at(0, 0, 0, rpy=(-np.pi / 2, 0, 0)), body, radius=r, **law)
+        for j in range(i):
+            m.sphere_sphere(f"s{i}{j}", bodies[j], body, radii=(r, r), **law)
+    return m
+
+
+START = {"j0_y": 0.0995, "j1_x": 0.15, "j1_y": 0.12, "j2_x": 0.26, "j2_y": 0.22, "j0_x_dot": 1.0, "j1_3_dot": 2.0}
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_as_the_same_pairs_one_by_one(target: str) -> None:
+    bulk, single = (heap(b).compile(target=target) for b in (True, False))
+    x = bulk.x0(**START)
+    assert np.count_nonzero(bulk.rhs(0.0, x)[9:]) == 9  # all touch
+    for call in ("rhs", "jacobian", "parameter_jacobian", "bias"):
+        found, wanted = getattr(bulk, call)(0.0, x), getattr(single, call)(0.0, x)
+        assert np.abs(found - wanted).max() <= 1e-13 * np.abs(wanted).max(), call
+    assert np.allclose(bulk.energy(x), single.energy(x), rtol=1e-14, atol=0)
+    many = np.ascontiguousarray(x[:, None] + 1e-3 * np.random.default_rng(3).standard_normal((len(x), 21)))
+    together = bulk.rhs(0.0, many)
+    apart = np.array([bulk.rhs(0.0, column) for column in many.T.copy()]).T
+    assert np.allclose(together, apart, rtol=1e-12, atol=1e-10 * np.abs(apart).max())
+    late = [mod.bind(p={"r": 0.11, "mu": 0.7}).rhs(0.0, x) for mod in (bulk, single)]
+    assert np.allclose(*late, rtol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["lagrange", "hamilton", "newton_euler", "gibbs_appell", "augmented"])
+def test_every_method(method: str) -> None:
+    a, b = heap(True).compile(target="numpy"), heap(False).compile(method=method, target="numpy")
+    c = heap(True).compile(method=method, target="numpy")
+    x = a.x0(**START)
+    if method != "hamilton":  # whose states are momenta
+        assert np.allclose(c.rhs(0.0, x), a.rhs(0.0, x), rtol=1e-12)
+    assert np.allclose(c.rhs(0.0, c.x0(**START)), b.rhs(0.0, b.x0(**START)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("kinds", list(combinations_with_replacement(PLANAR, 2)), ids="-".join)
+def test_depth_and_force_against_geometry(kinds: tuple[str, str]) -> None:
+    """The energy is that of the depths found in NumPy, the force its slope; momentum and its moment are kept."""
+    m, (a, b) = scenes.planar("pair", 2, (0, 0, 0))
+    m.contacts("touch", on(PLANAR[kinds[0]], a), on(PLANAR[kinds[1]], b), ELASTIC)
+    mod = m.compile(target="numpy")
+    rng, met = np.random.default_rng(5), 0
+    for _ in range(200):
+        q = np.concatenate([rng.uniform(-0.05, 0.05, 2), [rng.uniform(-3, 3)], np.zeros(3)])
+        way = rng.uniform(-3, 3)
+        q[3:5] = q[:2] + rng.uniform(0.1, 0.25) * np.array([np.cos(way), np.sin(way)])
+        q[5] = rng.uniform(-3, 3)
+        x = np.concatenate([q, np.zeros(6)])
+        deep = [max(d, 0.0) for d in scenes.depths(*kinds, q[:3], q[3:])]
+        wanted = sum(2e4 * d**2.5 / 2.5 for d in deep)
+        assert mod.energy(x)[1] == pytest.approx(wanted, rel=1e-9, abs=1e-15)
+        force = -mod.bias(0.0, x)
+        if wanted < 1e-3:
+            continue
+        met += 1
+        sides = [x.copy() for _ in range(12)]
+        for k in range(6):
+            sides[2 * k][k] += 1e-6
+            sides[2 * k + 1][k] -= 1e-6
+        V = [mod.energy(side)[1] for side in sides]
+        slope = (np.array(V[::2]) - np.array(V[1::2])) / 2e-6
+        assert np.allclose(force, -slope, rtol=1e-4, atol=1e-4 * np.abs(slope).max())
+        assert np.abs(force[:2] + force[3:5]).max() <= 1e-12 * np.abs(force).max()
+        moment = q[0] * force[1] - q[1] * force[0] + q[3] * force[4] - q[4] * force[3] + force[2] + force[5]
+        assert abs(moment) <= 1e-12 * np.abs(force).max()
+    assert met >= 20
+
+
+def test_order_of_groups_does_not_matter() -> None:
+    values = []
+    for swapped in (False, True):
+        m, (a, b) = scenes.planar("pair", 2)
+        groups = [on(PLANAR["box"], a), [on(PLANAR["polygon"], b), on(PLANAR["circle"], b.at(0.05, 0, 0))]]
+        m.contacts("touch", *(groups[::-1] if swapped else groups), LAW)
+        mod = m.compile(target="numpy")
+        x = mod.x0(j1_x=0.15, j1_y=0.03, j1_3=2.0, j0_x_dot=1.0, j1_3_dot=4.0)
+        assert np.abs(mod.rhs(0.0, x)[6:]).max() > 20.0
+        values.append(mod.rhs(0.0, x))
+    assert np.allclose(*values, rtol=1e-12)
+
+
+def test_shapes_in_space_as_one_by_one() -> None:
+    """Spheres and the ends of capsules on a slope, in turned frames."""
+    mods = []
+    for bulk in (True, False):
+        m = eg.Model("spheres", gravity=(0, 0, -G))
+        bodies = [m.body(f"b{k}", mass=1.0, inertia=(0.01, 0.02, 0.025)) for k in range(2)]
+        for k, body in enumerate(bodies):
+            m.free(f"j{k}", m.ground, body)
+        slope, hub = m.ground.at(0, 0, 0, rpy=(0.2, 0.1, 0)), bodies[0].at(0.01, 0.02, 0.03, rpy=(0.4, 1.0, 0.3))
+        ends = [bodies[1].at(0, 0, z) for z in (-0.15, 0.15)]
+        if bulk:
+            group = [
+                {"shape": "sphere", "on": hub, "radius": 0.1},
+                {"shape": "capsule", "on": bodies[1], "length": 0.3, "radius": 0.05},
+            ]
+            m.contacts("floor", {"shape": "half_space", "on": slope}, group, LAW)
+            m.contacts("among", group[0], group[1], LAW)
+        else:
+            m.sphere_plane("f0", slope, hub, radius=0.1, **LAW)
+            for k, end in enumerate(ends):
+                m.sphere_plane(f"f{k + 1}", slope, end, radius=0.05, **LAW)
+        mods.append(m.compile(target="numpy"))
+    x = mods[0].x0(j0_x=2.0, j0_z=-0.2, j1_z=0.02, j1_y_dot=1.0, j0_x_dot=0.3)
+    x[:] = x + 0.01 * np.random.default_rng(4).standard_normal(len(x))
+    x = mods[0].project(x)
+    assert np.abs(mods[0].rhs(0.0, x)).max() > 50.0
+    assert np.allclose(mods[0].rhs(0.0, x), mods[1].rhs(0.0, x), rtol=1e-11, atol=1e-9)
+
+
+def test_a_sphere_on_a_capsule() -> None:
+    """Beside the cylinder the depth is across the axis, beyond an end it is that of two spheres."""
+    m = eg.Model("rod", gravity=(0, 0, 0))
+    rod, ball = m.body("rod", mass=1.0, inertia=(0.1, 0.1, 0.1)), m.body("ball", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    m.free("jr", m.ground, rod)
+    m.free("jb", m.ground, ball)
+    first = {"shape": "capsule", "on": rod, "length": 0.4, "radius": 0.05}
+    m.contacts("touch", first, {"shape": "sphere", "on": ball, "radius": 0.1}, ELASTIC)
+    mod = m.compile(target="numpy")
+    for place, normal, gap in (
+        ((0.08, 0.1, 0.1), (0.08, 0.1, 0.0), np.hypot(0.08, 0.1)),
+        ((0.06, 0.02, -0.3), (0.06, 0.02, -0.1), np.sqrt(0.06**2 + 0.02**2 + 0.1**2)),
+    ):
+        x = mod.x0(**dict(zip(("jb_x", "jb_y", "jb_z"), place, strict=True)))
+        force = 2e4 * (0.15 - gap) ** 1.5 * np.array(normal) / gap
+        names = list(mod.v_names)
+        found = -mod.bias(0.0, x)
+        at = [names.index(f"jb_{c}_dot") for c in "xyz"]
+        assert np.allclose(found[at], force, rtol=1e-12)
+        back = [names.index(f"jr_{c}_dot") for c in "xyz"]
+        assert np.allclose(found[back], -force, rtol=1e-12)
+
+
+def test_depth_of_a_bouncing_ball() -> None:
+    """Linear and without loss: k d^2 / 2 = m g (h + d) at the deepest point, and the height comes back."""
+    m, (ball,) = scenes.planar("ball", 1)
+    law = {"stiffness": 5e4, "exponent": 1}
+    m.contacts("floor", on(PLANAR["circle"], ball), {"shape": "half_plane", "on": m.ground}, law)
+    m.output("height", ball.position[1])
+    mod = m.compile()
+    h, k, W = 0.5, 5e4, G
+    traj = mod.simulate((0, 1.5), initial={"j0_y": 0.1 + h}, rtol=1e-11, atol=1e-13, t_eval=np.linspace(0, 1.5, 300001))
+    deep = (W + np.sqrt(W * W + 2 * k * W * h)) / k
+    assert 0.1 - traj["height"].min() == pytest.approx(deep, rel=1e-5)
+    later = traj["height"][traj.t > 0.5]
+    assert later.max() == pytest.approx(0.1 + h, abs=1e-6)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_angle_at_which_a_box_slides(side: int) -> None:
+    """A box slides with g (sin a - mu cos a) above atan mu, and not below it, to 1e-3 rad."""
+    mu = 0.4
+    angle = np.arctan(mu) + side * 1e-3
+    m = eg.Model("slope", gravity=(G * np.sin(angle), -G * np.cos(angle), 0))
+    box = m.body("box", mass=2.0, inertia={"zz": 0.02})
+    m.planar("j", m.ground, box)
+    law = {"stiffness": 1e6, "exponent": 1, "dissipation": 2.0, "friction": mu, "smoothing": 1e-5}
+    m.contacts("floor", {"shape": "box", "on": box, "size": (0.4, 0.1)}, {"shape": "half_plane", "on": m.ground}, law)
+    mod = m.compile()
+    traj = mod.simulate((0, 2), initial={"j_y": 0.05}, method="Radau", rtol=1e-8, atol=1e-11, t_eval=[0.0, 1.0, 2.0])
+    gained = traj["j_x_dot"][2] - traj["j_x_dot"][1]
+    expected = G * (np.sin(angle) - mu * np.cos(angle))
+    if side > 0:
+        assert gained == pytest.approx(expected, rel=1e-3)
+    else:
+        assert abs(gained) < 1e-3 * abs(expected)
+        assert 0.0 < traj["j_x_dot"][2] < 1e-3
+
+
+def test_when_a_sliding_sphere_begins_to_roll() -> None:
+    """After 2 v0 / (7 mu g), with 5/7 of the speed."""
+    mu, v0, r, mass = 0.2, 2.0, 0.1, 1.5
+    m = eg.Model("billiard", gravity=(0, 0, -G))
+    ball = m.body("ball", mass=mass, inertia=(0.4 * mass * r**2,) * 3)
+    m.free("j", m.ground, ball)
+    law = {"stiffness": 1e7, "exponent": 1.5, "dissipation": 1.0, "friction": mu, "smoothing": 1e-4}
+    m.contacts("table", {"shape": "sphere", "on": ball, "radius": r}, {"shape": "half_space", "on": m.ground}, law)
+    mod = m.compile()
+    rest = r - (mass * G / 1e7) ** (2 / 3)
+    wanted = 2 * v0 / (7 * mu * G)
+    times = np.linspace(0, 1.0, 2001)
+    traj = mod.simulate((0, 1.0), initial={"j_z": rest, "j_x_dot": v0}, method="Radau", t_eval=times)
+    speed = traj["j_x_dot"]
+    assert speed[-1] == pytest.approx(5 / 7 * v0, rel=1e-3)
+    sliding = times < 0.8 * wanted  # the speed falls by mu g; where its line meets the end speed
+    slope, start = np.polyfit(times[sliding], speed[sliding], 1)
+    assert (speed[-1] - start) / slope == pytest.approx(wanted, rel=1e-3)
+
+
+def test_newtons_cradle() -> None:
+    """Equal spheres in a row with gaps: the last takes all of the speed."""
+    m, bodies = scenes.planar("cradle", 5, (0, 0, 0))
+    for body in range(5):
+        m._description.sections["bodies"][body].values["mass"] = 1.0
+    m.contacts("among", {"shape": "circle", "on": bodies, "radius": 0.05}, law={"stiffness": 1e6})
+    mod = m.compile()
+    start: dict[str, Any] = {f"j{k}_x": 0.105 * k for k in range(5)} | {"j0_x_dot": 1.0}
+    traj = mod.simulate((0, 0.2), initial=start, rtol=1e-11, atol=1e-13)
+    speeds = np.array([traj[f"j{k}_x_dot"][-1] for k in range(5)])
+    assert np.allclose(speeds, [0, 0, 0, 0, 1], atol=1e-7)
+
+
+def test_energy_never_grows_in_random_scenes() -> None:
+    for seed in range(6):
+        mod, start = random_scene(seed)
+        traj = mod.simulate((0, 0.6), initial=start, rtol=1e-9, atol=1e-11)
+        energy = np.array([sum(mod.energy(x)) for x in traj.x.T])
+        assert np.diff(energy).max() <= 1e-6 * np.abs(energy).max(), seed
+
+
+def random_scene(seed: int) -> tuple[Any, dict[str, float]]:
+    """Random shapes thrown at each other on a floor."""
+    rng = np.random.default_rng(seed)
+    m, bodies = scenes.planar(f"random{seed}", 4)
+    kinds = rng.choice(list(PLANAR), 4)
+    group = [on(PLANAR[kind], body) for kind, body in zip(kinds, bodies, strict=True)]
+    law = {**LAW, "stiffness": 1e4 * 10 ** rng.uniform(0, 1), "friction": rng.uniform(0, 1)}
+    m.contacts("among", group, law=law)
+    m.contacts(
+        "floor", group, {"shape": "half_plane", "on": m.ground.at(0, 0, 0, rpy=(0, 0, rng.uniform(-0.2, 0.2)))}, law
+    )
+    start: dict[str, float] = {}
+    for k in range(4):
+        start |= {f"j{k}_x": 0.4 * (k % 2), f"j{k}_y": 0.3 + 0.4 * (k // 2), f"j{k}_3": rng.uniform(-3, 3)}
+        start |= {f"j{k}_x_dot": (1 - 2 * (k % 2)) * rng.uniform(0, 2), f"j{k}_3_dot": rng.uniform(-5, 5)}
+    return m.compile(target="cython"), start
