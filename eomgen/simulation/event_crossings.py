@@ -289,7 +289,8 @@ class Crossings:
     # -- resets ---------------------------------------------------------------------------------------------------
     def arrive(self, t: float, x: Array, length: float) -> None:
         """Take note how fast values come, right before a reset."""
-        self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self.values(t, x), length)
+        self.g = self.values(t, x)
+        self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self.g, length)
 
     def depart(self, t: float, x: Array, length: float = 0.0) -> None:
         """Go on from another state, after the events that fired.
@@ -300,6 +301,7 @@ class Crossings:
             Resets follow each other ever faster, or one leads nowhere.
         """
         arrived, came = self.slope, np.fmax(np.abs(self.slope), np.abs(self.slope_new))
+        at_zero = np.abs(self.g) <= TOUCHING * self.size  # not beyond a jump of an input
         self.g = self.values(t, x)
         self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self.g, length)
         stuck = False
@@ -308,7 +310,7 @@ class Crossings:
             touching = abs(self.g[i]) <= TOUCHING * self.size[i]
             if self.leaving[i]:  # it only touched zero
                 continue
-            if way * self.forward * float(arrived[i]) < 0.0:
+            if at_zero[i] and way * self.forward * float(arrived[i]) < 0.0:
                 stuck = True  # it goes the other way: less than the accuracy is left
             nowhere = (action == WAIT and rate < 0.0) or not abs(rate) > TOUCHING * came[i]
             stuck = stuck or bool(touching and nowhere)

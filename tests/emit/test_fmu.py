@@ -13,6 +13,7 @@ from typing import Any
 import models
 import numpy as np
 import pytest
+import sympy as sp
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.fmi2 import FMU2Model, FMU2Slave
@@ -111,18 +112,24 @@ def test_events_and_resets(model: Any, version: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_an_input_that_jumps_over_an_event_resets_once(version: str, tmp_path: Path) -> None:
-    """A push of 0.25 m/s when the lever goes from 0 to 1, in either kind of unit and in the closed form."""
+@pytest.mark.parametrize("speed", [0.0, -0.1, 0.1])
+def test_an_input_that_jumps_over_an_event_resets_once(speed: float, version: str, tmp_path: Path) -> None:
+    """A push of 0.25 m/s when the lever goes from 0 to 1, whichever way the motion changes the event's value.
+
+    In either kind of unit and in the closed form.
+    """
     m = eg.Model("switched")
     m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
     m.torque("nothing", "J", 0 * m.input("lever"))
-    m.event("on", "lever - 0.5", direction=1, reset={"s_dot": "s_dot + 0.25"})
+    m.initial(s=0.0, s_dot=speed)
+    m.event("on", "lever - 0.5 + s", direction=1, reset={"s_dot": "s_dot + 0.25"})
     path = write_fmu(derive(m, "auto"), tmp_path / "m.fmu", version)
     jump = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 1.0), (2.0, 1.0)], dtype=[("time", float), ("lever", float)])
     for kind in ("CoSimulation", "ModelExchange"):
         rows = simulate_fmu(str(path), fmi_type=kind, stop_time=2.0, output_interval=0.1, input=jump, output=["s"])
         found = np.interp([0.5, 1.0, 2.0], rows["time"], np.asarray(rows["s"]))
-        np.testing.assert_allclose(found, [0.0, 0.125, 0.375], atol=1e-6)
+        expected = np.array([0.0, 0.125, 0.375]) + speed * np.array([0.5, 1.0, 2.0])
+        np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
 def test_a_terminal_event_ends_the_run(tmp_path: Path) -> None:
@@ -172,6 +179,50 @@ def test_directional_derivatives_are_the_modules(crank: tuple[Path, Any]) -> Non
     slopes = module.rhs(0.0, x)
     found = instance.getDirectionalDerivative([at["speed"]], [at[name] for name in module.x_names], list(slopes))
     assert found[0] == pytest.approx(slopes[list(module.x_names).index("s_dot")], rel=1e-10)
+    instance.freeInstance()
+
+
+def test_derivatives_of_start_states_follow_the_loops(crank: tuple[Path, Any]) -> None:
+    """In initialization mode dependent states are unknowns: by theta, its rate and the crank, of the closed form.
+
+    s = r cos(theta) + sqrt(l^2 - r^2 sin(theta)^2).
+    """
+    path, module = crank
+    instance, at = opened(path)
+    instance.setupExperiment(startTime=0.0)
+    instance.enterInitializationMode()
+    value = dict(zip((*module.p_names, *module.x_names), [*module.p, *module.x0()], strict=True))
+    theta, r, l, w = sp.symbols("theta r l w", real=True)
+    s = r * sp.cos(theta) + sp.sqrt(l**2 - r**2 * sp.sin(theta) ** 2)
+    s_dot = sp.diff(s, theta) * w
+    s_ddot = sp.diff(s_dot, theta) * w  # and the crank's acceleration is another unknown
+    numbers = {theta: value["theta"], r: value["r"], l: value["l"], w: value["theta_dot"]}
+    for known, symbol in (("theta", theta), ("theta_dot", w), ("r", r), ("l", l)):
+        unknowns = [at[name] for name in ("s", "s_dot", "der(s)", "speed", "der(s_dot)", "der(theta_dot)")]
+        found = instance.getDirectionalDerivative(unknowns, [at[known]], [1.0])
+        of_s, of_v = (float(sp.diff(x, symbol).subs(numbers)) for x in (s, s_dot))
+        np.testing.assert_allclose(found[:4], [of_s, of_v, of_v, of_v], rtol=1e-8, atol=1e-9)
+        alpha = sp.Symbol("alpha")
+        whole = s_ddot + sp.diff(s, theta) * alpha
+        numbers[alpha] = instance.getReal([at["der(theta_dot)"]])[0]
+        expected = float((sp.diff(whole, symbol) + sp.diff(s, theta) * found[5]).subs(numbers))
+        assert found[4] == pytest.approx(expected, rel=1e-7, abs=1e-8)
+    instance.freeInstance()
+
+
+def test_rolling_keeps_the_start_values_that_hold(tmp_path: Path) -> None:
+    """A disc on a plane: lean and rates as they are set, height and velocity of the centre in closed form."""
+    path = write_fmu(derived("rolling_disc"), tmp_path / "rolling_disc.fmu")
+    instance, at = opened(path)
+    r = float(next(v for v in read_model_description(str(path)).modelVariables if v.name == "r").start)
+    given = {"lean": 0.6, "x": 3.0, "yaw_dot": 2.0, "lean_dot": 0.4, "spin_dot": 5.0}
+    instance.setReal([at[name] for name in given], list(given.values()))
+    initialized(instance)
+    found = dict(zip(at, instance.getReal(list(at.values())), strict=True))
+    assert {name: found[name] for name in given} == given
+    assert found["z"] == pytest.approx(r * np.cos(0.6), abs=1e-12)
+    assert found["z_dot"] == pytest.approx(-r * np.sin(0.6) * 0.4, abs=1e-12)
+    assert found["x_dot"] == pytest.approx(r * (5.0 + 2.0 * np.sin(0.6)), abs=1e-12)
     instance.freeInstance()
 
 
