@@ -104,7 +104,9 @@ def rank_of_pinocchio(rows: Sequence[tuple[float, float, float, bool]], gravity:
 
 @pytest.mark.parametrize("gravity", [DOWN, (1.0, 2.0, -9.0)], ids=["along", "across"])
 @pytest.mark.parametrize(
-    ("rows", "number"), [(STANFORD, 33), (SCARA, 8), (ELBOW, 36), (PUMA, 36)], ids=["stanford", "scara", "elbow", "puma"]
+    ("rows", "number"),
+    [(STANFORD, 33), (SCARA, 8), (ELBOW, 36), (PUMA, 36)],
+    ids=["stanford", "scara", "elbow", "puma"],
 )
 def test_numbers_are_the_ranks_of_pinocchios_regressor(
     rows: list[tuple[float, float, float, bool]], number: int, gravity: Sequence[float]
