@@ -1,7 +1,7 @@
 """Functions that JAX has traced and differentiated, evaluated operation by operation.
 
-XLA compiles a closed loop for ten seconds and more; the operations that JAX records are evaluated here at once, by NumPy
-where it has the same one, and by JAX itself where not.
+XLA compiles a closed loop for ten seconds and more; the operations that JAX records are evaluated here at once, by
+NumPy where it has the same one, and by JAX itself where not.
 """
 
 from __future__ import annotations

@@ -85,7 +85,7 @@ PUMA = [(-pi / 2, 0, 0, False), (0, 0.4318, 0.2435, False), (pi / 2, -0.0203, -0
 
 
 def rank_of_pinocchio(rows: Sequence[tuple[float, float, float, bool]], gravity: Sequence[float]) -> int:
-    """The rank of Pinocchio's regressor of the same arm at 100 random states; the gap in its singular values is wide."""
+    """The rank of Pinocchio's regressor of the same arm at 100 random states, with a wide gap behind it."""
     arm, joint, place = pin.Model(), 0, pin.SE3.Identity()
     arm.gravity.linear = np.array(gravity)
     for k, (alpha, a, d, slides) in enumerate(rows):

@@ -56,8 +56,8 @@ def measured(module: eg.Module, seed: int, noise: float = 0.002, **changed: Any)
 def test_eight_parameters_of_an_arm_come_back(module: eg.Module) -> None:
     """All eight within three standard errors, twelve times, and as far as a normal distribution says.
 
-    The squared distances in the metric of each fit's covariance add up to chi-squared with 96 degrees of freedom, so that
-    errors and correlations together are neither too small nor too large.
+    The squared distances in the metric of each fit's covariance add up to chi-squared with 96 degrees of freedom, so
+    that errors and correlations together are neither too small nor too large.
     """
     guess = {name: 1.3 * float(module.p[k]) for k, name in enumerate(module.p_names)}
     assert len(guess) == 8
