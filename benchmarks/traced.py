@@ -20,7 +20,7 @@ from .models import EXAMPLES
 from .report import Report, Table
 
 TITLE = "one rhs by the targets casadi and jax"
-MODELS = ("double_pendulum", "slider_crank", "quadrotor_load", "puma560", "stewart_platform")
+MODELS = ("double_pendulum", "slider_crank", "quadrotor_load", "puma560")
 CALLS, RUNS = 2_000, 10_000
 ALIKE = 1e-10
 

@@ -8,6 +8,7 @@ import platform
 import sys
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,10 @@ from .emit.fmu.versions import KERNELS, check_version, refuse_impacts
 from .errors import UsageError
 from .files.path_names import as_path
 from .files.writing import refuse_link, write_whole
+from .numeric.scales import Array
+from .program import Program
 from .runtime.bound_model import BoundModel
+from .runtime.signals import Forcing
 
 if TYPE_CHECKING:
     from .derivation import Derivation
@@ -103,11 +107,23 @@ def _is_ours(path: Path) -> bool:
         return False
 
 
+def _begin_signals(program: Program, module: BoundModel) -> tuple[Program, Array]:
+    """The program whose inputs start as their declared signals do, and the initial state with them."""
+    if not program.metadata.get("signals"):
+        return program, module.x0()
+    forcing = Forcing(module.layout, None)
+    forcing.attach(module)
+    values = [float(u) for u in forcing(0.0, module.x0())]
+    bound = module.bind(u=dict(zip(module.u_names, values, strict=True)))
+    return replace(program, metadata={**program.metadata, "u_values": values}), bound.x0()
+
+
 def fmu_bytes(equations: Derivation, version: str, progress: Callable[[str], None] | None = None) -> bytes:
     """The content of the file that :func:`write_fmu` writes; the same model gives the same bytes."""
     program = pipeline.build(equations, "c", KERNELS)
     refuse_impacts(program)
-    start = BoundModel(pipeline.compile_core(equations, "numpy")).x0()
+    module = BoundModel(pipeline.compile_core(equations, "numpy"))
+    program, start = _begin_signals(program, module)
     unit = emit_fmu(program, [float(x) for x in start], version)
     files: dict[str, bytes] = {name: text.encode() for name, text in unit.files.items()}
     folder = _FOLDERS.get((sys.platform, platform.machine()), (None, None))[version == "3.0"]

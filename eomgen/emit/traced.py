@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from ..errors import UsageError
 from ..graph.functions import Function
 from ..kernel_table import NAMED
-from ..limits.constraints import ACCEPTED, TIKHONOV
+from ..limits.constraints import ACCEPTED, DIFFERENTIATED
 from ..numeric.scales import Space
 from ..numeric.user_functions import Curve, Surface
 from ..program import Program
@@ -114,8 +114,8 @@ def _context(program: Program, library: str, steps: int) -> dict[str, Any]:
         "has_loops": has_loops,
         "n_h": sizes.n_h,
         "redundant": sizes.n_c > n_v - sizes.n_dof,
-        "passes": 2 if sizes.n_c > n_v - sizes.n_dof else 1,
-        "tikhonov": TIKHONOV,
+        "passes": 4 if sizes.n_c > n_v - sizes.n_dof else 1,
+        "tikhonov": DIFFERENTIATED,
         "accepted": ACCEPTED,
         "composed": not has_loops and "rhs" in drivers,
         "by_columns": "mass_times" in blocks,

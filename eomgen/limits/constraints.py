@@ -20,6 +20,10 @@ MEASURED = 1e-6  #: of gaps that a user says are closed, and of positions that c
 # -- solved by J J^T -------------------------------------------------------------------------------------------------
 #: Least term added to J J^T, relative to its largest diagonal entry: a hundred times the rounding of that, 1e-14.
 TIKHONOV = 1e-12
+#: The same where CasADi and JAX differentiate the solution: the rounding of a redundant row, 1e-16, is divided by it in
+#: the derivative, 1e-9 then; four solutions of what the last one left make (1e-7 / s^2)^4 of the term, s the least
+#: singular value of independent rows as a part of the greatest.
+DIFFERENTIATED = 1e-7
 #: The term to begin with: noise is blown up by 1 / (2 sqrt(1e-8)) = 5e3 at most.
 GENTLE = 1e-8
 #: The next term, relative to s^2 of the direction in which something is left: a pass leaves this part of it.

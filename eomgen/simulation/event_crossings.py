@@ -288,8 +288,9 @@ class Crossings:
 
     # -- resets ---------------------------------------------------------------------------------------------------
     def arrive(self, t: float, x: Array, length: float) -> None:
-        """Take note how fast values come, right before a reset."""
-        self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self.values(t, x), length)
+        """Take note of values and how fast they change, right before a reset and after it."""
+        self.g = self.values(t, x)
+        self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self.g, length)
 
     def depart(self, t: float, x: Array, length: float = 0.0) -> None:
         """Go on from another state, after the events that fired.
@@ -300,18 +301,17 @@ class Crossings:
             Resets follow each other ever faster, or one leads nowhere.
         """
         arrived, came = self.slope, np.fmax(np.abs(self.slope), np.abs(self.slope_new))
-        self.g = self.values(t, x)
-        self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self.g, length)
+        at_zero = np.abs(self.g) <= TOUCHING * self.size  # not beyond a jump of an input
+        self.arrive(t, x, length)
         stuck = False
         for i, way in zip(self.fired, self.ways, strict=True):
             rate, action = self.forward * float(self.slope[i]), self.events[i].action
             touching = abs(self.g[i]) <= TOUCHING * self.size[i]
             if self.leaving[i]:  # it only touched zero
                 continue
-            if way * self.forward * float(arrived[i]) < 0.0:
-                stuck = True  # it goes the other way: less than the accuracy is left
             nowhere = (action == WAIT and rate < 0.0) or not abs(rate) > TOUCHING * came[i]
-            stuck = stuck or bool(touching and nowhere)
+            back = at_zero[i] and way * self.forward * float(arrived[i]) < 0.0  # less than the accuracy is left
+            stuck = stuck or bool(back or (touching and nowhere))
             self.leaving[i] = (1 if rate > 0.0 else -1) if touching else 0
         changed = [self.events[i] for i in self.fired if self.events[i].action in (RESET, WAIT)]
         if changed:

@@ -28,6 +28,7 @@ typedef struct {
     double x[FMU_N_X + 1], u[FMU_N_U + 1], p[FMU_N_P + 1], c[FMU_N_CONST + 1], rates[FMU_N_X + 1];
     int guessed[FMU_N_X + 1]; /* states that others follow, and that were set nevertheless: where the search begins */
     int side[FMU_N_EVENTS + 1]; /* of model exchange: 1 where a value is positive or leaves zero upward, else 0 */
+    double seen;                /* of model exchange: when the last step was completed, with values g[0] */
     int begun;                  /* co-simulation has begun: the numbers below hold */
     double h_abs, last_reset;
     int crowded, ended;
@@ -75,6 +76,7 @@ int fmu_outputs(fmu_instance *f, double *y);
 int fmu_start(fmu_instance *f, double t, int tolerance_given, double tolerance);
 /* Initial states from those that were set: the others follow so that loops are closed. */
 int fmu_assemble(fmu_instance *f);
+int fmu_close(fmu_instance *f); /* the same, also where the start values are the model's own */
 int fmu_project(fmu_instance *f, const double *x, double *closed);
 /* A status of the model as one of FMI. */
 int fmu_judge(fmu_instance *f, int status, const char *what);

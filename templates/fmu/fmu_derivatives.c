@@ -52,6 +52,70 @@ static int of_rates(fmu_instance *f, const double *dx, const double *du, const d
     return fmu_judge(f, status, "the directional derivatives");
 }
 
+#if FMU_HAS_PROJECT
+/* Differences of order 6 at the places -3 .. 3 times their spacing, for the closing of loops, whose own derivative is no
+   function of the model. */
+static double weight_of(int k, double h)
+{
+    static const double weights[] = {3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0};
+    return (k < 0 ? -weights[-k - 1] : weights[k - 1]) / h;
+}
+
+/* Their spacing along a direction; 0 if it is none. */
+static double spacing_along(const fmu_memory *m, const double *dx, const double *du, const double *dp)
+{
+    double size = 0.0;
+    for (int i = 0; i < FMU_N_X; i++) {
+        size = fmax(size, fabs(dx[i]) / fmax(FMU_NOMINAL[i], fabs(m->x[i])));
+    }
+    for (int i = 0; i < FMU_N_U; i++) {
+        size = fmax(size, fabs(du[i]) / fmax(1.0, fabs(m->u[i])));
+    }
+    for (int i = 0; i < FMU_N_P; i++) {
+        size = fmax(size, fabs(dp[i]) / fmax(fabs(FMU_START_P[i]), fabs(m->p[i]) > 0.0 ? fabs(m->p[i]) : 1.0));
+    }
+    return size > 0.0 ? 2e-3 / size : 0.0;
+}
+
+/* During initialization: dx of all states where those of the exact ones are given and the others follow. */
+static int of_start(fmu_instance *f, double *dx, const double *du, const double *dp)
+{
+    fmu_memory *const m = &f->m;
+    double sum[FMU_N_X + 1] = {0.0};
+    int status = FMU_OK;
+    for (int i = 0; i < FMU_N_X; i++) {
+        dx[i] = FMU_INDEPENDENT[i] ? dx[i] : 0.0; /* the value of another is a guess only */
+    }
+    const double h = spacing_along(m, dx, du, dp);
+    f->before = *m;
+    for (int k = -3; k <= 3 && h > 0.0 && status == FMU_OK; k++) {
+        if (k == 0) {
+            continue;
+        }
+        for (int i = 0; i < FMU_N_X; i++) {
+            m->x[i] += k * h * dx[i];
+            m->guessed[i] = !FMU_INDEPENDENT[i];
+        }
+        for (int i = 0; i < FMU_N_U; i++) {
+            m->u[i] += k * h * du[i];
+        }
+        for (int i = 0; i < FMU_N_P; i++) {
+            m->p[i] += k * h * dp[i];
+        }
+        m->constants_known = 0;
+        status = fmu_close(f);
+        for (int i = 0; i < FMU_N_X; i++) {
+            sum[i] += weight_of(k, h) * m->x[i];
+        }
+        *m = f->before;
+    }
+    for (int i = 0; i < FMU_N_X; i++) {
+        dx[i] = FMU_INDEPENDENT[i] ? dx[i] : sum[i];
+    }
+    return status;
+}
+#endif
+
 #if FMU_HAS_OUTPUTS && !FMU_HAS_PROJECT
 /* dy by the chain rule: y is a function of q, v, the accelerations, u and p. */
 static int of_outputs(fmu_instance *f, const double *dx, const double *du, const double *dp, const double *d_rates, double *sum)
@@ -74,25 +138,14 @@ static int of_outputs(fmu_instance *f, const double *dx, const double *du, const
     return status;
 }
 #elif FMU_HAS_OUTPUTS
-/* dy by differences of order 6 through the closing of loops, whose own derivative is no function of the model. */
+/* dy by differences through the closing of loops. */
 static int of_outputs(fmu_instance *f, const double *dx, const double *du, const double *dp, const double *d_rates, double *sum)
 {
-    static const double weights[] = {3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0};
     fmu_memory *const m = &f->m;
     double *const x = f->trial, *const p = f->values + FMU_N_Y, *const u = p + FMU_N_P, *const y = f->values;
-    double size = 0.0;
+    const double h = spacing_along(m, dx, du, dp);
     (void)d_rates;
-    for (int i = 0; i < FMU_N_X; i++) {
-        size = fmax(size, fabs(dx[i]) / fmax(FMU_NOMINAL[i], fabs(m->x[i])));
-    }
-    for (int i = 0; i < FMU_N_U; i++) {
-        size = fmax(size, fabs(du[i]) / fmax(1.0, fabs(m->u[i])));
-    }
-    for (int i = 0; i < FMU_N_P; i++) {
-        size = fmax(size, fabs(dp[i]) / fmax(fabs(FMU_START_P[i]), fabs(m->p[i]) > 0.0 ? fabs(m->p[i]) : 1.0));
-    }
     memset(sum, 0, FMU_N_Y * sizeof(double));
-    const double h = size > 0.0 ? 2e-3 / size : 0.0;
     int status = 0;
     for (int k = -3; k <= 3 && h > 0.0 && status == 0; k++) {
         if (k == 0) {
@@ -109,9 +162,8 @@ static int of_outputs(fmu_instance *f, const double *dx, const double *du, const
         }
         status = FMU_MODEL(precompute)(p, f->matrix);
         status = status == 0 ? FMU_MODEL(outputs)(m->t, x, u, f->matrix, y, f->w) : status;
-        const double weight = (k < 0 ? -weights[-k - 1] : weights[k - 1]) / h;
         for (int i = 0; i < FMU_N_Y; i++) {
-            sum[i] += weight * y[i];
+            sum[i] += weight_of(k, h) * y[i];
         }
     }
     return fmu_judge(f, status, "the directional derivatives");
@@ -123,6 +175,7 @@ int fmu_directional(fmu_instance *f, const unsigned *unknowns, size_t n_unknowns
 {
     double dx[FMU_N_X + 1] = {0.0}, du[FMU_N_U + 1] = {0.0}, dp[FMU_N_P + 1] = {0.0};
     double of_x[FMU_N_X + 1], of_y[FMU_N_Y + 1];
+    const int starts = f->m.phase == FMU_INITIALIZING;
     int outputs = 0;
     for (size_t i = 0; i < n_knowns; i++) {
         const unsigned k = knowns[i];
@@ -133,13 +186,16 @@ int fmu_directional(fmu_instance *f, const unsigned *unknowns, size_t n_unknowns
     }
     for (size_t i = 0; i < n_unknowns; i++) {
         const unsigned k = unknowns[i];
-        if (k < FMU_AT_RATES || (k >= FMU_AT_U && k < FMU_AT_Y) || k >= FMU_AT_TIME) {
+        if ((k < FMU_AT_RATES && !starts) || (k >= FMU_AT_U && k < FMU_AT_Y) || k >= FMU_AT_TIME) {
             return fmu_say(f, FMU_ERROR, "value reference %u is neither a derivative of a state nor an output", k);
         }
         outputs = outputs || k >= FMU_AT_Y;
     }
     int status = fmu_ready(f);
     status = status == FMU_OK ? fmu_constants(f) : status;
+#if FMU_HAS_PROJECT
+    status = status == FMU_OK && starts ? of_start(f, dx, du, dp) : status;
+#endif
     status = status == FMU_OK ? of_rates(f, dx, du, dp, of_x) : status;
 #if FMU_HAS_OUTPUTS
     status = status == FMU_OK && outputs ? of_outputs(f, dx, du, dp, of_x, of_y) : status;
@@ -147,7 +203,8 @@ int fmu_directional(fmu_instance *f, const unsigned *unknowns, size_t n_unknowns
     (void)outputs, of_y[0] = 0.0;
 #endif
     for (size_t i = 0; i < n_unknowns && status == FMU_OK; i++) {
-        result[i] = unknowns[i] < FMU_AT_U ? of_x[unknowns[i] - FMU_AT_RATES] : of_y[unknowns[i] - FMU_AT_Y];
+        const unsigned k = unknowns[i];
+        result[i] = k < FMU_AT_RATES ? dx[k] : k < FMU_AT_U ? of_x[k - FMU_AT_RATES] : of_y[k - FMU_AT_Y];
     }
     return status;
 }

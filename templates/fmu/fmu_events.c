@@ -43,6 +43,12 @@ static int look(fmu_instance *f, double *g, double *slope)
 #endif
 }
 
+/* Whether a value is still on the side that a reset sent it away from, and on its way out. */
+static int leaves(const fmu_memory *m, int way, double slope, int i)
+{
+    return m->leaving[i] && way * slope < 0.0;
+}
+
 int fmu_arm(fmu_instance *f)
 {
     fmu_memory *const m = &f->m;
@@ -50,8 +56,9 @@ int fmu_arm(fmu_instance *f)
     const int status = look(f, g, slope);
     for (int i = 0; i < FMU_N_EVENTS && status == FMU_OK; i++) {
         m->side[i] = g[i] > 0.0 || (g[i] == 0.0 && FMU_DIRECTION[i] != 1 && slope[i] < 0.0);
+        m->leaving[i] = 0;
     }
-    m->last_reset = (double)NAN, m->crowded = 0;
+    m->last_reset = m->seen = (double)NAN, m->crowded = 0;
     return status;
 }
 
@@ -72,7 +79,9 @@ int fmu_completed(fmu_instance *f, int *event)
     const int status = FMU_N_EVENTS > 0 ? look(f, g, slope) : (int)FMU_OK;
     for (int i = 0; i < FMU_N_EVENTS && status == FMU_OK; i++) { /* one that nobody has seen change sides */
         const int way = (g[i] > 0.0) - m->side[i];
-        *event = *event || (way * slope[i] > 0.0 && g[i] != 0.0);
+        m->leaving[i] = m->leaving[i] && way != 0;
+        m->g[0][i] = g[i], m->seen = m->t;
+        *event = *event || (way != 0 && g[i] != 0.0 && !leaves(m, way, slope[i], i));
     }
     return status;
 }
@@ -105,7 +114,14 @@ static int side_of(const fmu_memory *m, double g, double slope, int i)
     return side == m->side[i] && coming && fabs(g) <= RUNS_SAME * fmax(fabs(m->t), 1.0) * fabs(slope) ? !side : side;
 }
 
-/* Events whose values have changed sides in their direction: the first FMU_N_EVENTS of fired. */
+/* Whether a value is beyond zero because an input jumped after the last step, not by the motion. */
+static int has_jumped(const fmu_memory *m, double g, double slope, int i)
+{
+    return m->seen == m->t && (m->g[0][i] > 0.0) == m->side[i] && (g > 0.0) != m->side[i] &&
+           fabs(g - m->g[0][i]) > RUNS_TOUCHING * fmax(fabs(m->t), 1.0) * fabs(slope);
+}
+
+/* Events whose values have changed sides in their direction: the first FMU_N_EVENTS of fired; 2 after a jump. */
 static int find_fired(fmu_instance *f, int *fired, int *ended)
 {
     fmu_memory *const m = &f->m;
@@ -120,16 +136,16 @@ static int find_fired(fmu_instance *f, int *fired, int *ended)
     for (int i = 0; i < FMU_N_EVENTS; i++) {
         const int side = side_of(m, g[i], slope[i], i), way = side - m->side[i];
         before[i] = g[i];
-        if (way * slope[i] < 0.0) { /* it leaves for the side that it was sent to, and is not there yet */
+        if (leaves(m, way, slope[i], i)) {
             continue;
         }
-        fired[i] = way != 0 && FMU_DIRECTION[i] * way >= 0;
+        fired[i] = way == 0 || FMU_DIRECTION[i] * way < 0 ? 0 : has_jumped(m, g[i], slope[i], i) ? 2 : 1;
         if (fired[i]) {
             m->count[i]++;
             any = any || FMU_RESETS[i];
             *ended = *ended || (FMU_MOST[i] > 0 && m->count[i] >= FMU_MOST[i]);
         }
-        m->side[i] = side;
+        m->side[i] = side, m->leaving[i] = 0;
     }
     return any;
 }
@@ -163,8 +179,9 @@ int fmu_update(fmu_instance *f, int *ended, int *changed)
         double *const g = f->values, *const slope = f->values + FMU_N_EVENTS, *const before = slope + FMU_N_EVENTS;
         status = look(f, g, slope);
         for (int i = 0; i < FMU_N_EVENTS && status == FMU_OK; i++) { /* one that is still beyond zero may leave at once */
-            const int leaves = fired[i] && fabs(g[i]) <= 2.0 * fabs(before[i]) && slope[i] != 0.0;
-            m->side[i] = leaves ? slope[i] > 0.0 : g[i] > 0.0;
+            const int sent = m->leaving[i] || fired[i] == 1;
+            m->leaving[i] = sent && fabs(g[i]) <= 2.0 * fabs(before[i]) && slope[i] != 0.0;
+            m->side[i] = m->leaving[i] ? slope[i] > 0.0 : g[i] > 0.0;
         }
         m->crowded = fabs(m->t - m->last_reset) < RUNS_CROWDED * fmax(fabs(m->t - m->t_start), 1.0) ? m->crowded + 1 : 0;
         m->last_reset = m->t;

@@ -101,21 +101,51 @@ static int as_given(const fmu_memory *m)
            memcmp(m->u, FMU_START_U, FMU_N_U * sizeof(double)) == 0 && memcmp(m->p, FMU_START_P, FMU_N_P * sizeof(double)) == 0;
 }
 
+#if FMU_HAS_PROJECT && !FMU_HAS_KINEMATICS
+/* The nearest closed state with the values of exact states: projected, and these put back, until they stay. */
+static int assemble_around(fmu_instance *f)
+{
+    enum { MOST = 5000 };
+    fmu_memory *const m = &f->m;
+    double *const given = f->trial, last = HUGE_VAL;
+    memcpy(given, m->x, FMU_N_X * sizeof(double));
+    for (int k = 0; k < MOST; k++) {
+        double off = 0.0;
+        const int status = fmu_project(f, m->x, f->closed);
+        if (status != FMU_OK) {
+            return status;
+        }
+        for (int i = 0; i < FMU_N_X; i++) {
+            const double size = fmax(FMU_NOMINAL[i], fabs(given[i]));
+            off = FMU_INDEPENDENT[i] ? fmax(off, fabs(f->closed[i] - given[i]) / size) : off;
+            m->x[i] = FMU_INDEPENDENT[i] ? given[i] : f->closed[i];
+        }
+        if (off <= RUNS_INSTANT || (off <= RUNS_SAME && off >= last)) { /* until rounding is left */
+            return FMU_OK;
+        }
+        last = off;
+    }
+    return fmu_say(f, FMU_ERROR, "the mechanism cannot be assembled with these start values and parameters");
+}
+#endif
+
+int fmu_close(fmu_instance *f)
+{
+#if FMU_HAS_KINEMATICS
+    return assemble_loops(f);
+#elif FMU_HAS_PROJECT
+    return assemble_around(f);
+#else
+    (void)f;
+    return FMU_OK;
+#endif
+}
+
 int fmu_assemble(fmu_instance *f)
 {
     fmu_memory *const m = &f->m;
     m->rates_known = 0;
-    int status = FMU_OK;
-    if (!as_given(m)) {
-#if FMU_HAS_KINEMATICS
-        status = assemble_loops(f);
-#else
-        status = fmu_project(f, m->x, f->closed);
-        if (status == FMU_OK) {
-            memcpy(m->x, f->closed, FMU_N_X * sizeof(double));
-        }
-#endif
-    }
+    const int status = as_given(m) ? (int)FMU_OK : fmu_close(f);
     m->assembled = status == FMU_OK;
     return status == FMU_DISCARD ? (int)FMU_ERROR : status;
 }

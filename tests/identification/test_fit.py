@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from scipy.optimize import curve_fit
+from scipy.stats import chi2, kstest
 
 import eomgen as eg
 from eomgen.errors import UsageError
@@ -53,20 +54,28 @@ def measured(module: eg.Module, seed: int, noise: float = 0.002, **changed: Any)
 
 
 def test_eight_parameters_of_an_arm_come_back(module: eg.Module) -> None:
-    """Within three standard errors, and as often within one and two as a normal distribution says."""
+    """All eight within three standard errors, twelve times, and as far as a normal distribution says.
+
+    The squared distances in the metric of each fit's covariance add up to chi-squared with 96 degrees of freedom, so
+    that errors and correlations together are neither too small nor too large.
+    """
     guess = {name: 1.3 * float(module.p[k]) for k, name in enumerate(module.p_names)}
-    distances = []
+    assert len(guess) == 8
+    distances, squares = [], []
     for seed in range(12):
         fit = module.fit(measured(module, seed), guess, initial=START, inputs=DRIVE, derivatives="differences")
         assert fit.success
         assert not fit.undetermined
         assert not fit.at_bounds
         assert 0.7 < fit.reduced_chi_squared < 1.3
-        distances += [
-            (fit.values[name] - value) / fit.errors[name] for name, value in zip(module.p_names, module.p, strict=True)
-        ]
-    far = np.abs(distances)
-    assert far.max() < 3.5  # of 96 values; three standard errors are passed by one in 370
+        off = np.array([fit.values[name] - value for name, value in zip(module.p_names, module.p, strict=True)])
+        distances.append(np.abs(off / [fit.errors[name] for name in module.p_names]))
+        squares.append(off @ np.linalg.solve(fit.covariance, off))
+    far = np.array(distances)
+    assert far.max() < 3.0  # of 96 values
+    low, high = chi2.ppf([0.01, 0.99], 8 * 12)
+    assert low < sum(squares) < high
+    assert kstest(squares, chi2(8).cdf).pvalue > 0.01
     assert 0.5 < (far < 1.0).mean() < 0.82
     assert (far < 2.0).mean() > 0.88
     assert fit.sigma == pytest.approx({"a": 0.002, "b": 0.004, "a_dot": 0.01}, rel=0.3)

@@ -355,3 +355,17 @@ def test_scipys_methods_find_all_events_of_one_instant(law: str, method: str) ->
     after = 0.8 - fall
     np.testing.assert_allclose(run.x[:3, -1], 0.5 * G * fall * after - 0.5 * G * after**2, atol=1e-7)
     assert [len(times) for times in run.t_events] == [1, 1, 1]
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("speed", [-0.1, 0.0, 0.1])
+def test_an_input_that_jumps_over_an_event_against_the_motion_is_no_zeno(target: str, speed: float) -> None:
+    """A push of 0.25 m/s when the lever goes from 0 to 1, whichever way the motion changes the value; closed form."""
+    m = eg.Model("switched")
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    m.torque("nothing", "J", 0 * m.input("lever"))
+    m.initial(s=0.0, s_dot=speed)
+    m.event("on", "lever - 0.5 + s", direction=1, reset={"s_dot": "s_dot + 0.25"})
+    lever = eg.Signal([0.0, 0.5], [0.0, 1.0], "zero-order")
+    run = m.compile(target=target).simulate(2.0, inputs={"lever": lever}, t_eval=[0.5, 1.0, 2.0], **TIGHT)
+    np.testing.assert_allclose(run["s"], np.array([0.0, 0.125, 0.375]) + speed * run.t, atol=1e-9)

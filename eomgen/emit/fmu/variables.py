@@ -91,7 +91,8 @@ def find_exact(program: Program) -> list[bool]:
     if sizes.n_h:
         of_q = [False] * sizes.n_q
         for k in independent:
-            of_q[coordinate_of(program, k)] = True
+            if (place := coordinate_of(program, k)) >= 0:  # no coordinate has the rate of a turning frame
+                of_q[place] = True
     return [*of_q, *of_v]
 
 

@@ -82,7 +82,9 @@ int eomgen_depart(eomgen_run *run, eomgen_events *ev)
     int stuck = 0;
     for (int i = 0; i < ev->n; i++) {
         const double came = run->direction * ev->slope[i] * (ev->leaving[i] == 0 ? ev->fired[i] : 0);
-        stuck = stuck || (abs(ev->fired[i]) == 1 && came < 0.0); /* it goes the other way: less than the accuracy is left */
+        const int at_zero = fabs(ev->g[i]) <= RUNS_TOUCHING * ev->size[i]; /* not beyond a jump of an input */
+        /* it goes the other way: less than the accuracy is left */
+        stuck = stuck || (at_zero && abs(ev->fired[i]) == 1 && came < 0.0);
         ev->trial[i] = fmax(fabs(ev->slope[i]), fabs(ev->slope_new[i])); /* about how fast it came */
     }
     run->step = 0.0;
