@@ -15,6 +15,9 @@ from ..program import Program
 from ..records import dataclass
 
 
+Slot = int | str  #: a place in an array, or the text of one
+
+
 @dataclass(frozen=True)
 class PrintedFunction:
     """A run of statements, printed as one function.
@@ -23,9 +26,9 @@ class PrintedFunction:
     ----------
     statements : tuple of int
         Node ids in order.
-    loads, stores : mapping of int to int
+    loads, stores : mapping of int to Slot
         Node id -> slot of the work array.
-    results : mapping of int to tuple of int
+    results : mapping of int to tuple of Slot
         Node id -> places in the result.
     checks : frozenset of int
         Ids that must not be <= 0.
@@ -34,9 +37,9 @@ class PrintedFunction:
     """
 
     statements: tuple[int, ...]
-    loads: Mapping[int, int]
-    stores: Mapping[int, int]
-    results: Mapping[int, tuple[int, ...]]
+    loads: Mapping[int, Slot]
+    stores: Mapping[int, Slot]
+    results: Mapping[int, tuple[Slot, ...]]
     checks: frozenset[int]
     inlined: frozenset[int]
 
@@ -89,7 +92,7 @@ def cut(
                 stores={i: slots[i] for i in c.exports},
                 results={i: tuple(places[i]) for i in c.statements if i in places},
                 checks=frozenset(check_ids.intersection(c.statements)),
-                inlined=_conditions(graph, c.statements, {*c.exports, *places}, check_ids),
+                inlined=conditions(graph, c.statements, {*c.exports, *places}, check_ids),
             )
         )
         free.extend(sorted((slots[i] for i in c.imports if last_use[i] == k), reverse=True))
@@ -123,7 +126,7 @@ def _pair(graph: Graph, sequence: list[int]) -> list[int]:
     return result
 
 
-def _conditions(graph: Graph, statements: Iterable[int], kept: set[int], checks: set[int]) -> frozenset[int]:
+def conditions(graph: Graph, statements: Iterable[int], kept: set[int], checks: set[int]) -> frozenset[int]:
     """Conditions of this piece that are used as conditions only."""
     nodes, conditions = graph.nodes, operations_with(lambda row: row.kind == CONDITION)
     found = set()

@@ -29,6 +29,8 @@ class Graph(Nodes):
     nodes : list of tuple
         ``nodes[i]`` is the node with id ``i``; operands always have smaller ids than the node that uses them, so id
         order is a topological order.
+    marks : list of int
+        Ids, ascending, with which another part of a recursion begins: code of big models is made of alike parts.
     functions, calls : dict
         Functions that expressions may call, by name; what each operation that is a call means: (Function, orders).
     """
@@ -44,7 +46,7 @@ class Graph(Nodes):
     def __deepcopy__(self, memo: dict[int, object]) -> Graph:
         """A graph of the same nodes by the same ids, which grows by itself; functions never change and are shared."""
         twin = memo[id(self)] = Graph.__new__(Graph)
-        twin.nodes, twin._ids = list(self.nodes), dict(self._ids)
+        twin.nodes, twin._ids, twin.marks = list(self.nodes), dict(self._ids), list(self.marks)
         twin.calls, twin.functions = dict(self.calls), dict(self.functions)
         twin.zero, twin.one = Expr(twin, self.zero.id), Expr(twin, self.one.id)
         return twin

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from ..operations import OPERATIONS, operations_with
 from .core import Expr, Graph
 from .slopes import half_power_slope, partials
-from .traverse import LEAVES, common_graph, reachable
+from .traverse import LEAVES, common_graph, parts, reachable
 
 
 def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict[int, int]) -> None:
@@ -211,7 +211,9 @@ def jvp(outputs: Sequence[Expr], seeds: Mapping[Expr, Expr]) -> list[Expr]:
     _column_bits(list(seeds))
     order = reachable(g, (y.id for y in outputs))
     tangents = {x.id: dx.id for x, dx in seeds.items() if not dx.is_zero}
-    _push(g, order, tangents, {})
+    slopes: dict[int, int] = {}
+    for part in g.marked(parts(g, order)):
+        _push(g, part, tangents, slopes)
     return [Expr(g, tangents.get(y.id, g.zero.id)) for y in outputs]
 
 

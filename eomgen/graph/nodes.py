@@ -6,8 +6,8 @@ The rules are those of arithmetic on constants, signs, zeros and ones; they are 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..limits.rounding import NORMAL, TINY
 from ..operations import OPERATIONS
@@ -17,16 +17,18 @@ if TYPE_CHECKING:
     from ..operations import Operation
     from .functions import Function
 
+Part = TypeVar("Part")
 Node = tuple[Any, ...]  # (operation, *operand ids), ("const", value) or ("sym", name)
 
 
 class Nodes:
     """A table of interned nodes by id; see :class:`~.core.Graph`, which adds handles and functions."""
 
-    __slots__ = ("_ids", "calls", "nodes")
+    __slots__ = ("_ids", "calls", "marks", "nodes")
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
+        self.marks: list[int] = []
         self._ids: dict[Node, int] = {}
         self.calls: dict[str, tuple[Function, tuple[int, ...]]] = {}
 
@@ -41,6 +43,18 @@ class Nodes:
             found = self._ids[key] = len(self.nodes)
             self.nodes.append(key)
         return found
+
+    def mark(self) -> None:
+        """Note that what is made from here on belongs to another part of a recursion than what was made before."""
+        if not self.marks or self.marks[-1] != len(self.nodes):
+            self.marks.append(len(self.nodes))
+
+    def marked(self, parts: Iterable[Part]) -> Iterator[Part]:
+        """The parts of a recursion in turn, with a mark before what is made of each and behind the last."""
+        for part in parts:
+            self.mark()
+            yield part
+        self.mark()
 
     def make(self, operation: str, *ids: int) -> int:
         """The id of ``operation`` on operand ids, simplified.  The rules are exact up to rounding order."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Container, Iterable, Sequence
+from itertools import pairwise
 
 from .core import Expr, Graph
 from .nodes import Node
@@ -43,6 +45,18 @@ def reachable(graph: Graph, roots: Iterable[int], stop: Container[int] = ()) -> 
                     seen.add(k)
                     stack.append(k)
     return sorted(seen)
+
+
+def parts(graph: Graph, ids: Sequence[int]) -> list[Sequence[int]]:
+    """Ids in ascending order, cut where the graph has marks; without empty parts."""
+    cuts = [0]
+    for mark in graph.marks[bisect_left(graph.marks, ids[0] if ids else 0) :]:
+        at = bisect_left(ids, mark, cuts[-1])
+        if at > cuts[-1]:
+            cuts.append(at)
+    if cuts[-1] < len(ids):
+        cuts.append(len(ids))
+    return [ids[start:end] for start, end in pairwise(cuts)]
 
 
 def common_graph(*groups: Sequence[Expr]) -> Graph | None:

@@ -83,7 +83,7 @@ def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Exp
     frames = {GROUND: ground}
     links: list[Link] = []
     first = 0
-    for branch in topology.branches:
+    for branch in graph.marked(topology.branches):
         spec = mechanism.joints[branch.joint]
         q = [symbols[name] for name in spec.coordinates]
         rotation, position = spec.joint.pose(graph, q)
@@ -133,7 +133,7 @@ def link_twists(graph: Graph, links: tuple[Link, ...], v: tuple[Expr, ...]) -> l
     """Twists of all links: omega_i = R^T omega_p + sum s v (Featherstone, RBDA, eq. 4.9)."""
     twists: list[Twist] = []
     still = (vec.zero(graph), vec.zero(graph))
-    for link in links:
+    for link in graph.marked(links):
         twist = link.down_twist(twists[link.parent] if link.parent != GROUND else still)
         for k, (angular, linear) in enumerate(link.columns):
             rate = v[link.first + k]
@@ -178,6 +178,7 @@ class Poses:
         return self._known[key]
 
     def _step(self, k: int, base: int, within: Frame | None) -> Frame:
+        self.graph.mark()
         link = self.links[k]
         if link.parent != base:
             parent = self.link(link.parent, base, within)

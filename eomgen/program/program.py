@@ -30,6 +30,7 @@ class Limits:
     #: second derivatives of more operations are generated only where they are named
     second_order: int = 40_000
     statements: int = 1500  #: statements in one generated function at most
+    rolled: int = 20_000  #: functions of more statements go through alike bodies in loops
 
 
 @dataclass(frozen=True)
