@@ -8,8 +8,9 @@ which the graph was made, so that a segment only reads what stands before it.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from itertools import groupby
+from itertools import chain, groupby
 
 import numpy as np
 
@@ -113,26 +114,51 @@ def find_segments(
     early = {i for i in statements if nodes[i][0] in CIRCULAR and nodes[i][1] in slot and i not in kept}
     known.update((i, ("w", slot[nodes[i][1]] + (len(angles) if nodes[i][0] == "cos" else 0))) for i in early)
     left = [i for i in statements if i not in early]
-    segments = [tuple(part[k : k + longest]) for part in parts(graph, left) for k in range(0, len(part), longest)]
     results = {i: tuple(at) for i, at in places.items()}
     reader = _Reader(graph, known, results, checked)
+    groups = _grouped(graph, [(number, tuple(part)) for number, part in parts(graph, left)])
+    common = _common(reader, [tuple(chain.from_iterable(group)) for group in groups])
+    segments: list[tuple[int, ...]] = []
+    for group, alike in zip(groups, common, strict=True):
+        segments += [tuple(chain.from_iterable(group))] if alike else group
+    segments = _merged(segments, _common(reader, segments), longest)
     read = [reader.read(segment) for segment in segments]
-    counts: dict[Signature, int] = {}
-    for signature, _ in read:
-        counts[signature] = counts.get(signature, 0) + 1
-    rare = [counts[signature] < FEW for signature, _ in read]
-    if any(rare):
-        merged = _merged(segments, rare, longest)
-        read = [reader.read(segment) for segment in merged]
-        segments = merged
     return _laid_out(segments, read, tuple(angles), known, results, checked)
 
 
-def _merged(segments: Sequence[tuple[int, ...]], rare: Sequence[bool], longest: int) -> list[tuple[int, ...]]:
-    """Rare segments that follow each other, in one as long as may be."""
+def _grouped(graph: Graph, every: Sequence[tuple[int, tuple[int, ...]]]) -> list[list[tuple[int, ...]]]:
+    """Segments of several passes over one body together, as far as what they read allows.
+
+    A segment goes to the last group that it reads from, unless that holds one of the same pass.
+    """
+    nodes = graph.nodes
+    groups: list[list[tuple[int, ...]]] = []
+    passes: list[set[int]] = []
+    home: dict[int, int] = {}
+    for number, segment in every:
+        last = max((home.get(j, -1) for i in segment for j in nodes[i][1:]), default=-1)
+        if last < 0 or not number or number in passes[last]:
+            last = len(groups)
+            groups.append([])
+            passes.append(set())
+        groups[last].append(segment)
+        passes[last].add(number)
+        home.update(dict.fromkeys(segment, last))
+    return groups
+
+
+def _common(reader: _Reader, segments: Sequence[tuple[int, ...]]) -> list[bool]:
+    """Whether a segment is one of several of its kind."""
+    signatures = [reader.read(segment)[0] for segment in segments]
+    counts = Counter(signatures)
+    return [counts[signature] >= FEW for signature in signatures]
+
+
+def _merged(segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int) -> list[tuple[int, ...]]:
+    """Segments; rare ones that follow each other are one, as long as may be."""
     result: list[tuple[int, ...]] = []
-    for alone, run in groupby(zip(segments, rare, strict=True), key=lambda pair: pair[1]):
-        if not alone:
+    for alike, run in groupby(zip(segments, common, strict=True), key=lambda pair: pair[1]):
+        if alike:
             result += [segment for segment, _ in run]
             continue
         joined = [i for segment, _ in run for i in segment]

@@ -212,8 +212,13 @@ def jvp(outputs: Sequence[Expr], seeds: Mapping[Expr, Expr]) -> list[Expr]:
     order = reachable(g, (y.id for y in outputs))
     tangents = {x.id: dx.id for x, dx in seeds.items() if not dx.is_zero}
     slopes: dict[int, int] = {}
-    for part in g.marked(parts(g, order)):
+    passes: dict[int, int] = {0: 0}
+    for number, part in parts(g, order):
+        if number not in passes:
+            passes[number] = g.begin_pass()
+        g.mark(passes[number])
         _push(g, part, tangents, slopes)
+    g.mark()
     return [Expr(g, tangents.get(y.id, g.zero.id)) for y in outputs]
 
 

@@ -24,11 +24,12 @@ Node = tuple[Any, ...]  # (operation, *operand ids), ("const", value) or ("sym",
 class Nodes:
     """A table of interned nodes by id; see :class:`~.core.Graph`, which adds handles and functions."""
 
-    __slots__ = ("_ids", "calls", "marks", "nodes")
+    __slots__ = ("_ids", "calls", "marks", "n_passes", "nodes")
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
-        self.marks: list[int] = []
+        self.marks: list[tuple[int, int]] = []
+        self.n_passes = 0
         self._ids: dict[Node, int] = {}
         self.calls: dict[str, tuple[Function, tuple[int, ...]]] = {}
 
@@ -44,15 +45,23 @@ class Nodes:
             self.nodes.append(key)
         return found
 
-    def mark(self) -> None:
-        """Note that what is made from here on belongs to another part of a recursion than what was made before."""
-        if not self.marks or self.marks[-1] != len(self.nodes):
-            self.marks.append(len(self.nodes))
+    def begin_pass(self) -> int:
+        """The number of another pass over the bodies of a model."""
+        self.n_passes += 1
+        return self.n_passes
+
+    def mark(self, number: int = 0) -> None:
+        """Note that what is made from here on belongs to another body, in the pass of this number; 0 is none."""
+        at = len(self.nodes)
+        if self.marks and self.marks[-1][0] == at:
+            self.marks.pop()
+        self.marks.append((at, number))
 
     def marked(self, parts: Iterable[Part]) -> Iterator[Part]:
-        """The parts of a recursion in turn, with a mark before what is made of each and behind the last."""
+        """What a pass goes through, with a mark before what is made of each and behind the last."""
+        number = self.begin_pass()
         for part in parts:
-            self.mark()
+            self.mark(number)
             yield part
         self.mark()
 

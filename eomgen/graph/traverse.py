@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Container, Iterable, Sequence
-from itertools import pairwise
 
 from .core import Expr, Graph
 from .nodes import Node
@@ -47,16 +46,16 @@ def reachable(graph: Graph, roots: Iterable[int], stop: Container[int] = ()) -> 
     return sorted(seen)
 
 
-def parts(graph: Graph, ids: Sequence[int]) -> list[Sequence[int]]:
-    """Ids in ascending order, cut where the graph has marks; without empty parts."""
-    cuts = [0]
-    for mark in graph.marks[bisect_left(graph.marks, ids[0] if ids else 0) :]:
-        at = bisect_left(ids, mark, cuts[-1])
-        if at > cuts[-1]:
-            cuts.append(at)
-    if cuts[-1] < len(ids):
-        cuts.append(len(ids))
-    return [ids[start:end] for start, end in pairwise(cuts)]
+def parts(graph: Graph, ids: Sequence[int]) -> list[tuple[int, Sequence[int]]]:
+    """Ids in ascending order, cut where the graph has marks, each with the number of its pass; none is empty."""
+    found: list[tuple[int, Sequence[int]]] = []
+    start = number = 0
+    for mark, following in [*graph.marks, (len(graph.nodes), 0)]:
+        end = bisect_left(ids, mark, start)
+        if end > start:
+            found.append((number, ids[start:end]))
+        start, number = end, following
+    return found
 
 
 def common_graph(*groups: Sequence[Expr]) -> Graph | None:

@@ -149,6 +149,7 @@ class Poses:
         self.graph = mechanism.graph
         self.links = links
         self.link_of = {link.body: k for k, link in enumerate(links)} | {GROUND: GROUND}
+        self._pass = self.graph.begin_pass()
         self._known: dict[tuple[int, int, tuple[Mat3, Vec3] | None], Frame] = {}
 
     def marker_in_link(self, marker: Marker) -> Frame:
@@ -178,7 +179,7 @@ class Poses:
         return self._known[key]
 
     def _step(self, k: int, base: int, within: Frame | None) -> Frame:
-        self.graph.mark()
+        self.graph.mark(self._pass)
         link = self.links[k]
         if link.parent != base:
             parent = self.link(link.parent, base, within)
