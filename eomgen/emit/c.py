@@ -16,7 +16,7 @@ from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_files, lane_kernels
 from .c_layout import driver_files, work_areas
 from .c_parts import distribute, part_names
-from .c_rolled import print_rolled
+from .c_rolled import print_rolled, print_rolled_precompute
 from .c_series import series_files
 from .c_text import Printed, print_block, print_precompute, used_helpers
 from .layouts import describe_layouts
@@ -103,13 +103,18 @@ def _costs(program: Program, sources: Mapping[str, str]) -> dict[str, tuple[str,
 
 def _print(program: Program) -> list[Printed]:
     """Every straight-line function, the precompute first."""
-    precompute = print_precompute(program) if program.hoisted else Printed("", (), 0)
-    return [precompute, *(_print_function(program, b) for b in program.blocks if b.name not in program.twins)]
+    blocks = [_print_function(program, b) for b in program.blocks if b.name not in program.twins]
+    return [_print_precompute(program) if program.hoisted else Printed("", (), 0), *blocks]
+
+
+def _print_precompute(program: Program) -> Printed:
+    rolled = print_rolled_precompute(program) if program.is_rolled("precompute") else None
+    return rolled or print_precompute(program)
 
 
 def _print_function(program: Program, block: Block) -> Printed:
-    rolled = program.counts[block.name].total > program.limits.rolled
-    return print_rolled(program, block) if rolled else print_block(program, block)
+    rolled = print_rolled(program, block) if program.is_rolled(block.name) else None
+    return rolled or print_block(program, block)
 
 
 def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:

@@ -6,34 +6,84 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..graph.core import Expr
 from ..program import Block, Program
 from .c_text import ARGUMENTS, SIGNATURE, Printed, Printer, direct_results, function_text
-from .rolled import Kind, Place, Segments, Table, find_segments
+from .rolled import Kind, Place, Segments, find_segments
 from .straight import Pieces, PrintedFunction, conditions, references
 
 CALLED = 24  #: runs in one function; more go through a table of runs
 ROW = 12  #: numbers in a line of a table
+#: A function is made of loops where that takes the text of so many times fewer statements.
+ALIKE = 2
 
 
-def print_rolled(program: Program, block: Block) -> Printed:
-    """The C functions of a block whose alike segments are loops."""
+def print_rolled(program: Program, block: Block) -> Printed | None:
+    """The C functions of a block whose alike segments are loops; None if too few of its segments are alike."""
     texts = references(program, block.inputs)
+    return _print(program, f"{block.name}_block", block.outputs, block.checks, program.parameter_only, texts)
+
+
+def print_rolled_precompute(program: Program) -> Printed | None:
+    """The same of ``precompute_block``."""
+    texts = {program.graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)}
+    return _print(program, "precompute_block", program.hoisted, (), frozenset(), texts)
+
+
+def _print(
+    program: Program,
+    name: str,
+    outputs: Sequence[Expr],
+    checks: Sequence[Expr],
+    skipped: frozenset[int],
+    texts: dict[int, str],
+) -> Printed | None:
     given = {i: _place(text) for i, text in texts.items()}
-    limit = max(1, program.limits.statements // 2)
-    found = find_segments(program.graph, block.outputs, block.checks, program.parameter_only, given, limit)
-    name = f"{block.name}_block"
+    longest = max(1, program.limits.statements // 2)
+    found = find_segments(program.graph, outputs, checks, skipped, given, longest)
+    if ALIKE * found.written > found.carried_out:
+        return None
     printed = [_print_kind(program, found, k, f"{name}_{n}") for n, k in enumerate(found.kinds)]
     made = {i for k in found.kinds for segment in k.members for i in segment}
-    direct = tuple((k, y.id) for k, y in enumerate(block.outputs) if y.id not in made)
-    bare = tuple(sorted({y.id for y in block.checks} - made))
+    direct = tuple((k, y.id) for k, y in enumerate(outputs) if y.id not in made)
+    bare = tuple(sorted({y.id for y in checks} - made))
     printer = Printer(program, texts)
     main = direct_results(printer, Pieces((), direct, bare, 0))
     main += [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in bare]
     angles, first = _print_angles(found, name)
     runs, calls = _print_runs(found.runs, name, len(found.kinds))
     text = function_text(f"static flag {name}", set(ARGUMENTS), [*main, *first, *calls])
-    text = "\n".join([*printed, angles + runs + text])
-    return Printed(text, (), found.work)
+    return Printed("\n".join([*printed, angles + runs + text]), (), found.work)
+
+
+class Table:
+    """What differs between the members of a kind: rows of whole numbers, each column up to a constant.
+
+    Columns that differ by a constant share one; columns that grow evenly need none.
+    """
+
+    def __init__(self, name: str, members: int) -> None:
+        self.name, self.steps = name, np.arange(members)
+        self.columns: dict[bytes, int] = {}
+        self.rows: list[np.ndarray] = []
+
+    def text(self, column: Sequence[float]) -> str:
+        """The text of what stands in a column at row ``m``."""
+        values = np.asarray(column, dtype=np.int64)
+        start = int(values[0])
+        apart = values - start
+        if not apart.any():
+            return str(start)
+        step = int(apart[1])
+        if (apart == step * self.steps).all():
+            return f"{start} + {step}*m" if step >= 0 else f"{start} - {-step}*m"
+        key = apart.tobytes()
+        if key not in self.columns:
+            self.columns[key] = len(self.rows)
+            self.rows.append(values)
+        at = self.columns[key]
+        offset = start - int(self.rows[at][0])
+        return f"{self.name}[{at}]" + (f" + {offset}" if offset > 0 else f" - {-offset}" if offset else "")
 
 
 def _place(text: str) -> Place:
@@ -46,7 +96,7 @@ def _print_kind(program: Program, found: Segments, kind: Kind, name: str) -> str
     table = Table("i", n)
     numbers: dict[tuple[float, ...], int] = {}
     fixed, loads = {}, {}
-    used = {"w"}
+    used: set[str] = set()
     for column in zip(*kind.reads, strict=True):
         i = column[0]
         where = [found.places[j] for j in column]
@@ -132,9 +182,7 @@ def _print_runs(runs: Sequence[tuple[int, int]], name: str, kinds: int) -> tuple
         return "", lines
     flat = [number for run in runs for number in run]
     table = f"EOMGEN_SHARED const int {name}_runs[{len(flat)}] = {{\n{_lines(flat)}\n}};\n"
-    cases = [
-        f"    case {k}: EOMGEN_REJECT({name}_{k}(t, x, u, c, out, w, first, last)) break;" for k in range(kinds)
-    ]
+    cases = [f"    case {k}: EOMGEN_REJECT({name}_{k}(t, x, u, c, out, w, first, last)) break;" for k in range(kinds)]
     return table, [
         f"int done[{kinds}] = {{ 0 }};",
         f"for (int r = 0; r < {len(flat)}; r += 2) {{",

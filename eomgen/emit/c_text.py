@@ -145,6 +145,7 @@ class Printer:
 
 
 def function_text(head: str, used: set[str], lines: Sequence[str]) -> str:
+    """A C function of the arguments of all blocks."""
     unused = [f"(void){a};" for a in ARGUMENTS if a not in used]
     text = "\n".join(f"    {line}" for line in ([" ".join(unused)] if unused else []) + list(lines))
     return f"{head}({SIGNATURE})\n{{\n    EOMGEN_BEGIN\n{text}\n    EOMGEN_RETURN\n}}\n"

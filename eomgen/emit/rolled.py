@@ -1,9 +1,9 @@
 """Stage emit: a straight-line block -> alike segments of its statements, each kind to be written once, as a loop.
 
-A recursion over a big tree repeats itself: what is made for one body is, but for where it reads and writes, what is made
-for another.  The graph marks where the part of another body begins.  Statements between two marks are a segment;
-segments whose statements are the same function of what they read are of one kind.  The order of evaluation is that in
-which the graph was made, so that a segment only reads what stands before it.
+A recursion over a big tree does the same for many bodies, but for where it reads and writes.  The graph marks where the
+part of another body begins.  Statements between two marks are a segment; segments whose statements are the same
+function of what they read are of one kind.  Statements stay in the order in which the graph was made, but that the
+segments of one body in several passes come together where what they read allows.
 """
 
 from __future__ import annotations
@@ -12,15 +12,12 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from itertools import chain, groupby
 
-import numpy as np
-
 from ..graph.core import Expr, Graph
 from ..graph.traverse import LEAVES, parts, reachable
 from ..records import dataclass
 from .angles import CIRCULAR
 
 FEW = 3  #: segments of fewer members are not worth a loop
-ARRAY = np.ndarray
 
 #: ("x", 3): a place in an array; ("const", 2.0); ("t", 0).
 Place = tuple[str, float]
@@ -77,6 +74,16 @@ class Segments:
     checks: frozenset[int]
     work: int
 
+    @property
+    def written(self) -> int:
+        """Statements that are written."""
+        return sum(len(kind.members[0]) for kind in self.kinds)
+
+    @property
+    def carried_out(self) -> int:
+        """Statements that are carried out."""
+        return sum(len(kind.members) * len(kind.members[0]) for kind in self.kinds)
+
 
 def find_segments(
     graph: Graph,
@@ -105,14 +112,14 @@ def find_segments(
     every = reachable(graph, [*places, *checked], stop=skipped)
     statements = [i for i in every if nodes[i][0] not in LEAVES and i not in skipped]
     kept = {*places, *checked}
-    angles = sorted({
-        nodes[i][1] for i in statements if nodes[i][0] in CIRCULAR and given.get(nodes[i][1], "t")[0] == "x" and i not in kept
-    })  # fmt: skip
+    turning = [i for i in statements if nodes[i][0] in CIRCULAR and i not in kept]
+    turning = [i for i in turning if given.get(nodes[i][1], ("", 0))[0] == "x"]
+    angles = sorted({nodes[i][1] for i in turning})
     known: dict[int, Place] = dict(given)
     known.update((i, ("const", nodes[i][1])) for i in every if nodes[i][0] == "const")
     slot = {a: k for k, a in enumerate(angles)}
-    early = {i for i in statements if nodes[i][0] in CIRCULAR and nodes[i][1] in slot and i not in kept}
-    known.update((i, ("w", slot[nodes[i][1]] + (len(angles) if nodes[i][0] == "cos" else 0))) for i in early)
+    known.update((i, ("w", slot[nodes[i][1]] + (len(angles) if nodes[i][0] == "cos" else 0))) for i in turning)
+    early = set(turning)
     left = [i for i in statements if i not in early]
     results = {i: tuple(at) for i, at in places.items()}
     reader = _Reader(graph, known, results, checked)
@@ -239,33 +246,3 @@ def _laid_out(
         work += len(of) * len(exports)
     runs = tuple((k, len(list(run))) for k, run in groupby(kind_of))
     return Segments(tuple(kinds), runs, angles, known, results, checked, work)
-
-
-class Table:
-    """What differs between the members of a kind: rows of whole numbers, each column up to a constant.
-
-    Columns that differ by a constant share one; columns that grow evenly need none.
-    """
-
-    def __init__(self, name: str, members: int) -> None:
-        self.name, self.steps = name, np.arange(members)
-        self.columns: dict[bytes, int] = {}
-        self.rows: list[ARRAY] = []
-
-    def text(self, column: Sequence[float]) -> str:
-        """The text of what stands in a column at row ``m``."""
-        values = np.asarray(column, dtype=np.int64)
-        start = int(values[0])
-        apart = values - start
-        if not apart.any():
-            return str(start)
-        step = int(apart[1])
-        if (apart == step * self.steps).all():
-            return f"{start} + {step}*m" if step >= 0 else f"{start} - {-step}*m"
-        key = apart.tobytes()
-        if key not in self.columns:
-            self.columns[key] = len(self.rows)
-            self.rows.append(values)
-        at = self.columns[key]
-        offset = start - int(self.rows[at][0])
-        return f"{self.name}[{at}]" + (f" + {offset}" if offset > 0 else f" - {-offset}" if offset else "")

@@ -5,7 +5,7 @@ Language-independent; :mod:`.c_text` and :mod:`.numpy_text` print the pieces.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 
 from ..graph.core import Expr, Graph
 from ..graph.schedule import chunk, order
@@ -13,7 +13,6 @@ from ..graph.traverse import LEAVES
 from ..operations import CONDITION, operations_with
 from ..program import Program
 from ..records import dataclass
-
 
 Slot = int | str  #: a place in an array, or the text of one
 
@@ -126,13 +125,13 @@ def _pair(graph: Graph, sequence: list[int]) -> list[int]:
     return result
 
 
-def conditions(graph: Graph, statements: Iterable[int], kept: set[int], checks: set[int]) -> frozenset[int]:
+def conditions(graph: Graph, statements: Iterable[int], kept: Container[int], checks: Container[int]) -> frozenset[int]:
     """Conditions of this piece that are used as conditions only."""
-    nodes, conditions = graph.nodes, operations_with(lambda row: row.kind == CONDITION)
+    nodes, relations = graph.nodes, operations_with(lambda row: row.kind == CONDITION)
     found = set()
     for i in statements:
         node = nodes[i]
-        if node[0] in conditions and i not in kept and (i not in checks or node[0] == "lt"):
+        if node[0] in relations and i not in kept and (i not in checks or node[0] == "lt"):
             found.add(i)
         found.difference_update(node[2:] if node[0] == "select" else node[1:])
     return frozenset(found)

@@ -172,10 +172,11 @@ class Poses:
             return own if within is None else place(within, own)
         key = (link, base, None if within is None else (within.rotation, within.position))
         if key not in self._known:
-            chain = self.ancestors(link)
-            for k in reversed(chain[: chain.index(base)]):  # from base outwards, so that no chain recurses deeply
-                if (k, *key[1:]) not in self._known:
-                    self._known[k, base, key[2]] = self._step(k, base, within)
+            missing = [link]
+            while (above := self.links[missing[-1]].parent) != base and (above, *key[1:]) not in self._known:
+                missing.append(above)
+            for k in reversed(missing):  # from base outwards, so that no chain recurses deeply
+                self._known[k, base, key[2]] = self._step(k, base, within)
         return self._known[key]
 
     def _step(self, k: int, base: int, within: Frame | None) -> Frame:

@@ -30,7 +30,9 @@ class Limits:
     #: second derivatives of more operations are generated only where they are named
     second_order: int = 40_000
     statements: int = 1500  #: statements in one generated function at most
-    rolled: int = 20_000  #: functions of more statements go through alike bodies in loops
+    #: Functions of more operations go through alike bodies in loops.  Open spatial chains take as long either way from
+    #: 7,000 to 25,000 operations, which then leave the first level of caches; twice as long without loops at 200,000.
+    rolled: int = 12_000
 
 
 @dataclass(frozen=True)
@@ -153,6 +155,10 @@ class Program:
     def block_names(self) -> frozenset[str]:
         """Names of all blocks."""
         return frozenset(b.name for b in self.blocks)
+
+    def is_rolled(self, name: str) -> bool:
+        """Whether a block, or ``precompute``, is so long that what is alike in it is written once."""
+        return self.counts[name].total > self.limits.rolled
 
     @property
     def twins(self) -> dict[str, str]:
