@@ -8,8 +8,8 @@ import numpy as np
 
 from ..graph.core import Expr
 from ..program import Block, Program
-from .c_text import ARGUMENTS, SIGNATURE, Printed, Printer, direct_results, function_text
-from .rolled import Kind, Place, Segments, find_segments
+from .c_text import ARGUMENTS, SIGNATURE, BlockPrinter, Printed, direct_results, function_text
+from .rolled import Place, SegmentKind, Segments, find_segments
 from .straight import Pieces, PrintedFunction, conditions, references
 
 CALLED = 24  #: runs in one function; more go through a table of runs
@@ -47,7 +47,7 @@ def _print(
     made = {i for k in found.kinds for segment in k.members for i in segment}
     direct = tuple((k, y.id) for k, y in enumerate(outputs) if y.id not in made)
     bare = tuple(sorted({y.id for y in checks} - made))
-    printer = Printer(program, texts)
+    printer = BlockPrinter(program, texts)
     main = direct_results(printer, Pieces((), direct, bare, 0))
     main += [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in bare]
     angles, first = _print_angles(found, name)
@@ -56,7 +56,7 @@ def _print(
     return Printed("\n".join([*printed, angles + runs + text]), (), found.work)
 
 
-class Table:
+class PlaceTable:
     """What differs between the members of a kind: rows of whole numbers, each column up to a constant.
 
     Columns that differ by a constant share one; columns that grow evenly need none.
@@ -90,10 +90,10 @@ def _place(text: str) -> Place:
     return (text, 0) if text == "t" else (text[0], int(text[2:-1]))
 
 
-def _print_kind(program: Program, found: Segments, kind: Kind, name: str) -> str:
+def _print_kind(program: Program, found: Segments, kind: SegmentKind, name: str) -> str:
     """A function that evaluates members ``first`` to ``last`` of a kind."""
     n = len(kind.members)
-    table = Table("i", n)
+    table = PlaceTable("i", n)
     numbers: dict[tuple[float, ...], int] = {}
     fixed, loads = {}, {}
     used: set[str] = set()
@@ -124,7 +124,7 @@ def _print_kind(program: Program, found: Segments, kind: Kind, name: str) -> str
     kept = {*stores, *results}
     checks = found.checks.intersection(statements)
     inlined = conditions(program.graph, statements, kept, checks)
-    printer = Printer(program, fixed)
+    printer = BlockPrinter(program, fixed)
     lines = printer.lines(PrintedFunction(statements, loads, stores, results, checks, inlined))
     head = [f"const int *restrict const i = {name}_places[m];"] if table.rows else []
     head += [f"const double *restrict const k = {name}_numbers[m];"] if numbers else []

@@ -33,7 +33,7 @@ def literal(value: float) -> str:
     return f"({text})" if text.startswith("-") else text
 
 
-class Printer:
+class BlockPrinter:
     """Prints the statements of one block; variables are numbered through all its pieces."""
 
     def __init__(self, program: Program, references: dict[int, str]) -> None:
@@ -167,7 +167,7 @@ def print_block(program: Program, block: Block) -> Printed:
 
 def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, str]) -> Printed:
     """Print cut statements as one function, or as several and one that calls them."""
-    printer = Printer(program, texts)
+    printer = BlockPrinter(program, texts)
     main = direct_results(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
     used = {*printer.used, *(["out"] if pieces.direct else [])}
     functions: list[tuple[str, str]] = []
@@ -185,7 +185,7 @@ def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, s
     return Printed(function_text(f"static flag {name}", used, main), tuple(functions), pieces.work)
 
 
-def direct_results(printer: Printer, pieces: Pieces) -> list[str]:
+def direct_results(printer: BlockPrinter, pieces: Pieces) -> list[str]:
     """Results that need no statement; a long run of zeros becomes a loop that later results overwrite."""
     texts = [(k, printer.real(i)) for k, i in pieces.direct]
     zeros = [k for k, text in texts if text == "same(0.0)"]

@@ -26,7 +26,7 @@ Signature = tuple[object, ...]
 
 
 @dataclass(frozen=True)
-class Kind:
+class SegmentKind:
     """Segments that are the same function of what they read.
 
     Attributes
@@ -53,7 +53,7 @@ class Segments:
 
     Attributes
     ----------
-    kinds : tuple of Kind
+    kinds : tuple of SegmentKind
     runs : tuple of (int, int)
         Number of a kind, and how many of its members come next.
     angles : tuple of int
@@ -66,7 +66,7 @@ class Segments:
     work : int
     """
 
-    kinds: tuple[Kind, ...]
+    kinds: tuple[SegmentKind, ...]
     runs: tuple[tuple[int, int], ...]
     angles: tuple[int, ...]
     places: Mapping[int, Place]
@@ -184,9 +184,15 @@ class _Reader:
         checked: Collection[int],
     ) -> None:
         self.nodes, self.known, self.results, self.checked = graph.nodes, known, results, checked
+        self.found: dict[tuple[int, ...], tuple[Signature, tuple[int, ...]]] = {}
 
-    def read(self, segment: Sequence[int]) -> tuple[Signature, tuple[int, ...]]:
+    def read(self, segment: tuple[int, ...]) -> tuple[Signature, tuple[int, ...]]:
         """The signature of a segment, and what it reads from outside in order of first use."""
+        if segment not in self.found:
+            self.found[segment] = self._read(segment)
+        return self.found[segment]
+
+    def _read(self, segment: Sequence[int]) -> tuple[Signature, tuple[int, ...]]:
         nodes, known = self.nodes, self.known
         local = {i: k for k, i in enumerate(segment)}
         numbers: dict[int, int] = {}
@@ -242,7 +248,7 @@ def _laid_out(
         for m, s in enumerate(of):
             base = work + m * len(exports)
             known.update((segments[s][index], ("w", base + e)) for e, index in enumerate(exports))
-        kinds.append(Kind(tuple(segments[s] for s in of), tuple(read[s][1] for s in of), exports, work))
+        kinds.append(SegmentKind(tuple(segments[s] for s in of), tuple(read[s][1] for s in of), exports, work))
         work += len(of) * len(exports)
     runs = tuple((k, len(list(run))) for k, run in groupby(kind_of))
     return Segments(tuple(kinds), runs, angles, known, results, checked, work)

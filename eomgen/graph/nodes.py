@@ -24,12 +24,13 @@ Node = tuple[Any, ...]  # (operation, *operand ids), ("const", value) or ("sym",
 class Nodes:
     """A table of interned nodes by id; see :class:`~.core.Graph`, which adds handles and functions."""
 
-    __slots__ = ("_ids", "calls", "marks", "n_passes", "nodes")
+    __slots__ = ("_ids", "calls", "marks", "n_passes", "nodes", "reached")
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
         self.marks: list[tuple[int, int]] = []
         self.n_passes = 0
+        self.reached: dict[frozenset[int], list[int]] = {}
         self._ids: dict[Node, int] = {}
         self.calls: dict[str, tuple[Function, tuple[int, ...]]] = {}
 

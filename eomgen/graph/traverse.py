@@ -9,6 +9,8 @@ from .core import Expr, Graph
 from .nodes import Node
 
 LEAVES = frozenset({"const", "sym"})
+MANY = 100  #: so many roots are those of a big model: what they are made of is asked for again and again
+KEPT = 12  #: answers kept
 
 
 def operands(node: Node) -> tuple[int, ...]:
@@ -24,6 +26,9 @@ def reachable(graph: Graph, roots: Iterable[int], stop: Container[int] = ()) -> 
     """
     nodes = graph.nodes
     seen = set(roots)
+    key = None if stop or len(seen) < MANY else frozenset(seen)
+    if key is not None and key in graph.reached:
+        return list(graph.reached[key])
     stack = list(seen)
     while stack:
         i = stack.pop()
@@ -43,7 +48,12 @@ def reachable(graph: Graph, roots: Iterable[int], stop: Container[int] = ()) -> 
                 if k not in seen:
                     seen.add(k)
                     stack.append(k)
-    return sorted(seen)
+    found = sorted(seen)
+    if key is not None:
+        if len(graph.reached) >= KEPT:
+            graph.reached.pop(next(iter(graph.reached)))
+        graph.reached[key] = list(found)
+    return found
 
 
 def parts(graph: Graph, ids: Sequence[int]) -> list[tuple[int, Sequence[int]]]:
