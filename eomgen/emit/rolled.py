@@ -122,7 +122,7 @@ def find_segments(
     early = set(turning)
     left = [i for i in statements if i not in early]
     results = {i: tuple(at) for i, at in places.items()}
-    reader = _Reader(graph, known, results, checked)
+    reader = SegmentReader(graph, known, results, checked)
     groups = _grouped(graph, [(number, tuple(part)) for number, part in parts(graph, left)])
     common = _common(reader, [tuple(chain.from_iterable(group)) for group in groups])
     segments: list[tuple[int, ...]] = []
@@ -154,7 +154,7 @@ def _grouped(graph: Graph, every: Sequence[tuple[int, tuple[int, ...]]]) -> list
     return groups
 
 
-def _common(reader: _Reader, segments: Sequence[tuple[int, ...]]) -> list[bool]:
+def _common(reader: SegmentReader, segments: Sequence[tuple[int, ...]]) -> list[bool]:
     """Whether a segment is one of several of its kind."""
     signatures = [reader.read(segment)[0] for segment in segments]
     counts = Counter(signatures)
@@ -173,7 +173,7 @@ def _merged(segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest
     return result
 
 
-class _Reader:
+class SegmentReader:
     """Segments -> what they are made of, apart from where they read."""
 
     def __init__(
