@@ -30,9 +30,9 @@ class Limits:
     #: second derivatives of more operations are generated only where they are named
     second_order: int = 40_000
     statements: int = 1500  #: statements in one generated function at most
-    #: Functions of more operations go through alike bodies in loops.  Measured (benchmarks/big_trees.py) on open spatial
-    #: chains, microseconds of loops and of text without: 3.2 and 3.0 at 12,000 operations, 6.1 and 6.5 at 25,000, 23 and
-    #: 32 at 103,000, where text without loops has left the second level of caches and takes 10 times as long to compile.
+    #: Functions of more operations go through alike bodies in loops.  Measured (benchmarks/big_trees.py) on open
+    #: spatial chains, microseconds of loops and of text without: 3.2 and 3.0 at 12,000 operations, 6.1 and 6.5 at
+    #: 25,000, 23 and 32 at 103,000, where text without loops takes 10 times as long to compile.
     rolled: int = 16_000
 
 
