@@ -15,7 +15,19 @@ from .report import Report, show, write
 
 BENCHMARKS = (
     *("derive", "growth", "compile", "panda", "robots", "latency"),
-    *("call", "simulate", "integrate", "stiff", "loops", "large_loops", "four_bars", "robot_loops", "traced", "fit"),
+    *(
+        "call",
+        "simulate",
+        "integrate",
+        "stiff",
+        "loops",
+        "large_loops",
+        "big_trees",
+        "four_bars",
+        "robot_loops",
+        "traced",
+        "fit",
+    ),
     *("operation_counts", "rhs", "robot_kernels", "derivatives", "grid_robots", "lanes", "loop_lanes", "ensembles"),
     *("device", "equilibria"),
 )

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from .runtime.protocols import Core
 
 LINEAR_ALGEBRA = ThreadpoolController()  #: found once: that looks through the libraries of the process
+Derived = TypeVar("Derived", bound=Derivation)
 OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a bare Lagrangian
 
 
@@ -79,7 +80,6 @@ def choose_method(mechanism: Mechanism, method: str) -> str:
     return method
 
 
-@np.errstate(all="ignore")  # results are looked at, and what is not finite is refused by name
 def derive(
     model: Builder,
     method: str = "auto",
@@ -109,6 +109,18 @@ def derive(
     UsageError
         No such method.
     """
+    return derive_as(Derivation, model, method, independent, baumgarte)
+
+
+@np.errstate(all="ignore")  # results are looked at, and what is not finite is refused by name
+def derive_as(
+    kind: type[Derived],
+    model: Builder,
+    method: str = "auto",
+    independent: Sequence[str] | None = None,
+    baumgarte: tuple[float, float] | None = None,
+) -> Derived:
+    """The same as a result of another type."""
     from .program.choice import choose
 
     seconds: dict[str, float] = {}
@@ -130,7 +142,7 @@ def derive(
             tree = METHODS[chosen](kinematics)
         else:
             tree, choice = choose(kinematics, mobility)
-    return Derivation(kinematics, mobility, tree, seconds, choice)
+    return kind(kinematics, mobility, tree, seconds, choice)
 
 
 def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float]) -> Kinematics:

@@ -231,5 +231,4 @@ def derive(
     baumgarte: tuple[float, float] | None = None,
 ) -> Equations:
     """Derive the equations of motion of a model; see :func:`eomgen.pipeline.derive`."""
-    d = pipeline.derive(model, method, independent, baumgarte)
-    return Equations(d.kinematics, d.mobility, d.tree, d.seconds, d.choice)
+    return pipeline.derive_as(Equations, model, method, independent, baumgarte)

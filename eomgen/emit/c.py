@@ -17,6 +17,7 @@ from .c_lanes import lane_files, lane_kernels
 from .c_layout import driver_files, work_areas
 from .c_pairs import pair_declarations, pair_files
 from .c_parts import distribute, part_names
+from .c_rolled import print_rolled, print_rolled_precompute
 from .c_series import series_files
 from .c_text import Printed, print_block, print_precompute, used_helpers
 from .layouts import describe_layouts
@@ -104,8 +105,18 @@ def _costs(program: Program, sources: Mapping[str, str]) -> dict[str, tuple[str,
 
 def _print(program: Program) -> list[Printed]:
     """Every straight-line function, the precompute first."""
-    precompute = print_precompute(program) if program.hoisted else Printed("", (), 0)
-    return [precompute, *(print_block(program, b) for b in program.blocks if b.name not in program.twins)]
+    blocks = [_print_function(program, b) for b in program.blocks if b.name not in program.twins]
+    return [_print_precompute(program) if program.hoisted else Printed("", (), 0), *blocks]
+
+
+def _print_precompute(program: Program) -> Printed:
+    rolled = print_rolled_precompute(program) if program.is_rolled("precompute") else None
+    return rolled or print_precompute(program)
+
+
+def _print_function(program: Program, block: Block) -> Printed:
+    rolled = print_rolled(program, block) if program.is_rolled(block.name) else None
+    return rolled or print_block(program, block)
 
 
 def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:

@@ -24,6 +24,8 @@ Calls = dict[str, tuple[Function, list[Orders]]]  # by name of the function, its
 def used_calls(program: Program) -> Calls:
     """The functions that a program calls, with the orders of derivatives that it needs, by name."""
     graph = program.graph
+    if not graph.calls:
+        return {}
     roots = [y.id for block in program.blocks for y in (*block.outputs, *block.checks)]
     operations = {graph.nodes[i][0] for i in reachable(graph, roots)} & set(graph.calls)
     found: Calls = {}

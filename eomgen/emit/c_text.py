@@ -34,7 +34,7 @@ def literal(value: float) -> str:
     return f"({text})" if text.startswith("-") else text
 
 
-class _CPrinter:
+class BlockPrinter:
     """Prints the statements of one block; variables are numbered through all its pieces."""
 
     def __init__(self, program: Program, references: dict[int, str], pieces: Pieces) -> None:
@@ -63,7 +63,7 @@ class _CPrinter:
     def real(self, i: int) -> str:
         """An operand as a ``real`` even if it is a number."""
         node = self._nodes[i]
-        return f"same({literal(node[1])})" if node[0] == "const" else self.operand(i)
+        return f"same({self.operand(i)})" if node[0] == "const" else self.operand(i)
 
     def operands(self, node: Node) -> list[str]:
         """The operands of an operation; beside a value, arithmetic takes a number as it is."""
@@ -155,7 +155,8 @@ class _CPrinter:
             result.append(f"const real {self._name(i)} = w[{piece.loads[i]}];")
 
 
-def _function(head: str, used: set[str], lines: Sequence[str]) -> str:
+def function_text(head: str, used: set[str], lines: Sequence[str]) -> str:
+    """A C function of the arguments of all blocks."""
     unused = [f"(void){a};" for a in ARGUMENTS if a not in used]
     text = "\n".join(f"    {line}" for line in ([" ".join(unused)] if unused else []) + list(lines))
     return f"{head}({SIGNATURE})\n{{\n    EOMGEN_BEGIN\n{text}\n    EOMGEN_RETURN\n}}\n"
@@ -177,8 +178,8 @@ def print_block(program: Program, block: Block) -> Printed:
 
 def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, str]) -> Printed:
     """Print cut statements as one function, or as several and one that calls them."""
-    printer = _CPrinter(program, texts, pieces)
-    main = _direct(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
+    printer = BlockPrinter(program, texts, pieces)
+    main = direct_results(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
     used = {*printer.used, *(["out"] if pieces.direct else [])}
     functions: list[tuple[str, str]] = []
     if len(pieces.pieces) == 1:
@@ -190,12 +191,12 @@ def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, s
             printer.used.clear()
             lines = printer.lines(piece)
             part = f"{program.name}_{name}_{k}"
-            functions.append((part, _function(f"flag {part}", printer.used, lines)))
+            functions.append((part, function_text(f"flag {part}", printer.used, lines)))
             main.append(f"EOMGEN_REJECT({part}(t, x, u, c, out, w))")
-    return Printed(_function(f"static flag {name}", used, main), tuple(functions), printer.lists.end)
+    return Printed(function_text(f"static flag {name}", used, main), tuple(functions), printer.lists.end)
 
 
-def _direct(printer: _CPrinter, pieces: Pieces) -> list[str]:
+def direct_results(printer: BlockPrinter, pieces: Pieces) -> list[str]:
     """Results that need no statement; a long run of zeros becomes a loop that later results overwrite."""
     texts = [(k, printer.real(i)) for k, i in pieces.direct]
     zeros = [k for k, text in texts if text == "same(0.0)"]

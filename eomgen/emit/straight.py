@@ -5,7 +5,7 @@ Language-independent; :mod:`.c_text` and :mod:`.numpy_text` print the pieces.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 
 from ..graph.core import Expr, Graph
 from ..graph.schedule import chunk, order
@@ -13,6 +13,8 @@ from ..graph.traverse import LEAVES
 from ..operations import CONDITION, operations_with
 from ..program import Program
 from ..records import dataclass
+
+Slot = int | str  #: a place in an array, or the text of one
 
 
 @dataclass(frozen=True)
@@ -23,9 +25,9 @@ class PrintedFunction:
     ----------
     statements : tuple of int
         Node ids in order.
-    loads, stores : mapping of int to int
+    loads, stores : mapping of int to Slot
         Node id -> slot of the work array.
-    results : mapping of int to tuple of int
+    results : mapping of int to tuple of Slot
         Node id -> places in the result.
     checks : frozenset of int
         Ids that must not be <= 0.
@@ -34,9 +36,9 @@ class PrintedFunction:
     """
 
     statements: tuple[int, ...]
-    loads: Mapping[int, int]
-    stores: Mapping[int, int]
-    results: Mapping[int, tuple[int, ...]]
+    loads: Mapping[int, Slot]
+    stores: Mapping[int, Slot]
+    results: Mapping[int, tuple[Slot, ...]]
     checks: frozenset[int]
     inlined: frozenset[int]
 
@@ -89,7 +91,7 @@ def cut(
                 stores={i: slots[i] for i in c.exports},
                 results={i: tuple(places[i]) for i in c.statements if i in places},
                 checks=frozenset(check_ids.intersection(c.statements)),
-                inlined=_conditions(graph, c.statements, {*c.exports, *places}, check_ids),
+                inlined=conditions(graph, c.statements, {*c.exports, *places}, check_ids),
             )
         )
         free.extend(sorted((slots[i] for i in c.imports if last_use[i] == k), reverse=True))
@@ -123,13 +125,13 @@ def _pair(graph: Graph, sequence: list[int]) -> list[int]:
     return result
 
 
-def _conditions(graph: Graph, statements: Iterable[int], kept: set[int], checks: set[int]) -> frozenset[int]:
+def conditions(graph: Graph, statements: Iterable[int], kept: Container[int], checks: Container[int]) -> frozenset[int]:
     """Conditions of this piece that are used as conditions only."""
-    nodes, conditions = graph.nodes, operations_with(lambda row: row.kind == CONDITION)
+    nodes, relations = graph.nodes, operations_with(lambda row: row.kind == CONDITION)
     found = set()
     for i in statements:
         node = nodes[i]
-        if node[0] in conditions and i not in kept and (i not in checks or node[0] == "lt"):
+        if node[0] in relations and i not in kept and (i not in checks or node[0] == "lt"):
             found.add(i)
         found.difference_update(node[2:] if node[0] == "select" else node[1:])
     return frozenset(found)

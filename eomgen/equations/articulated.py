@@ -224,14 +224,14 @@ class ArticulatedBodies:
 
     def solve(self) -> TreeMotion:
         """Both sweeps."""
-        for k in reversed(range(len(self.links))):
+        for k in self.graph.marked(reversed(range(len(self.links)))):
             self._inwards(k)
         self.last = self._take_out(self.at_ground, None)
         self._find_multipliers(self.last, None)
         accelerations = [self.graph.zero] * len(self.forces)
         pivots = list(accelerations)
         motions: list[Twist] = []
-        for k, link in enumerate(self.links):
+        for k, link in self.graph.marked(enumerate(self.links)):
             above = motions[link.parent] if link.parent != GROUND else self.base[k]
             motion = add(link.down_twist(above), self.products[k])
             self._find_multipliers(self.outer[k], motion)

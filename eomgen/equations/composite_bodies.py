@@ -19,7 +19,7 @@ def composite_mass_matrix(links: Sequence[Link], inertias: Sequence[SpatialInert
     composite = list(inertias)
     graph = links[0].mass.graph
     rows = [[graph.zero] * n for _ in range(n)]
-    for k in reversed(range(len(links))):
+    for k in graph.marked(reversed(range(len(links)))):
         link = links[k]
         if link.parent != GROUND:
             composite[link.parent] = composite[link.parent].plus(link.up_inertia(composite[k]))

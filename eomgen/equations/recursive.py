@@ -61,7 +61,7 @@ def _velocity_products(kinematics: Kinematics, rates: list[JointRates]) -> list[
     """Acceleration of each link relative to its parent at v' = 0: Coriolis and centripetal terms."""
     graph = kinematics.graph
     products: list[Twist] = []
-    for link, rate in zip(kinematics.links, rates, strict=True):
+    for link, rate in graph.marked(zip(kinematics.links, rates, strict=True)):
         above = kinematics.twists[link.parent][0] if link.parent != GROUND else vec.zero(graph)
         # below is omega_p x r + 2 r', so that omega_p x below + r'' is what turning axes add
         below = vec.add(vec.cross(above, link.position), vec.scale(graph.constant(2.0), rate.slide))
@@ -74,7 +74,9 @@ def _loads(kinematics: Kinematics, inertias: list[SpatialInertia]) -> list[Wrenc
     """Wrench on each link at zero acceleration: omega x momentum, less what is applied."""
     result: list[Wrench] = []
     applied = applied_wrenches(kinematics)
-    for inertia, (omega, _), (turn, push) in zip(inertias, kinematics.twists, applied, strict=True):
+    for inertia, (omega, _), (turn, push) in kinematics.graph.marked(
+        zip(inertias, kinematics.twists, applied, strict=True)
+    ):
         spin = vec.cross(omega, vec.times(inertia.inertia, omega))
         swing = vec.cross(omega, vec.cross(omega, inertia.moment))
         result.append((vec.sub(spin, turn), vec.sub(swing, push)))
@@ -97,7 +99,7 @@ def _newton_euler(
     links = kinematics.links
     motions: list[Twist] = []
     wrenches: list[Wrench] = []
-    for k, link in enumerate(links):
+    for k, link in kinematics.graph.marked(enumerate(links)):
         above = motions[link.parent] if link.parent != GROUND else _base(kinematics)
         motion = add(link.down_twist(above), products[k])
         for c, column in enumerate(link.columns):
@@ -105,7 +107,7 @@ def _newton_euler(
         motions.append(motion)
         wrenches.append(add(inertias[k].times(*motion), loads[k]))
     result = [-f for f in coordinate_forces(kinematics)]
-    for k in reversed(range(len(links))):
+    for k in kinematics.graph.marked(reversed(range(len(links)))):
         link = links[k]
         for c, column in enumerate(link.columns):
             result[link.first + c] = result[link.first + c] + dot(column, wrenches[k])

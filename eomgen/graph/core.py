@@ -29,6 +29,12 @@ class Graph(Nodes):
     nodes : list of tuple
         ``nodes[i]`` is the node with id ``i``; operands always have smaller ids than the node that uses them, so id
         order is a topological order.
+    marks : list of (int, int)
+        Ids, ascending, with which the part of another body begins, and the pass over the bodies that it is of: code of
+        big models is made of alike parts.
+    n_passes : int
+    reached : dict
+        What many roots were found to be made of: nodes never change, so neither does that.
     functions, calls : dict
         Functions that expressions may call, by name; what each operation that is a call means: (Function, orders).
     """
@@ -45,6 +51,7 @@ class Graph(Nodes):
         """A graph of the same nodes by the same ids, which grows by itself; functions never change and are shared."""
         twin = memo[id(self)] = Graph.__new__(Graph)
         twin.nodes, twin._ids = list(self.nodes), dict(self._ids)
+        twin.marks, twin.n_passes, twin.reached = list(self.marks), self.n_passes, {}
         twin.calls, twin.functions = dict(self.calls), dict(self.functions)
         twin.zero, twin.one = Expr(twin, self.zero.id), Expr(twin, self.one.id)
         return twin

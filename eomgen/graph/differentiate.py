@@ -13,7 +13,7 @@ from ..operations import OPERATIONS, operations_with
 from .core import Expr, Graph
 from .pair_calls import is_pair_item, pair_call, push_pairs
 from .slopes import half_power_slope, partials
-from .traverse import LEAVES, common_graph, reachable
+from .traverse import LEAVES, common_graph, parts, reachable
 
 
 def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict[int, int]) -> None:
@@ -217,7 +217,14 @@ def jvp(outputs: Sequence[Expr], seeds: Mapping[Expr, Expr]) -> list[Expr]:
     _column_bits(list(seeds))
     order = reachable(g, (y.id for y in outputs))
     tangents = {x.id: dx.id for x, dx in seeds.items() if not dx.is_zero}
-    _push(g, order, tangents, {})
+    slopes: dict[int, int] = {}
+    passes: dict[int, int] = {0: 0}
+    for number, part in parts(g, order):
+        if number not in passes:
+            passes[number] = g.begin_pass()
+        g.mark(passes[number])
+        _push(g, part, tangents, slopes)
+    g.mark()
     return [Expr(g, tangents.get(y.id, g.zero.id)) for y in outputs]
 
 

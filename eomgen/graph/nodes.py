@@ -6,8 +6,8 @@ The rules are those of arithmetic on constants, signs, zeros and ones; they are 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..limits.rounding import NORMAL, TINY
 from ..operations import OPERATIONS
@@ -17,16 +17,20 @@ if TYPE_CHECKING:
     from ..operations import Operation
     from .functions import Function
 
+Part = TypeVar("Part")
 Node = tuple[Any, ...]  # (operation, *operand ids), ("const", value) or ("sym", name)
 
 
 class Nodes:
     """A table of interned nodes by id; see :class:`~.core.Graph`, which adds handles and functions."""
 
-    __slots__ = ("_ids", "calls", "nodes")
+    __slots__ = ("_ids", "calls", "marks", "n_passes", "nodes", "reached")
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
+        self.marks: list[tuple[int, int]] = []
+        self.n_passes = 0
+        self.reached: dict[frozenset[int], list[int]] = {}
         self._ids: dict[Node, int] = {}
         self.calls: dict[str, tuple[Function, tuple[int, ...]]] = {}
 
@@ -41,6 +45,26 @@ class Nodes:
             found = self._ids[key] = len(self.nodes)
             self.nodes.append(key)
         return found
+
+    def begin_pass(self) -> int:
+        """The number of another pass over the bodies of a model."""
+        self.n_passes += 1
+        return self.n_passes
+
+    def mark(self, number: int = 0) -> None:
+        """Note that what is made from here on belongs to another body, in the pass of this number; 0 is none."""
+        at = len(self.nodes)
+        if self.marks and self.marks[-1][0] == at:
+            self.marks.pop()
+        self.marks.append((at, number))
+
+    def marked(self, parts: Iterable[Part]) -> Iterator[Part]:
+        """What a pass goes through, with a mark before what is made of each and behind the last."""
+        number = self.begin_pass()
+        for part in parts:
+            self.mark(number)
+            yield part
+        self.mark()
 
     def make(self, operation: str, *ids: int) -> int:
         """The id of ``operation`` on operand ids, simplified.  The rules are exact up to rounding order."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Container, Iterable, Sequence
 
 from .core import Expr, Graph
 from .nodes import Node
 
 LEAVES = frozenset({"const", "sym"})
+MANY = 100  #: so many roots are those of a big model: what they are made of is asked for again and again
+KEPT = 12  #: answers kept
 
 
 def operands(node: Node) -> tuple[int, ...]:
@@ -23,6 +26,9 @@ def reachable(graph: Graph, roots: Iterable[int], stop: Container[int] = ()) -> 
     """
     nodes = graph.nodes
     seen = set(roots)
+    key = None if stop or len(seen) < MANY else frozenset(seen)
+    if key is not None and key in graph.reached:
+        return list(graph.reached[key])
     stack = list(seen)
     while stack:
         i = stack.pop()
@@ -42,7 +48,24 @@ def reachable(graph: Graph, roots: Iterable[int], stop: Container[int] = ()) -> 
                 if k not in seen:
                     seen.add(k)
                     stack.append(k)
-    return sorted(seen)
+    found = sorted(seen)
+    if key is not None:
+        if len(graph.reached) >= KEPT:
+            graph.reached.pop(next(iter(graph.reached)))
+        graph.reached[key] = list(found)
+    return found
+
+
+def parts(graph: Graph, ids: Sequence[int]) -> list[tuple[int, Sequence[int]]]:
+    """Ids in ascending order, cut where the graph has marks, each with the number of its pass; none is empty."""
+    found: list[tuple[int, Sequence[int]]] = []
+    start = number = 0
+    for mark, following in [*graph.marks, (len(graph.nodes), 0)]:
+        end = bisect_left(ids, mark, start)
+        if end > start:
+            found.append((number, ids[start:end]))
+        start, number = end, following
+    return found
 
 
 def common_graph(*groups: Sequence[Expr]) -> Graph | None:

@@ -16,7 +16,7 @@ from .kinematics import Kinematics
 def kinetic_energy(kinematics: Kinematics) -> Expr:
     """T = sum of twist . (inertia twist) / 2 over the bodies (J), each in its link's axes about its origin."""
     total = kinematics.graph.zero
-    for link, (omega, v) in zip(kinematics.links, kinematics.twists, strict=True):
+    for link, (omega, v) in total.graph.marked(zip(kinematics.links, kinematics.twists, strict=True)):
         turning, linear = link.spatial.times(omega, v)
         total = total + (vec.dot(omega, turning) + vec.dot(v, linear))
     return 0.5 * total
@@ -27,7 +27,7 @@ def potential_energy(kinematics: Kinematics) -> Expr:
     graph = kinematics.graph
     total = graph.zero
     heights: list[tuple[Expr, Vec3]] = []
-    for link in kinematics.links:
+    for link in graph.marked(kinematics.links):
         height, pull = (graph.zero, kinematics.mechanism.gravity) if link.parent == GROUND else heights[link.parent]
         height, pull = height + vec.dot(pull, link.position), link.down(pull)
         heights.append((height, pull))

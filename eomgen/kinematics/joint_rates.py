@@ -40,7 +40,7 @@ def joint_rates(kinematics: Kinematics) -> list[JointRates]:
     slide_rates = jvp(slides, along)
     result = []
     at = 0
-    for k, link in enumerate(links):
+    for k, link in graph.marked(enumerate(links)):
         spin = spin_rate = vec.zero(graph)
         for c, (angular, _) in enumerate(link.columns):
             rate = v[link.first + c]

@@ -13,7 +13,7 @@ def applied_wrenches(kinematics: Kinematics) -> list[Wrench]:
     """Force elements' wrench on each link, about its origin in link axes."""
     graph, poses = kinematics.graph, kinematics.poses
     total: list[Wrench] = [(vec.zero(graph), vec.zero(graph)) for _ in kinematics.links]
-    for terms in kinematics.forces:
+    for terms in graph.marked(kinematics.forces):
         for load in terms.marker_loads:
             if load.marker.body == GROUND:
                 continue
@@ -31,7 +31,7 @@ def coordinate_forces(kinematics: Kinematics) -> list[Expr]:
     graph, loop = kinematics.graph, kinematics.loop_coordinates
     total = [graph.zero] * len(kinematics.v)
     place = {name: j for j, name in enumerate(kinematics.velocity_labels)}
-    for terms in kinematics.forces:
+    for terms in graph.marked(kinematics.forces):
         for load in terms.coordinate_loads:
             if load.coordinate in place:
                 j = place[load.coordinate]

@@ -21,7 +21,7 @@ from .tree import Link
 def regroup(graph: Graph, links: tuple[Link, ...]) -> list[SpatialInertia]:
     """Spatial inertia of every link after moving towards ground all that can be moved; what reaches ground is gone."""
     inertias = [link.spatial for link in links]
-    for k in reversed(range(len(links))):
+    for k in graph.marked(reversed(range(len(links)))):
         link = links[k]
         part = movable(graph, link, inertias[k])
         if part.is_zero:

@@ -83,7 +83,7 @@ def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Exp
     frames = {GROUND: ground}
     links: list[Link] = []
     first = 0
-    for branch in topology.branches:
+    for branch in graph.marked(topology.branches):
         spec = mechanism.joints[branch.joint]
         q = [symbols[name] for name in spec.coordinates]
         rotation, position = spec.joint.pose(graph, q)
@@ -133,7 +133,7 @@ def link_twists(graph: Graph, links: tuple[Link, ...], v: tuple[Expr, ...]) -> l
     """Twists of all links: omega_i = R^T omega_p + sum s v (Featherstone, RBDA, eq. 4.9)."""
     twists: list[Twist] = []
     still = (vec.zero(graph), vec.zero(graph))
-    for link in links:
+    for link in graph.marked(links):
         twist = link.down_twist(twists[link.parent] if link.parent != GROUND else still)
         for k, (angular, linear) in enumerate(link.columns):
             rate = v[link.first + k]
@@ -149,6 +149,7 @@ class Poses:
         self.graph = mechanism.graph
         self.links = links
         self.link_of = {link.body: k for k, link in enumerate(links)} | {GROUND: GROUND}
+        self._pass = self.graph.begin_pass()
         self._known: dict[tuple[int, int, tuple[Mat3, Vec3] | None], Frame] = {}
 
     def marker_in_link(self, marker: Marker) -> Frame:
@@ -171,13 +172,15 @@ class Poses:
             return own if within is None else place(within, own)
         key = (link, base, None if within is None else (within.rotation, within.position))
         if key not in self._known:
-            chain = self.ancestors(link)
-            for k in reversed(chain[: chain.index(base)]):  # from base outwards, so that no chain recurses deeply
-                if (k, *key[1:]) not in self._known:
-                    self._known[k, base, key[2]] = self._step(k, base, within)
+            missing = [link]
+            while (above := self.links[missing[-1]].parent) != base and (above, *key[1:]) not in self._known:
+                missing.append(above)
+            for k in reversed(missing):  # from base outwards, so that no chain recurses deeply
+                self._known[k, base, key[2]] = self._step(k, base, within)
         return self._known[key]
 
     def _step(self, k: int, base: int, within: Frame | None) -> Frame:
+        self.graph.mark(self._pass)
         link = self.links[k]
         if link.parent != base:
             parent = self.link(link.parent, base, within)

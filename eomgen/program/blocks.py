@@ -111,7 +111,8 @@ class BlockMaker:
         """v' of a tree in terms of (q, v), and the conditions for it to exist."""
         terms = self.terms
         if terms.accelerations is not None and terms.pivots:
-            pivots = [d * s * s for d, s in zip(terms.pivots, terms.coordinate_scales, strict=True)]
+            every = terms.graph.marked(zip(terms.pivots, terms.coordinate_scales, strict=True))
+            pivots = [d * s * s for d, s in every]
             zero = terms.graph.zero
             one = [terms.graph.apply("lt", zero, d) for d in pivots]
             checks = one if len(pivots) == 1 else exceeding(pivots, outward(pivots, terms.parent))

@@ -93,11 +93,11 @@ def exceeding(pivots: Sequence[Expr], sizes: Sequence[Expr]) -> list[Expr]:
     """Conditions (each 1.0 or 0.0): each pivot exceeds 1e-13 of its size and 1e-22 of the largest size."""
     graph = pivots[0].graph
     largest, *rest = sizes
-    for entry in rest:
+    for entry in graph.marked(rest):
         largest = _larger(largest, entry)
     nothing = largest * NOTHING
     conditions = []
-    for size, d in zip(sizes, pivots, strict=True):
+    for size, d in graph.marked(zip(sizes, pivots, strict=True)):
         reduced = not (size - d).is_zero
         if reduced:
             conditions.append(graph.apply("lt", size * SINGULAR, d))
@@ -109,7 +109,7 @@ def exceeding(pivots: Sequence[Expr], sizes: Sequence[Expr]) -> list[Expr]:
 def outward(pivots: Sequence[Expr], parent: Sequence[int]) -> list[Expr]:
     """For each articulated inertia the largest of those from there to the leaves, which it is left over from."""
     sizes = list(pivots)
-    for k in reversed(range(len(sizes))):
+    for k in pivots[0].graph.marked(reversed(range(len(sizes)))):
         if parent[k] >= 0:
             sizes[parent[k]] = _larger(sizes[parent[k]], sizes[k])
     return sizes

@@ -42,7 +42,7 @@ def _spell_graph(program: Program) -> list[Any]:
     used = sorted(reachable(graph, [y.id for y in expressions]))
     nodes = [(i, graph.nodes[i]) for i in used]
     calls = {node[0] for _, node in nodes} & graph.calls.keys()
-    return [nodes, [(call, _spell(graph.calls[call])) for call in sorted(calls)]]
+    return [nodes, graph.marks, [(call, _spell(graph.calls[call])) for call in sorted(calls)]]
 
 
 def _spell(value: Any) -> Any:

@@ -9,12 +9,12 @@ from .terms import SystemTerms
 
 def port_symbols(terms: SystemTerms, n_h: int) -> Mapping[str, tuple[str, ...]]:
     """Symbols by the name of the port; n_h holonomic rows have corrections."""
-    independent = terms.preferred
+    independent, coordinate_of = terms.preferred, terms.coordinate_of
     return {
         "q": terms.q,
         "v": terms.v,
         "a": terms.a,
-        "q_i": tuple(terms.q[terms.coordinate_of[i]] for i in independent if i < terms.n_v - terms.n_states),
+        "q_i": tuple(terms.q[coordinate_of[i]] for i in independent if i < terms.n_v - terms.n_states),
         "v_i": tuple(terms.v[i] for i in independent),
         "a_i": tuple(terms.a[i] for i in independent),
         "q_guess": tuple(f"guess({q})" for q in terms.q),

@@ -30,6 +30,10 @@ class Limits:
     #: second derivatives of more operations are generated only where they are named
     second_order: int = 40_000
     statements: int = 1500  #: statements in one generated function at most
+    #: Functions of more operations go through alike bodies in loops.  Measured (benchmarks/big_trees.py) on open
+    #: spatial chains, microseconds of loops and of text without: 3.2 and 3.0 at 12,000 operations, 6.1 and 6.5 at
+    #: 25,000, 23 and 32 at 103,000, where text without loops takes 10 times as long to compile.
+    rolled: int = 16_000
 
 
 @dataclass(frozen=True)
@@ -152,6 +156,10 @@ class Program:
     def block_names(self) -> frozenset[str]:
         """Names of all blocks."""
         return frozenset(b.name for b in self.blocks)
+
+    def is_rolled(self, name: str) -> bool:
+        """Whether a block, or ``precompute``, is so long that what is alike in it is written once."""
+        return self.counts[name].total > self.limits.rolled
 
     @property
     def twins(self) -> dict[str, str]:

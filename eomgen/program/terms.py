@@ -110,10 +110,11 @@ class SystemTerms:
     @property
     def has_minimal_form(self) -> bool:
         """Whether positions follow from those of the independent velocities."""
+        coordinates = self.coordinate_of
         return (
             not self.given_rates
             and self.n_c == len(self.constraints)
-            and all(self.coordinate_of[k] >= 0 for k in self.preferred if k < self.n_v - self.n_states)
+            and all(coordinates[k] >= 0 for k in self.preferred if k < self.n_v - self.n_states)
         )
 
     @property

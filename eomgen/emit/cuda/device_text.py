@@ -7,7 +7,9 @@ Nothing is included from outside, so that NVRTC needs no headers.  Each kernel i
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ...errors import UsageError
@@ -52,7 +54,8 @@ def emit_device_text(program: Program) -> str:
             f"target 'cuda': function {', '.join(native)} is C code, which may need what a device does not have; "
             "give a table or an expression"
         )
-    sources = dict(emit_c(program, lanes=False, separate=False))
+    unrolled = replace(program, limits=replace(program.limits, rolled=sys.maxsize))  # threads have little memory
+    sources = dict(emit_c(unrolled, lanes=False, separate=False))
     parts = (*STEPPERS, *(EVENTS if program.metadata.get("events") else ()))
     texts = {**sources, **read_layer(), "steppers": read_steppers(parts)}
     there: set[str] = set()

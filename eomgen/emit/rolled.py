@@ -1,0 +1,254 @@
+"""Stage emit: a straight-line block -> alike segments of its statements, each kind to be written once, as a loop.
+
+A recursion over a big tree does the same for many bodies, but for where it reads and writes.  The graph marks where the
+part of another body begins.  Statements between two marks are a segment; segments whose statements are the same
+function of what they read are of one kind.  Statements stay in the order in which the graph was made, but that the
+segments of one body in several passes come together where what they read allows.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from itertools import chain, groupby
+
+from ..graph.core import Expr, Graph
+from ..graph.traverse import LEAVES, parts, reachable
+from ..records import dataclass
+from .angles import CIRCULAR
+
+FEW = 3  #: segments of fewer members are not worth a loop
+
+#: ("x", 3): a place in an array; ("const", 2.0); ("t", 0).
+Place = tuple[str, float]
+#: Statements with what they read by number, and which of them are checked or are results, how often.
+Signature = tuple[object, ...]
+
+
+@dataclass(frozen=True)
+class SegmentKind:
+    """Segments that are the same function of what they read.
+
+    Attributes
+    ----------
+    members : tuple of tuple of int
+        Statements of every segment, in order of evaluation.
+    reads : tuple of tuple of int
+        Ids that every segment reads from outside, numbered alike.
+    exports : tuple of int
+        Indices of statements that later segments read; place ``k`` of the block of member ``m`` holds entry k.
+    start : int
+        Where in the work array the blocks of the members begin.
+    """
+
+    members: tuple[tuple[int, ...], ...]
+    reads: tuple[tuple[int, ...], ...]
+    exports: tuple[int, ...]
+    start: int
+
+
+@dataclass(frozen=True)
+class Segments:
+    """All of a block.
+
+    Attributes
+    ----------
+    kinds : tuple of SegmentKind
+    runs : tuple of (int, int)
+        Number of a kind, and how many of its members come next.
+    angles : tuple of int
+        Symbols whose sines and cosines are computed first, from places 0 and ``len(angles)`` of the work array on.
+    places : mapping of int to Place
+        Where each value is that a segment reads from outside.
+    results : mapping of int to tuple of int
+        Node id -> places in the result.
+    checks : frozenset of int
+    work : int
+    """
+
+    kinds: tuple[SegmentKind, ...]
+    runs: tuple[tuple[int, int], ...]
+    angles: tuple[int, ...]
+    places: Mapping[int, Place]
+    results: Mapping[int, tuple[int, ...]]
+    checks: frozenset[int]
+    work: int
+
+    @property
+    def written(self) -> int:
+        """Statements that are written."""
+        return sum(len(kind.members[0]) for kind in self.kinds)
+
+    @property
+    def carried_out(self) -> int:
+        """Statements that are carried out."""
+        return sum(len(kind.members) * len(kind.members[0]) for kind in self.kinds)
+
+
+def find_segments(
+    graph: Graph,
+    outputs: Sequence[Expr],
+    checks: Sequence[Expr],
+    skipped: frozenset[int],
+    given: Mapping[int, Place],
+    longest: int,
+) -> Segments:
+    """The segments of a block and the kinds that they are of.
+
+    Parameters
+    ----------
+    skipped : frozenset of int
+        Operations that are not evaluated here.
+    given : mapping of int to Place
+        Symbols and hoisted values.
+    longest : int
+        Most statements in a segment.
+    """
+    nodes = graph.nodes
+    places: dict[int, list[int]] = {}
+    for k, y in enumerate(outputs):
+        places.setdefault(y.id, []).append(k)
+    checked = frozenset(y.id for y in checks)
+    every = reachable(graph, [*places, *checked], stop=skipped)
+    statements = [i for i in every if nodes[i][0] not in LEAVES and i not in skipped]
+    kept = {*places, *checked}
+    turning = [i for i in statements if nodes[i][0] in CIRCULAR and i not in kept]
+    turning = [i for i in turning if given.get(nodes[i][1], ("", 0))[0] == "x"]
+    angles = sorted({nodes[i][1] for i in turning})
+    known: dict[int, Place] = dict(given)
+    known.update((i, ("const", nodes[i][1])) for i in every if nodes[i][0] == "const")
+    slot = {a: k for k, a in enumerate(angles)}
+    known.update((i, ("w", slot[nodes[i][1]] + (len(angles) if nodes[i][0] == "cos" else 0))) for i in turning)
+    early = set(turning)
+    left = [i for i in statements if i not in early]
+    results = {i: tuple(at) for i, at in places.items()}
+    reader = SegmentReader(graph, known, results, checked)
+    groups = _grouped(graph, [(number, tuple(part)) for number, part in parts(graph, left)])
+    common = _common(reader, [tuple(chain.from_iterable(group)) for group in groups])
+    segments: list[tuple[int, ...]] = []
+    for group, alike in zip(groups, common, strict=True):
+        segments += [tuple(chain.from_iterable(group))] if alike else group
+    segments = _merged(segments, _common(reader, segments), longest)
+    read = [reader.read(segment) for segment in segments]
+    return _laid_out(segments, read, tuple(angles), known, results, checked)
+
+
+def _grouped(graph: Graph, every: Sequence[tuple[int, tuple[int, ...]]]) -> list[list[tuple[int, ...]]]:
+    """Segments of several passes over one body together, as far as what they read allows.
+
+    A segment goes to the last group that it reads from, unless that holds one of the same pass.
+    """
+    nodes = graph.nodes
+    groups: list[list[tuple[int, ...]]] = []
+    passes: list[set[int]] = []
+    home: dict[int, int] = {}
+    for number, segment in every:
+        last = max((home.get(j, -1) for i in segment for j in nodes[i][1:]), default=-1)
+        if last < 0 or not number or number in passes[last]:
+            last = len(groups)
+            groups.append([])
+            passes.append(set())
+        groups[last].append(segment)
+        passes[last].add(number)
+        home.update(dict.fromkeys(segment, last))
+    return groups
+
+
+def _common(reader: SegmentReader, segments: Sequence[tuple[int, ...]]) -> list[bool]:
+    """Whether a segment is one of several of its kind."""
+    signatures = [reader.read(segment)[0] for segment in segments]
+    counts = Counter(signatures)
+    return [counts[signature] >= FEW for signature in signatures]
+
+
+def _merged(segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int) -> list[tuple[int, ...]]:
+    """Segments; rare ones that follow each other are one, as long as may be."""
+    result: list[tuple[int, ...]] = []
+    for alike, run in groupby(zip(segments, common, strict=True), key=lambda pair: pair[1]):
+        if alike:
+            result += [segment for segment, _ in run]
+            continue
+        joined = [i for segment, _ in run for i in segment]
+        result += [tuple(joined[k : k + longest]) for k in range(0, len(joined), longest)]
+    return result
+
+
+class SegmentReader:
+    """Segments -> what they are made of, apart from where they read."""
+
+    def __init__(
+        self,
+        graph: Graph,
+        known: Mapping[int, Place],
+        results: Mapping[int, tuple[int, ...]],
+        checked: Collection[int],
+    ) -> None:
+        self.nodes, self.known, self.results, self.checked = graph.nodes, known, results, checked
+        self.found: dict[tuple[int, ...], tuple[Signature, tuple[int, ...]]] = {}
+
+    def read(self, segment: tuple[int, ...]) -> tuple[Signature, tuple[int, ...]]:
+        """The signature of a segment, and what it reads from outside in order of first use."""
+        if segment not in self.found:
+            self.found[segment] = self._read(segment)
+        return self.found[segment]
+
+    def _read(self, segment: Sequence[int]) -> tuple[Signature, tuple[int, ...]]:
+        nodes, known = self.nodes, self.known
+        local = {i: k for k, i in enumerate(segment)}
+        numbers: dict[int, int] = {}
+        signature: list[object] = []
+        for i in segment:
+            node = nodes[i]
+            signature.append(node[0])
+            for j in node[1:]:
+                at = local.get(j)
+                if at is None:
+                    at = numbers.get(j)
+                    if at is None:
+                        numbers[j] = at = -1 - len(numbers)
+                        place = known.get(j)
+                        signature.append("w" if place is None else place[0])
+                signature.append(at)
+            if i in self.results:
+                signature.append((len(self.results[i]),))
+            if i in self.checked:
+                signature.append("check")
+        return tuple(signature), tuple(numbers)
+
+
+def _laid_out(
+    segments: Sequence[tuple[int, ...]],
+    read: Sequence[tuple[Signature, tuple[int, ...]]],
+    angles: tuple[int, ...],
+    known: dict[int, Place],
+    results: Mapping[int, tuple[int, ...]],
+    checked: frozenset[int],
+) -> Segments:
+    """Where every value goes that a later segment reads."""
+    number: dict[Signature, int] = {}
+    kind_of = [number.setdefault(signature, len(number)) for signature, _ in read]
+    members: list[list[int]] = [[] for _ in number]
+    for s, k in enumerate(kind_of):
+        members[k].append(s)
+    home: dict[int, tuple[int, int]] = {}  #: statement -> kind, index
+    for s, segment in enumerate(segments):
+        home.update((i, (kind_of[s], at)) for at, i in enumerate(segment))
+    first: list[dict[int, tuple[int, int]]] = [{} for _ in number]  #: index of an export -> who reads it first, where
+    for s, (_, reads) in enumerate(read):
+        for at, i in enumerate(reads):
+            if i in home:
+                k, index = home[i]
+                use = (kind_of[s], at)
+                if use < first[k].get(index, (len(number), 0)):
+                    first[k][index] = use
+    work = 2 * len(angles)
+    kinds = []
+    for k, of in enumerate(members):
+        exports = tuple(sorted(first[k], key=first[k].__getitem__))
+        for m, s in enumerate(of):
+            base = work + m * len(exports)
+            known.update((segments[s][index], ("w", base + e)) for e, index in enumerate(exports))
+        kinds.append(SegmentKind(tuple(segments[s] for s in of), tuple(read[s][1] for s in of), exports, work))
+        work += len(of) * len(exports)
+    runs = tuple((k, len(list(run))) for k, run in groupby(kind_of))
+    return Segments(tuple(kinds), runs, angles, known, results, checked, work)
