@@ -59,9 +59,8 @@ class BlockMaker:
     @property
     def unrolled(self) -> bool:
         """Whether the right-hand side is straight-line code."""
-        if self.has_loops or self.terms.system is not None:
-            return False
-        return self.terms.accelerations is not None or is_unrolled(self.terms.parent, self.limits.unrolled)
+        terms, short = self.terms, is_unrolled(self.terms.parent, self.limits.unrolled)
+        return not self.has_loops and terms.system is None and (terms.accelerations is not None or short)
 
     @cached_property
     def _loops(self) -> LoopBlocks | None:
@@ -111,8 +110,8 @@ class BlockMaker:
         """v' of a tree in terms of (q, v), and the conditions for it to exist."""
         terms = self.terms
         if terms.accelerations is not None and terms.pivots:
-            every = terms.graph.marked(zip(terms.pivots, terms.coordinate_scales, strict=True))
-            pivots = [d * s * s for d, s in every]
+            scaled = zip(terms.pivots, terms.coordinate_scales, strict=True)
+            pivots = [d * s * s for d, s in terms.graph.marked(scaled)]
             zero = terms.graph.zero
             one = [terms.graph.apply("lt", zero, d) for d in pivots]
             checks = one if len(pivots) == 1 else exceeding(pivots, outward(pivots, terms.parent))
