@@ -106,16 +106,16 @@ def pair_declarations(program: Program) -> list[str]:
 
 def _declared(program: str, function: PairFunction, slopes: bool) -> str:
     prefix, n, results = f"{program}_pairs_{function.name}", function.count, function.results
-    text = f"#define each_{function.name}_numbers {prefix}_numbers\n"
+    text = f"#define pairs_{function.name}_numbers {prefix}_numbers\n"
     text += f"EOMGEN_PIECE extern const double {prefix}_numbers[{max(1, len(function.data))}];\n"
     text += f"EOMGEN_PIECE void {prefix}_sum(const double *given, double *out, double *work);\n"
-    text += _each(f"each_{function.name}_sum", f"{prefix}_sum", n, results, False)
+    text += _each(f"pairs_{function.name}_sum", f"{prefix}_sum", n, results, False)
     if slopes:
         text += (
             f"EOMGEN_PIECE void {prefix}_slope(const double *given, const double *rates, double *out, double *work, "
             "int low, int high);\n"
         )
-        text += _each(f"each_{function.name}_slope", f"{prefix}_slope", n, results, True)
+        text += _each(f"pairs_{function.name}_slope", f"{prefix}_slope", n, results, True)
     return text
 
 

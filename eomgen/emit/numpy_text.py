@@ -66,7 +66,7 @@ class _NumpyPrinter:
 
 def _print_pair_node(call: PairCall, operands: Sequence[str]) -> str:
     """A node of a sum over pairs."""
-    name = f"call_{call.function.name}"
+    name = f"pairs_{call.function.name}"
     if call.part == "given":
         return f"[{', '.join(operands)}]"
     if call.part == "sum":
@@ -77,12 +77,12 @@ def _print_pair_node(call: PairCall, operands: Sequence[str]) -> str:
 
 
 def print_pair_sum(program: Program, function: PairFunction) -> str:
-    """``call_<name>``, the loops over the pairs of a sum, after the functions of one pair."""
+    """``pairs_<name>``, the loops over the pairs of a sum, after the functions of one pair."""
     texts, kinds = list[str](), list[str]()
     for kind in function.kinds:
         names = []
         for slopes in (False, True):
-            name = f"_{function.name}_{kind.name}{'_slope' * slopes}"
+            name = f"_pairs_{function.name}_{kind.name}{'_slope' * slopes}"
             outputs = kind.expressions(slopes)
             graph = outputs[0].graph
             places = {graph.symbol(symbol).id: f"x[{k}]" for k, symbol in enumerate(kind.symbols)}
@@ -96,7 +96,7 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
         kinds.append(f"        ({', '.join(map(repr, row))}, {names[0]}, {names[1]}),\n")
     tables = "".join(f"        {table!r},\n" for table in function.tables)
     made = f"PairSum(\n    {function.bodies},\n    (\n{tables}    ),\n    (\n{''.join(kinds)}    ),\n)"
-    return "\n\n".join([*texts, f"call_{function.name} = {made}"])
+    return "\n\n".join([*texts, f"pairs_{function.name} = {made}"])
 
 
 def _function(name: str, arguments: str, doc: str, lines: Sequence[str]) -> str:

@@ -74,20 +74,20 @@ class PairLists:
         if call.part == "given":
             start = POSE * function.bodies
             moving = [(k, x) for k, x in enumerate(operands) if k < start or function.data[k - start] is None]
-            numbers = f"each_{function.name}_numbers[i]"
+            numbers = f"pairs_{function.name}_numbers[i]"
             return [
                 f"for (int i = 0; i < {len(function.data)}; i++) {{ w[{place + start} + i] = same({numbers}); }}",
                 *(f"w[{place + k}] = {text(x)};" for k, x in moving),
             ]
         given = self._places[operands[0]]
         if call.part == "sum":
-            return [f"each_{function.name}_sum(w + {given}, w + {place}, w + {work});"]
+            return [f"pairs_{function.name}_sum(w + {given}, w + {place}, w + {work});"]
         rates = self._rates[function.name]
         low, high = _moved(function, call.numbers)
         return [
             f"for (int i = 0; i < {function.count}; i++) {{ w[{rates} + i] = same(0.0); }}",
             *(f"w[{rates + k}] = {text(x)};" for k, x in zip(call.numbers, operands[1:], strict=True)),
-            f"each_{function.name}_slope(w + {given}, w + {rates}, w + {place}, w + {work}, {low}, {high});",
+            f"pairs_{function.name}_slope(w + {given}, w + {rates}, w + {place}, w + {work}, {low}, {high});",
         ]
 
 

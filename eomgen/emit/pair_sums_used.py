@@ -26,7 +26,7 @@ def refuse_sums(program: Program, target: str) -> None:
     ------
     UsageError
     """
-    names = sorted({function.name.removesuffix("_lost") for function, _ in used_sums(program)})
+    names = sorted({function.element for function, _ in used_sums(program)})
     if names:
         raise UsageError(
             f"{target} has no contacts between groups of shapes (here {', '.join(names)}); use target c, cython or "

@@ -18,13 +18,13 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
-from ..graph.pair_calls import PairFunction, PairKind, pair_sum
+from ..graph.pair_calls import LOSSES, PairFunction, PairKind, pair_sum
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..numeric.pair_sums import POSE
 from ..records import dataclass
 from .contact import SpherePlane
-from .contact_shapes import PLANAR, ContactShape, Feature, ShapeMotion, meet, touching
+from .contact_shapes import PLANAR, AtHeight, ContactShape, Feature, ShapeMotion, meet, touching
 from .force import Force, Load, MarkerLoad, View
 from .friction import FRICTION, Friction, read_friction
 from .normal_laws import NORMAL, HuntCrossley, read_normal_law
@@ -42,14 +42,15 @@ class _PairView:
         rotation = ((x[3], x[4], x[5]), (x[6], x[7], x[8]), (x[9], x[10], x[11]))
         return ShapeMotion((x[0], x[1], x[2]), rotation, (x[12], x[13], x[14]), (x[15], x[16], x[17]))
 
+    def height(self) -> Vec3:
+        """From the plane of the first shape, in which shapes of the plane touch, to the second."""
+        first, second = self._poses
+        normal = vec.transpose(first.rotation)[2]
+        return vec.scale(vec.dot(normal, vec.sub(second.position, first.position)), normal)
+
     def position(self, marker: Marker) -> Vec3:
         position = self._poses[marker.body].position
-        if marker.body and self._planar:  # in the plane of the first
-            first = self._poses[0]
-            normal = vec.transpose(first.rotation)[2]
-            height = vec.dot(normal, vec.sub(position, first.position))
-            return vec.sub(position, vec.scale(height, normal))
-        return position
+        return vec.sub(position, self.height()) if marker.body and self._planar else position
 
     def rotation(self, marker: Marker) -> vec.Mat3:
         return self._poses[marker.body].rotation
@@ -95,7 +96,7 @@ class ContactGroups(Force):
         return self._results(view, "", still=True)[1][-1]
 
     def remainder(self, view: View) -> list[Load]:
-        return self._loads(view, "_lost")
+        return self._loads(view, LOSSES)
 
     def _loads(self, view: View, part: str) -> list[Load]:
         markers, results = self._results(view, part)
@@ -118,7 +119,7 @@ class ContactGroups(Force):
             operands += [*view.position(marker), *rotation]
             operands += [graph.zero if still else x for v in moving for x in v]
         data = _SharedData(len(operands), graph)
-        function = self._function(f"{self.name}{part}", bodies, data, bool(part))
+        function = self._function(f"{part}{self.name}", bodies, data, bool(part))
         return markers, pair_sum(graph, function, [*operands, *data.values])
 
     def _function(self, name: str, bodies: Sequence[int], data: _SharedData, lost: bool) -> PairFunction:
@@ -171,6 +172,8 @@ class ContactGroups(Force):
         ]
         bare = SpherePlane(self.name, *markers, normal, friction, graph.zero)
         contact = touching(kinds, markers, (given[0], given[1]), bare)
+        if planar:
+            contact = AtHeight(self.name, *markers, normal, friction, contact, view.height())
         on_second, on_first = contact.remainder(view) if lost else contact.loads(view)
         assert isinstance(on_second, MarkerLoad)
         assert isinstance(on_first, MarkerLoad)
@@ -268,6 +271,16 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
                 e.fault("second", f"two shapes {a} do not meet", _ALLOWED)
             elif a == b == "capsule" and (second or _differ(first, a)):
                 e.fault("second", "two shapes capsule do not meet", _ALLOWED)
+    thin = [shape for shape in first if _is_thin(shape)], [shape for shape in second or first if _is_thin(shape)]
+    for k, others in enumerate((second or first, first)):
+        cornered = sorted({shape.kind for shape in others if shape.kind in ("box", "polygon") or _is_thin(shape)})
+        if thin[k] and cornered and (second or _differ_in_body(first)):
+            e.fault(
+                ("first", "second")[k] if second else "first",
+                f"corners of {cornered[0]} pass through a segment of radius 0, which has no inside",
+                "give the segment a radius greater than 0",
+            )
+            break
     both = {shape.marker.label for shape in first if shape in second}
     if both:
         e.fault(
@@ -278,6 +291,14 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
     bodies = {shape.marker.body for shape in (*first, *second)}
     if len(bodies) == 1:
         e.fault("", "has shapes on one body only", "shapes of one body do not meet; give shapes on other bodies")
+
+
+def _is_thin(shape: ContactShape) -> bool:
+    return shape.kind == "segment" and shape.sizes[1].is_zero
+
+
+def _differ_in_body(shapes: Sequence[ContactShape]) -> bool:
+    return len({shape.marker.body for shape in shapes}) > 1
 
 
 def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:

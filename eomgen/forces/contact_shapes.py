@@ -191,6 +191,21 @@ class PolygonRound(Contact):
         return normal, depth, vec.add(reach, second), second
 
 
+@dataclass(frozen=True)
+class AtHeight(Contact):
+    """Shapes of the plane that touch in the plane of the first: the point of contact lies at the height of the second.
+
+    So both bodies feel the force at one place, and its power is that of the depth, whichever way the bodies tilt.
+    """
+
+    flat: Contact
+    height: Vec3
+
+    def touch(self, view: View) -> Touch:
+        normal, depth, first, second = self.flat.touch(view)
+        return normal, depth, vec.add(first, self.height), second
+
+
 #: Classes of features that meet: the first is a surface, or round beside round.
 MEETINGS = (
     ("round", "round"),

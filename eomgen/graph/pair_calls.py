@@ -1,8 +1,8 @@
 """Stage graph: the sum over pairs of shapes as nodes: one that holds all operands, one that sums, one for each result.
 
 The law of one kind of pair is a small graph of its own (:class:`PairKind`), so that the nodes of a sum do not grow with
-the number of pairs.  ``<name>(given)`` holds the operands, ``<name>(sum)`` and ``<name>(slope)`` are lists of results
-and of their directional derivatives, ``<name>(k)`` is one entry of such a list.
+the number of pairs.  ``pairs <name>(given)`` holds the operands, ``pairs <name>(sum)`` and ``pairs <name>(slope)`` are
+lists of results and of their directional derivatives, ``pairs <name>(k)`` is one entry of such a list.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ from ..numeric.pair_sums import POSE, PairSum
 from ..records import dataclass
 from .core import Expr, Graph
 from .nodes import Node
+
+
+LOSSES = "0"  #: begins the name of a sum of losses, as no name of a model does
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,7 @@ class PairFunction:
     Attributes
     ----------
     name : str
+        That of the contact, behind :data:`LOSSES` for what it takes from the energy.
     bodies : int
         Ground among them.
     data : tuple of float or None
@@ -89,6 +93,11 @@ class PairFunction:
     data: tuple[float | None, ...]
     tables: tuple[tuple[tuple[int, ...], ...], ...]
     kinds: tuple[PairKind, ...]
+
+    @property
+    def element(self) -> str:
+        """The name of the contact, which the sum of its losses shares."""
+        return self.name.removeprefix(LOSSES)
 
     @property
     def count(self) -> int:
@@ -120,6 +129,11 @@ class PairFunction:
         ]
         return PairSum(self.bodies, self.tables, kinds)
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            name: getattr(self, name) for name in self.__dataclass_fields__
+        }  # loops are made anew where they are used
+
     @cached_property
     def in_floats(self) -> PairSum:
         """Its loops on floats and arrays."""
@@ -149,7 +163,7 @@ class PairCall:
     @property
     def name(self) -> str:
         """Its name in formulas."""
-        return "_".join([self.function.name, self.part, *map(str, self.numbers[:1])])
+        return "_".join([self.function.element, self.part, *map(str, self.numbers[:1])])
 
     def implementation(self, orders: tuple[int, ...]) -> Callable[..., Any]:
         """Its value as a function of floats or arrays."""
@@ -187,7 +201,7 @@ def has_pair_sums(graph: Graph) -> bool:
 
 def opaque_names(graph: Graph) -> list[str]:
     """What expressions call that has no formula of its own: declared functions and sums over pairs."""
-    sums = {function.function.name for function, _ in graph.calls.values() if isinstance(function, PairCall)}
+    sums = {function.function.element for function, _ in graph.calls.values() if isinstance(function, PairCall)}
     return sorted({*graph.functions, *sums})
 
 
@@ -203,14 +217,14 @@ def _node(graph: Graph, call: PairCall, operation: str, ids: Sequence[int]) -> i
 
 
 def _item(graph: Graph, function: PairFunction, listed: int, k: int) -> int:
-    return _node(graph, PairCall(function, "item", (k,)), f"{function.name}({k})", [listed])
+    return _node(graph, PairCall(function, "item", (k,)), f"pairs {function.name}({k})", [listed])
 
 
 def pair_sum(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -> list[Expr]:
     """The results of a sum over pairs as expressions."""
     ids = [x.id for x in operands]
-    given = _node(graph, PairCall(function, "given"), f"{function.name}(given)", ids)
-    total = _node(graph, PairCall(function, "sum"), f"{function.name}(sum)", [given])
+    given = _node(graph, PairCall(function, "given"), f"pairs {function.name}(given)", ids)
+    total = _node(graph, PairCall(function, "sum"), f"pairs {function.name}(sum)", [given])
     return [Expr(graph, _item(graph, function, total, k)) for k in range(function.results)]
 
 
@@ -237,14 +251,14 @@ def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
         return None
     if call.part == "slope":
         raise UsageError(
-            f"contacts {function.name!r}: second derivatives of contacts between groups are not made; use point_plane, "
+            f"contacts {function.element!r}: second derivatives of contacts between groups are not made; use point_plane, "
             "sphere_plane or sphere_sphere, or do without second-order sensitivities"
         )
     operands = graph.nodes[ids[0]][1:]
     moving_numbers = tuple(k for k, j in enumerate(operands) if j in tangents)
     if not moving_numbers:
         return None
-    name = f"{function.name}(slope {' '.join(map(str, moving_numbers))})"
+    name = f"pairs {function.name}(slope {' '.join(map(str, moving_numbers))})"
     rates = [tangents[operands[k]] for k in moving_numbers]
     return _node(graph, PairCall(function, "slope", moving_numbers), name, [ids[0], *rates])
 

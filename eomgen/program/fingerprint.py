@@ -69,5 +69,6 @@ def _spell(value: Any) -> Any:
     if kind is np.ndarray:
         return ["array", value.shape, value.dtype.str, value.tobytes()]
     if kind.__module__.startswith("eomgen.") and (kind in FIELDS or hasattr(kind, "__dataclass_fields__")):
-        return [kind.__qualname__, *((name, _spell(part)) for name, part in vars(value).items() if name != "place")]
+        fields = getattr(kind, "__dataclass_fields__", vars(value))  # what is worked out once and kept is no part of it
+        return [kind.__qualname__, *((name, _spell(getattr(value, name))) for name in fields if name != "place")]
     raise TypeError(f"{kind.__name__} has no text")

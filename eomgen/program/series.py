@@ -189,7 +189,8 @@ class _Terms:
         varies = any(self._terms[k].varies for k in operands)
         row = OPERATIONS.get(kind)
         if row is None:
-            raise NoSeriesError("a table or a function of your own has no series")
+            what = "a contact between groups" if kind.startswith("pairs ") else "a table or a function of your own"
+            raise NoSeriesError(f"{what} has no series")
         if self._smooth and varies and row.bends:
             word = "a condition" if row.chooses else "a comparison" if row.kind == CONDITION else kind
             raise NoSeriesError(f"{word} of a moving quantity has corners or jumps")

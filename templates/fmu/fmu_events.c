@@ -56,9 +56,9 @@ int fmu_arm(fmu_instance *f)
     const int status = look(f, g, slope);
     for (int i = 0; i < FMU_N_EVENTS && status == FMU_OK; i++) {
         m->side[i] = g[i] > 0.0 || (g[i] == 0.0 && FMU_DIRECTION[i] != 1 && slope[i] < 0.0);
-        m->leaving[i] = 0;
+        m->leaving[i] = 0, m->g[0][i] = g[i];
     }
-    m->last_reset = m->seen = (double)NAN, m->crowded = 0;
+    m->last_reset = (double)NAN, m->seen = m->t, m->crowded = 0;
     return status;
 }
 
@@ -147,6 +147,7 @@ static int find_fired(fmu_instance *f, int *fired, int *ended)
         }
         m->side[i] = side, m->leaving[i] = 0;
     }
+    memcpy(m->g[0], g, FMU_N_EVENTS * sizeof(double)), m->seen = m->t; /* an input may jump once more at this time */
     return any;
 }
 
@@ -182,6 +183,7 @@ int fmu_update(fmu_instance *f, int *ended, int *changed)
             const int sent = m->leaving[i] || fired[i] == 1;
             m->leaving[i] = sent && fabs(g[i]) <= 2.0 * fabs(before[i]) && slope[i] != 0.0;
             m->side[i] = m->leaving[i] ? slope[i] > 0.0 : g[i] > 0.0;
+            m->g[0][i] = g[i];
         }
         m->crowded = fabs(m->t - m->last_reset) < RUNS_CROWDED * fmax(fabs(m->t - m->t_start), 1.0) ? m->crowded + 1 : 0;
         m->last_reset = m->t;

@@ -103,7 +103,7 @@ DOORS: dict[str, Callable[[Any, Any], Any]] = {
 
 
 #: Doors of one number that a user writes, which may be an expression of numbers as text.
-WRITTEN = ("named", "named parameter", "initial", "end", "guess")
+WRITTEN = ("named", "named parameter", "initial", "end", "guess", "tolerance")
 LOOPS = ("state", "constraints", "independent", "minimal", "reactions", "late kernel")
 PLACES = [("pendulum", door) for door in DOORS] + [("four_bar", door) for door in LOOPS]
 

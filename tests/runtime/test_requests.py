@@ -40,7 +40,7 @@ def ending(times: Any) -> Any:
         ({"events": {"low": {"expression": "theta", "terminal": -2}}}, "event low: terminal .* not -2"),
         ({"events": {"low": {"expression": "theta", "terminal": "once"}}}, "event low: terminal .* not 'once'"),
         ({"method": "RK4", "step": [0.1]}, r"step must be a number of seconds, not \[0.1\]"),
-        ({"method": "RK4", "step": "fine"}, "step must be a number of seconds, not 'fine'"),
+        ({"method": "RK4", "step": "fine"}, "step must be a number, not 'fine'"),
         ({"method": "RK4", "step": -0.1}, "step must be greater than 0 s, not -0.1"),
         ({"t_eval": "all"}, "t_eval must be a list of times in seconds, not 'all'"),
         ({"t_eval": [0, "end"]}, "t_eval must be a list of times"),
