@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from . import pipeline
 from .device.device_module import DeviceModule
 from .emit.cuda.device_text import describe_device, emit_device_text
+from .traced_functions import with_start
 
 if TYPE_CHECKING:
     from .derivation import Derivation
@@ -34,5 +35,5 @@ def cuda_functions(equations: Derivation, device: Device | None = None) -> Devic
     MissingDependencyError
         cuda-core or NVRTC is not installed.
     """
-    program = pipeline.build(equations, "cuda")
+    program = with_start(equations, pipeline.build(equations, "cuda"))
     return DeviceModule(emit_device_text(program), describe_device(program), program.metadata, device)

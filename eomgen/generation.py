@@ -15,6 +15,7 @@ from .files.path_names import as_path
 from .pipeline import build, compile_core, derive
 from .runtime.bound_model import BoundModel
 from .targets import find_target
+from .traced_functions import with_start
 from .verification.record import record
 from .verification.record_calls import RECORDED, record_calls
 from .verification.recorded import FILE
@@ -68,6 +69,8 @@ def generate(
             raise UsageError(f"slim and precision are for packages; target {target} makes one file")
         return row.write(equations, folder, fmi)
     program = build(equations, target)
+    if row.kernels and not row.module:
+        program = with_start(equations, program)
     asked = {"independent": list(independent or ()) or None, "baumgarte": baumgarte, "precision": precision}
     told = {name: value for name, value in asked.items() if value not in (None, "double")}
     sources = dict(emit_package(program, target, slim, precision, told))

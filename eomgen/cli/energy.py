@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
+from ..graph.pair_calls import PairCall
 from ..graph.substitute import substitute
 from ..graph.traverse import reachable
 
@@ -100,7 +101,12 @@ def uncounted_functions(equations: Equations) -> list[str]:
 def _without_twin(power: Expr) -> list[str]:
     graph = power.graph
     called = {graph.nodes[i][0] for i in reachable(graph, [power.id])} & graph.calls.keys()
-    return sorted({function.name for function, _ in (graph.calls[key] for key in called) if function.evaluator is None})
+    return sorted({function.name for function, _ in (graph.calls[key] for key in called) if _lacks_twin(function)})
+
+
+def _lacks_twin(function: object) -> bool:
+    """Whether NumPy cannot evaluate a function, as it can sums over pairs of shapes."""
+    return not isinstance(function, PairCall) and getattr(function, "evaluator", None) is None
 
 
 def _power(kinematics: Kinematics) -> Expr:

@@ -228,7 +228,9 @@ def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
     for (quantity, name), path in reader.asked.items():
         if quantity != "power" and name in known and not known[name].acts_along:
             remedy = f"power({name}) is known of every element; force, length and rate of elements along a path "
-            reader.faults.add(path, f"{name!r} does not act along a path", remedy + "or a coordinate, and of contacts")
+            reader.faults.add(
+                path, f"{name!r} does not act along a path", remedy + "or a coordinate, and of single contacts"
+            )
 
 
 def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -> dict[str, Expr]:

@@ -14,8 +14,13 @@ RATE = 1.0  #: of an independent coordinate whose initial rate is not declared (
 
 
 def example_state(program: Program) -> list[float]:
-    """x at the declared initial position: the independent velocities declared, or RATE, and the others as loops ask."""
+    """x where the model starts, if the program knows it; else the declared position, and velocities as loops ask.
+
+    Independent velocities are those declared, or RATE.
+    """
     metadata, sizes = program.metadata, program.sizes
+    if "start" in metadata:
+        return list(metadata["start"])
     q = [float(x) for x in metadata.get("q_reference") or [0.0] * sizes.n_q]
     declared = metadata.get("initial", {})
     independent = list(metadata.get("independent", range(sizes.n_v)))

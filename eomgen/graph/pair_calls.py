@@ -17,7 +17,6 @@ from ..records import dataclass
 from .core import Expr, Graph
 from .nodes import Node
 
-
 LOSSES = "0"  #: begins the name of a sum of losses, as no name of a model does
 
 
@@ -251,8 +250,8 @@ def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
         return None
     if call.part == "slope":
         raise UsageError(
-            f"contacts {function.element!r}: second derivatives of contacts between groups are not made; use point_plane, "
-            "sphere_plane or sphere_sphere, or do without second-order sensitivities"
+            f"contacts {function.element!r}: second derivatives of contacts between groups are not made; use "
+            "point_plane, sphere_plane or sphere_sphere, or do without second-order sensitivities"
         )
     operands = graph.nodes[ids[0]][1:]
     moving_numbers = tuple(k for k, j in enumerate(operands) if j in tangents)

@@ -16,11 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analysis.tables import as_html, as_text
-from ..errors import ProjectionError
+from ..errors import ProjectionError, UsageError
 from ..limits.identification import EFFECT, ROUNDED_COEFFICIENT
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.near_names import unknown
+from ..runtime.refusals import refuse_states
+from ..runtime.room import read_number
 from .random_states import free_directions, random_states
 from .regressor import STANDARD, regressor, standard_names, standard_parameters
 
@@ -172,10 +174,15 @@ def base_parameters(module: BoundModel, /, *, least: float = EFFECT, seed: int =
     Raises
     ------
     UsageError
-        A model without bodies.
+        A model without bodies, or such a value of least.
+    UnavailableError
+        The model has first-order states.
     ProjectionError
         No random state could be put on the constraints.
     """
+    refuse_states(module.layout, "base_parameters")
+    if not 0.0 <= read_number("least", least) < 1.0:
+        raise UsageError(f"least must be 0 or positive and less than 1, not {least:g}")
     module = module if p is None else module.bind(p)
     standard = standard_names(module)
     count = ROWS * len(standard) // max(1, module.n_dof) + SPARE

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.kernels import into
+from ..runtime.refusals import refuse_states
 from ..runtime.room import read_numbers
 
 if TYPE_CHECKING:
@@ -88,12 +89,15 @@ def regressor(
     ------
     UsageError
         A wrong shape, or a model without bodies.
+    UnavailableError
+        The model has first-order states.
 
     Notes
     -----
     ``inverse_dynamics(q, v, a)`` is Y pi and what no body's inertia makes: springs, dampers and other force elements,
     inputs, and the inertia of drives (``armature``).  :meth:`inertial_remainder` is that part.
     """
+    refuse_states(module.layout, "regressor")
     names, (q, v, a), single = _motion(module, q, v, a)
     values, count, n_v = _values(module, p), q.shape[1], module.n_v
     result = np.empty((n_v, len(names), count))

@@ -155,6 +155,10 @@ def _scale(layout: Layout, unit: str, slopes: Array) -> float:
 def _place(kernels: Kernels, name: str, marker: str, axis: int) -> WantedPosition:
     layout, poses = kernels.layout, kernels.state("poses")
     data = load_show("data").read_picture(layout.metadata, kernels.context.p)
+    body, _, own = marker.rpartition(".")
+    marker = (
+        marker if marker in data.markers else f"{body.replace('.', '_')}.{own}"
+    )  # leg.thigh.knee of an instance leg
     if marker not in data.markers:
         raise unknown("marker", marker, data.markers)
     frame = data.markers[marker]

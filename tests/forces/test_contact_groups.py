@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from itertools import combinations_with_replacement
 from typing import Any
 
@@ -11,6 +12,8 @@ import pytest
 from contact_scenes import ELASTIC, LAW, PLANAR, on
 
 import eomgen as eg
+from eomgen.pipeline import build
+from eomgen.program.fingerprint import fingerprint
 
 G = 9.81
 
@@ -253,3 +256,76 @@ def random_scene(seed: int) -> tuple[Any, dict[str, float]]:
         start |= {f"j{k}_x": 0.4 * (k % 2), f"j{k}_y": 0.3 + 0.4 * (k // 2), f"j{k}_3": rng.uniform(-3, 3)}
         start |= {f"j{k}_x_dot": (1 - 2 * (k % 2)) * rng.uniform(0, 2), f"j{k}_3_dot": rng.uniform(-5, 5)}
     return m.compile(target="cython"), start
+
+
+TILTED = [("circle", "circle", 0.16), ("box", "circle", 0.16), ("segment", "box", 0.09), ("polygon", "segment", 0.07)]
+
+
+@pytest.mark.parametrize(("first", "second", "away"), TILTED)
+def test_bodies_that_tilt_keep_their_energy(first: str, second: str, away: float) -> None:
+    """Shapes of the plane on bodies whose planes differ: the force is minus the slope of the potential energy."""
+    m = eg.Model("tilted", gravity=(0, 0, 0))
+    low, high = (m.body(name, mass=1.0, inertia=(0.02, 0.02, 0.02)) for name in ("low", "high"))
+    m.revolute("lean", m.ground, low, axis="x")
+    m.universal("hang", m.ground.at(0.01, away, 0.3), high)
+    kinds = [{"on": body, **PLANAR[kind]} for kind, body in ((first, low), (second, high))]
+    m.contacts("touch", *kinds, {"stiffness": 1e4, "exponent": 1.5})
+    module = m.compile(target="numpy")
+    pushed = 0
+    for q in 0.12 * np.random.default_rng(5).uniform(-1.0, 1.0, (12, module.n_q)):
+        rest = np.zeros(module.n_v)
+
+        def height(at: np.ndarray, rest: np.ndarray = rest) -> float:
+            return float(module.energy(np.concatenate([at, rest]))[1])
+
+        slopes = [(height(q + d) - height(q - d)) / 2e-6 for d in 1e-6 * np.eye(module.n_q)]
+        forces = -module.bias(0.0, np.concatenate([q, rest]))
+        pushed += bool(np.abs(forces).max() > 1.0)
+        np.testing.assert_allclose(forces, np.negative(slopes), rtol=1e-5, atol=1e-3)
+    assert pushed > 4
+
+
+def test_names_of_contacts_stand_apart_from_functions_and_losses() -> None:
+    """A function of the contact's name, and a contact named as another's losses could be."""
+    m, (first, second) = scenes.planar("named", 2)
+    m.table("push", np.linspace(-1.0, 1.0, 5), np.linspace(-2.0, 2.0, 5))
+    disc = {"shape": "circle", "radius": 0.1}
+    for name, body in (("push", first), ("push_lost", second)):
+        m.contacts(name, {**disc, "on": body}, {"shape": "half_plane", "on": m.ground}, LAW)
+    m.force("pull", first, (0, "push(j0_x)", 0))
+    module = m.compile(target="numpy")
+    x = module.x0({"j0_x": 0.3, "j0_y": 0.09, "j1_x": 2.0, "j1_y": 0.07, "j0_x_dot": 0.2})
+    alone = m.compile().rhs(0.0, x)
+    np.testing.assert_allclose(module.rhs(0.0, x), alone, rtol=1e-12, atol=1e-12)
+    still = module.x0({"j0_x": 0.3, "j0_y": 0.09, "j1_x": 2.0, "j1_y": 0.07})
+    forces = [0.6 - 1.0 * G + push(0.01), -1.2 * G + push(0.03)]
+    np.testing.assert_allclose(-module.bias(0.0, still)[[1, 4]], forces, rtol=1e-9)
+    report = module.verify()
+    assert report.ok, report
+
+
+def push(depth: float) -> float:
+    """The force of LAW at rest."""
+    return float(LAW["stiffness"]) * depth ** float(LAW.get("exponent", 1.5))
+
+
+def test_derived_contacts_are_pickled_and_recognised() -> None:
+    equations = heap(True).derive()
+    kept = [fingerprint(build(e, "cython")) for e in (equations, heap(True).derive())]
+    module = equations.compile(target="numpy")
+    module.rhs(0.0, module.x0(START))  # what evaluating keeps is no part of it
+    again = pickle.loads(pickle.dumps(equations))
+    assert kept[0] is not None
+    assert kept == [fingerprint(build(again, "cython"))] * 2
+
+
+def test_segments_without_a_radius_are_refused_where_corners_would_pass() -> None:
+    m, bodies = scenes.planar("thin", 2)
+    thin = {"shape": "segment", "length": 0.3}
+    for shape in (thin, {"shape": "box", "size": (0.1, 0.1)}):
+        m.contacts("c", on(thin, bodies[0]), on(shape, bodies[1]), LAW)
+        with pytest.raises(eg.ModelError, match="pass through a segment of radius 0, which has no inside; give the"):
+            m.derive()
+        m, bodies = scenes.planar("thin", 2)
+    m.contacts("c", {"on": bodies[0], **thin}, {"on": bodies[1], "shape": "circle", "radius": 0.1}, LAW)
+    m.derive()
