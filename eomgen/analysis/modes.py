@@ -22,7 +22,7 @@ from ..notation.notation import Notation
 from ..numeric import algebra
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
-from ..runtime.initial import Initial
+from ..runtime.assembled import initial_of
 from ..runtime.room import read_numbers
 from ..runtime.show_parts import load_show
 from ..texts import html_text
@@ -259,7 +259,7 @@ def modes(
     if x is None:
         x = equilibrium(module, t=t).x
     if isinstance(x, Mapping):
-        at_rest = not Initial(module.kernels, t).sort(x).rates
+        at_rest = not initial_of(module.kernels, t, x).sort(x).rates
         x = module.x0(x, t=t)[: module.n_q if at_rest else module.n_x]
     state = np.array(read_numbers("x", x))
     if state.shape == (module.n_q,):
