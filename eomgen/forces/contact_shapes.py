@@ -22,8 +22,9 @@ from .force import View
 
 CORNERS = 64  #: most corners of a polygon
 
+KINDS = ("circle", "segment", "box", "polygon", "half_plane", "sphere", "capsule", "half_space")
 _ON = {
-    "shape": Field("text", "kind of shape", required=True),
+    "shape": Field("choice", "kind of shape", required=True, choices=KINDS),
     "on": Field("on", "the marker to which it is fixed, or a list of markers that have one each", required=True),
 }
 _RADIUS = Field("expression", "radius (m)", required=True, dimension=LENGTH)
