@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from . import pipeline
 from .device.device_module import DeviceModule
 from .emit.cuda.device_text import describe_device, emit_device_text
-from .traced_functions import with_start
 
 if TYPE_CHECKING:
     from .derivation import Derivation
@@ -35,5 +34,5 @@ def cuda_functions(equations: Derivation, device: Device | None = None) -> Devic
     MissingDependencyError
         cuda-core or NVRTC is not installed.
     """
-    program = with_start(equations, pipeline.build(equations, "cuda"))
+    program = pipeline.with_start(equations, pipeline.build(equations, "cuda"))
     return DeviceModule(emit_device_text(program), describe_device(program), program.metadata, device)

@@ -12,10 +12,9 @@ from .emit import emit_package
 from .emit.write import write_package
 from .errors import EomgenError, UsageError
 from .files.path_names import as_path
-from .pipeline import build, compile_core, derive
+from .pipeline import build, compile_core, derive, with_start
 from .runtime.bound_model import BoundModel
 from .targets import find_target
-from .traced_functions import with_start
 from .verification.record import record
 from .verification.record_calls import RECORDED, record_calls
 from .verification.recorded import FILE

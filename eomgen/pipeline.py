@@ -21,7 +21,7 @@ from .describe.dotted_names import Undotted
 from .equations import GIVEN, METHODS, take_given
 from .equations.digits_kept import note_lost_digits
 from .equations.positive import require_inertia
-from .errors import AssemblyError, ToolchainError, UsageError
+from .errors import AssemblyError, EomgenError, ToolchainError, UsageError
 from .kinematics import Kinematics, analyse
 from .kinematics.mobility import Mobility, find_mobility
 from .kinematics.report import MechanismReport, report
@@ -246,6 +246,17 @@ def compile_core(
         return _load(equations, build(equations, target, wanted), target, options)
 
     return LateCore(core, list(late), load_late)
+
+
+def with_start(equations: Derivation, program: Program) -> Program:
+    """The program with the state in which the model starts, for libraries of functions, which assemble none."""
+    from .runtime.bound_model import BoundModel
+
+    try:
+        start = BoundModel(compile_core(equations, "numpy")).x0()
+    except EomgenError:  # functions that are in C alone, or no such state
+        return program
+    return replace(program, metadata={**program.metadata, "start": [float(x) for x in start]})
 
 
 def _load(

@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from hashlib import sha256
 from types import ModuleType
 from typing import TYPE_CHECKING
 
 from . import pipeline
 from .emit.traced import LIBRARIES, emit_traced
-from .errors import EomgenError, MissingDependencyError
+from .errors import MissingDependencyError
 from .files.source import find_module, load_source
-from .runtime.bound_model import BoundModel
 
 if TYPE_CHECKING:
     from .derivation import Derivation
-    from .program import Program
-
-
-def with_start(equations: Derivation, program: Program) -> Program:
-    """The program with the state in which the model starts, which libraries of functions alone cannot assemble."""
-    try:
-        start = BoundModel(pipeline.compile_core(equations, "numpy")).x0()
-    except EomgenError:  # functions that are in C alone, or no such state
-        return program
-    return replace(program, metadata={**program.metadata, "start": [float(x) for x in start]})
 
 
 def traced_functions(equations: Derivation, library: str) -> ModuleType:
@@ -49,7 +37,7 @@ def traced_functions(equations: Derivation, library: str) -> ModuleType:
     MissingDependencyError
         The library is not installed.
     """
-    text = emit_traced(with_start(equations, pipeline.build(equations, library)), library)
+    text = emit_traced(pipeline.with_start(equations, pipeline.build(equations, library)), library)
     name = f"{equations.name}_{library}_{sha256(text.encode()).hexdigest()[:16]}"
     found = find_module(name)
     if found is not None:

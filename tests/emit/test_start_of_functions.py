@@ -12,8 +12,7 @@ import pytest
 import eomgen as eg
 from eomgen.emit.cuda.device_text import describe_device
 from eomgen.generation import generate
-from eomgen.pipeline import build
-from eomgen.traced_functions import with_start
+from eomgen.pipeline import build, with_start
 
 
 def crane() -> eg.Model:
