@@ -257,7 +257,8 @@ def _converted(model: Described, found: ElementType, name: Any, key: str, value:
     if kind == "factors" and isinstance(value, Mapping):
         return {_reference(model, kind, part): factor for part, factor in value.items()}
     if kind == "shapes":
-        return [_on(model, part) for part in ([value] if isinstance(value, Mapping) else value)]
+        listed = [value] if isinstance(value, Mapping) else items(value)
+        return value if listed is None else [_on(model, part) for part in listed]  # reading tells what is no list
     if kind == "via":
         return [_stop(model, stop) for stop in value] or None
     return value

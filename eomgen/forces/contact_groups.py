@@ -281,6 +281,9 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
                 "give the segment a radius greater than 0",
             )
             break
+    for key, shapes in (("first", first), ("second", second)):
+        if twice := [shape for k, shape in enumerate(shapes) if shape in shapes[:k]]:
+            e.fault(key, f"has the {twice[0].kind} on {twice[0].marker.label} twice", "give each shape once")
     both = {shape.marker.label for shape in first if shape in second}
     if both:
         e.fault(

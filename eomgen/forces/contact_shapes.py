@@ -22,35 +22,34 @@ from .force import View
 
 CORNERS = 64  #: most corners of a polygon
 
-KINDS = ("circle", "segment", "box", "polygon", "half_plane", "sphere", "capsule", "half_space")
-_ON = {
-    "shape": Field("choice", "kind of shape", required=True, choices=KINDS),
-    "on": Field("on", "the marker to which it is fixed, or a list of markers that have one each", required=True),
-}
 _RADIUS = Field("expression", "radius (m)", required=True, dimension=LENGTH)
 _ALONG = "length between the centres of its ends (m), along {} of the marker"
-#: Kind of shape -> its keys; a shape in the plane lies in the x-y plane of its marker.
-SHAPE_FIELDS: dict[str, Fields] = {
-    "circle": {**_ON, "radius": _RADIUS},
+_SIZES: dict[str, Fields] = {
+    "circle": {"radius": _RADIUS},
     "segment": {
-        **_ON,
         "length": Field("expression", _ALONG.format("x"), required=True, dimension=LENGTH),
         "radius": _RADIUS._replace(required=False, default=0),
     },
-    "box": {**_ON, "size": Field("two", "lengths along x and y (m)", required=True, dimension=LENGTH)},
+    "box": {"size": Field("two", "lengths along x and y (m)", required=True, dimension=LENGTH)},
     "polygon": {
-        **_ON,
-        "points": Field("corners", f"3 to {CORNERS} corners [x, y] of a convex outline (m)", required=True),
+        "points": Field(
+            "corners", f"3 to {CORNERS} corners [x, y] of a convex outline (m)", required=True, dimension=LENGTH
+        ),
     },
-    "half_plane": _ON,
-    "sphere": {**_ON, "radius": _RADIUS},
+    "half_plane": {},
+    "sphere": {"radius": _RADIUS},
     "capsule": {
-        **_ON,
         "length": Field("expression", _ALONG.format("z"), required=True, dimension=LENGTH),
         "radius": _RADIUS,
     },
-    "half_space": _ON,
+    "half_space": {},
 }
+_ON = {
+    "shape": Field("choice", "kind of shape", required=True, choices=tuple(_SIZES)),
+    "on": Field("on", "the marker to which it is fixed, or a list of markers that have one each", required=True),
+}
+#: Kind of shape -> its keys; a shape in the plane lies in the x-y plane of its marker.
+SHAPE_FIELDS: dict[str, Fields] = {kind: {**_ON, **sizes} for kind, sizes in _SIZES.items()}
 #: Shapes of mechanisms in the plane; the others are shapes in space.
 PLANAR = ("circle", "segment", "box", "polygon", "half_plane")
 _EDGE = 5  #: numbers of an edge: its first corner, its outward normal, its length

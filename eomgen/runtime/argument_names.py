@@ -23,11 +23,12 @@ def both_names(function: Function) -> Function:
     """
     taken = signature(function).parameters
     others = {other: name for name, other in PAIRS if name in taken and other not in taken}
+    place = {name: k for k, name in enumerate(taken)}
 
     @wraps(function)
     def call(*args, **given):  # type: ignore[no-untyped-def]
         for other in others.keys() & given.keys() if given else ():
-            if others[other] in given:
+            if others[other] in given or place[others[other]] < len(args):
                 raise UsageError(f"{others[other]} and {other} are the same argument; give one of them")
             given[others[other]] = given.pop(other)
         return function(*args, **given)

@@ -329,3 +329,22 @@ def test_segments_without_a_radius_are_refused_where_corners_would_pass() -> Non
         m, bodies = scenes.planar("thin", 2)
     m.contacts("c", {"on": bodies[0], **thin}, {"on": bodies[1], "shape": "circle", "radius": 0.1}, LAW)
     m.derive()
+
+
+@pytest.mark.parametrize(
+    ("first", "told"),
+    [
+        (3, "is not a list of shapes"),
+        ("disc", "is not a list of shapes"),
+        ([{"shape": "circle", "radius": 0.1}] * 2, "has the circle on b0 twice; give each shape once"),
+        ({"shape": "polygon", "points": [("m", 0), (0, 0.1), (-0.1, 0)]}, r"points\[0\]\[0\]"),
+    ],
+)
+def test_groups_that_cannot_be_are_told(first: Any, told: str) -> None:
+    m, bodies = scenes.planar("wrong", 2)
+    m.parameter("m", 0.1, unit="kg")
+    given = [on(one, bodies[0]) for one in first] if isinstance(first, list) else first
+    given = on(given, bodies[0]) if isinstance(given, dict) else given
+    with pytest.raises(eg.EomgenError, match=told):
+        m.contacts("c", given, {"shape": "half_plane", "on": m.ground}, LAW)
+        m.check()

@@ -47,6 +47,8 @@ def test_what_is_given_twice_or_not_known_is_refused(module: eg.Module, name: st
     given, call = arguments(module, name, module.x0()), getattr(module, name)
     with pytest.raises(UsageError, match="p and parameters are the same argument; give one of them"):
         call(*given, p={"m_r": 1.0}, parameters={"m_r": 1.0})
+    with pytest.raises(UsageError, match="p and parameters are the same argument; give one of them"):
+        call(*given, *([0.0] if name == "project" else []), module.p, parameters={"m_r": 1.0})  # its second is t
     with pytest.raises(UsageError, match="u and inputs are the same argument; give one of them"):
         call(*given, u=[0.0], inputs={"tau": 0.0})
     with pytest.raises(UsageError, match=r"m_x.*(m_r|parameter)"):
