@@ -135,6 +135,8 @@ def derive_as(
     if baumgarte is not None:
         kinematics = _stabilised(kinematics, chosen, baumgarte)
     with _alone(), _timed(seconds, "equations"):
+        if any(force.by_reaction for force in mechanism.forces):
+            kinematics = _with_reactions(kinematics, mobility)
         choice: Choice | None = None
         if chosen == GIVEN:
             tree = take_given(kinematics)
@@ -160,6 +162,13 @@ def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float])
     if not kinematics.constraints.labels:
         raise UsageError("baumgarte stabilises constraints, and this model has no constraints; leave it out")
     return stabilise(kinematics, alpha, beta)
+
+
+def _with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
+    """Kinematics with laws that speak of the joints' reactions solved for these."""
+    from .program.reaction_laws import with_reactions
+
+    return with_reactions(kinematics, mobility)
 
 
 def _mobility(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:

@@ -9,7 +9,7 @@ from .contact import Contact, SpherePlane, SphereSphere
 from .contact_groups import ContactGroups
 from .contact_shapes import ContactShape
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
-from .friction import Friction, JointFriction
+from .friction import Friction, JointFriction, ReactionFriction
 from .laws import GeneralElement
 from .muscle import Muscle
 from .normal_laws import HuntCrossley
@@ -39,6 +39,7 @@ __all__ = [
     "HuntCrossley",
     "JointCoordinate",
     "JointFriction",
+    "ReactionFriction",
     "JointStop",
     "Line",
     "Load",

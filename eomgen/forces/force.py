@@ -73,6 +73,7 @@ class Force(ABC):
     sentence: ClassVar[str] = "A force element of the model."
     formula: ClassVar[str] = ""
     uses_value: ClassVar[bool] = False  #: whether its law looks at the value of its path, not at the rate alone
+    by_reaction: ClassVar[bool] = False  #: whether its law speaks of the reactions of joints
     by_power: ClassVar[bool] = False  #: whether its forces enter by virtual power, though it has a potential
     name: str
 

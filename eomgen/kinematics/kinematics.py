@@ -21,6 +21,7 @@ from .constraint_equations import couple
 from .length import length_scale
 from .loops import Constraints, close_loop, differentiate_constraints, own_rows
 from .motion import MarkerMotion
+from .resolved_loads import entries_of, with_entries
 from .state import MotionSymbols, acceleration_name, lay_out
 from .topology import Topology, find_topology
 from .tree import Link, Poses, build_links, link_twists
@@ -261,10 +262,10 @@ def _resolve_force(force: Force, motion: MarkerMotion, mechanism: Mechanism) -> 
     loads = force.loads(motion)
     potential = force.potential(motion)
     rest = force.remainder(motion) if potential is not None else []
-    flat = [e for load in [*loads, *rest] for e in _entries(load)]
+    flat = [e for load in [*loads, *rest] for e in entries_of(load)]
     mapping = motion.derived_symbols(mechanism, symbols_of([*flat, *([potential] if potential is not None else [])]))
     values = iter(substitute(flat, mapping) if mapping else flat)
-    loads, rest = ([_with_entries(load, values) for load in part] for part in (loads, rest))
+    loads, rest = ([with_entries(load, values) for load in part] for part in (loads, rest))
     if potential is not None:
         potential = substitute([potential], mapping)[0] if mapping else potential
         allowed = {p.name for p in mechanism.parameters} | {n for n, _ in _coordinate_symbols(motion)}
@@ -333,15 +334,3 @@ def _expressions(value: object) -> list[Expr]:
 
 def _coordinate_symbols(motion: MarkerMotion) -> list[tuple[str, Expr]]:
     return [(name, triple[0]) for name, triple in motion.coordinates.items()]
-
-
-def _with_entries(load: Load, values: Iterator[Expr]) -> Load:
-    """A load with its entries replaced by the next values."""
-    if isinstance(load, CoordinateLoad):
-        return CoordinateLoad(load.coordinate, next(values))
-    x = [next(values) for _ in range(6)]
-    return MarkerLoad(load.marker, (x[0], x[1], x[2]), (x[3], x[4], x[5]))
-
-
-def _entries(load: MarkerLoad | CoordinateLoad) -> list[Expr]:
-    return [*load.force, *load.torque] if isinstance(load, MarkerLoad) else [load.value]

@@ -47,6 +47,7 @@ class MarkerMotion:
         self.coordinates = coordinates
         self.state = state
         self.turning = turning or {}
+        self.carried: Mapping[str, Expr] = {}  # what symbols of reactions stand for, once that is solved for
         self._open: list[str] = []  # quantities of elements being resolved, each asked for by the one before
 
     def relative(self, start: Marker, end: Marker) -> Frame:
@@ -159,6 +160,8 @@ class MarkerMotion:
         for name, quantity in mechanism.quantities.items():
             if name in used:
                 mapping[self.graph.symbol(name)] = self._quantity(quantity)
+        for name in self.carried.keys() & used:
+            mapping[self.graph.symbol(name)] = self.carried[name]
         for name in mechanism.element_quantities.keys() & used:
             mapping[self.graph.symbol(name)] = self._of_element(mechanism, name)
         return mapping

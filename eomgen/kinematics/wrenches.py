@@ -208,6 +208,13 @@ class JointWrenches:
 
     # -- the kernels ----------------------------------------------------------------------------------------------
     @cached_property
+    def on_bodies(self) -> dict[str, dict[int, Row6]]:
+        """D of each constraint row, body by body; rows that vanish identically are there too."""
+        return self._element_rows() | {
+            label: self._on_ends(joint.spec, gradient) for joint in self.cut for label, gradient in joint.rows
+        }
+
+    @cached_property
     def geometry(self) -> Row6:
         """D of the constraint rows (n_c, n_bodies, 6); S of the joints (n_j, 3); their free directions as (linear,
         angular) at S (n_f, 6); gradients of the equations of joints without coordinates (n_r, 6), and of the
@@ -215,11 +222,8 @@ class JointWrenches:
         graph, n = self.kinematics.graph, len(self.mechanism.bodies)
         empty = (graph.zero,) * 6
         flat: list[Expr] = []
-        on_bodies = self._element_rows() | {
-            label: self._on_ends(joint.spec, gradient) for joint in self.cut for label, gradient in joint.rows
-        }
         for label in self.kinematics.constraints.labels:
-            wrenches = on_bodies[label]
+            wrenches = self.on_bodies[label]
             for body in range(n):
                 flat += wrenches.get(body, empty)
         for spec in self.specs:

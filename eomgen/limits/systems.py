@@ -20,3 +20,7 @@ ROUNDED = 1e-14
 FAINT = 1e-15
 #: Least s^2 in that: below it, FAINT would allow more than a hundredth.
 WEAKEST = 1e-13
+#: Most by which forces of laws of reactions may miss their laws, relative to the sum of their sizes: 5e4 eps, as LEFT.
+FIXED = 1e-11
+#: Below it a component of a reaction vanishes whatever the state is: 5e3 eps, of symbols between 0.5 and 1.5.
+UNTOUCHED = 1e-12

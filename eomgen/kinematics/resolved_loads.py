@@ -1,0 +1,21 @@
+"""Stage kinematics: the entries of loads of force elements, and loads with other entries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..forces import CoordinateLoad, Load, MarkerLoad
+from ..graph.core import Expr
+
+
+def with_entries(load: Load, values: Iterator[Expr]) -> Load:
+    """A load with its entries replaced by the next values."""
+    if isinstance(load, CoordinateLoad):
+        return CoordinateLoad(load.coordinate, next(values))
+    x = [next(values) for _ in range(6)]
+    return MarkerLoad(load.marker, (x[0], x[1], x[2]), (x[3], x[4], x[5]))
+
+
+def entries_of(load: MarkerLoad | CoordinateLoad) -> list[Expr]:
+    """Force and torque of a load on a marker, or the one value of a load along a coordinate."""
+    return [*load.force, *load.torque] if isinstance(load, MarkerLoad) else [load.value]
