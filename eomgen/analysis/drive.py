@@ -24,7 +24,7 @@ from ..numeric.partitions import partition
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.near_names import read_names
-from ..runtime.refusals import refuse_states
+from ..runtime.refusals import refuse_reaction_laws, refuse_states
 from ..runtime.room import read_numbers
 from ..suggestions import hint, joined
 from .constrained import ProjectedStates, free_motions, prepare, solve_multipliers
@@ -118,6 +118,7 @@ def actuator_forces(
     module = module if p is None and u is None else module.bind(p, u)
     layout = module.layout
     refuse_states(layout, "actuator_forces")
+    refuse_reaction_laws(layout, "actuator_forces")
     states = prepare(module, t, x)
     count = len(states.t)
     names = _drives(layout, actuated)

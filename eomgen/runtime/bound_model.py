@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -89,6 +89,10 @@ class BoundModel(Assembled, Momenta):
             mechanical = Mechanical(kernels)
         self.mass_matrix, self.embedded_mass_matrix = mechanical.mass_matrix, mechanical.embedded_mass_matrix
         self.bias, self.inverse_dynamics = mechanical.bias, mechanical.inverse_dynamics
+        if self.layout.reaction_laws:
+            from .refusals import RefusedInverse
+
+            self.inverse_dynamics = cast("Motion", RefusedInverse(self.layout))
         self.constraint_jacobian = mechanical.constraint_jacobian
         self.velocity_constraints = kernels.velocity_constraints
 

@@ -68,7 +68,13 @@ def _not_finite(kernels: Evaluates, t: float, x: Array, p: Array | None, u: Arra
         return f"the input{'s' * (len(bad) > 1)} {', '.join(bad)} given {'are' if len(bad) > 1 else 'is'} not"
     if layout.n_finite_forces and "finite_forces" in kernels.core.names and x.size >= layout.n_x:
         finite = kernels.state("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
-        loads = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
+        bad = [name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0]
+        if bad and set(bad) <= set(layout.reaction_laws):
+            return (
+                f"the forces of {' and '.join(bad)} depend on reactions which they change so strongly that the motion "
+                "may have several solutions or none (Painleve's paradox); give smaller coefficients"
+            )
+        loads = " and ".join(name for name in bad if name not in layout.reaction_laws)
         if loads:
             why = "its ends meet or lie inside the cylinder, or its law is outside its domain"
             return f"the loads of {loads} are not ({why})"

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UnavailableError, UsageError
 from ..numeric.scales import Array
-from .refusals import refuse_states, require_velocities
+from .refusals import refuse_reaction_laws, refuse_states, require_velocities
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ def inverse_dynamics_derivatives(
         The model has first-order states.
     """
     refuse_states(module.layout, "inverse_dynamics_derivatives")
+    refuse_reaction_laws(module.layout, "inverse_dynamics_derivatives")
     n_q, n_v = module.n_q, module.n_v
     every = _kept(module, "motion", "inverse_dynamics_derivatives")(q, v, a, p, u, out, t)
     return InverseDynamicsDerivatives(every[:, :n_q], every[:, n_q : n_q + n_v], every[:, n_q + n_v :])
@@ -101,6 +102,7 @@ def inverse_dynamics_hessian_product(
         The model has first-order states.
     """
     refuse_states(module.layout, "inverse_dynamics_hessian_product")
+    refuse_reaction_laws(module.layout, "inverse_dynamics_hessian_product")
     n_q, n_v = module.n_q, module.n_v
     given = zip("qva", (q, v, a), (n_q, n_v, n_v), strict=True)
     x = _stacked([*given, ("weights", weights, n_v), ("direction", direction, n_q + 2 * n_v)])

@@ -47,6 +47,8 @@ class Layout:
         self.constraint_labels: tuple[str, ...] = tuple(data.get("constraint_labels", ()))
         self.alignment_labels: tuple[str, ...] = tuple(data.get("alignment_labels", ()))
         self.fragile_forces: tuple[str, ...] = tuple(data.get("fragile_forces", ()))
+        #: elements whose forces depend on reactions of joints
+        self.reaction_laws: tuple[str, ...] = tuple(data.get("reaction_laws", ()))
         self.n_q, self.n_v, self.n_x = len(self.q), len(self.v), len(self.q) + len(self.v)
         self.n_u, self.n_p, self.n_y = len(self.u), len(self.p), len(self.y)
         self.n_c: int = data.get("n_c", 0)

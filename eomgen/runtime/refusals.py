@@ -40,6 +40,22 @@ def refuse_states(layout: Layout, what: str) -> None:
         )
 
 
+def refuse_reaction_laws(layout: Layout, what: str) -> None:
+    """Refuse a model whose forces depend on reactions, where other forces than its own act or the motion is given.
+
+    Raises
+    ------
+    UnavailableError
+    """
+    if layout.reaction_laws:
+        raise UnavailableError(
+            f"{what} is not available for models whose forces depend on reactions of joints, as those of "
+            f"{', '.join(layout.reaction_laws)} do: they are solved for in the motion under the model's own forces; "
+            "available are rhs, jacobian, simulate, simulate_many, equilibrium, linearize, modes, sensitivities, "
+            "reactions, multipliers and driving_forces"
+        )
+
+
 def require_projection(layout: Layout) -> None:
     """Refuse a model whose right-hand side holds constraints by Baumgarte's stabilisation.
 
@@ -52,6 +68,22 @@ def require_projection(layout: Layout) -> None:
             f"model {layout.name!r} was derived with baumgarte=, so its right-hand side does not project; analyses "
             "of such models are not available; derive without baumgarte for analyses"
         )
+
+
+class RefusedInverse:
+    """In place of ``inverse_dynamics`` where forces depend on reactions: says why when it is called."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+
+    def __call__(self, *args: Any, **options: Any) -> Any:
+        """Refuse.
+
+        Raises
+        ------
+        UnavailableError
+        """
+        refuse_reaction_laws(self.layout, "inverse_dynamics")
 
 
 class Refusal:
