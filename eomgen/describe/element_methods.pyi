@@ -152,8 +152,10 @@ class ElementMethods(Described):
     def point_gravity(self, name: str, center: Any, body: Any, mu: Value, extent: str | None = None) -> ForceHandle:
         """Add the gravity that a point exerts on a body; the reaction acts at the point."""
     def friction(self, name: str, joint: Any, viscous: Value = None, coulomb: Value = None, static: Value = None,
+        coefficient: Value = None, static_coefficient: Value = None, radius: Value = None, thrust_radius: Value = None,
         stribeck: Value = None, smoothing: Value = None) -> ForceHandle:
-        """Add friction on a joint's coordinate: viscous, Coulomb (with the Stribeck effect if wanted), or both."""
+        """Add friction on a joint's coordinate: viscous, Coulomb (with the Stribeck effect if wanted), by the reaction
+        that the joint carries, or several of them."""
     def stop(self, name: str, joint: Any, stiffness: Value, lower: Value = None, upper: Value = None,
         exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None, velocity: Value = None,
         formula: str | None = None) -> ForceHandle:

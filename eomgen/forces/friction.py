@@ -199,7 +199,7 @@ def _reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) -> For
     coefficient, onset, preload, breakaway = (
         e.given(key) for key in ("coefficient", "static_coefficient", "coulomb", "static")
     )
-    given = dict(coefficient=coefficient, static_coefficient=onset, coulomb=preload, static=breakaway)
+    given = {"coefficient": coefficient, "static_coefficient": onset, "coulomb": preload, "static": breakaway}
     for key, value in given.items():
         if value is not None:
             e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
@@ -252,13 +252,15 @@ TYPES = table(
                 dimension=PUSH,
             ),
             "coefficient": Field(
-                "expression", "friction coefficient, times the force across its axis that the joint carries", level=LAW,
+                "expression",
+                "friction coefficient, times the force across its axis that the joint carries",
+                level=LAW,
                 dimension=NONE,
             ),
             "static_coefficient": Field(
                 "expression", "the same at the onset of sliding; give stribeck too", level=LAW, dimension=NONE
             ),
-            "radius": Field("expression", "radius of the pin (m), where coefficient acts about an angle", dimension=LENGTH),
+            "radius": Field("expression", "radius of the pin (m), where the coordinate is an angle", dimension=LENGTH),
             "thrust_radius": Field(
                 "expression",
                 "mean radius of the collar (m) on which the reaction along the axis rubs; none by default",

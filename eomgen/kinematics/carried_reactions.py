@@ -49,7 +49,7 @@ def carried_reactions(wrenches: JointWrenches, multipliers: Mapping[str, Expr]) 
             if label in multipliers:
                 wrench = [x - multipliers[label] * d for x, d in zip(wrench, gradient, strict=True)]
         found[joint.spec.name] = tuple(wrench)
-    turned = {}
+    turned: dict[str, Row6] = {}
     for spec in wrenches.specs:
         if spec.name in found:
             axes, wrench = poses.marker(spec.successor).rotation, found[spec.name]

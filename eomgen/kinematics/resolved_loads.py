@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TypeVar
 
-from ..forces import CoordinateLoad, Load, MarkerLoad
+from ..forces import CoordinateLoad, MarkerLoad
 from ..graph.core import Expr
 
+AnyLoad = TypeVar("AnyLoad", MarkerLoad, CoordinateLoad)
 
-def with_entries(load: Load, values: Iterator[Expr]) -> Load:
+
+def with_entries(load: AnyLoad, values: Iterator[Expr]) -> AnyLoad:
     """A load with its entries replaced by the next values."""
     if isinstance(load, CoordinateLoad):
         return CoordinateLoad(load.coordinate, next(values))

@@ -15,14 +15,14 @@ ends with an error that names the elements.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
 import numpy as np
 
 from ..equations import METHODS
-from ..errors import ModelError
+from ..errors import ModelError, Problem
 from ..forces import JointCoordinate, ReactionFriction
 from ..forces.joint_reactions import reaction_of
 from ..graph.core import Expr, sqrt
@@ -33,7 +33,7 @@ from ..kinematics import Kinematics
 from ..kinematics.carried_reactions import carried_reactions
 from ..kinematics.kinematics import ForceTerms
 from ..kinematics.mobility import Mobility
-from ..kinematics.resolved_loads import entries_of, with_entries
+from ..kinematics.resolved_loads import AnyLoad, entries_of, with_entries
 from ..kinematics.wrenches import JointWrenches
 from ..limits.systems import FIXED, UNTOUCHED
 from .factor import factorize, solve
@@ -67,7 +67,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     values = _solve_laws(laws, symbols, still, gain)
     carried = dict(zip(symbols, values, strict=True))
     motion = copy(kinematics.motion)
-    motion.carried = {name: value for name, value in zip(names, values, strict=True)}
+    motion.carried = dict(zip(names, values, strict=True))
     return replace(_replaced(kinematics, carried, inside=True), motion=motion)
 
 
@@ -76,15 +76,19 @@ def _entries(terms: ForceTerms) -> list[Expr]:
     return [e for loads in every for load in loads for e in entries_of(load)]
 
 
+def _with(loads: tuple[AnyLoad, ...], values: Iterator[Expr]) -> tuple[AnyLoad, ...]:
+    return tuple(with_entries(load, values) for load in loads)
+
+
 def _replaced(kinematics: Kinematics, mapping: Mapping[Expr, Expr], inside: bool = False) -> Kinematics:
     """Other entries of the loads: whole ones, or with ``inside`` the symbols in them."""
     flat = [e for terms in kinematics.forces for e in _entries(terms)]
     values = iter(substitute(flat, mapping) if inside else [mapping.get(e, e) for e in flat])
     found = []
     for terms in kinematics.forces:
-        every = (terms.marker_loads, terms.coordinate_loads, terms.marker_remainder, terms.coordinate_remainder)
-        parts = [tuple(with_entries(load, values) for load in loads) for loads in every]
-        found.append(ForceTerms(terms.force, parts[0], parts[1], terms.potential, parts[2], parts[3]))
+        markers, along = _with(terms.marker_loads, values), _with(terms.coordinate_loads, values)
+        rest, rest_along = _with(terms.marker_remainder, values), _with(terms.coordinate_remainder, values)
+        found.append(ForceTerms(terms.force, markers, along, terms.potential, rest, rest_along))
     return replace(kinematics, forces=tuple(found))
 
 
@@ -145,7 +149,7 @@ def _reactions(
     ------
     ModelError
     """
-    graph, constraints = kinematics.graph, kinematics.constraints
+    graph = kinematics.graph
     wrenches = JointWrenches(kinematics)
     _refuse_redundant(kinematics, mobility)
     own = {label: graph.symbol(f"multiplier[{label}]") for label in labels}
@@ -209,7 +213,8 @@ def _refuse_redundant(kinematics: Kinematics, mobility: Mobility) -> None:
         raise ModelError(problems)
 
 
-def _problem(kinematics: Kinematics, joint: str, message: str, remedy: str):  # type: ignore[no-untyped-def]
+def _problem(kinematics: Kinematics, joint: str, message: str, remedy: str) -> Problem:
+    """A problem of the element whose law speaks of the joint's reaction."""
     users = [f.name for f in kinematics.mechanism.forces if getattr(f, "joint", None) == joint]
     return kinematics.mechanism.problem(f"forces.{users[0]}" if users else f"joints.{joint}", message, remedy)
 
