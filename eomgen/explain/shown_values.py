@@ -31,7 +31,8 @@ def value_of(expression: Any, known: dict[Any, Any]) -> Any:
     if expression in known:
         return known[expression]
     if not expression.args:
-        value = float(expression) if expression.is_number else expression  # true of a Piecewise
+        # true of a Piecewise stays, and an infinity in a branch of one that need not be taken
+        value = float(expression) if expression.is_number and expression.is_finite else expression
     else:
         parts = [value_of(part, known) for part in expression.args]
         plain = all(type(part) is float for part in parts)

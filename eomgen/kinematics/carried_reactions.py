@@ -44,11 +44,11 @@ def carried_reactions(wrenches: JointWrenches, multipliers: Mapping[str, Expr]) 
             lifted = _about(here, at, wrenches.origins[branch.parent])
             total[branch.parent] = [x + y for x, y in zip(base, lifted, strict=True)]
     for joint, load in zip(wrenches.cut, sixes[count:], strict=True):
-        wrench = list(load)
+        loaded = list(load)
         for label, gradient in joint.rows:
             if label in multipliers:
-                wrench = [x - multipliers[label] * d for x, d in zip(wrench, gradient, strict=True)]
-        found[joint.spec.name] = tuple(wrench)
+                loaded = [x - multipliers[label] * d for x, d in zip(loaded, gradient, strict=True)]
+        found[joint.spec.name] = tuple(loaded)
     turned: dict[str, Row6] = {}
     for spec in wrenches.specs:
         if spec.name in found:

@@ -35,7 +35,10 @@ from ..kinematics.kinematics import ForceTerms
 from ..kinematics.mobility import Mobility
 from ..kinematics.resolved_loads import AnyLoad, entries_of, with_entries
 from ..kinematics.wrenches import JointWrenches
+from ..limits.inertia import SINGULAR
 from ..limits.systems import FIXED, UNTOUCHED
+from ..numeric import algebra
+from ..numeric.definite import correlated
 from .factor import factorize, solve
 
 #: Of Newton's method from f = 0.  Random laws of 1 to 8 forces (|N| in space, spectral radius of B up to 0.99) were met
@@ -100,7 +103,7 @@ def _linear_parts(
     graph = kinematics.graph
     reactions, multipliers = _reactions(kinematics, mobility, names, labels)
     unknown = [*kinematics.a, *multipliers]
-    a, columns = _motion(kinematics, forces, mobility.independent_rows)
+    a, columns = _motion(kinematics, mobility, forces)
     slopes = jacobian(reactions, [*unknown, *forces])
     base = substitute(reactions, dict.fromkeys([*unknown, *forces], graph.zero))
     still, gain = [], []
@@ -116,16 +119,18 @@ def _linear_parts(
     return still, gain
 
 
-def _motion(kinematics: Kinematics, forces: Sequence[Expr], rows: Sequence[int]) -> tuple[list[Expr], Matrix]:
+def _motion(kinematics: Kinematics, mobility: Mobility, forces: Sequence[Expr]) -> tuple[list[Expr], Matrix]:
     """[a; l] without the laws' forces, and what a unit of each of them changes: M a + h + C^T l = 0, C a = -gamma."""
     graph, constraints = kinematics.graph, kinematics.constraints
     tree = METHODS["embedding"](kinematics)
+    _require_inertia(kinematics, mobility, tree.mass_matrix)
     slopes, n = jacobian(list(tree.bias), list(forces)), len(kinematics.v)
     bias = substitute(list(tree.bias), dict.fromkeys(forces, graph.zero))
     right = [[-h for h in bias]]
     right += [[-slopes.get((i, j), graph.zero) for i in range(n)] for j in range(len(forces))]
     factor = factorize(tree.mass_matrix, kinematics.parent)
     free = [solve(factor, column) for column in right]
+    rows = mobility.independent_rows
     C = [constraints.jacobian[i] for i in rows]
     moved = [solve(factor, row) for row in C]
     schur = [[_dot(row, y) for y in moved] for row in C]
@@ -196,6 +201,27 @@ def _refuse_joints(kinematics: Kinematics) -> None:
             problems.append(mechanism.problem(f"forces.{force.name}", message, "leave thrust_radius out"))
     if problems:
         raise ModelError(problems)
+
+
+def _require_inertia(kinematics: Kinematics, mobility: Mobility, mass_matrix: Sequence[Sequence[Expr]]) -> None:
+    """Refuse a tree that does not have inertia behind every coordinate, with which its reactions are found."""
+    values = {p.name: p.value for p in kinematics.mechanism.parameters}
+    if mobility.assumed or any(value is None for value in values.values()):
+        return
+    known = dict(zip(kinematics.names, mobility.q_reference, strict=True)) | values
+    flat, n = [x for row in mass_matrix for x in row], len(kinematics.v)
+    names = sorted(symbols_of(flat))
+    with np.errstate(all="ignore"):
+        M = np.reshape(compile_evaluator(flat, names)([float(known.get(name) or 0.0) for name in names]), (n, n))
+    M = np.where(np.triu(np.ones((n, n), dtype=bool)), M, M.T)  # M may be given by one of its triangles
+    sizes, directions = algebra.eigh(correlated(M))
+    if n and not sizes[0] > SINGULAR:
+        weights = np.abs(directions[:, 0])
+        moved = [x for x, w in zip(kinematics.velocity_labels, weights, strict=True) if w > 0.1 * weights.max()]
+        laws = " and ".join(force.name for force in kinematics.mechanism.forces if force.by_reaction)
+        message = f"depend on reactions, and moving {', '.join(moved)} without its loops meets no inertia"
+        remedy = "give every body mass, or inertia about its joint"
+        raise ModelError([kinematics.mechanism.problem(f"forces.{laws}", message, remedy)])
 
 
 def _refuse_redundant(kinematics: Kinematics, mobility: Mobility) -> None:
