@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
 import eomgen as eg
@@ -256,17 +257,18 @@ def test_limit_of_painleve(target, lean):
 
 @pytest.mark.parametrize("rate", [2.0, -2.0])
 def test_sliding_rod_against_newton_euler(rate):
+    """0.5 turn'' = -N c + F s about the centre, 1.5 (c turn'' - s turn'^2) = N - 1.5 g for its height s."""
     mu, lean, spin = 0.9, 1.1, 0.4
     mod = sliding_rod(mu).compile(target="numpy")
-    c, s, sign = np.cos(lean), np.sin(lean), np.sign(rate)
-    # y'' of the centre is given by the ground, N by it; the torque about the centre by N and friction
-    ends = []
-    for side in (1.0, -1.0):  # the ground pushes, or pulls
-        N = (G - s * spin**2) / (1 / 1.5 + c * (c + (-s) * (-1) * (-mu * sign * side) * (-1)) / 0.5)
-        ends.append(N) if N * side > 0 else None
-    (N,) = ends
-    turn = (-c * N + s * (-mu * sign * abs(N))) / 0.5
-    assert mod.rhs(0.0, [0.0, lean, rate, spin])[3] == pytest.approx(turn, rel=1e-10)
+    c, s = np.cos(lean), np.sin(lean)
+
+    def turn(N):
+        return (-N * c - mu * np.sign(rate) * abs(N) * s) / 0.5
+
+    N = brentq(lambda N: N - 1.5 * (G + c * turn(N) - s * spin**2), -1e3, 1e3, xtol=1e-13)
+    x = [0.0, lean, rate, spin]
+    assert mod.rhs(0.0, x)[3] == pytest.approx(turn(N), rel=1e-10)
+    assert mod.reactions(0.0, x)[0, 1] == pytest.approx(N, rel=1e-10)
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -298,3 +300,220 @@ def test_revolute_in_space(target):
         return moment @ axis + mu * (radius * radial + collar * abs(thrust)) * np.tanh(rate / SMOOTH)
 
     assert mod.rhs(0.0, [angle, rate])[1] == pytest.approx(brentq(balance, -1e3, 1e3, xtol=1e-13), rel=1e-11)
+
+
+def ladder(mu: float) -> eg.Model:
+    """A rod whose ends slide in a horizontal and an upright guide: a loop, cut anywhere."""
+    m = eg.Model("ladder", gravity=(0, -G, 0))
+    foot, head = m.body("foot", mass=0.2, inertia={"zz": 0.01}), m.body("head", mass=0.3, inertia={"zz": 0.01})
+    rod = m.body("rod", mass=4.0, inertia={"zz": 1.2}, com=(1.0, 0, 0))
+    m.prismatic("floor", m.ground, foot, axis="x", coordinate="x")
+    m.prismatic("wall", m.ground, head, axis="y", coordinate="y")
+    m.revolute("low", foot, rod, coordinate="lean")
+    m.revolute("high", rod.at(2.0, 0, 0), head)
+    m.initial(lean=2.2, lean_dot=0.8)
+    m.guess(x=1.2, y=1.6)
+    m.friction("on_floor", joint="floor", coefficient=mu, smoothing=SMOOTH)
+    m.friction("on_wall", joint="wall", coefficient=mu, smoothing=SMOOTH)
+    return m
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize(("lean", "spin"), [(2.2, 0.8), (1.9, -1.5)])
+def test_ladder_between_wall_and_floor(target, lean, spin):
+    mu = 0.4
+    mod = ladder(mu).compile(target=target)
+    x = mod.x0(lean=lean, lean_dot=spin)
+    axis = np.array([np.cos(lean), np.sin(lean)])
+    foot, head = 2.0 * np.sin(lean) * spin, 2.0 * np.cos(lean) * spin  # x = -2 cos, y = 2 sin
+    joints = [
+        (0, 1, ((0.0, 0.0), -axis), (0.0, spin), lambda F: 0.0),
+        (1, 2, (axis, (0.0, 0.0)), (spin, 0.0), lambda F: 0.0),
+    ]
+    guides = [
+        (0, np.array([0.0, 1.0]), lambda N: -mu * abs(N) * np.tanh(foot / SMOOTH)),
+        (2, np.array([-1.0, 0.0]), lambda N: -mu * abs(N) * np.tanh(head / SMOOTH)),
+    ]
+    bodies = [(0.2, 0.01), (4.0, 1.2), (0.3, 0.01)]
+    a, _, N = planar_system(bodies, joints, [np.array([0.0, -G * m, 0.0]) for m, _ in bodies], guides)
+    rates = dict(zip(mod.x_names, mod.rhs(0.0, x), strict=True))
+    assert (rates["x"], rates["y"]) == pytest.approx((foot, head), rel=1e-9)
+    assert rates["lean_dot"] == pytest.approx(a[1, 2], rel=1e-8)
+    forces = dict(zip(mod.joint_names, mod.reactions(0.0, x), strict=True))
+    assert (forces["floor"][1], -forces["wall"][0]) == pytest.approx((N[0, 0], N[1, 0]), rel=1e-8)
+
+
+def test_run_loses_what_friction_takes():
+    """Energy falls by the integral of the friction's power, which is never positive."""
+    m = slider_crank(0.1, 0.2)
+    m.output("loss", "power(guide) + power(pinA) + power(pinB) + power(pinC)")
+    mod = m.compile(target="cython")
+    run = mod.simulate(0.3, mod.x0(), rtol=1e-10, atol=1e-12, t_eval=np.linspace(0, 0.3, 3001))
+    loss = mod.outputs(run.t, run.x)[0]
+    energy = mod.energy(run.x).sum(axis=0)
+    assert (loss <= 0.0).all()
+    assert np.trapezoid(loss, run.t) == pytest.approx(energy[-1] - energy[0], rel=1e-4)
+
+
+def test_run_agrees_with_hand_written_equations():
+    mod = pendulum().compile(target="numpy")
+    run = mod.simulate(2.0, mod.x0(A=0.3), rtol=1e-10, atol=1e-12)
+    truth = solve_ivp(lambda t, x: [x[1], pendulum_truth(0.3, *x)], (0, 2), [0.3, 0.0], rtol=1e-10, atol=1e-12)
+    assert run.x[:, -1] == pytest.approx(truth.y[:, -1], abs=1e-7)
+
+
+def test_derivatives_by_parameters_and_outputs():
+    m = eg.Model("pin", gravity=(0, -G, 0))
+    m.parameter("mu", 0.3)
+    m.parameter("r", 0.05)
+    rod = m.body("rod", mass=2.0, inertia={"zz": 0.3}, com=(0.4, 0, 0))
+    m.revolute("A", m.ground, rod)
+    m.friction("pin", joint="A", coefficient="mu", radius="r", smoothing=SMOOTH)
+    m.output("rub", "force(pin)")
+    mod = m.compile(target="numpy")
+    x, h = [0.7, 1.3], 1e-6
+    slope = (pendulum_truth(0.3 + h, *x) - pendulum_truth(0.3 - h, *x)) / (2 * h)
+    assert mod.jacobian(0.0, x, wrt="p")[1] == pytest.approx([slope, slope * 6], rel=1e-7)  # mu r: 0.3 / 0.05 = 6
+    pin = np.linalg.norm(mod.reactions(0.0, x)[0, :3])
+    assert mod.outputs(0.0, x)[0] == pytest.approx(-0.3 * 0.05 * pin, rel=1e-12)
+
+
+def test_preload_stribeck_and_viscous_parts():
+    """At a sliding speed the coefficient is the curve's, and the parts add."""
+    keys = {"coulomb": 0.7, "static": 0.9, "viscous": 0.2, "static_coefficient": 0.5, "stribeck": 0.8}
+    mod = pendulum(0.3, **keys).compile(target="numpy")
+    rate, angle = 1.1, 0.4
+    fall = np.exp(-((rate / 0.8) ** 2))
+    mu, level = 0.3 + 0.2 * fall, 0.7 + 0.2 * fall
+    pin = np.linalg.norm(mod.reactions(0.0, [angle, rate])[0, :3])
+    torque = -((level + mu * 0.05 * pin) * np.tanh(rate / SMOOTH) + 0.2 * rate)
+    turn = (torque - 2.0 * G * 0.4 * np.cos(angle)) / (0.3 + 2.0 * 0.4**2)
+    assert mod.rhs(0.0, [angle, rate])[1] == pytest.approx(turn, rel=1e-12)
+
+
+def test_model_file_is_the_same(tmp_path):
+    (tmp_path / "engine.yaml").write_text(slider_crank(0.15, 0.3).to_yaml())
+    both = [m.compile(target="numpy") for m in (slider_crank(0.15, 0.3), eg.load(tmp_path / "engine.yaml"))]
+    assert both[0].rhs(0.0, both[0].x0()) == pytest.approx(both[1].rhs(0.0, both[1].x0()), rel=1e-14)
+
+
+def test_two_instances_of_a_component():
+    both = eg.Model("two", gravity=(0, -G, 0))
+    both.add(pendulum(), "left_")
+    both.add(pendulum(), "right_", at=both.ground.at(1.0, 0, 0))
+    rate = both.compile(target="numpy").rhs(0.0, [0.7, 0.2, 1.3, 0.004])
+    assert rate[2:] == pytest.approx([pendulum_truth(0.3, 0.7, 1.3), pendulum_truth(0.3, 0.2, 0.004)], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"coefficient": 0.1, "radius": 0.1}, "smoothing: is missing"),
+        ({"coefficient": -0.1, "radius": 0.1, "smoothing": 1e-3}, "coefficient: is -0.1; must be 0 or greater"),
+        ({"coefficient": 0.1, "radius": -0.1, "smoothing": 1e-3}, "radius: is -0.1; must be greater than 0"),
+        ({"coefficient": 0.1, "smoothing": 1e-3}, "radius: is missing, and 'A' is an angle"),
+        ({"radius": 0.1, "viscous": 1.0}, "radius: is given without coefficient"),
+        ({"coefficient": 0.1, "radius": 0.1, "smoothing": 1e-3, "static_coefficient": 0.2}, "stribeck: is missing"),
+        ({"coefficient": 0.1, "radius": 0.1, "smoothing": 1e-3, "stribeck": 0.2}, "stribeck: is given without"),
+        (
+            {"coefficient": 0.1, "radius": 0.1, "smoothing": 1e-3, "static": 0.2, "stribeck": 0.1},
+            "static: is given without coulomb",
+        ),
+    ],
+)
+def test_faults_of_keys(keys, message):
+    m = eg.Model("pin", gravity=(0, -G, 0))
+    m.revolute("A", m.ground, m.body("rod", mass=2.0, inertia={"zz": 0.3}))
+    m.friction("pin", joint="A", **keys)
+    with pytest.raises(eg.ModelError, match=message):
+        m.check()
+
+
+def test_joints_without_a_force_across_one_axis_are_refused():
+    m = eg.Model("plane")
+    m.planar("A", m.ground, m.body("disc", mass=2.0, inertia={"zz": 0.3}))
+    m.friction("pin", joint="A_3", coefficient=0.1, radius=0.1, smoothing=1e-3)
+    with pytest.raises(eg.ModelError, match=r"forces\.pin: joint 'A' is planar, which has no force across one fixed"):
+        m.check()
+
+
+def sleeve(**keys) -> eg.Model:
+    m = eg.Model("sleeve", gravity=(0, -G, 0))
+    body = m.body("sleeve", mass=2.0, inertia={"xx": 0.3, "yy": 0.3, "zz": 0.25}, com=(0.1, 0, 0))
+    m.cylindrical("A", m.ground, body, coordinates=("slide", "turn"))
+    m.friction("along", joint="slide", coefficient=0.2, smoothing=SMOOTH)
+    m.friction("around", joint="turn", coefficient=0.2, radius=0.05, smoothing=SMOOTH, **keys)
+    return m
+
+
+def test_cylindrical_joint_rubs_both_ways():
+    """The force across the axis follows from the rate of turning and its derivative, which friction changes."""
+    turn, rates = 0.3, np.array([0.4, 0.9])
+    c, s = np.cos(turn), np.sin(turn)
+
+    def across(alpha):
+        return 2.0 * np.hypot(0.1 * (-s * alpha - c * rates[1] ** 2), 0.1 * (c * alpha - s * rates[1] ** 2) + G)
+
+    def balance(alpha):
+        rub = 0.2 * 0.05 * across(alpha) * np.tanh(rates[1] / SMOOTH)
+        return (0.25 + 2.0 * 0.01) * alpha + 2.0 * G * 0.1 * c + rub
+
+    alpha = brentq(balance, -1e3, 1e3, xtol=1e-14)
+    along = -0.2 * across(alpha) * np.tanh(rates[0] / SMOOTH) / 2.0
+    found = sleeve().compile(target="numpy").rhs(0.0, [0.1, turn, *rates])
+    assert found[2:] == pytest.approx([along, alpha], rel=1e-11)
+
+
+def test_thrust_of_a_sliding_joint_is_refused():
+    with pytest.raises(eg.ModelError, match="slides along its axis, so it carries no thrust"):
+        sleeve(thrust_radius=0.1).check()
+
+
+def test_reactions_that_are_not_unique_are_refused():
+    m = eg.Model("table", gravity=(0, -G, 0))
+    cranks = [m.body(f"crank{k}", mass=1.0, inertia={"zz": 0.1}, com=(0.5, 0, 0)) for k in range(3)]
+    bar = m.body("bar", mass=1.0, inertia={"zz": 0.1})
+    for k, crank in enumerate(cranks):
+        m.revolute(f"A{k}", m.ground.at(k, 0, 0), crank)
+        m.revolute(f"B{k}", crank.at(1, 0, 0), bar.at(k, 0, 0))
+    m.initial(A0=0.5)
+    m.friction("pin", joint="A0", coefficient=0.1, radius=0.1, smoothing=1e-2)
+    with pytest.raises(eg.ModelError, match=r"forces\.pin: depends on the reaction of a joint, and .* not unique"):
+        m.check()
+
+
+def test_forces_out_of_the_plane_of_a_loop_are_refused():
+    m = slider_crank(0.1, 0.0)
+    flat = eg.Model("flat", gravity=(0, 0, -G))
+    flat.add(m)
+    with pytest.raises(eg.ModelError, match="rigid bodies do not determine"):
+        flat.check()
+
+
+def test_massless_links_are_refused():
+    m = eg.Model("engine", gravity=(0, -G, 0))
+    crank = m.body("crank", mass=1.0, inertia={"zz": 0.01})
+    rod, piston = m.body("rod", mass=0.0), m.body("piston", mass=0.0)
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.revolute("B", crank.at(0.1, 0, 0), rod)
+    m.revolute("C", rod.at(0.3, 0, 0), piston)
+    m.prismatic("S", m.ground, piston, axis="x", coordinate="s")
+    m.initial(theta=0.8)
+    m.friction("guide", joint="S", coefficient=0.1, smoothing=1e-2)
+    with pytest.raises(eg.ModelError, match="depend on reactions, and moving .* without its loops meets no inertia"):
+        m.check()
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda mod: mod.inverse_dynamics([0.0], [1.0], [0.0]),
+        lambda mod: mod.inverse_dynamics_derivatives([0.0], [1.0], [0.0]),
+        lambda mod: mod.inverse_dynamics_hessian_product([0.0], [1.0], [0.0], [1.0], [1.0, 0.0, 0.0]),
+        lambda mod: mod.inertial_remainder([0.0], [1.0], [0.0]),
+        lambda mod: mod.actuator_forces(0.0, [0.0, 1.0]),
+    ],
+)
+def test_prescribed_motions_are_refused(call):
+    with pytest.raises(eg.UnavailableError, match="forces depend on reactions of joints, as those of pin do"):
+        call(pendulum().compile(target="numpy"))
