@@ -34,7 +34,7 @@ def group_by_clock(reader: Reader, entries: Sequence[DescribedEntry]) -> list[Ti
     """Sampled states by period and offset as they are written, the names of their clocks taken in."""
     groups: dict[tuple[str, str], list[DescribedEntry]] = {}
     for entry in entries:
-        if "sampled" in entry.values:
+        if "sampled" in entry.values or ("period" in entry.values and "rate" not in entry.values):
             written = (_text(entry.values.get("period")), _text(entry.values.get("offset", 0)))
             groups.setdefault(written, []).append(entry)
     timings = [Timing(tuple(group)) for group in groups.values()]

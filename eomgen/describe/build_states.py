@@ -83,6 +83,8 @@ def _motion(reader: Reader, entry: DescribedEntry) -> tuple[Expr, Expr | None]:
         reader.faults.add(path, "has a rate and is sampled", "give rate, or sampled and period")
     if "sampled" in values:
         return reader.graph.zero, reader.expression(f"{path}.sampled", values["sampled"], LAW)
+    if "period" in values and "rate" not in values:  # a function of the run renews it
+        return reader.graph.zero, reader.graph.symbol(str(entry.name))
     for key in ("period", "offset"):
         if key in values:
             reader.faults.add(f"{path}.{key}", "is a key of states that are sampled", "give sampled instead of rate")

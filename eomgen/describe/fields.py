@@ -72,7 +72,7 @@ STATE: Fields = {
     ),
     "sampled": Field(
         "expression",
-        "instead of rate: its new value at each sampling time, held in between; of what a rate may depend on",
+        "instead of rate: its new value at each sampling time, held in between; without it a run's controllers give it",
         level=LAW,
     ),
     "period": Field("expression", "time from one sampling time to the next (s)", dimension=TIME),

@@ -39,7 +39,7 @@ class StateMethods(Described):
         return symbol(name)
 
     def sampled(
-        self, name: str, value: Value, period: Value = None, *, offset: Value = 0.0, initial: Value = 0.0,
+        self, name: str, value: Value = None, period: Value = None, *, offset: Value = 0.0, initial: Value = 0.0,
         unit: str = "", doc: str = "", latex: str = "",
     ) -> Any:  # fmt: skip
         """Declare a state that is held, and renewed at the times offset + k period: what a digital controller gives.
@@ -53,7 +53,8 @@ class StateMethods(Described):
             Identifier; ``<name>_samples`` counts the samples and ``<name>_sampled`` is the event, for the first state
             of each period and offset.
         value : number, str or SymPy expression
-            The new value, of what the rate of a :meth:`state` may depend on.
+            The new value, of what the rate of a :meth:`state` may depend on.  Without one the state keeps its value,
+            unless a run gives a function for it: ``simulate(controllers={name: f})``.
         period : number, str or SymPy expression
             Time from one sampling time to the next (s), of parameters, if an expression.
         offset : number, str or SymPy expression, optional
@@ -69,6 +70,6 @@ class StateMethods(Described):
         """
         given = {"sampled": value, "period": period, "offset": offset, "initial": initial}
         given |= {"unit": unit, "doc": doc, "latex": latex}
-        defaults = {"period": None, "offset": 0.0, "initial": 0.0, "unit": "", "doc": "", "latex": ""}
+        defaults = {"sampled": None, "period": None, "offset": 0.0, "initial": 0.0, "unit": "", "doc": "", "latex": ""}
         self._description.add("states", name, without_defaults(given, defaults))
         return symbol(name)

@@ -34,6 +34,7 @@ LEFT_OUT = {
     "simulation/solver_state": "checkpoint=",
     "simulation/steppers": "step and classes of solvers",
 }
+OF_CLOCKS = ("simulation/clocks", "simulation/controllers")
 #: Classes whose methods users call.
 PUBLIC = (
     ("api/module", "Module"),
@@ -62,7 +63,7 @@ def carry_slim(package: Mapping[str, str], signals: bool, states: bool, clocks: 
     """
     left_out = LEFT_OUT if signals else LEFT_OUT | {"runtime/tapes": "inputs that a model declares"}
     left_out = left_out if states else left_out | {"runtime/mechanical": "first-order states"}
-    left_out = left_out if clocks else left_out | {"simulation/clocks": "sampled states"}
+    left_out = left_out if clocks else left_out | dict.fromkeys(OF_CLOCKS, "sampled states")
     own = {name: text for name, text in package.items() if name.endswith(".py")}
     typed = [SourceText("", text) for name, text in package.items() if name.endswith(".pyi")]
     selection = Selection(carry(package) | own, left_out)

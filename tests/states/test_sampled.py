@@ -234,7 +234,7 @@ def test_runs_backwards_and_periods_that_are_not_positive_are_refused(module: An
         ({"sampled": "s", "period": "s"}, r"u\.period: .*coordinate 's'"),
         ({"sampled": "s", "rate": 1, "period": 1}, r"has a rate and is sampled"),
         ({"rate": 1, "period": 1}, r"u\.period: is a key of states that are sampled"),
-        ({"period": 1}, r"u\.rate: is missing"),
+        ({"offset": 1}, r"u\.rate: is missing"),
         ({"sampled": "s_ddot", "period": 1}, r"s_ddot"),
         ({"sampled": "nothing", "period": 1}, r"nothing"),
         ({"sampled": "s", "period": 1, "ofset": 1}, r"ofset"),
@@ -244,3 +244,51 @@ def test_faults_name_their_place(entry: dict[str, Any], words: str, tmp_path: Pa
     text = TEXT.split("forces:")[0] + f"states:\n  u: {json.dumps(entry)}\n"
     with pytest.raises(eg.ModelError, match=words):
         loads(text, tmp_path).derive()
+
+
+def outside() -> eg.Model:
+    """A mass whose drive a function of the run controls."""
+    m = eg.Model("servo")
+    m.prismatic("slide", m.ground, m.body("sledge", mass=MASS), axis="x", coordinate="s")
+    m.sampled("z", "z + 0.1*(0.1 - s)", 0.1)
+    m.sampled("u", period=0.1)
+    m.actuator("motor", "s", value="u")
+    return m
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("method", ["DOP853", "Radau"])
+def test_a_function_of_the_run_gives_what_the_model_leaves_open(target: str, method: str) -> None:
+    called: list[float] = []
+
+    def drive(t: float, x: Any) -> Any:
+        called.append(t)
+        return 8.0 * (TARGET - x[0]) + 5.0 * x[2] - 4.0 * x[1]  # x[2] is z, renewed before u
+
+    module = outside().compile(target=target)
+    run = module.simulate(1.05, method=method, controllers={"u": drive})
+    assert np.abs(run.x[:4, -1] - by_hand(1.05, 0.1 * np.arange(11))).max() < 1e-12
+    assert np.abs(called - 0.1 * np.arange(11)).max() < 1e-15
+    assert np.abs(module.simulate(1.05)["s"]).max() == 0.0  # without one it keeps its value
+    servo_module = servo().compile(target=target)
+    other = servo_module.simulate(1.05, controllers={"u": lambda t, x: 0.0})
+    assert np.abs(other["s"]).max() == 0.0
+    assert abs(other["z"][-1] - 11 * 0.1 * TARGET) < 1e-15
+
+
+def test_controllers_that_cannot_be_are_refused(module: Any, tmp_path: Path) -> None:
+    for given, words in (
+        ({"w": lambda t, x: 0.0}, "sampled state"),
+        ({"z_samples": lambda t, x: 0.0}, "sampled state"),
+        ({"u": 3.0}, "controller of u must be a function"),
+        ({"u": lambda t: 0.0}, "controller of u"),
+        (["u"], "controllers"),
+    ):
+        with pytest.raises(eg.UsageError, match=words):
+            module.simulate(1.0, controllers=given)
+    with pytest.raises(eg.SimulationError, match=r"controller of u .* returned nan at t = 0 s"):
+        module.simulate(1.0, controllers={"u": lambda t, x: float("nan")})
+    with pytest.raises(eg.UsageError, match="checkpoint"):
+        module.simulate(1.0, controllers={"u": lambda t, x: 0.0}, checkpoint=tmp_path / "run.npz")
+    with pytest.raises(eg.UsageError, match="has none"):
+        eg.load_example("pendulum").compile(target="numpy").simulate(1.0, controllers={"u": lambda t, x: 0.0})
