@@ -151,8 +151,14 @@ def _clocks(kinematics: Kinematics) -> list[dict[str, Any]]:
     """Of each clock its event, the place of its counter in x, and the states that it renews."""
     events = [event.name for event in kinematics.mechanism.events]
     states = (*kinematics.names, *kinematics.velocity_names, *kinematics.state_names)
+    lawless = {s.name for s in kinematics.mechanism.states if s.sampled == kinematics.graph.symbol(s.name)}
     return [
-        {"event": events.index(c.event), "counter": states.index(c.counter), "states": list(c.states)}
+        {
+            "event": events.index(c.event),
+            "counter": states.index(c.counter),
+            "states": list(c.states),
+            "open": [name for name in c.states if name in lawless],
+        }
         for c in kinematics.mechanism.clocks
     ]
 

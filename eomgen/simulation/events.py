@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.formulas import Formula
     from ..runtime.signals import Forcing
-    from .controllers import Controller
 
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
 STOP = 3  #: an integrator stops there and goes on, from another state or the same
@@ -108,17 +107,10 @@ class Events:
     layout : Layout
     given : None, or one event or several: names, texts, functions; a mapping names them
         None watches all of the model.  Those of the model that reset the state are watched always.
-    controllers : mapping of str to callable, optional
-        Sampled states and functions f(t, x) that give their new values.
     """
 
-    def __init__(self, layout: Layout, given: Any, controllers: Any = None) -> None:
+    def __init__(self, layout: Layout, given: Any) -> None:
         self.layout = layout
-        self.controllers: dict[int, list[Controller]] = {}
-        if controllers is not None:
-            from .controllers import read_controllers
-
-            self.controllers = read_controllers(layout, controllers)
         self.declared: list[dict[str, Any]] = layout.metadata.get("events") or []
         self.names: list[str] = []
         self.model: list[RunEvent] = []
@@ -136,15 +128,13 @@ class Events:
             else:
                 self.functions.append(RunEvent(one, name or ""))
         self.model = [_of_model(event, event["name"] in chosen) for event in self.declared]
-        for i in self.controllers:
-            self.model[i].action = WAIT
         taken: dict[str, int] = {}
         for name in (*known, *(event.name for event, _ in self.formulas), *(event.name for event in self.functions)):
             taken[name] = taken.get(name, 0) + 1
             self.names.append(name if taken[name] == 1 else f"{name}_{taken[name]}")
         if all(event.direction == UNWATCHED for event in self.model):
             self.names, self.model = self.names[len(known) :], []
-        if any(event.action == WAIT and i not in self.controllers for i, event in enumerate(self.model)):  # here, so that a slim package refuses before the run
+        if any(event.action == WAIT for event in self.model):  # here, so that a slim package refuses before the run
             from ..analysis.impact import strike_events
 
             self._strike = strike_events
@@ -197,17 +187,18 @@ class Events:
         """The state after the events that happened at time t."""
         after = np.array(x, dtype=float)
         for i in fired:
-            if self.model[i].action == RESET or i in self.controllers:
-                resets = self.layout.metadata["resets"]
-                own = [k for k, (event, _) in enumerate(resets) if event == i]
-                places = [resets[k][1] for k in own]
-                after[places] = module.kernels.rows("resets", own, t, after, forcing(t, after))
-                for control in self.controllers.get(i, ()):
-                    after[control.place] = control(t, after)
-                after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
-        gaps = [i for i in fired if self.model[i].action == WAIT and i not in self.controllers]
+            if self.model[i].action == RESET:
+                after = np.asarray(module.project(self.renewed(module, forcing, t, after, i), t=t, u=forcing(t, after)))
+        gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
             after = self._strike(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
+        return after
+
+    def renewed(self, module: BoundModel, forcing: Forcing, t: float, x: Array, event: int) -> Array:
+        """The state x with the new values that the model gives at an event."""
+        after, resets = x.copy(), self.layout.metadata["resets"]
+        own = [k for k, (index, _) in enumerate(resets) if index == event]
+        after[[resets[k][1] for k in own]] = module.kernels.rows("resets", own, t, after, forcing(t, after))
         return after
 
     def crowded(self, t: float, count: int) -> ZenoError:

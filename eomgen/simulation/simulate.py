@@ -30,7 +30,19 @@ if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory
 
 OPTIONS = (
-    *("method", "rtol", "atol", "t_eval", "events", "controllers", "dense_output", "max_step", "first_step", "progress", "step"),
+    *(
+        "method",
+        "rtol",
+        "atol",
+        "t_eval",
+        "events",
+        "controllers",
+        "dense_output",
+        "max_step",
+        "first_step",
+        "progress",
+        "step",
+    ),
     *("checkpoint", "checkpoint_every", "resume"),
 )
 
@@ -91,7 +103,8 @@ def simulate(
         as text, or functions with SciPy's attributes ``terminal`` and ``direction``.  In a mapping also
         ``{"expression": text, "terminal": times, "direction": 1}``.
     controllers : mapping of str to callable f(t, x), optional
-        Functions that give the new values of sampled states at their times, in place of what the model says.
+        Functions that give the new values of sampled states for which the model has no law; x is the state right
+        before, in which the sampled states with a law have their new values already.
     dense_output : bool
         Keep a continuous solution for ``Trajectory.at``.
     max_step, first_step : float, optional
@@ -149,9 +162,11 @@ def simulate(
     step, dense_output = check_method(method, step), read_flag("dense_output", dense_output)
     declared = declare(module)
     method = declared["method"] if method is None else method
-    watched = Events(module.layout, events, controllers)
-    if controllers and kept is not None:
-        raise UsageError("a run with controllers= keeps no checkpoint: a function may hold values that no file keeps")
+    watched = Events(module.layout, events)
+    if controllers is not None:
+        from .controllers import ControlledEvents
+
+        watched = ControlledEvents(module.layout, events, controllers, kept is not None)
     forcing = Forcing(module.layout, inputs)
     compiled = can_run(module, method, forcing) and options.keys().isdisjoint(IMPLICIT)
     if method == "RK4" and not compiled:

@@ -180,13 +180,36 @@ def test_a_model_file_says_the_same(module: Any, tmp_path: Path) -> None:
 
 def test_instances_have_their_own_clocks(tmp_path: Path) -> None:
     m = eg.Model("pair")
-    part = loads(TEXT.replace("name: servo", "name: part"), tmp_path)
+    part = loads(
+        TEXT.replace("name: servo", "name: part").replace("outputs: {", "outputs: {taken: z_samples, "), tmp_path
+    )
     for prefix, period in (("a_", 100), ("b_", 50)):
         m.add(part, prefix, T=period)
     run = m.compile(target="numpy").simulate(1.02)
     for prefix, T in (("a_", 0.1), ("b_", 0.05)):
         exact = by_hand(1.02, T * np.arange(int(1.02 / T) + 1), T=T)
         assert np.abs([run[prefix + name][-1] for name in ("s", "s_dot", "z", "u")] - exact).max() < 1e-12
+        assert run[prefix + "taken"][-1] == int(1.02 / T) + 1
+
+
+@pytest.mark.parametrize(
+    ("unit", "period", "fault"),
+    [
+        ("m*s", "T", None),
+        ("m*s", "T/2 + 3*T", None),
+        ("m", "T", "sampled"),
+        ("m*s", "a", "period"),
+        ("m*s", "T*a", "period"),
+    ],
+)
+def test_units_of_values_and_periods(unit: str, period: str, fault: str | None, tmp_path: Path) -> None:
+    text = TEXT.split("forces:")[0].replace("inputs:", "# ").replace("kp: 8", "a: {value: 1, unit: m}")
+    text += f'states:\n  z: {{sampled: z - T*s, period: "{period}", unit: {unit}}}\n'
+    if fault is None:
+        loads(text, tmp_path).derive()
+        return
+    with pytest.raises(eg.ModelError, match=rf"states\.z\.{fault}"):
+        loads(text, tmp_path).derive()
 
 
 @pytest.mark.parametrize("kind", ["ModelExchange", "CoSimulation"])
@@ -270,15 +293,15 @@ def test_a_function_of_the_run_gives_what_the_model_leaves_open(target: str, met
     assert np.abs(run.x[:4, -1] - by_hand(1.05, 0.1 * np.arange(11))).max() < 1e-12
     assert np.abs(called - 0.1 * np.arange(11)).max() < 1e-15
     assert np.abs(module.simulate(1.05)["s"]).max() == 0.0  # without one it keeps its value
-    servo_module = servo().compile(target=target)
-    other = servo_module.simulate(1.05, controllers={"u": lambda t, x: 0.0})
-    assert np.abs(other["s"]).max() == 0.0
-    assert abs(other["z"][-1] - 11 * 0.1 * TARGET) < 1e-15
 
 
 def test_controllers_that_cannot_be_are_refused(module: Any, tmp_path: Path) -> None:
+    with pytest.raises(eg.UsageError, match="without a law, and 'servo' has none"):
+        module.simulate(1.0, controllers={"u": lambda t, x: 0.0})
+    module = outside().compile(target="numpy")
     for given, words in (
         ({"w": lambda t, x: 0.0}, "sampled state"),
+        ({"z": lambda t, x: 0.0}, "sampled state without a law"),
         ({"z_samples": lambda t, x: 0.0}, "sampled state"),
         ({"u": 3.0}, "controller of u must be a function"),
         ({"u": lambda t: 0.0}, "controller of u"),
@@ -292,3 +315,9 @@ def test_controllers_that_cannot_be_are_refused(module: Any, tmp_path: Path) -> 
         module.simulate(1.0, controllers={"u": lambda t, x: 0.0}, checkpoint=tmp_path / "run.npz")
     with pytest.raises(eg.UsageError, match="has none"):
         eg.load_example("pendulum").compile(target="numpy").simulate(1.0, controllers={"u": lambda t, x: 0.0})
+
+
+def test_ida_samples_too(module: Any) -> None:
+    pytest.importorskip("sksundae")
+    run = module.dae.solve((0.0, 1.05), rtol=1e-9, atol=1e-11)
+    assert np.abs(run.x[:4, -1] - by_hand(1.05, 0.1 * np.arange(11))).max() < 1e-6
