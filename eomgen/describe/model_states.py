@@ -13,7 +13,7 @@ class StateMethods(Described):
     """The part of Model that declares first-order states."""
 
     def state(
-        self, name: str, rate: Value = None, initial: Value = 0.0, unit: str = "", doc: str = "", latex: str = ""
+        self, name: str, rate: Any = None, initial: Any = 0.0, unit: str = "", doc: str = "", latex: str = ""
     ) -> Any:
         """Declare a first-order state s with s' = rate: an activation, a pressure, what a filter or controller holds.
 
@@ -39,7 +39,7 @@ class StateMethods(Described):
         return symbol(name)
 
     def sampled(
-        self, name: str, value: Value = None, period: Value = None, *, offset: Value = 0.0, initial: Value = 0.0,
+        self, name: str, value: Any = None, period: Any = None, *, offset: Any = 0.0, initial: Any = 0.0,
         unit: str = "", doc: str = "", latex: str = "",
     ) -> Any:  # fmt: skip
         """Declare a state that is held, and renewed at the times offset + k period: what a digital controller gives.

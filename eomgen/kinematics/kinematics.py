@@ -117,12 +117,12 @@ class Kinematics:
 
     @cached_property
     def sampled(self) -> tuple[tuple[str, Expr], ...]:
-        """Of each clock ``t``, the time of its next sample, and its states with their new values, of (t, q, v, s, u)."""
+        """Of each clock ``t``, the time of its next sample, then its states with their new values."""
         given = {s.name: s.sampled for s in self.mechanism.states if s.sampled is not None}
         found: list[tuple[str, Expr]] = []
-        for clock in self.mechanism.clocks:
-            found.append(("t", clock.offset + clock.period * self.graph.symbol(clock.counter)))
-            found += ((name, given[name]) for name in clock.states)
+        for own in self.mechanism.clocks:
+            found.append(("t", own.offset + own.period * self.graph.symbol(own.counter)))
+            found += ((name, given[name]) for name in own.states)
         return tuple(zip((name for name, _ in found), self.resolve([x for _, x in found]), strict=True))
 
     @property

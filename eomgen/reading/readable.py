@@ -167,7 +167,7 @@ class Readable(QuantitiesOfMethods):
 
     @cached_property
     def sampled_values(self) -> Any:
-        """What ``sampled`` become (n, 1) at a sampling time, one after the other; for t: the time of the next sample."""
+        """What ``sampled`` become (n, 1), one after the other; for t: the time of the next sample."""
         return self._column("sampled_values", lambda s: [x for _, x in s.kinematics.sampled])
 
     # -- constraints --------------------------------------------------------------------------------------------------

@@ -30,20 +30,8 @@ if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory
 
 OPTIONS = (
-    *(
-        "method",
-        "rtol",
-        "atol",
-        "t_eval",
-        "events",
-        "controllers",
-        "dense_output",
-        "max_step",
-        "first_step",
-        "progress",
-        "step",
-    ),
-    *("checkpoint", "checkpoint_every", "resume"),
+    *("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step"),
+    *("checkpoint", "checkpoint_every", "resume", "controllers"),
 )
 
 
