@@ -59,15 +59,27 @@ def _reactions(bench: Bench) -> Finding:
         a = bench.rhs(case)[module.n_q :]
         wrenches = reactions(module, case.t, case.x, p=case.p, u=case.u)
         missing, size = _unbalanced(bench, truth, a, wrenches)
-        loads = np.array([[np.abs(wrenches[:, :3]).max(initial=0.0)] * 3 + [np.abs(wrenches).max(initial=0.0)] * 3])
-        C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
-        exact, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
-        slack = bench.acceleration_limit(k, exact, multipliers) if module.layout.n_v else np.zeros(0)
-        inertia = _inertia(truth)
-        grown = (1.0 + bench.dependence(C)) * UNIT * 6 * len(bench.layout.bodies)
-        limit = inertia @ slack + grown * (size + np.repeat(loads, len(bench.layout.bodies), axis=0).ravel())
-        found.add(k, missing, limit, size_of(size), labels)
+        found.add(k, missing, _limit(bench, k, truth, wrenches, size), size_of(size), labels)
     return found.finding()
+
+
+def _limit(bench: Bench, k: int, truth: Truth, wrenches: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """What rounding allows the balances of the bodies at state k to be off by, of terms of such sizes."""
+    case, module = truth.case, bench.module
+    loads = np.array([[np.abs(wrenches[:, :3]).max(initial=0.0)] * 3 + [np.abs(wrenches).max(initial=0.0)] * 3])
+    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+    exact, multipliers = (numbers(x) for x in truth.solve(list(bench.layout.rows)))
+    slack = bench.acceleration_limit(k, exact, multipliers) if module.layout.n_v else np.zeros(0)
+    grown = (1.0 + bench.dependence(C)) * UNIT * 6 * len(bench.layout.bodies)
+    limit = _inertia(truth) @ slack + grown * (size + np.repeat(loads, len(bench.layout.bodies), axis=0).ravel())
+    return np.asarray(limit)
+
+
+def force_limit(bench: Bench, k: int, truth: Truth, wrenches: np.ndarray) -> float:
+    """What rounding allows the force in a joint at state k to be off by: it carries all bodies beyond it."""
+    a = bench.rhs(truth.case)[bench.module.n_q :]
+    _, size = _unbalanced(bench, truth, a, wrenches)
+    return float(_limit(bench, k, truth, wrenches, size).reshape(-1, 2, 3)[:, 0].sum())
 
 
 def _inertia(truth: Truth) -> np.ndarray:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 STATES = 6  #: random states
 SECONDS, LEAST = 12.0, 2.0  #: for all of it, and for variants of a model at least
 #: Files of checks that need the equations, in the order of the table; each has ``check(bench)``.
-GROUPS = ("kernels", "bodies", "joints", "reactions", "constraints", "derivatives", "runs")
+GROUPS = ("kernels", "bodies", "joints", "reactions", "reaction_laws", "constraints", "derivatives", "runs")
 KINEMATIC = ("kernels", "constraints")  #: of models without inertia
 
 

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
 import eomgen as eg
+from eomgen.verification import check_reaction_laws
 
 G, SMOOTH = 9.81, 1e-2
 TARGETS = ("numpy", "cython")
@@ -517,3 +518,13 @@ def test_massless_links_are_refused():
 def test_prescribed_motions_are_refused(call):
     with pytest.raises(eg.UnavailableError, match="forces depend on reactions of joints, as those of pin do"):
         call(pendulum().compile(target="numpy"))
+
+
+def test_verification_tells_a_law_that_is_not_met(monkeypatch):
+    """The laws are held against reactions that are found in another way: a hundredth more is a breach."""
+    mod = slider_crank(0.1, 0.2).derive().compile(target="numpy")
+    check = "friction: laws at the joints' reactions"
+    assert next(found for found in mod.verify(seconds=0).findings if found.check == check).ok
+    right = check_reaction_laws.reactions
+    monkeypatch.setattr(check_reaction_laws, "reactions", lambda *args, **keys: 1.01 * right(*args, **keys))
+    assert not next(found for found in mod.verify(seconds=0).findings if found.check == check).ok
