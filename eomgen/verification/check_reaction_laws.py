@@ -35,13 +35,13 @@ def check(bench: Bench) -> list[Finding]:
     found = Comparison("friction: laws at the joints' reactions")
     specs = {spec.name: spec for spec in bench.mechanism.joints}
     forces = [terms.force for terms in laws if isinstance(terms.force, ReactionFriction)]
+    loads = [load.value for terms in laws for load in terms.coordinate_loads]
     for k, truth in enumerate(bench.truths):
         case = truth.case
         wrenches = reactions(bench.module, case.t, case.x, p=case.p, u=case.u)
         carried = dict(zip(bench.layout.metadata["joint_names"], wrenches, strict=True))
         loose = force_limit(bench, k, truth, wrenches)
-        loads = [load.value for terms in laws for load in terms.coordinate_loads]
-        acting = numbers(truth.system.evaluate("friction by reactions", lambda loads=loads: loads, truth.values))
+        acting = numbers(truth.system.evaluate("friction by reactions", lambda: loads, truth.values))
         expected, slopes = np.transpose([_law(truth, f, specs[f.joint], carried[f.joint]) for f in forces])
         limit = slopes * loose + (1.0 + np.abs(slopes)) * UNIT * np.abs(expected) * len(bench.layout.bodies)
         found.add(k, acting - expected, limit, float(np.abs(expected).max()), [f.name for f in forces])
