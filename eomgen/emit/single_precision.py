@@ -61,6 +61,12 @@ def refuse_double(program: Program) -> None:
     UsageError
     """
     refuse_sums(program, "precision='float'")
+    laws = program.metadata.get("reaction_laws", [])
+    if laws:
+        raise UsageError(
+            f"precision='float': the forces of {', '.join(laws)} depend on reactions, which are solved for to more "
+            "digits than single precision has; use precision='double'"
+        )
     native = sorted({f.name for f, _ in used_calls(program).values() if f.native is not None})
     if native:
         raise UsageError(

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
 import eomgen as eg
+from eomgen.generation import generate
 from eomgen.verification import check_reaction_laws
 
 G, SMOOTH = 9.81, 1e-2
@@ -528,3 +529,28 @@ def test_verification_tells_a_law_that_is_not_met(monkeypatch):
     right = check_reaction_laws.reactions
     monkeypatch.setattr(check_reaction_laws, "reactions", lambda *args, **keys: 1.01 * right(*args, **keys))
     assert not next(found for found in mod.verify(seconds=0).findings if found.check == check).ok
+
+
+def test_a_motor_overcomes_friction():
+    """Torque times rate is the rate of energy and what friction takes, in a mechanism that its motor moves."""
+    m = slider_crank(0.15, 0.3)
+    m.driver("motor", "theta", "0.8+20*t")
+    m.output("loss", "power(guide) + power(pinA) + power(pinB) + power(pinC)")
+    mod = m.compile(target="numpy")
+    x, h = mod.x0(), 1e-4
+    energies = [mod.energy(mod.project(x, t=k * h), t=k * h).sum() for k in (-2, -1, 1, 2)]
+    rate = np.dot(energies, [1.0, -8.0, 8.0, -1.0]) / (12 * h)
+    loss = mod.outputs(0.0, x)[0]
+    assert loss < 0.0
+    assert 20.0 * mod.driving_forces(0.0, x)["motor"] == pytest.approx(rate - loss, rel=1e-9)
+
+
+def test_single_precision_is_refused(tmp_path):
+    with pytest.raises(eg.UsageError, match="the forces of pin depend on reactions"):
+        generate(pendulum(), tmp_path, target="c", precision="float")
+
+
+def test_explained_formulas_agree_with_the_module():
+    found = pendulum().derive().explain()
+    assert found.difference < 1e-12
+    assert "grows with the force" in found.markdown
