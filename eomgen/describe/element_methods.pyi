@@ -156,29 +156,33 @@ class ElementMethods(Described):
         """Add friction on a joint's coordinate: viscous, Coulomb (with the Stribeck effect if wanted), or both."""
     def stop(self, name: str, joint: Any, stiffness: Value, lower: Value = None, upper: Value = None,
         exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None, velocity: Value = None,
-        formula: str | None = None) -> ForceHandle:
+        formula: str | None = None, normal_law: str | None = None, damping: Value = None) -> ForceHandle:
         """Add elastic stops of a joint's coordinate: below ``lower``, above ``upper`` or both."""
     def point_plane(self, name: str, a: Any, b: Any, stiffness: Value, exponent: Value = 1.5, dissipation: Value = None,
         restitution: Value = None, velocity: Value = None, formula: str | None = None, friction: Value = None,
-        static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0,
-        smoothing: Value = None) -> ForceHandle:
+        static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0, smoothing: Value = None,
+        normal_law: str | None = None, damping: Value = None) -> ForceHandle:
         """Add contact of a point (the second marker) with a plane (x-y of the first marker, z out of the solid)."""
-    def sphere_plane(self, name: str, a: Any, b: Any, radius: Value, stiffness: Value, exponent: Value = 1.5,
+    def sphere_plane(self, name: str, a: Any, b: Any, radius: Value, stiffness: Value = None, exponent: Value = 1.5,
         dissipation: Value = None, restitution: Value = None, velocity: Value = None, formula: str | None = None,
         friction: Value = None, static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0,
-        smoothing: Value = None) -> ForceHandle:
+        smoothing: Value = None, normal_law: str | None = None, damping: Value = None,
+        moduli: Sequence[Value] | None = None, poisson: Sequence[Value] | None = None) -> ForceHandle:
         """Add contact of a sphere (about the second marker) with a plane (x-y of the first marker, z out of the
         solid)."""
-    def sphere_sphere(self, name: str, a: Any, b: Any, radii: Sequence[Value], stiffness: Value, exponent: Value = 1.5,
-        dissipation: Value = None, restitution: Value = None, velocity: Value = None, formula: str | None = None,
-        friction: Value = None, static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0,
-        smoothing: Value = None) -> ForceHandle:
+    def sphere_sphere(self, name: str, a: Any, b: Any, radii: Sequence[Value], stiffness: Value = None,
+        exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None, velocity: Value = None,
+        formula: str | None = None, friction: Value = None, static_friction: Value = None, stribeck: Value = None,
+        viscous_friction: Value = 0, smoothing: Value = None, normal_law: str | None = None, damping: Value = None,
+        moduli: Sequence[Value] | None = None, poisson: Sequence[Value] | None = None) -> ForceHandle:
         """Add contact of two spheres, each centred at a marker."""
     def contacts(self, name: str, first: Sequence[Mapping[str, Any]] | Mapping[str, Any],
         second: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None, law: Mapping[str, Any] | None = None,
         stiffness: Value = None, exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None,
         velocity: Value = None, formula: str | None = None, friction: Value = None, static_friction: Value = None,
-        stribeck: Value = None, viscous_friction: Value = 0, smoothing: Value = None) -> ForceHandle:
+        stribeck: Value = None, viscous_friction: Value = 0, smoothing: Value = None, normal_law: str | None = None,
+        damping: Value = None, moduli: Sequence[Value] | None = None,
+        poisson: Sequence[Value] | None = None) -> ForceHandle:
         """Add contact of every shape of a group with every shape of another, by one law."""
     def muscle(self, name: str, a: Any, b: Any, activation: Value, force_max: Value, fiber_length: Value,
         slack_length: Value, velocity_max: Value = None, pennation: Value = 0, damping: Value = 0.1,

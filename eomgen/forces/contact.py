@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
@@ -17,7 +17,7 @@ from ..graph.vectors import Vec3
 from ..records import dataclass
 from .force import Force, Load, MarkerLoad, Measured, View
 from .friction import FRICTION, Friction, read_friction
-from .normal_laws import NORMAL, HuntCrossley, read_normal_law
+from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, NormalLaw, read_normal_law
 
 #: Normal (ground axes, from the first body to the second), penetration (m), arms of the contact point from the markers.
 Touch = tuple[Vec3, Expr, Vec3, Vec3]
@@ -25,7 +25,7 @@ Touch = tuple[Vec3, Expr, Vec3, Vec3]
 
 @dataclass(frozen=True)
 class Contact(Force):
-    """Contact at one point: a Hunt-Crossley force along the normal and friction against the sliding velocity.
+    """Contact at one point: a force along the normal and friction against the sliding velocity.
 
     The force on the second body is F_n n - F_n [c(v) / sqrt(v^2 + smoothing^2) + viscous] v_t, with the velocity v_t of
     the second body relative to the first, across n, at the contact point, the middle of the overlap; its opposite acts
@@ -36,11 +36,14 @@ class Contact(Force):
         "Contact at one point: a force along the normal from the penetration $d$ and its rate, and friction "
         "against the sliding."
     )
-    formula: ClassVar[str] = r"F_n = k d^n (1 + \lambda \dot{d}), \quad d > 0"
     first: Marker
     second: Marker
-    normal_law: HuntCrossley
+    normal_law: NormalLaw
     friction: Friction | None
+
+    @property
+    def laws(self) -> tuple[Any, ...]:
+        return (self.normal_law,) if self.friction is None else (self.normal_law, self.friction)
 
     @abstractmethod
     def touch(self, view: View) -> Touch:
@@ -133,6 +136,11 @@ class SphereSphere(Contact):
         return normal, depth, first, second
 
 
+def joint_radius(first: Expr, second: Expr) -> Expr:
+    """R of 1 / R = 1 / R1 + 1 / R2."""
+    return first * second / (first + second)
+
+
 def _friction(e: Entry) -> Friction | None:
     return read_friction(e, "friction", "static_friction", "viscous_friction")
 
@@ -140,7 +148,7 @@ def _friction(e: Entry) -> Friction | None:
 def _on_plane(e: Entry) -> SpherePlane | None:
     pair, law, friction = e.pair(), read_normal_law(e), _friction(e)
     radius = e.positive("radius") if "radius" in e.fields else e.graph.zero
-    return None if pair is None else SpherePlane(e.name, *pair, law, friction, radius)
+    return None if pair is None else SpherePlane(e.name, *pair, law.at(lambda: radius), friction, radius)
 
 
 def _two_spheres(e: Entry) -> SphereSphere | None:
@@ -149,11 +157,13 @@ def _two_spheres(e: Entry) -> SphereSphere | None:
         return None
     for k, radius in enumerate(radii):
         e.require(f"radii[{k}]", radius, lambda x: x >= 0, "a radius is 0 or greater")
-    return SphereSphere(e.name, *pair, law, friction, (radii[0], radii[1]))
+    return SphereSphere(e.name, *pair, law.at(lambda: joint_radius(*radii)), friction, (radii[0], radii[1]))
 
 
 _ENDS = "the plane (z points out of the solid) and the {0}"
-_CONTACT: Fields = {**NORMAL, **FRICTION}
+_CONTACT: Fields = {**NORMAL, **FRICTION, **NORMAL_CHOICE}
+#: Of contacts whose radii are known.
+CURVED: Fields = {**_CONTACT, "stiffness": NORMAL["stiffness"]._replace(required=False), **ELASTIC}
 
 TYPES = table(
     ElementType(
@@ -168,7 +178,7 @@ TYPES = table(
         {
             "between": Field("pair", _ENDS.format("sphere's centre"), required=True),
             "radius": Field("expression", "radius of the sphere (m)", required=True, dimension=LENGTH),
-            **_CONTACT,
+            **CURVED,
         },
         _on_plane,
     ),
@@ -178,7 +188,7 @@ TYPES = table(
         {
             "between": Field("pair", "the centres", required=True),
             "radii": Field("radii", "radii of the spheres (m)", required=True, dimension=LENGTH),
-            **_CONTACT,
+            **CURVED,
         },
         _two_spheres,
     ),

@@ -7,7 +7,7 @@ model's graph (:mod:`~eomgen.graph.pair_calls`), so that equations do not grow w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
@@ -23,11 +23,11 @@ from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..numeric.pair_sums import POSE
 from ..records import dataclass
-from .contact import SpherePlane
+from .contact import CURVED, SpherePlane
 from .contact_shapes import PLANAR, AtHeight, ContactShape, Feature, ShapeMotion, meet, touching
 from .force import Force, Load, MarkerLoad, View
-from .friction import FRICTION, Friction, read_friction
-from .normal_laws import NORMAL, HuntCrossley, read_normal_law
+from .friction import Friction, read_friction
+from .normal_laws import HertzBodies, NormalLaw, read_normal_law
 
 
 class _PairView:
@@ -79,12 +79,15 @@ class ContactGroups(Force):
         "Contact of every shape of one group with every shape of another: a force along the normal from the "
         "penetration $d$ and its rate, and friction against the sliding."
     )
-    formula: ClassVar[str] = r"F_n = k d^n (1 + \lambda \dot{d}), \quad d > 0"
     by_power: ClassVar[bool] = True
     first: tuple[ContactShape, ...]
     second: tuple[ContactShape, ...]
-    normal_law: HuntCrossley
+    normal_law: NormalLaw
     friction: Friction | None
+
+    @property
+    def laws(self) -> tuple[Any, ...]:
+        return (self.normal_law,) if self.friction is None else (self.normal_law, self.friction)
 
     def drawn(self) -> list[Seen]:
         return [seen for shape in (*self.first, *self.second) for seen in shape.drawn()]
@@ -159,8 +162,8 @@ class ContactGroups(Force):
             places.append(data.place(x))
             return graph.symbol(f"l{len(places) - 1}")
 
-        law, frame = self.normal_law, Frame(vec.identity(graph), vec.zero(graph))
-        normal = HuntCrossley(*(_there(own(x)) for x in (law.stiffness, law.exponent, law.dissipation)))
+        frame = Frame(vec.identity(graph), vec.zero(graph))
+        normal = self.normal_law.mapped(lambda x: _there(own(x)))
         dry = self.friction
         friction = None
         if dry is not None:
@@ -173,7 +176,7 @@ class ContactGroups(Force):
         bare = SpherePlane(self.name, *markers, normal, friction, graph.zero)
         contact = touching(kinds, markers, (given[0], given[1]), bare)
         if planar:
-            contact = AtHeight(self.name, *markers, normal, friction, contact, view.height())
+            contact = AtHeight(self.name, *markers, contact.normal_law, friction, contact, view.height())
         on_second, on_first = contact.remainder(view) if lost else contact.loads(view)
         assert isinstance(on_second, MarkerLoad)
         assert isinstance(on_first, MarkerLoad)
@@ -257,6 +260,10 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
     if first is None or second is None or e.at_fault():
         return None
     _refuse_pairs(e, first, second)
+    if isinstance(law, HertzBodies):
+        for key, shapes in (("first", first), ("second", second)):
+            if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
+                e.fault(key, f"a {flat[0]} has no radius for Hertz's law from moduli", "give stiffness, not moduli")
     return ContactGroups(e.name, first, second, law, friction)
 
 
@@ -330,8 +337,7 @@ TYPES = table(
                 dimension=LENGTH,
             ),
             "law": Field("law", "the keys that follow as a mapping, instead of one by one"),
-            **NORMAL,
-            **FRICTION,
+            **CURVED,
         },
         _contact_groups,
     )

@@ -17,7 +17,7 @@ from ..graph.core import Expr, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .branches import where
-from .contact import Contact, SpherePlane, SphereSphere, Touch
+from .contact import Contact, SpherePlane, SphereSphere, Touch, joint_radius
 from .force import View
 
 CORNERS = 64  #: most corners of a polygon
@@ -234,8 +234,9 @@ def touching(
     law: Contact,
 ) -> Contact:
     """The contact of one feature with another; ``law`` has the laws."""
-    laws = (law.name, *markers, law.normal_law, law.friction)
     first, radius = sizes[0], sizes[1][0]
+    normal = law.normal_law.at(lambda: joint_radius(first[0], radius) if kinds[0] == "round" else radius)
+    laws = (law.name, *markers, normal, law.friction)
     if kinds[0] == "round":
         return SphereSphere(*laws, (first[0], radius))
     if kinds[0] == "half":

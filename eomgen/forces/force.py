@@ -93,6 +93,11 @@ class Force(ABC):
         return None
 
     @property
+    def laws(self) -> tuple[Any, ...]:
+        """Laws that it is made of, each with a ``formula`` and numbers of its own, instead of the type's formula."""
+        return ()
+
+    @property
     def acts_along(self) -> bool:
         """Whether it acts along a path, so that :meth:`measured` is something."""
         return hasattr(self, "path")
