@@ -22,7 +22,7 @@ from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .build_quantities import Outputs, read_input, read_parameter, with_signal
-from .build_states import build_states, declare_states
+from .build_states import build_states, declare_states, own_states
 from .cam_turns import check_turns
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
@@ -89,6 +89,7 @@ def build(description: Description) -> Mechanism:
     )
 
     declared = declare_states(reader, sections["states"], given_values is not None or lagrangian_values is not None)
+    held, state_rates = own_states(reader, sections["forces"])
     read_outputs = Outputs(reader, sections["outputs"]).all
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     bodies = _bodies(reader, sections["bodies"])
@@ -103,7 +104,7 @@ def build(description: Description) -> Mechanism:
     outputs = read_outputs()
     events = build_events(reader, sections["events"])
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
-    kinds = ("coordinate", "velocity", *(("state",) if declared else ()))
+    kinds = ("coordinate", "velocity", *(("state",) if declared or held else ()))
     starts = _initial(reader, "initial", values.get("initial", {}), (*kinds, "output"))
     moving = set(reader.names.of(*kinds))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
@@ -139,10 +140,10 @@ def build(description: Description) -> Mechanism:
         joints=joints,
         forces=forces,
         outputs=outputs,
-        states=states,
+        states=(*states, *held),
         events=events,
         quantities=dict(reader.quantities),
-        element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked},
+        element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked} | state_rates,
         initial=begun | {name: value for name, value in starts.items() if name in moving},
         initial_outputs={name: value for name, value in starts.items() if name not in moving},
         guess=guess,

@@ -10,6 +10,7 @@ from ..joints import JOINTS
 from ..notation import with_instance
 from .build_cam_points import needs_point
 from .build_joints import coordinate_names, sketch
+from .build_states import states_of
 from .description import GROUND_NAME, Description
 from .marker_quantities import ElementQuantity, MarkerQuantity
 from .names import COM, QUANTITIES, TOTALS, function_words
@@ -44,6 +45,7 @@ class OwnNames:
             joint = sketch(kind, entry.values)
             self.symbols |= {str(name) for name in coordinate_names(kind, entry.name, entry.values, joint)[0]}
             self.symbols |= {entry.name + velocity.suffix for velocity in joint.velocities if velocity.of is None}
+        self.symbols |= {name for entry in sections["forces"] for name in states_of(entry)}
         for entry in sections["constraints"]:
             if needs_point(entry.values):
                 self.symbols.add(str(entry.values.get("coordinate", f"{entry.name}_contact")))

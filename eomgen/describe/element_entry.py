@@ -15,6 +15,7 @@ from ..graph.shown import quoted, shown
 from ..graph.vectors import Vec3
 from .build_cam_points import Contacts
 from .build_joints import Declared
+from .build_states import states_of
 from .checks import check_keys
 from .coordinates import find_coordinate
 from .description import DescribedEntry, items
@@ -186,6 +187,9 @@ class ElementEntry:
             self.reader.wrong(self._at(key), value, "flag")
             return False
         return value
+
+    def states(self) -> tuple[Expr, ...]:
+        return tuple(self.graph.symbol(name) for name in states_of(self.entry))
 
     # -- parts of the mechanism -----------------------------------------------------------------------------------
     def marker(self, key: str) -> Marker | None:

@@ -152,7 +152,8 @@ class ElementMethods(Described):
     def point_gravity(self, name: str, center: Any, body: Any, mu: Value, extent: str | None = None) -> ForceHandle:
         """Add the gravity that a point exerts on a body; the reaction acts at the point."""
     def friction(self, name: str, joint: Any, viscous: Value = None, coulomb: Value = None, static: Value = None,
-        stribeck: Value = None, smoothing: Value = None) -> ForceHandle:
+        stribeck: Value = None, smoothing: Value = None, friction_law: str | None = None, transition: Value = None,
+        bristle_stiffness: Value = None, bristle_damping: Value = None) -> ForceHandle:
         """Add friction on a joint's coordinate: viscous, Coulomb (with the Stribeck effect if wanted), or both."""
     def stop(self, name: str, joint: Any, stiffness: Value, lower: Value = None, upper: Value = None,
         exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None, velocity: Value = None,
@@ -161,12 +162,14 @@ class ElementMethods(Described):
     def point_plane(self, name: str, a: Any, b: Any, stiffness: Value, exponent: Value = 1.5, dissipation: Value = None,
         restitution: Value = None, velocity: Value = None, formula: str | None = None, friction: Value = None,
         static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0, smoothing: Value = None,
-        normal_law: str | None = None, damping: Value = None) -> ForceHandle:
+        normal_law: str | None = None, damping: Value = None, friction_law: str | None = None, transition: Value = None,
+        bristle_stiffness: Value = None, bristle_damping: Value = None) -> ForceHandle:
         """Add contact of a point (the second marker) with a plane (x-y of the first marker, z out of the solid)."""
     def sphere_plane(self, name: str, a: Any, b: Any, radius: Value, stiffness: Value = None, exponent: Value = 1.5,
         dissipation: Value = None, restitution: Value = None, velocity: Value = None, formula: str | None = None,
         friction: Value = None, static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0,
-        smoothing: Value = None, normal_law: str | None = None, damping: Value = None,
+        smoothing: Value = None, normal_law: str | None = None, damping: Value = None, friction_law: str | None = None,
+        transition: Value = None, bristle_stiffness: Value = None, bristle_damping: Value = None,
         moduli: Sequence[Value] | None = None, poisson: Sequence[Value] | None = None) -> ForceHandle:
         """Add contact of a sphere (about the second marker) with a plane (x-y of the first marker, z out of the
         solid)."""
@@ -174,14 +177,17 @@ class ElementMethods(Described):
         exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None, velocity: Value = None,
         formula: str | None = None, friction: Value = None, static_friction: Value = None, stribeck: Value = None,
         viscous_friction: Value = 0, smoothing: Value = None, normal_law: str | None = None, damping: Value = None,
-        moduli: Sequence[Value] | None = None, poisson: Sequence[Value] | None = None) -> ForceHandle:
+        friction_law: str | None = None, transition: Value = None, bristle_stiffness: Value = None,
+        bristle_damping: Value = None, moduli: Sequence[Value] | None = None,
+        poisson: Sequence[Value] | None = None) -> ForceHandle:
         """Add contact of two spheres, each centred at a marker."""
     def contacts(self, name: str, first: Sequence[Mapping[str, Any]] | Mapping[str, Any],
         second: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None, law: Mapping[str, Any] | None = None,
         stiffness: Value = None, exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None,
         velocity: Value = None, formula: str | None = None, friction: Value = None, static_friction: Value = None,
         stribeck: Value = None, viscous_friction: Value = 0, smoothing: Value = None, normal_law: str | None = None,
-        damping: Value = None, moduli: Sequence[Value] | None = None,
+        damping: Value = None, friction_law: str | None = None, transition: Value = None,
+        bristle_stiffness: Value = None, bristle_damping: Value = None, moduli: Sequence[Value] | None = None,
         poisson: Sequence[Value] | None = None) -> ForceHandle:
         """Add contact of every shape of a group with every shape of another, by one law."""
     def muscle(self, name: str, a: Any, b: Any, activation: Value, force_max: Value, fiber_length: Value,

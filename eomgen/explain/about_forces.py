@@ -83,8 +83,7 @@ def _weight(author: Author, name: str) -> list[Piece]:
 
 def _law(author: Author, force: Any) -> list[Piece]:
     """The sentence and the formula of an element's type, and what its letters are."""
-    formulas = [law.formula for law in force.laws] or [force.formula] * bool(force.formula)
-    pieces: list[Piece] = [Sentence(" ".join([force.sentence, *(f"${formula}$" for formula in formulas)]))]
+    pieces: list[Piece] = [Sentence(" ".join([force.sentence, *(f"${formula}$" for formula in force.formulas)]))]
     for part in (force, *force.laws):
         for key, value in vars(part).items():
             if isinstance(value, Expr) and not key.startswith("_"):

@@ -9,10 +9,11 @@ from .contact import Contact, SpherePlane, SphereSphere
 from .contact_groups import ContactGroups
 from .contact_shapes import ContactShape
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
-from .friction import Friction, JointFriction
+from .friction import JointFriction
+from .friction_laws import BrownMcPhee, Friction, LuGre
 from .laws import GeneralElement
 from .muscle import Muscle
-from .normal_laws import HuntCrossley
+from .normal_laws import HuntCrossley, DampedLinear, NormalLaw
 from .paths import JointCoordinate, Line, Path, Turn
 from .routes import Route
 from .springs import Damper, Spring
@@ -26,11 +27,13 @@ __all__ = [
     "FORCES",
     "Actuator",
     "BodyTorque",
+    "BrownMcPhee",
     "Bushing",
     "Contact",
     "ContactGroups",
     "ContactShape",
     "CoordinateLoad",
+    "DampedLinear",
     "Damper",
     "ElementType",
     "Force",
@@ -42,8 +45,10 @@ __all__ = [
     "JointStop",
     "Line",
     "Load",
+    "LuGre",
     "MarkerLoad",
     "Muscle",
+    "NormalLaw",
     "Path",
     "PointForce",
     "PointGravity",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from ..elements.dimensions import LENGTH
@@ -16,7 +17,7 @@ from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
 from .force import Force, Load, MarkerLoad, Measured, View
-from .friction import FRICTION, Friction, read_friction
+from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip, has_bristles, read_friction
 from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, NormalLaw, read_normal_law
 
 #: Normal (ground axes, from the first body to the second), penetration (m), arms of the contact point from the markers.
@@ -39,7 +40,7 @@ class Contact(Force):
     first: Marker
     second: Marker
     normal_law: NormalLaw
-    friction: Friction | None
+    friction: DryFriction | None
 
     @property
     def laws(self) -> tuple[Any, ...]:
@@ -52,7 +53,8 @@ class Contact(Force):
     def loads(self, view: View) -> list[Load]:
         normal, depth, arms, sliding, rate = self._motion(view)
         push = self.normal_law.force(depth, rate)
-        return self._pair(arms, vec.add(vec.scale(push, normal), self._drag(push, sliding)))
+        drag = self._drag(push, self._slip(view, normal, depth, sliding))
+        return self._pair(arms, vec.add(vec.scale(push, normal), drag))
 
     def potential(self, view: View) -> Expr | None:
         return self.normal_law.energy(self.touch(view)[1])
@@ -61,7 +63,14 @@ class Contact(Force):
         normal, depth, arms, sliding, rate = self._motion(view)
         push = self.normal_law.force(depth, rate)
         lost = push - self.normal_law.elastic(depth)
-        return self._pair(arms, vec.add(vec.scale(lost, normal), self._drag(push, sliding)))
+        drag = self._drag(push, self._slip(view, normal, depth, sliding))
+        return self._pair(arms, vec.add(vec.scale(lost, normal), drag))
+
+    def state_rates(self, view: View) -> tuple[Expr, ...]:
+        if self.friction is None:
+            return ()
+        normal, depth, _, sliding, _ = self._motion(view)
+        return self.friction.rates_in_plane(self._slip(view, normal, depth, sliding))
 
     @property
     def acts_along(self) -> bool:
@@ -82,10 +91,11 @@ class Contact(Force):
         parting = vec.dot(normal, relative)
         return normal, depth, (first, second), vec.sub(relative, vec.scale(parting, normal)), -parting
 
-    def _drag(self, push: Expr, sliding: Vec3) -> Vec3:
-        if self.friction is None:
-            return vec.zero(push.graph)
-        return vec.scale(-push * self.friction.per_velocity(vec.dot(sliding, sliding)), sliding)
+    def _slip(self, view: View, normal: Vec3, depth: Expr, sliding: Vec3) -> Slip:
+        return Slip(sliding, normal, depth, view.rotation(self.first))
+
+    def _drag(self, push: Expr, slip: Slip) -> Vec3:
+        return vec.zero(push.graph) if self.friction is None else vec.scale(-push, self.friction.in_plane(slip))
 
     def _pair(self, arms: tuple[Vec3, Vec3], force: Vec3) -> list[Load]:
         """The force on the second body at the contact point, its opposite on the first."""
@@ -141,7 +151,7 @@ def joint_radius(first: Expr, second: Expr) -> Expr:
     return first * second / (first + second)
 
 
-def _friction(e: Entry) -> Friction | None:
+def _friction(e: Entry) -> DryFriction | None:
     return read_friction(e, "friction", "static_friction", "viscous_friction")
 
 
@@ -161,9 +171,15 @@ def _two_spheres(e: Entry) -> SphereSphere | None:
 
 
 _ENDS = "the plane (z points out of the solid) and the {0}"
-_CONTACT: Fields = {**NORMAL, **FRICTION, **NORMAL_CHOICE}
+_CONTACT: Fields = {**NORMAL, **FRICTION, **NORMAL_CHOICE, **FRICTION_CHOICE}
 #: Of contacts whose radii are known.
 CURVED: Fields = {**_CONTACT, "stiffness": NORMAL["stiffness"]._replace(required=False), **ELASTIC}
+
+
+def _states(axes: str) -> Callable[[Mapping[str, Any]], dict[str, str]]:
+    """States of bristles along axes of the first marker."""
+    return lambda values: {f"bristle_{x}": "m" for x in axes} if has_bristles(values) else {}
+
 
 TYPES = table(
     ElementType(
@@ -171,6 +187,7 @@ TYPES = table(
         "contact of a point (the second marker) with a plane (x-y of the first marker, z out of the solid).",
         {"between": Field("pair", _ENDS.format("point"), required=True), **_CONTACT},
         _on_plane,
+        states=_states("xy"),
     ),
     ElementType(
         "sphere_plane",
@@ -181,6 +198,7 @@ TYPES = table(
             **CURVED,
         },
         _on_plane,
+        states=_states("xy"),
     ),
     ElementType(
         "sphere_sphere",
@@ -191,5 +209,6 @@ TYPES = table(
             **CURVED,
         },
         _two_spheres,
+        states=_states("xyz"),
     ),
 )

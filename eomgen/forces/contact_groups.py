@@ -26,7 +26,7 @@ from ..records import dataclass
 from .contact import CURVED, SpherePlane
 from .contact_shapes import PLANAR, AtHeight, ContactShape, Feature, ShapeMotion, meet, touching
 from .force import Force, Load, MarkerLoad, View
-from .friction import Friction, read_friction
+from .friction_laws import DryFriction, has_bristles, read_friction
 from .normal_laws import HertzBodies, NormalLaw, read_normal_law
 
 
@@ -83,7 +83,7 @@ class ContactGroups(Force):
     first: tuple[ContactShape, ...]
     second: tuple[ContactShape, ...]
     normal_law: NormalLaw
-    friction: Friction | None
+    friction: DryFriction | None
 
     @property
     def laws(self) -> tuple[Any, ...]:
@@ -156,19 +156,16 @@ class ContactGroups(Force):
         view = _PairView(graph, planar)
         places: list[int] = []
 
-        def own(x: Expr | None) -> Expr | None:
-            if x is None or x.value is not None:
-                return None if x is None else graph.constant(x.value or 0.0)
+        def own(x: Expr) -> Expr:
+            if x.value is not None:
+                return graph.constant(x.value)
             places.append(data.place(x))
             return graph.symbol(f"l{len(places) - 1}")
 
         frame = Frame(vec.identity(graph), vec.zero(graph))
-        normal = self.normal_law.mapped(lambda x: _there(own(x)))
+        normal = self.normal_law.mapped(own)
         dry = self.friction
-        friction = None
-        if dry is not None:
-            level, smoothing, viscous = (_there(own(x)) for x in (dry.dynamic, dry.smoothing, dry.viscous))
-            friction = Friction(level, smoothing, viscous, own(dry.static), own(dry.stribeck))
+        friction = None if dry is None else dry.mapped(own)
         markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
         given = [
             tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
@@ -243,11 +240,6 @@ def _kept(graph: Graph, results: Sequence[Expr]) -> tuple[tuple[tuple[object, ..
     return tuple(nodes), renamed
 
 
-def _there(x: Expr | None) -> Expr:
-    assert x is not None
-    return x
-
-
 def _vector(x: Sequence[Expr]) -> Vec3:
     return x[0], x[1], x[2]
 
@@ -256,6 +248,10 @@ def _vector(x: Sequence[Expr]) -> Vec3:
 def _contact_groups(e: Entry) -> ContactGroups | None:
     first = e.shapes("first")
     second = e.shapes("second") if "second" in e.values else ()
+    if has_bristles(e.values):
+        remedy = "use brown_mcphee, or point_plane, sphere_plane or sphere_sphere for each pair"
+        e.fault("friction_law", "lugre has states, which pairs of groups do not", remedy)
+        return None
     law, friction = read_normal_law(e), read_friction(e, "friction", "static_friction", "viscous_friction")
     if first is None or second is None or e.at_fault():
         return None

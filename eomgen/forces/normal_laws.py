@@ -99,7 +99,7 @@ class HuntCrossley(NormalLaw):
 
 
 @dataclass(frozen=True)
-class Linear(NormalLaw):
+class DampedLinear(NormalLaw):
     """max(0, k d + c d') of the penetration d > 0, else 0.
 
     With damping the force begins with a jump to c d'; it ends at 0 where the surfaces part faster than k d / c.
@@ -119,8 +119,8 @@ class Linear(NormalLaw):
     def energy(self, depth: Expr) -> Expr:
         return beyond_zero(depth, lambda d: 0.5 * self.stiffness * d * d)
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> Linear:
-        return Linear(own(self.stiffness), own(self.damping))
+    def mapped(self, own: Callable[[Expr], Expr]) -> DampedLinear:
+        return DampedLinear(own(self.stiffness), own(self.damping))
 
 
 @dataclass(frozen=True)
@@ -216,14 +216,14 @@ def _require_stiffness(e: Entry) -> None:
         e.fault("stiffness", "is missing", "give it, or moduli and poisson with normal_law: hertz")
 
 
-def _linear(e: Entry) -> Linear:
+def _linear(e: Entry) -> DampedLinear:
     _require_stiffness(e)
     for key in ("dissipation", "restitution", "velocity", "formula", "exponent", *ELASTIC):
         e.refuse(key, "has no meaning in normal_law: linear, which has stiffness and damping")
     damping = e.given("damping")
     if damping is not None:
         e.require("damping", damping, lambda c: c >= 0, "must be 0 or greater")
-    return Linear(e.positive("stiffness"), e.graph.zero if damping is None else damping)
+    return DampedLinear(e.positive("stiffness"), e.graph.zero if damping is None else damping)
 
 
 def _elastic(e: Entry, kind: str) -> NormalLaw:
