@@ -50,6 +50,7 @@ KINDS = {
     "shapes": "a list of shapes {shape, on, ...}",
     "on": "a marker or a list of markers",
     "corners": "a list of corners [x, y]",
+    "places": "a list of points [x, y]",
     "law": "a mapping of keys of the law to numbers or expressions",
     "radii": "two numbers or expressions",
     "matrix": "a list of rows, each a list of numbers or expressions",

@@ -13,7 +13,7 @@ from .friction import JointFriction
 from .friction_laws import BrownMcPhee, Friction, LuGre
 from .laws import GeneralElement
 from .muscle import Muscle
-from .normal_laws import HuntCrossley, DampedLinear, NormalLaw
+from .normal_laws import DampedLinear, HuntCrossley, NormalLaw
 from .paths import JointCoordinate, Line, Path, Turn
 from .routes import Route
 from .springs import Damper, Spring

@@ -50,19 +50,27 @@ class Contact(Force):
     def touch(self, view: View) -> Touch:
         """Where the surfaces meet."""
 
+    def share(self, view: View) -> Expr | None:
+        """The part of the law that counts here, of a surface made of pieces; None means all."""
+        return None
+
+    def _shared(self, view: View, x: Expr) -> Expr:
+        share = self.share(view)
+        return x if share is None else share * x
+
     def loads(self, view: View) -> list[Load]:
         normal, depth, arms, sliding, rate = self._motion(view)
-        push = self.normal_law.force(depth, rate)
+        push = self._shared(view, self.normal_law.force(depth, rate))
         drag = self._drag(push, self._slip(view, normal, depth, sliding))
         return self._pair(arms, vec.add(vec.scale(push, normal), drag))
 
     def potential(self, view: View) -> Expr | None:
-        return self.normal_law.energy(self.touch(view)[1])
+        return self._shared(view, self.normal_law.energy(self.touch(view)[1]))
 
     def remainder(self, view: View) -> list[Load]:
         normal, depth, arms, sliding, rate = self._motion(view)
-        push = self.normal_law.force(depth, rate)
-        lost = push - self.normal_law.elastic(depth)
+        push = self._shared(view, self.normal_law.force(depth, rate))
+        lost = push - self._shared(view, self.normal_law.elastic(depth))
         drag = self._drag(push, self._slip(view, normal, depth, sliding))
         return self._pair(arms, vec.add(vec.scale(lost, normal), drag))
 
@@ -78,7 +86,7 @@ class Contact(Force):
 
     def measured(self, view: View) -> Measured:
         _, depth, _, _, rate = self._motion(view)
-        return Measured(depth, rate, self.normal_law.force(depth, rate))
+        return Measured(depth, rate, self._shared(view, self.normal_law.force(depth, rate)))
 
     def _motion(self, view: View) -> tuple[Vec3, Expr, tuple[Vec3, Vec3], Vec3, Expr]:
         """Normal, penetration, arms, sliding velocity and the rate of penetration."""

@@ -24,7 +24,7 @@ from ..graph.vectors import Vec3
 from ..numeric.pair_sums import POSE
 from ..records import dataclass
 from .contact import CURVED, SpherePlane
-from .contact_shapes import PLANAR, AtHeight, ContactShape, Feature, ShapeMotion, meet, touching
+from .contact_shapes import GROUNDS, PLANAR, AtHeight, ContactShape, Feature, ShapeMotion, meet, touching
 from .force import Force, Load, MarkerLoad, View
 from .friction_laws import DryFriction, has_bristles, read_friction
 from .normal_laws import HertzBodies, NormalLaw, read_normal_law
@@ -270,13 +270,16 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
         for b in kinds[1]:
             if (a in PLANAR) != (b in PLANAR):
                 e.fault("second", f"{a} and {b} do not meet", _ALLOWED)
-            elif a.startswith("half") and b.startswith("half") and (second or _differ(first, a)):
-                e.fault("second", f"two shapes {a} do not meet", _ALLOWED)
-            elif a == b == "capsule" and (second or _differ(first, a)):
-                e.fault("second", "two shapes capsule do not meet", _ALLOWED)
+            elif (
+                (a in GROUNDS and b in GROUNDS)
+                or (a in _ON_GROUND and b in _IN_SPACE)
+                or (b in _ON_GROUND and a in _IN_SPACE)
+            ) and (second or a != b or _differ(first, a)):
+                told = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
+                e.fault("second" if second else "first", told, _ALLOWED)
     thin = [shape for shape in first if _is_thin(shape)], [shape for shape in second or first if _is_thin(shape)]
     for k, others in enumerate((second or first, first)):
-        cornered = sorted({shape.kind for shape in others if shape.kind in ("box", "polygon") or _is_thin(shape)})
+        cornered = sorted({shape.kind for shape in others if shape.kind in _CORNERED or _is_thin(shape)})
         if thin[k] and cornered and (second or _differ_in_body(first)):
             e.fault(
                 ("first", "second")[k] if second else "first",
@@ -312,9 +315,12 @@ def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
     return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
 
 
+_CORNERED = ("box", "polygon", "profile", "smooth_profile")  #: shapes whose corners meet segments
+_ON_GROUND = ("ellipsoid", "cuboid")  #: shapes that meet a half-space alone
+_IN_SPACE = ("sphere", "capsule", *_ON_GROUND)
 _ALLOWED = (
-    "circle, segment, box, polygon meet each other and half_plane; sphere meets sphere, capsule, half_space; capsule "
-    "meets sphere, half_space"
+    "circle, segment, box, polygon meet each other, half_plane, profile and smooth_profile; sphere and capsule meet "
+    "each other and half_space; ellipsoid and cuboid meet half_space"
 )
 
 _SHAPES = "shapes {shape, on, ...} of the "
@@ -323,7 +329,8 @@ TYPES = table(
     ElementType(
         "contacts",
         "contact of every shape of a group with every shape of another, by one law.  Shapes are mappings of shape "
-        "(circle, segment, box, polygon, half_plane; sphere, capsule, half_space), on (a marker or a list of markers) "
+        "(circle, segment, box, polygon, half_plane, profile, smooth_profile; sphere, capsule, half_space, ellipsoid, "
+        "cuboid), on (a marker or a list of markers) "
         "and sizes.  Shapes of one body do not meet.",
         {
             "first": Field("shapes", _SHAPES + "first group", required=True, dimension=LENGTH),
