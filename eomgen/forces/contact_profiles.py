@@ -162,7 +162,10 @@ def _part(side: Expr, width: Expr) -> Expr:
 
 @dataclass(frozen=True)
 class ProfilePiece(Contact):
-    """A circle about the second marker on a piece of a profile in the x-y plane of the first."""
+    """A circle about the second marker on a piece of a profile in the x-y plane of the first.
+
+    The last of ``sizes`` is how far below the profile its solid reaches; a deeper centre feels nothing.
+    """
 
     sizes: tuple[Expr, ...]
     radius: Expr
@@ -174,7 +177,8 @@ class ProfilePiece(Contact):
 
     def _touching(self, view: View, gap: Expr, normal: tuple[Expr, Expr], reach: Vec3) -> Touch:
         out = vec.times(view.rotation(self.first), (*normal, view.graph.zero))
-        depth = self.radius - gap
+        thick = self.sizes[-1]
+        depth = where(view.graph.apply("lt", gap, -thick), -thick, self.radius - gap)
         second = vec.scale(0.5 * depth - self.radius, out)
         return out, depth, vec.add(reach, second), second
 
@@ -184,7 +188,7 @@ class EdgeRound(ProfilePiece):
 
     def share(self, view: View) -> Expr:
         x, y, _ = self._place(view)
-        half, left_x, left_y, left, right_x, right_y, right, width = self.sizes
+        half, left_x, left_y, left, right_x, right_y, right, width, _ = self.sizes
         first = _part((x + half) * left_y - y * left_x, width)
         second = _part((half - x) * right_y - y * right_x, width)
         return (1.0 - left * (1.0 - first)) * (1.0 - right * (1.0 - second))
@@ -192,7 +196,7 @@ class EdgeRound(ProfilePiece):
     def touch(self, view: View) -> Touch:
         graph = view.graph
         x, y, reach = self._place(view)
-        half, _, _, left, _, _, right, _ = self.sizes
+        half, _, _, left, _, _, right, _, _ = self.sizes
         over = right * graph.apply("max", 0.0, x - half) - left * graph.apply("max", 0.0, -half - x)
         beside = graph.apply("lt", 0.0, over * over)
         distance = sqrt(where(beside, over * over + y * y, 1.0))
@@ -209,7 +213,7 @@ class ArcRound(ProfilePiece):
 
     def share(self, view: View) -> Expr:
         x, y, _ = self._place(view)
-        _, half, rise, cosine, sine, width = self.sizes
+        _, half, rise, cosine, sine, width, _ = self.sizes
         left = (x + half) * cosine - (y - rise) * sine
         right = (half - x) * cosine - (y - rise) * sine
         return _part(left, width) * _part(right, width)

@@ -152,10 +152,10 @@ class ContactShape:
 
     def _pieces(self, frame: Frame) -> list[Feature]:
         """Pieces of a profile, and its peaks, which meet what is flat."""
-        points, zero = self._points(), self.sizes[0].graph.zero
+        points, depth, zero = self._points(), self.sizes[0], self.sizes[0].graph.zero
         pieces = straight_pieces(points) if self.kind == "profile" else smooth_pieces(points)
         found = [
-            Feature(one.kind, one.frame(frame), one.sizes, None if one.open else one.half + self.sizes[0])
+            Feature(one.kind, one.frame(frame), (*one.sizes, depth), None if one.open else one.half + depth)
             for one in pieces
         ]
         tops = peaks(points)

@@ -28,7 +28,7 @@ def test_a_flat_profile_is_a_half_plane(kind: str, target: str) -> None:
     """In turned axes, with points in line, for every shape, over points and beyond the ends."""
     points = [(-0.3, 0), (0, 0), (0.2, 0), (0.7, 0)]
     mods = []
-    for shape in ({"shape": "half_plane"}, {"shape": kind, "points": points}):
+    for shape in ({"shape": "half_plane"}, {"shape": kind, "points": points, "depth": 0.5}):
         m, bodies = scenes.planar("flat", 4)
         base = m.ground.at(0.1, 0.2, 0, rpy=(0, 0, 0.3))
         m.contacts("floor", [on(PLANAR[k], b) for k, b in zip(PLANAR, bodies, strict=True)], on(shape, base), LAW)
@@ -49,14 +49,11 @@ def test_a_flat_profile_is_a_half_plane(kind: str, target: str) -> None:
     assert pushed > 30
 
 
-def outline(kind: str) -> np.ndarray:
-    """Fine points of the profile HILLS, drawn on at its ends, without what is tested."""
+def outline() -> np.ndarray:
+    """Fine points of the profile HILLS, drawn on at its ends."""
     given = np.array(HILLS)
-    if kind == "profile":
-        ends = [given[0] + 2 * (given[0] - given[1]), given[-1] + 2 * (given[-1] - given[-2])]
-        corners = np.array([ends[0], *given, ends[1]])
-        return np.concatenate([np.linspace(a, b, 20001) for a, b in itertools.pairwise(corners)])
-    raise AssertionError
+    ends = [given[0] + 2 * (given[0] - given[1]), given[-1] + 2 * (given[-1] - given[-2])]
+    return np.concatenate([np.linspace(a, b, 20001) for a, b in itertools.pairwise([ends[0], *given, ends[1]])])
 
 
 def signed_distance(p: np.ndarray, line: np.ndarray) -> float:
@@ -188,6 +185,23 @@ def test_targets_parameters_and_derivatives(kind: str) -> None:
     np.testing.assert_allclose(
         mods[1].parameter_jacobian(0.0, x)[:, 0], slope, rtol=1e-4, atol=1e-5 * np.abs(slope).max()
     )
+
+
+@pytest.mark.parametrize("kind", ["profile", "smooth_profile"])
+def test_what_is_deeper_than_the_solid_feels_nothing(kind: str) -> None:
+    """Also in a batch in which other states are near."""
+    m, (ball,) = scenes.planar("deep", 1, (0, 0, 0))
+    m.contacts("floor", on(PLANAR["circle"], ball), ground(m, HILLS, kind, depth=0.05), ELASTIC)
+    for target in ("numpy", "cython"):
+        mod = m.compile(target=target)
+        heights = np.linspace(-0.6, 0.2, 161)
+        x = np.zeros((6, 161))
+        x[0], x[1] = 0.05, heights
+        together = mod.rhs(0.0, x)
+        apart = np.transpose([mod.rhs(0.0, column) for column in x.T.copy()])
+        np.testing.assert_allclose(together, apart, rtol=1e-12, atol=1e-9)
+        assert not together[3:, heights < -0.1].any()
+        assert np.abs(together[3:, heights > -0.01]).max() > 100
 
 
 @pytest.mark.parametrize(
