@@ -22,13 +22,14 @@ from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .build_quantities import Outputs, read_input, read_parameter, with_signal
-from .build_states import build_states, declare_states, own_states
+from .build_states import build_states, declare_states
 from .cam_turns import check_turns
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
 from .dotted_names import undotted
 from .element_entry import Surroundings
+from .element_states import own_states
 from .fields import BODY, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
@@ -100,9 +101,9 @@ def build(description: Description) -> Mechanism:
     given = build_equations(reader, given_values)
     constraints = build_elements(around, "constraint", sections["constraints"], CONSTRAINTS)
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
-    states, begun = build_states(reader, declared)
+    states, begun, clocks, samplings = build_states(reader, declared)
     outputs = read_outputs()
-    events = build_events(reader, sections["events"])
+    events = (*build_events(reader, sections["events"]), *samplings)
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
     kinds = ("coordinate", "velocity", *(("state",) if declared or held else ()))
     starts = _initial(reader, "initial", values.get("initial", {}), (*kinds, "output"))
@@ -141,6 +142,7 @@ def build(description: Description) -> Mechanism:
         forces=forces,
         outputs=outputs,
         states=(*states, *held),
+        clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
         element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked} | state_rates,

@@ -15,10 +15,10 @@ from ..graph.shown import quoted, shown
 from ..graph.vectors import Vec3
 from .build_cam_points import Contacts
 from .build_joints import Declared
-from .build_states import states_of
 from .checks import check_keys
 from .coordinates import find_coordinate
 from .description import DescribedEntry, items
+from .element_states import states_of
 from .fields import CYLINDER
 from .mechanism import Body, JointSpec
 from .names import nearest

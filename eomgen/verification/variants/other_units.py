@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...describe.build_states import states_of
 from ...describe.description import Description
+from ...describe.element_states import states_of
 from ...describe.fields import MODEL, Field, acts_on_length, fields_of, part_fields
 from ...describe.marker_quantities import ElementQuantity, MarkerQuantity
 from ...describe.mechanism import LEVEL_DIMENSIONS, MOMENTUM, dimension_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...describe.build_states import states_of
 from ...describe.description import GROUND_NAME, Description
+from ...describe.element_states import states_of
 from ...describe.marker_quantities import MarkerQuantity
 from ...describe.names import COM
 from ...describe.rewritten_texts import rewritten
