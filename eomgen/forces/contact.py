@@ -18,7 +18,7 @@ from ..graph.vectors import Vec3
 from ..records import dataclass
 from .force import Force, Load, MarkerLoad, Measured, View
 from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip, has_bristles, read_friction
-from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, NormalLaw, read_normal_law
+from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, HertzBodies, NormalLaw, read_normal_law
 
 #: Normal (ground axes, from the first body to the second), penetration (m), arms of the contact point from the markers.
 Touch = tuple[Vec3, Expr, Vec3, Vec3]
@@ -28,9 +28,9 @@ Touch = tuple[Vec3, Expr, Vec3, Vec3]
 class Contact(Force):
     """Contact at one point: a force along the normal and friction against the sliding velocity.
 
-    The force on the second body is F_n n - F_n [c(v) / sqrt(v^2 + smoothing^2) + viscous] v_t, with the velocity v_t of
-    the second body relative to the first, across n, at the contact point, the middle of the overlap; its opposite acts
-    on the first body at the same point.
+    The force on the second body is F_n n - F_n f(v_t), with the law of friction f of the velocity v_t of the second
+    body relative to the first, across n, at the contact point, the middle of the overlap; its opposite acts on the
+    first body at the same point.
     """
 
     sentence: ClassVar[str] = (
@@ -175,6 +175,8 @@ def _two_spheres(e: Entry) -> SphereSphere | None:
         return None
     for k, radius in enumerate(radii):
         e.require(f"radii[{k}]", radius, lambda x: x >= 0, "a radius is 0 or greater")
+        if isinstance(law, HertzBodies):
+            e.require(f"radii[{k}]", radius, lambda x: x > 0, "the law of Hertz from moduli needs both radii")
     return SphereSphere(e.name, *pair, law.at(lambda: joint_radius(*radii)), friction, (radii[0], radii[1]))
 
 

@@ -6,6 +6,7 @@ shapes, which are round of radius 0 or of the shape's own.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from ..elements.dimensions import LENGTH
@@ -81,6 +82,7 @@ PLANAR = ("circle", "segment", "box", "polygon", "half_plane", "profile", "smoot
 #: Shapes without an end, which do not meet each other.
 GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space")
 _BOTH = (-1.0, 1.0)
+_STEPS = 24  #: lines of which the picture of an ellipse is made
 _EDGE = 5  #: numbers of an edge: its first corner, its outward normal, its length
 
 
@@ -165,6 +167,16 @@ class ContactShape:
         """The frame whose z axis points out of the solid: y of a half-plane's marker, z of a half-space's."""
         return _turned(frame, (2, 0, 1)) if self.kind == "half_plane" else frame
 
+    def _ellipse(self, i: int, j: int) -> Drawn:
+        """The outline of an ellipsoid in a plane of two of its axes."""
+        places = []
+        for k in range(_STEPS + 1):
+            angle = 2.0 * math.pi * k / _STEPS
+            place = [self.sizes[0].graph.zero] * 3
+            place[i], place[j] = math.cos(angle) * self.sizes[i], math.sin(angle) * self.sizes[j]
+            places.append(_moved(self.marker.frame, (place[0], place[1], place[2])))
+        return Drawn(tuple(Marker(self.marker.body, frame, self.marker.label) for frame in places))
+
     def drawn(self) -> list[Seen]:
         """What is to be seen of it."""
         marker = self.marker
@@ -177,9 +189,7 @@ class ContactShape:
             places = [_moved(marker.frame, (x, y, zero)) for x, y in self._points()]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
         if self.kind == "ellipsoid":
-            frames = [marker.frame, *(_turned(marker.frame, turn) for turn in ((1, 2, 0), (2, 0, 1)))]
-            radii = (self.sizes[0], self.sizes[1], self.sizes[2])
-            return [Wheel(Marker(marker.body, f, marker.label), r) for f, r in zip(frames, radii, strict=True)]
+            return [self._ellipse(i, j) for i, j in ((0, 1), (1, 2), (2, 0))]
         if self.kind == "cuboid":
             found = [feature.frame for feature in self.features()]
             ways = ((0, 1, 3, 2, 0, 4, 5, 7, 6, 4), (1, 5), (2, 6), (3, 7))

@@ -131,6 +131,8 @@ class HertzBodies(NormalLaw):
     Contact Mechanics, 1985, equations 4.22 to 4.24).  ``modulus`` is E (Pa).
     """
 
+    formula: ClassVar[str] = r"F_n = \frac{4}{3} E \sqrt{R} d^{3/2} (1 + \lambda \dot{d}), \quad d > 0"
+
     modulus: Expr
     dissipation: Expr
 

@@ -206,5 +206,7 @@ def test_solids_are_drawn_and_verified(tmp_path: Any) -> None:
     file = tmp_path / "solids.yaml"
     file.write_text(m.to_yaml())
     assert np.array_equal(eg.load(file).compile(target="numpy").rhs(0.0, mod.x0()), mod.rhs(0.0, mod.x0()))
+    drawn = m.mechanism().forces[0].drawn()
+    assert len(drawn) == 3 + 4 + 1 + 1  # ellipses, edges, the line of a capsule, the plane
     report = mod.verify()
     assert report.ok, report

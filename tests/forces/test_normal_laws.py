@@ -134,6 +134,15 @@ def test_two_spheres_after_hertz() -> None:
         assert force == pytest.approx(4 / 3 * HERTZ_E * np.sqrt(0.024) * 1e-5**1.5, rel=1e-9)
 
 
+def test_the_law_of_hertz_needs_radii() -> None:
+    m = eg.Model("pair")
+    body = m.body("b", mass=1, inertia=(1e-3,) * 3)
+    m.prismatic("x", m.ground, body, axis="x")
+    m.sphere_sphere("touch", m.ground, body, radii=(0, 0.1), **STEEL)
+    with pytest.raises(ModelError, match=r"radii\[0\]: is 0; the law of Hertz from moduli needs both radii"):
+        m.mechanism()
+
+
 def test_a_stop_with_the_linear_law() -> None:
     m = eg.Model("stop")
     body = m.body("b", mass=2)
