@@ -45,7 +45,7 @@ KINDS = {
     "count": "a whole number greater than 0",
     "functions": "a list of names of C functions, null for one that is not there",
     "shape": "three expressions [x, y, z] of the joint's own first coordinates and of parameters",
-    "via": "a list of markers and cylinders {around, radius, sense}",
+    "via": "a list of markers and cylinders {around, radius, sense, friction, smoothing}",
     "matrix6": "six numbers or expressions for the diagonal, or 6 x 6 of them",
     "shapes": "a list of shapes {shape, on, ...}",
     "on": "a marker or a list of markers",
