@@ -28,11 +28,14 @@ class Marker:
 
 @dataclass(frozen=True)
 class WrapCylinder:
-    """A smooth cylinder of the radius (m) about the z axis of a marker; ``sense`` is the turn of the path about it.
+    """A cylinder of the radius (m) about the z axis of a marker; ``sense`` is the turn of the path about it.
 
-    The path runs from start to end round the axis counterclockwise (1) or clockwise (-1), seen against z.
+    The path runs from start to end round the axis counterclockwise (1) or clockwise (-1), seen against z.  The surface
+    is smooth, or has a coefficient of ``friction`` that is reached well above the velocity ``smoothing`` (m/s) of slip.
     """
 
     marker: Marker
     radius: Expr
     sense: int
+    friction: Expr | None = None
+    smoothing: Expr | None = None

@@ -29,6 +29,7 @@ from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
 from .dotted_names import undotted
 from .element_entry import Surroundings
+from .element_states import own_states
 from .fields import BODY, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
@@ -89,6 +90,7 @@ def build(description: Description) -> Mechanism:
     )
 
     declared = declare_states(reader, sections["states"], given_values is not None or lagrangian_values is not None)
+    held, state_rates = own_states(reader, sections["forces"])
     read_outputs = Outputs(reader, sections["outputs"]).all
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     bodies = _bodies(reader, sections["bodies"])
@@ -103,7 +105,7 @@ def build(description: Description) -> Mechanism:
     outputs = read_outputs()
     events = (*build_events(reader, sections["events"]), *samplings)
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
-    kinds = ("coordinate", "velocity", *(("state",) if declared else ()))
+    kinds = ("coordinate", "velocity", *(("state",) if declared or held else ()))
     starts = _initial(reader, "initial", values.get("initial", {}), (*kinds, "output"))
     moving = set(reader.names.of(*kinds))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
@@ -139,11 +141,11 @@ def build(description: Description) -> Mechanism:
         joints=joints,
         forces=forces,
         outputs=outputs,
-        states=states,
+        states=(*states, *held),
         clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
-        element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked},
+        element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked} | state_rates,
         initial=begun | {name: value for name, value in starts.items() if name in moving},
         initial_outputs={name: value for name, value in starts.items() if name not in moving},
         guess=guess,

@@ -12,6 +12,7 @@ from .build_cam_points import needs_point
 from .build_clocks import COUNTER, EVENT
 from .build_joints import coordinate_names, sketch
 from .description import GROUND_NAME, Description
+from .element_states import states_of
 from .marker_quantities import ElementQuantity, MarkerQuantity
 from .names import COM, QUANTITIES, TOTALS, function_words
 from .placed_on import placed_on
@@ -45,6 +46,7 @@ class OwnNames:
             joint = sketch(kind, entry.values)
             self.symbols |= {str(name) for name in coordinate_names(kind, entry.name, entry.values, joint)[0]}
             self.symbols |= {entry.name + velocity.suffix for velocity in joint.velocities if velocity.of is None}
+        self.symbols |= {name for entry in sections["forces"] for name in states_of(entry)}
         for entry in sections["states"]:
             if "period" in entry.values and isinstance(entry.name, str):
                 self.symbols |= {entry.name + COUNTER, entry.name + EVENT}

@@ -18,6 +18,7 @@ from .build_joints import Declared
 from .checks import check_keys
 from .coordinates import find_coordinate
 from .description import DescribedEntry, items
+from .element_states import states_of
 from .fields import CYLINDER
 from .mechanism import Body, JointSpec
 from .names import nearest
@@ -187,6 +188,9 @@ class ElementEntry:
             return False
         return value
 
+    def states(self) -> tuple[Expr, ...]:
+        return tuple(self.graph.symbol(name) for name in states_of(self.entry))
+
     # -- parts of the mechanism -----------------------------------------------------------------------------------
     def marker(self, key: str) -> Marker | None:
         value = self.values.get(key, self.fields[key].default)
@@ -228,7 +232,25 @@ class ElementEntry:
             reader.faults.add(f"{path}.radius", f"is {radius.value:g}", "must be greater than 0")
         field = CYLINDER["sense"]
         sense = reader.choice(f"{path}.sense", value.get("sense", field.default), field)
-        return None if marker is None else WrapCylinder(marker, radius, 1 if sense == "positive" else -1)
+        rubbing = self._rubbing(path, value)
+        return None if marker is None else WrapCylinder(marker, radius, 1 if sense == "positive" else -1, *rubbing)
+
+    def _rubbing(self, path: str, value: Mapping[str, Any]) -> tuple[Expr | None, Expr | None]:
+        """Friction of a rope on a cylinder, and the velocity below which it is smoothed; neither where it is smooth."""
+        keys = ("friction", "smoothing")
+        missing = [key for key in keys if key not in value]
+        if missing:
+            if len(missing) == 1:
+                remedy = "give friction and smoothing together, or neither"
+                self.reader.faults.add(f"{path}.{missing[0]}", "is missing", remedy)
+            return None, None
+        friction, smoothing = (self.reader.expression(f"{path}.{key}", value[key]) for key in keys)
+        known = self.reader.known(friction), self.reader.known(smoothing)
+        if known[0] is not None and known[0] < 0:
+            self.reader.faults.add(f"{path}.friction", f"is {known[0]:g}", "must be 0 or greater")
+        if known[1] is not None and known[1] <= 0:
+            self.reader.faults.add(f"{path}.smoothing", f"is {known[1]:g}", "must be greater than 0")
+        return friction, smoothing
 
     def shapes(self, key: str) -> tuple[ContactShape, ...] | None:
         return read_shapes(self.reader, self._at(key), self.values[key]) if key in self.values else None

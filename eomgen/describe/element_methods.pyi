@@ -153,34 +153,44 @@ class ElementMethods(Described):
         """Add the gravity that a point exerts on a body; the reaction acts at the point."""
     def friction(self, name: str, joint: Any, viscous: Value = None, coulomb: Value = None, static: Value = None,
         coefficient: Value = None, static_coefficient: Value = None, radius: Value = None, thrust_radius: Value = None,
-        stribeck: Value = None, smoothing: Value = None) -> ForceHandle:
+        stribeck: Value = None, smoothing: Value = None, friction_law: str | None = None, transition: Value = None,
+        bristle_stiffness: Value = None, bristle_damping: Value = None) -> ForceHandle:
         """Add friction on a joint's coordinate: viscous, Coulomb (with the Stribeck effect if wanted), by the reaction
         that the joint carries, or several of them."""
     def stop(self, name: str, joint: Any, stiffness: Value, lower: Value = None, upper: Value = None,
         exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None, velocity: Value = None,
-        formula: str | None = None) -> ForceHandle:
+        formula: str | None = None, normal_law: str | None = None, damping: Value = None) -> ForceHandle:
         """Add elastic stops of a joint's coordinate: below ``lower``, above ``upper`` or both."""
     def point_plane(self, name: str, a: Any, b: Any, stiffness: Value, exponent: Value = 1.5, dissipation: Value = None,
         restitution: Value = None, velocity: Value = None, formula: str | None = None, friction: Value = None,
-        static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0,
-        smoothing: Value = None) -> ForceHandle:
+        static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0, smoothing: Value = None,
+        normal_law: str | None = None, damping: Value = None, friction_law: str | None = None, transition: Value = None,
+        bristle_stiffness: Value = None, bristle_damping: Value = None) -> ForceHandle:
         """Add contact of a point (the second marker) with a plane (x-y of the first marker, z out of the solid)."""
-    def sphere_plane(self, name: str, a: Any, b: Any, radius: Value, stiffness: Value, exponent: Value = 1.5,
+    def sphere_plane(self, name: str, a: Any, b: Any, radius: Value, stiffness: Value = None, exponent: Value = 1.5,
         dissipation: Value = None, restitution: Value = None, velocity: Value = None, formula: str | None = None,
         friction: Value = None, static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0,
-        smoothing: Value = None) -> ForceHandle:
+        smoothing: Value = None, normal_law: str | None = None, damping: Value = None, friction_law: str | None = None,
+        transition: Value = None, bristle_stiffness: Value = None, bristle_damping: Value = None,
+        moduli: Sequence[Value] | None = None, poisson: Sequence[Value] | None = None) -> ForceHandle:
         """Add contact of a sphere (about the second marker) with a plane (x-y of the first marker, z out of the
         solid)."""
-    def sphere_sphere(self, name: str, a: Any, b: Any, radii: Sequence[Value], stiffness: Value, exponent: Value = 1.5,
-        dissipation: Value = None, restitution: Value = None, velocity: Value = None, formula: str | None = None,
-        friction: Value = None, static_friction: Value = None, stribeck: Value = None, viscous_friction: Value = 0,
-        smoothing: Value = None) -> ForceHandle:
+    def sphere_sphere(self, name: str, a: Any, b: Any, radii: Sequence[Value], stiffness: Value = None,
+        exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None, velocity: Value = None,
+        formula: str | None = None, friction: Value = None, static_friction: Value = None, stribeck: Value = None,
+        viscous_friction: Value = 0, smoothing: Value = None, normal_law: str | None = None, damping: Value = None,
+        friction_law: str | None = None, transition: Value = None, bristle_stiffness: Value = None,
+        bristle_damping: Value = None, moduli: Sequence[Value] | None = None,
+        poisson: Sequence[Value] | None = None) -> ForceHandle:
         """Add contact of two spheres, each centred at a marker."""
     def contacts(self, name: str, first: Sequence[Mapping[str, Any]] | Mapping[str, Any],
         second: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None, law: Mapping[str, Any] | None = None,
         stiffness: Value = None, exponent: Value = 1.5, dissipation: Value = None, restitution: Value = None,
         velocity: Value = None, formula: str | None = None, friction: Value = None, static_friction: Value = None,
-        stribeck: Value = None, viscous_friction: Value = 0, smoothing: Value = None) -> ForceHandle:
+        stribeck: Value = None, viscous_friction: Value = 0, smoothing: Value = None, normal_law: str | None = None,
+        damping: Value = None, friction_law: str | None = None, transition: Value = None,
+        bristle_stiffness: Value = None, bristle_damping: Value = None, moduli: Sequence[Value] | None = None,
+        poisson: Sequence[Value] | None = None) -> ForceHandle:
         """Add contact of every shape of a group with every shape of another, by one law."""
     def muscle(self, name: str, a: Any, b: Any, activation: Value, force_max: Value, fiber_length: Value,
         slack_length: Value, velocity_max: Value = None, pennation: Value = 0, damping: Value = 0.1,

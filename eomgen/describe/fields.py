@@ -126,6 +126,12 @@ CYLINDER: Fields = {
     "around": Field("marker", "marker whose z axis is the axis of the cylinder", required=True),
     "radius": Field("expression", "radius (m)", required=True, dimension=LENGTH),
     "sense": Field("choice", "sense of the path about the axis", default="positive", choices=("positive", "negative")),
+    "friction": Field(
+        "expression", "coefficient of friction of a rope or belt on it; give smoothing too", dimension=NONE
+    ),
+    "smoothing": Field(
+        "expression", "slip velocity (m/s) below which this friction is smoothed", dimension=LENGTH.times(TIME, -1)
+    ),
 }
 PLACED: Fields = {"body": Field("name", "a body or ground", required=True), **MARKER}
 SHAPES = ("mesh", "box", "cylinder", "sphere", "capsule")

@@ -172,6 +172,9 @@ class Output:
     doc: str = ""
 
 
+STATE_RATE = "state "  #: begins the quantity of an element that is the rate of its state of a number
+
+
 @dataclass(frozen=True)
 class FirstOrderState:
     """A first-order state s with s' = rate, beside the coordinates and velocities of the mechanism.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -67,6 +68,14 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         return (-x, -y, x, -y, x, y, -x, y)
     if kind == "polygon":
         return _corners(reader, f"{path}.points", given["points"])
+    if kind in ("profile", "smooth_profile"):
+        return _profile(reader, path, given, 2 if kind == "profile" else 3)
+    if kind in ("ellipsoid", "cuboid"):
+        key = "axes" if kind == "ellipsoid" else "size"
+        lengths = _several(reader, f"{path}.{key}", given[key], 3)
+        for k, x in enumerate(lengths or ()):
+            _positive(reader, f"{path}.{key}[{k}]", x)
+        return None if lengths is None else tuple(lengths)
     names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius",)
     sizes = [reader.expression(f"{path}.{name}", given.get(name, 0)) for name in names]
     for name, x in zip(names, sizes, strict=True):
@@ -78,7 +87,7 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
 def _several(reader: Reader, path: str, value: Any, count: int) -> list[Expr] | None:
     listed = items(value)
     if listed is None or len(listed) != count:
-        reader.wrong(path, value, "two")
+        reader.wrong(path, value, "two" if count == 2 else "vector")
         return None
     return [reader.expression(f"{path}[{k}]", x) for k, x in enumerate(listed)]
 
@@ -87,6 +96,30 @@ def _positive(reader: Reader, path: str, x: Expr, or_zero: bool = False) -> None
     number = reader.known(x)
     if number is not None and (number < 0 if or_zero else number <= 0):
         reader.faults.add(path, f"is {number:g}", "must be 0 or greater" if or_zero else "must be greater than 0")
+
+
+def _profile(reader: Reader, path: str, given: Mapping[str, Any], least: int) -> tuple[Expr, ...] | None:
+    """Depth and points of a profile, from left to right."""
+    listed, place = items(given["points"]), f"{path}.points"
+    if listed is None or len(listed) < least:
+        reader.faults.add(place, "is no profile", f"give {least} or more points [x, y] from left to right")
+        return None
+    read = [_several(reader, f"{place}[{k}]", point, 2) for k, point in enumerate(listed)]
+    points = [(point[0], point[1]) for point in read if point is not None]
+    if len(points) < len(read):
+        return None
+    for k, ((a, _), (b, _)) in enumerate(itertools.pairwise(points)):
+        left, right = reader.known(a), reader.known(b)
+        if left is not None and right is not None and left >= right:
+            message = f"has x = {right:g} after x = {left:g}: the profile turns back or crosses itself"
+            reader.faults.add(f"{place}[{k + 1}]", message, "give the points from left to right, each x once")
+            return None
+    if "depth" in given:
+        depth = reader.expression(f"{path}.depth", given["depth"])
+        _positive(reader, f"{path}.depth", depth)
+    else:
+        depth = 0.1 * (points[-1][0] - points[0][0])
+    return (depth, *(x for point in points for x in point))
 
 
 def _corners(reader: Reader, path: str, value: Any) -> tuple[Expr, ...] | None:

@@ -192,6 +192,11 @@ _KINDS: dict[str, Schema] = {
         "minItems": 3,
         "maxItems": CORNERS,
     },
+    "places": {
+        "type": "array",
+        "items": {"type": "array", "items": _ref("expression"), "minItems": 2, "maxItems": 2},
+        "minItems": 2,
+    },
     "law": {"type": "object"},
     "radii": {"type": "array", "items": _ref("expression"), "minItems": 2, "maxItems": 2},
     "forces": {

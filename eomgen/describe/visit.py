@@ -180,9 +180,8 @@ def _shape(part: Any, slot: Slot, visitor: Visitor) -> Any:
 def _via(part: Any, slot: Slot, visitor: Visitor) -> Any:
     if isinstance(part, Mapping) and "around" in part:
         made = {**part, "around": visitor.marker(part["around"], slot)}
-        return (
-            made if "radius" not in part else {**made, "radius": visitor.scalar(part["radius"], slot.named("radius"))}
-        )
+        sizes = [key for key in ("radius", "friction", "smoothing") if key in part]
+        return made | {key: visitor.scalar(part[key], slot.named(key)) for key in sizes}
     return visitor.marker(part, slot)
 
 

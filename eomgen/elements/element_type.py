@@ -32,6 +32,8 @@ class ElementType(NamedTuple):
         What to do instead, for keys that people give something of another kind.
     ends : tuple of str
         What the arguments of the method are called that a key of two markers or joints has.
+    states : callable
+        The entry's values -> its first-order states, as suffixes of its name, and their units.
     """
 
     name: str
@@ -41,6 +43,7 @@ class ElementType(NamedTuple):
     one_of: tuple[str, ...] = ()
     remedies: Mapping[str, str] = {}
     ends: tuple[str, str] = ("a", "b")
+    states: Callable[[Mapping[str, Any]], Mapping[str, str]] = lambda values: {}
 
     def fields(self, what: str, types: Mapping[str, Any]) -> Fields:
         """All keys, ``type`` among them."""

@@ -104,6 +104,9 @@ class Entry(Protocol):
     def flag(self, key: str) -> bool:
         """True or false."""
 
+    def states(self) -> tuple[Expr, ...]:
+        """The symbols of its own first-order states, in the order in which its type names them."""
+
     # -- parts of the mechanism -----------------------------------------------------------------------------------
     def marker(self, key: str) -> Marker | None:
         """A marker."""

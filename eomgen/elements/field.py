@@ -15,6 +15,7 @@ LAW = 2  #: positions and velocities of markers, and outputs that need no accele
 OUTPUT = 3  #: accelerations and energies
 
 EXPONENT = 1.5  #: of the penetration in the law of a contact (Hertz), unless given
+LINEAR = "linear"  #: the choice of normal_law whose exponent is 1
 
 
 class Field(NamedTuple):
@@ -61,7 +62,7 @@ class Field(NamedTuple):
         if self.kind == "matrix6":  # three forces, then three torques; three lengths, then three angles
             return found.times(LENGTH, -sum(index < 3 for index in (place[0], place[-1])))
         if self.exponent and length:
-            power = values.get(self.exponent, EXPONENT)
+            power = 1.0 if values.get("normal_law") == LINEAR else values.get(self.exponent, EXPONENT)
             return None if isinstance(power, str) or not hasattr(power, "__float__") else found.times(LENGTH, -power)
         return found
 

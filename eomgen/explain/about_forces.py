@@ -100,9 +100,10 @@ def _weight(author: Author, name: str) -> list[Piece]:
 
 def _law(author: Author, force: Any) -> list[Piece]:
     """The sentence and the formula of an element's type, and what its letters are."""
-    pieces: list[Piece] = [Sentence(f"{force.sentence} ${force.formula}$" if force.formula else force.sentence)]
-    for key, value in vars(force).items():
-        if isinstance(value, Expr) and not key.startswith("_"):
-            (expression,) = author.write("laws of force elements", [value]).expressions
-            pieces.append(FormulaLine((rf"\mathrm{{{key.replace('_', '.')}}}", expression)))
+    pieces: list[Piece] = [Sentence(" ".join([force.sentence, *(f"${formula}$" for formula in force.formulas)]))]
+    for part in (force, *force.laws):
+        for key, value in vars(part).items():
+            if isinstance(value, Expr) and not key.startswith("_"):
+                (expression,) = author.write("laws of force elements", [value]).expressions
+                pieces.append(FormulaLine((rf"\mathrm{{{key.replace('_', '.')}}}", expression)))
     return pieces

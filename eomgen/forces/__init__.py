@@ -9,11 +9,13 @@ from .contact import Contact, SpherePlane, SphereSphere
 from .contact_groups import ContactGroups
 from .contact_shapes import ContactShape
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
-from .friction import Friction, JointFriction, ReactionFriction
+from .friction import JointFriction
+from .friction_laws import BrownMcPhee, Friction, LuGre
 from .laws import GeneralElement
 from .muscle import Muscle
-from .normal_laws import HuntCrossley
+from .normal_laws import DampedLinear, HuntCrossley, NormalLaw
 from .paths import JointCoordinate, Line, Path, Turn
+from .reaction_friction import ReactionFriction
 from .routes import Route
 from .springs import Damper, Spring
 from .stops import JointStop
@@ -26,11 +28,13 @@ __all__ = [
     "FORCES",
     "Actuator",
     "BodyTorque",
+    "BrownMcPhee",
     "Bushing",
     "Contact",
     "ContactGroups",
     "ContactShape",
     "CoordinateLoad",
+    "DampedLinear",
     "Damper",
     "ElementType",
     "Force",
@@ -42,8 +46,10 @@ __all__ = [
     "JointStop",
     "Line",
     "Load",
+    "LuGre",
     "MarkerLoad",
     "Muscle",
+    "NormalLaw",
     "Path",
     "PointForce",
     "PointGravity",

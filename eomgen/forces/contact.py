@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
 
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
@@ -16,8 +17,8 @@ from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
 from .force import Force, Load, MarkerLoad, Measured, View
-from .friction import FRICTION, Friction, read_friction
-from .normal_laws import NORMAL, HuntCrossley, read_normal_law
+from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip, has_bristles, read_friction
+from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, HertzBodies, NormalLaw, read_normal_law
 
 #: Normal (ground axes, from the first body to the second), penetration (m), arms of the contact point from the markers.
 Touch = tuple[Vec3, Expr, Vec3, Vec3]
@@ -25,40 +26,59 @@ Touch = tuple[Vec3, Expr, Vec3, Vec3]
 
 @dataclass(frozen=True)
 class Contact(Force):
-    """Contact at one point: a Hunt-Crossley force along the normal and friction against the sliding velocity.
+    """Contact at one point: a force along the normal and friction against the sliding velocity.
 
-    The force on the second body is F_n n - F_n [c(v) / sqrt(v^2 + smoothing^2) + viscous] v_t, with the velocity v_t of
-    the second body relative to the first, across n, at the contact point, the middle of the overlap; its opposite acts
-    on the first body at the same point.
+    The force on the second body is F_n n - F_n f(v_t), with the law of friction f of the velocity v_t of the second
+    body relative to the first, across n, at the contact point, the middle of the overlap; its opposite acts on the
+    first body at the same point.
     """
 
     sentence: ClassVar[str] = (
         "Contact at one point: a force along the normal from the penetration $d$ and its rate, and friction "
         "against the sliding."
     )
-    formula: ClassVar[str] = r"F_n = k d^n (1 + \lambda \dot{d}), \quad d > 0"
     first: Marker
     second: Marker
-    normal_law: HuntCrossley
-    friction: Friction | None
+    normal_law: NormalLaw
+    friction: DryFriction | None
+
+    @property
+    def laws(self) -> tuple[Any, ...]:
+        return (self.normal_law,) if self.friction is None else (self.normal_law, self.friction)
 
     @abstractmethod
     def touch(self, view: View) -> Touch:
         """Where the surfaces meet."""
 
+    def share(self, view: View) -> Expr | None:
+        """The part of the law that counts here, of a surface made of pieces; None means all."""
+        return None
+
+    def _shared(self, view: View, x: Expr) -> Expr:
+        share = self.share(view)
+        return x if share is None else share * x
+
     def loads(self, view: View) -> list[Load]:
         normal, depth, arms, sliding, rate = self._motion(view)
-        push = self.normal_law.force(depth, rate)
-        return self._pair(arms, vec.add(vec.scale(push, normal), self._drag(push, sliding)))
+        push = self._shared(view, self.normal_law.force(depth, rate))
+        drag = self._drag(push, self._slip(view, normal, depth, sliding))
+        return self._pair(arms, vec.add(vec.scale(push, normal), drag))
 
     def potential(self, view: View) -> Expr | None:
-        return self.normal_law.energy(self.touch(view)[1])
+        return self._shared(view, self.normal_law.energy(self.touch(view)[1]))
 
     def remainder(self, view: View) -> list[Load]:
         normal, depth, arms, sliding, rate = self._motion(view)
-        push = self.normal_law.force(depth, rate)
-        lost = push - self.normal_law.elastic(depth)
-        return self._pair(arms, vec.add(vec.scale(lost, normal), self._drag(push, sliding)))
+        push = self._shared(view, self.normal_law.force(depth, rate))
+        lost = push - self._shared(view, self.normal_law.elastic(depth))
+        drag = self._drag(push, self._slip(view, normal, depth, sliding))
+        return self._pair(arms, vec.add(vec.scale(lost, normal), drag))
+
+    def state_rates(self, view: View) -> tuple[Expr, ...]:
+        if self.friction is None:
+            return ()
+        normal, depth, _, sliding, _ = self._motion(view)
+        return self.friction.rates_in_plane(self._slip(view, normal, depth, sliding))
 
     @property
     def acts_along(self) -> bool:
@@ -66,7 +86,7 @@ class Contact(Force):
 
     def measured(self, view: View) -> Measured:
         _, depth, _, _, rate = self._motion(view)
-        return Measured(depth, rate, self.normal_law.force(depth, rate))
+        return Measured(depth, rate, self._shared(view, self.normal_law.force(depth, rate)))
 
     def _motion(self, view: View) -> tuple[Vec3, Expr, tuple[Vec3, Vec3], Vec3, Expr]:
         """Normal, penetration, arms, sliding velocity and the rate of penetration."""
@@ -79,10 +99,11 @@ class Contact(Force):
         parting = vec.dot(normal, relative)
         return normal, depth, (first, second), vec.sub(relative, vec.scale(parting, normal)), -parting
 
-    def _drag(self, push: Expr, sliding: Vec3) -> Vec3:
-        if self.friction is None:
-            return vec.zero(push.graph)
-        return vec.scale(-push * self.friction.per_velocity(vec.dot(sliding, sliding)), sliding)
+    def _slip(self, view: View, normal: Vec3, depth: Expr, sliding: Vec3) -> Slip:
+        return Slip(sliding, normal, depth, view.rotation(self.first))
+
+    def _drag(self, push: Expr, slip: Slip) -> Vec3:
+        return vec.zero(push.graph) if self.friction is None else vec.scale(-push, self.friction.in_plane(slip))
 
     def _pair(self, arms: tuple[Vec3, Vec3], force: Vec3) -> list[Load]:
         """The force on the second body at the contact point, its opposite on the first."""
@@ -133,14 +154,19 @@ class SphereSphere(Contact):
         return normal, depth, first, second
 
 
-def _friction(e: Entry) -> Friction | None:
+def joint_radius(first: Expr, second: Expr) -> Expr:
+    """R of 1 / R = 1 / R1 + 1 / R2."""
+    return first * second / (first + second)
+
+
+def _friction(e: Entry) -> DryFriction | None:
     return read_friction(e, "friction", "static_friction", "viscous_friction")
 
 
 def _on_plane(e: Entry) -> SpherePlane | None:
     pair, law, friction = e.pair(), read_normal_law(e), _friction(e)
     radius = e.positive("radius") if "radius" in e.fields else e.graph.zero
-    return None if pair is None else SpherePlane(e.name, *pair, law, friction, radius)
+    return None if pair is None else SpherePlane(e.name, *pair, law.at(lambda: radius), friction, radius)
 
 
 def _two_spheres(e: Entry) -> SphereSphere | None:
@@ -149,11 +175,21 @@ def _two_spheres(e: Entry) -> SphereSphere | None:
         return None
     for k, radius in enumerate(radii):
         e.require(f"radii[{k}]", radius, lambda x: x >= 0, "a radius is 0 or greater")
-    return SphereSphere(e.name, *pair, law, friction, (radii[0], radii[1]))
+        if isinstance(law, HertzBodies):
+            e.require(f"radii[{k}]", radius, lambda x: x > 0, "the law of Hertz from moduli needs both radii")
+    return SphereSphere(e.name, *pair, law.at(lambda: joint_radius(*radii)), friction, (radii[0], radii[1]))
 
 
 _ENDS = "the plane (z points out of the solid) and the {0}"
-_CONTACT: Fields = {**NORMAL, **FRICTION}
+_CONTACT: Fields = {**NORMAL, **FRICTION, **NORMAL_CHOICE, **FRICTION_CHOICE}
+#: Of contacts whose radii are known.
+CURVED: Fields = {**_CONTACT, "stiffness": NORMAL["stiffness"]._replace(required=False), **ELASTIC}
+
+
+def _states(axes: str) -> Callable[[Mapping[str, Any]], dict[str, str]]:
+    """States of bristles along axes of the first marker."""
+    return lambda values: {f"bristle_{x}": "m" for x in axes} if has_bristles(values) else {}
+
 
 TYPES = table(
     ElementType(
@@ -161,6 +197,7 @@ TYPES = table(
         "contact of a point (the second marker) with a plane (x-y of the first marker, z out of the solid).",
         {"between": Field("pair", _ENDS.format("point"), required=True), **_CONTACT},
         _on_plane,
+        states=_states("xy"),
     ),
     ElementType(
         "sphere_plane",
@@ -168,9 +205,10 @@ TYPES = table(
         {
             "between": Field("pair", _ENDS.format("sphere's centre"), required=True),
             "radius": Field("expression", "radius of the sphere (m)", required=True, dimension=LENGTH),
-            **_CONTACT,
+            **CURVED,
         },
         _on_plane,
+        states=_states("xy"),
     ),
     ElementType(
         "sphere_sphere",
@@ -178,8 +216,9 @@ TYPES = table(
         {
             "between": Field("pair", "the centres", required=True),
             "radii": Field("radii", "radii of the spheres (m)", required=True, dimension=LENGTH),
-            **_CONTACT,
+            **CURVED,
         },
         _two_spheres,
+        states=_states("xyz"),
     ),
 )

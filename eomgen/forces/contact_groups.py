@@ -7,7 +7,7 @@ model's graph (:mod:`~eomgen.graph.pair_calls`), so that equations do not grow w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
@@ -23,11 +23,11 @@ from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..numeric.pair_sums import POSE
 from ..records import dataclass
-from .contact import SpherePlane
-from .contact_shapes import PLANAR, AtHeight, ContactShape, Feature, ShapeMotion, meet, touching
+from .contact import CURVED, SpherePlane
+from .contact_shapes import GROUNDS, PLANAR, AtHeight, ContactShape, Feature, ShapeMotion, meet, touching
 from .force import Force, Load, MarkerLoad, View
-from .friction import FRICTION, Friction, read_friction
-from .normal_laws import NORMAL, HuntCrossley, read_normal_law
+from .friction_laws import DryFriction, has_bristles, read_friction
+from .normal_laws import HertzBodies, NormalLaw, read_normal_law
 
 
 class _PairView:
@@ -79,12 +79,15 @@ class ContactGroups(Force):
         "Contact of every shape of one group with every shape of another: a force along the normal from the "
         "penetration $d$ and its rate, and friction against the sliding."
     )
-    formula: ClassVar[str] = r"F_n = k d^n (1 + \lambda \dot{d}), \quad d > 0"
     by_power: ClassVar[bool] = True
     first: tuple[ContactShape, ...]
     second: tuple[ContactShape, ...]
-    normal_law: HuntCrossley
-    friction: Friction | None
+    normal_law: NormalLaw
+    friction: DryFriction | None
+
+    @property
+    def laws(self) -> tuple[Any, ...]:
+        return (self.normal_law,) if self.friction is None else (self.normal_law, self.friction)
 
     def drawn(self) -> list[Seen]:
         return [seen for shape in (*self.first, *self.second) for seen in shape.drawn()]
@@ -153,19 +156,16 @@ class ContactGroups(Force):
         view = _PairView(graph, planar)
         places: list[int] = []
 
-        def own(x: Expr | None) -> Expr | None:
-            if x is None or x.value is not None:
-                return None if x is None else graph.constant(x.value or 0.0)
+        def own(x: Expr) -> Expr:
+            if x.value is not None:
+                return graph.constant(x.value)
             places.append(data.place(x))
             return graph.symbol(f"l{len(places) - 1}")
 
-        law, frame = self.normal_law, Frame(vec.identity(graph), vec.zero(graph))
-        normal = HuntCrossley(*(_there(own(x)) for x in (law.stiffness, law.exponent, law.dissipation)))
+        frame = Frame(vec.identity(graph), vec.zero(graph))
+        normal = self.normal_law.mapped(own)
         dry = self.friction
-        friction = None
-        if dry is not None:
-            level, smoothing, viscous = (_there(own(x)) for x in (dry.dynamic, dry.smoothing, dry.viscous))
-            friction = Friction(level, smoothing, viscous, own(dry.static), own(dry.stribeck))
+        friction = None if dry is None else dry.mapped(own)
         markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
         given = [
             tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
@@ -173,7 +173,7 @@ class ContactGroups(Force):
         bare = SpherePlane(self.name, *markers, normal, friction, graph.zero)
         contact = touching(kinds, markers, (given[0], given[1]), bare)
         if planar:
-            contact = AtHeight(self.name, *markers, normal, friction, contact, view.height())
+            contact = AtHeight(self.name, *markers, contact.normal_law, friction, contact, view.height())
         on_second, on_first = contact.remainder(view) if lost else contact.loads(view)
         assert isinstance(on_second, MarkerLoad)
         assert isinstance(on_first, MarkerLoad)
@@ -240,11 +240,6 @@ def _kept(graph: Graph, results: Sequence[Expr]) -> tuple[tuple[tuple[object, ..
     return tuple(nodes), renamed
 
 
-def _there(x: Expr | None) -> Expr:
-    assert x is not None
-    return x
-
-
 def _vector(x: Sequence[Expr]) -> Vec3:
     return x[0], x[1], x[2]
 
@@ -253,10 +248,18 @@ def _vector(x: Sequence[Expr]) -> Vec3:
 def _contact_groups(e: Entry) -> ContactGroups | None:
     first = e.shapes("first")
     second = e.shapes("second") if "second" in e.values else ()
+    if has_bristles(e.values):
+        remedy = "use brown_mcphee, or point_plane, sphere_plane or sphere_sphere for each pair"
+        e.fault("friction_law", "lugre has states, which pairs of groups do not", remedy)
+        return None
     law, friction = read_normal_law(e), read_friction(e, "friction", "static_friction", "viscous_friction")
     if first is None or second is None or e.at_fault():
         return None
     _refuse_pairs(e, first, second)
+    if isinstance(law, HertzBodies):
+        for key, shapes in (("first", first), ("second", second)):
+            if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
+                e.fault(key, f"a {flat[0]} has no radius for Hertz's law from moduli", "give stiffness, not moduli")
     return ContactGroups(e.name, first, second, law, friction)
 
 
@@ -267,13 +270,16 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
         for b in kinds[1]:
             if (a in PLANAR) != (b in PLANAR):
                 e.fault("second", f"{a} and {b} do not meet", _ALLOWED)
-            elif a.startswith("half") and b.startswith("half") and (second or _differ(first, a)):
-                e.fault("second", f"two shapes {a} do not meet", _ALLOWED)
-            elif a == b == "capsule" and (second or _differ(first, a)):
-                e.fault("second", "two shapes capsule do not meet", _ALLOWED)
+            elif (
+                (a in GROUNDS and b in GROUNDS)
+                or (a in _ON_GROUND and b in _IN_SPACE)
+                or (b in _ON_GROUND and a in _IN_SPACE)
+            ) and (second or a != b or _differ(first, a)):
+                told = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
+                e.fault("second" if second else "first", told, _ALLOWED)
     thin = [shape for shape in first if _is_thin(shape)], [shape for shape in second or first if _is_thin(shape)]
     for k, others in enumerate((second or first, first)):
-        cornered = sorted({shape.kind for shape in others if shape.kind in ("box", "polygon") or _is_thin(shape)})
+        cornered = sorted({shape.kind for shape in others if shape.kind in _CORNERED or _is_thin(shape)})
         if thin[k] and cornered and (second or _differ_in_body(first)):
             e.fault(
                 ("first", "second")[k] if second else "first",
@@ -309,9 +315,12 @@ def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
     return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
 
 
+_CORNERED = ("box", "polygon", "profile", "smooth_profile")  #: shapes whose corners meet segments
+_ON_GROUND = ("ellipsoid", "cuboid")  #: shapes that meet a half-space alone
+_IN_SPACE = ("sphere", "capsule", *_ON_GROUND)
 _ALLOWED = (
-    "circle, segment, box, polygon meet each other and half_plane; sphere meets sphere, capsule, half_space; capsule "
-    "meets sphere, half_space"
+    "circle, segment, box, polygon meet each other, half_plane, profile and smooth_profile; sphere and capsule meet "
+    "each other and half_space; ellipsoid and cuboid meet half_space"
 )
 
 _SHAPES = "shapes {shape, on, ...} of the "
@@ -320,7 +329,8 @@ TYPES = table(
     ElementType(
         "contacts",
         "contact of every shape of a group with every shape of another, by one law.  Shapes are mappings of shape "
-        "(circle, segment, box, polygon, half_plane; sphere, capsule, half_space), on (a marker or a list of markers) "
+        "(circle, segment, box, polygon, half_plane, profile, smooth_profile; sphere, capsule, half_space, ellipsoid, "
+        "cuboid), on (a marker or a list of markers) "
         "and sizes.  Shapes of one body do not meet.",
         {
             "first": Field("shapes", _SHAPES + "first group", required=True, dimension=LENGTH),
@@ -330,8 +340,7 @@ TYPES = table(
                 dimension=LENGTH,
             ),
             "law": Field("law", "the keys that follow as a mapping, instead of one by one"),
-            **NORMAL,
-            **FRICTION,
+            **CURVED,
         },
         _contact_groups,
     )

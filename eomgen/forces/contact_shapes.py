@@ -6,6 +6,7 @@ shapes, which are round of radius 0 or of the shape's own.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from ..elements.dimensions import LENGTH
@@ -17,13 +18,33 @@ from ..graph.core import Expr, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .branches import where
-from .contact import Contact, SpherePlane, SphereSphere, Touch
+from .contact import Contact, SpherePlane, SphereSphere, Touch, joint_radius
+from .contact_profiles import ArcRound, EdgeRound, peaks, smooth_pieces, straight_pieces
+from .contact_solids import EllipsoidPlane, RodRod
 from .force import View
 
 CORNERS = 64  #: most corners of a polygon
 
 _RADIUS = Field("expression", "radius (m)", required=True, dimension=LENGTH)
 _ALONG = "length between the centres of its ends (m), along {} of the marker"
+
+
+def _profile(how: str, least: int) -> Fields:
+    return {
+        "points": Field(
+            "places",
+            f"{least} or more points [x, y] from left to right that the ground runs through{how} (m)",
+            required=True,
+            dimension=LENGTH,
+        ),
+        "depth": Field(
+            "expression",
+            "how far the solid reaches below it (m); a tenth of its length unless given",
+            dimension=LENGTH,
+        ),
+    }
+
+
 _SIZES: dict[str, Fields] = {
     "circle": {"radius": _RADIUS},
     "segment": {
@@ -37,12 +58,18 @@ _SIZES: dict[str, Fields] = {
         ),
     },
     "half_plane": {},
+    "profile": _profile("", 2),
+    "smooth_profile": _profile(", by a smooth curve of circular arcs", 3),
     "sphere": {"radius": _RADIUS},
     "capsule": {
         "length": Field("expression", _ALONG.format("z"), required=True, dimension=LENGTH),
         "radius": _RADIUS,
     },
     "half_space": {},
+    "ellipsoid": {
+        "axes": Field("vector", "half axes along x, y and z (m)", required=True, dimension=LENGTH),
+    },
+    "cuboid": {"size": Field("vector", "lengths along x, y and z (m)", required=True, dimension=LENGTH)},
 }
 _ON = {
     "shape": Field("choice", "kind of shape", required=True, choices=tuple(_SIZES)),
@@ -51,7 +78,11 @@ _ON = {
 #: Kind of shape -> its keys; a shape in the plane lies in the x-y plane of its marker.
 SHAPE_FIELDS: dict[str, Fields] = {kind: {**_ON, **sizes} for kind, sizes in _SIZES.items()}
 #: Shapes of mechanisms in the plane; the others are shapes in space.
-PLANAR = ("circle", "segment", "box", "polygon", "half_plane")
+PLANAR = ("circle", "segment", "box", "polygon", "half_plane", "profile", "smooth_profile")
+#: Shapes without an end, which do not meet each other.
+GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space")
+_BOTH = (-1.0, 1.0)
+_STEPS = 24  #: lines of which the picture of an ellipse is made
 _EDGE = 5  #: numbers of an edge: its first corner, its outward normal, its length
 
 
@@ -73,7 +104,8 @@ class ContactShape:
     kind : str
         One of :data:`SHAPE_FIELDS`.
     sizes : tuple of Expr
-        radius; length, radius; of a box or polygon x and y of its corners, counterclockwise.
+        radius; length, radius; of a box or polygon x and y of its corners, counterclockwise; of a profile its depth
+        and x and y of its points; half axes; lengths.
     """
 
     kind: str
@@ -87,11 +119,24 @@ class ContactShape:
             return [Feature("round", frame, self.sizes, self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
             return [Feature("half", self._facing(frame), (), None)]
+        if self.kind in ("profile", "smooth_profile"):
+            return self._pieces(frame)
+        if self.kind == "ellipsoid":
+            return [Feature("ellipsoid", frame, self.sizes, None)]
+        if self.kind == "cuboid":
+            x, y, z = (0.5 * size for size in self.sizes)
+            return [
+                Feature("end", _moved(frame, (i * x, j * y, k * z)), (zero,), zero)
+                for i in _BOTH
+                for j in _BOTH
+                for k in _BOTH
+            ]
         if self.kind in ("segment", "capsule"):
             along = frame if self.kind == "segment" else _turned(frame, (2, 0, 1))
             half, radius = 0.5 * self.sizes[0], self.sizes[1]
-            ends = [Feature("corner", _moved(along, (x, zero, zero)), (radius,), radius) for x in (-half, half)]
-            return [Feature("segment", along, (half, radius), half + radius), *ends]
+            whole, end = ("segment", "corner") if self.kind == "segment" else ("rod", "end")
+            ends = [Feature(end, _moved(along, (x, zero, zero)), (radius,), radius) for x in (-half, half)]
+            return [Feature(whole, along, (half, radius), half + radius), *ends]
         corners = list(zip(self.sizes[::2], self.sizes[1::2], strict=True))
         edges: list[Expr] = []
         reach = zero
@@ -103,9 +148,34 @@ class ContactShape:
         points = [Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero) for x, y in corners]
         return [Feature(f"polygon{len(corners)}", frame, tuple(edges), sqrt(reach)), *points]
 
+    def _points(self) -> list[tuple[Expr, Expr]]:
+        """Points of a profile."""
+        return list(zip(self.sizes[1::2], self.sizes[2::2], strict=True))
+
+    def _pieces(self, frame: Frame) -> list[Feature]:
+        """Pieces of a profile, and its peaks, which meet what is flat."""
+        points, depth, zero = self._points(), self.sizes[0], self.sizes[0].graph.zero
+        pieces = straight_pieces(points) if self.kind == "profile" else smooth_pieces(points)
+        found = [
+            Feature(one.kind, one.frame(frame), (*one.sizes, depth), None if one.open else one.half + depth)
+            for one in pieces
+        ]
+        tops = peaks(points)
+        return [*found, *(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero) for x, y in tops)]
+
     def _facing(self, frame: Frame) -> Frame:
         """The frame whose z axis points out of the solid: y of a half-plane's marker, z of a half-space's."""
         return _turned(frame, (2, 0, 1)) if self.kind == "half_plane" else frame
+
+    def _ellipse(self, i: int, j: int) -> Drawn:
+        """The outline of an ellipsoid in a plane of two of its axes."""
+        places = []
+        for k in range(_STEPS + 1):
+            angle = 2.0 * math.pi * k / _STEPS
+            place = [self.sizes[0].graph.zero] * 3
+            place[i], place[j] = math.cos(angle) * self.sizes[i], math.sin(angle) * self.sizes[j]
+            places.append(_moved(self.marker.frame, (place[0], place[1], place[2])))
+        return Drawn(tuple(Marker(self.marker.body, frame, self.marker.label) for frame in places))
 
     def drawn(self) -> list[Seen]:
         """What is to be seen of it."""
@@ -114,6 +184,16 @@ class ContactShape:
             return [Wheel(marker, self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
             return [Drawn((Marker(marker.body, self._facing(marker.frame), marker.label),), about=PLANE)]
+        if self.kind in ("profile", "smooth_profile"):
+            zero = self.sizes[0].graph.zero
+            places = [_moved(marker.frame, (x, y, zero)) for x, y in self._points()]
+            return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
+        if self.kind == "ellipsoid":
+            return [self._ellipse(i, j) for i, j in ((0, 1), (1, 2), (2, 0))]
+        if self.kind == "cuboid":
+            found = [feature.frame for feature in self.features()]
+            ways = ((0, 1, 3, 2, 0, 4, 5, 7, 6, 4), (1, 5), (2, 6), (3, 7))
+            return [Drawn(tuple(Marker(marker.body, found[k], marker.label) for k in way)) for way in ways]
         frames = [feature.frame for feature in self.features()[1:]]
         closed = frames if self.kind in ("segment", "capsule") else [*frames, frames[0]]
         return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in closed))]
@@ -205,11 +285,19 @@ class AtHeight(Contact):
         normal, depth, first, second = self.flat.touch(view)
         return normal, depth, vec.add(first, self.height), second
 
+    def share(self, view: View) -> Expr | None:
+        return self.flat.share(view)
 
+
+_FLAT = ("segment", "polygon", "edge", "arc")
 #: Classes of features that meet: the first is a surface, or round beside round.
 MEETINGS = (
     ("round", "round"),
-    *((surface, soft) for surface in ("half", "segment", "polygon") for soft in ("round", "corner")),
+    *((surface, soft) for surface in ("half", *_FLAT) for soft in ("round", "corner")),
+    ("half", "end"),
+    ("half", "ellipsoid"),
+    ("rod", "round"),
+    ("rod", "rod"),
 )
 
 
@@ -234,12 +322,20 @@ def touching(
     law: Contact,
 ) -> Contact:
     """The contact of one feature with another; ``law`` has the laws."""
-    laws = (law.name, *markers, law.normal_law, law.friction)
     first, radius = sizes[0], sizes[1][0]
+    normal = law.normal_law.at(lambda: joint_radius(first[0], radius) if kinds[0] == "round" else radius)
+    laws = (law.name, *markers, normal, law.friction)
     if kinds[0] == "round":
         return SphereSphere(*laws, (first[0], radius))
+    if kinds[1] == "ellipsoid":
+        x, y, z = sizes[1]
+        return EllipsoidPlane(*laws, (x, y, z))
+    if kinds[1] == "rod":
+        return RodRod(*laws, (first[0], sizes[1][0]), (first[1], sizes[1][1]))
     if kinds[0] == "half":
         return SpherePlane(*laws, radius)
-    if kinds[0] == "segment":
+    if kinds[0] in ("edge", "arc"):
+        return (EdgeRound if kinds[0] == "edge" else ArcRound)(*laws, first, radius)
+    if kinds[0] in ("segment", "rod"):
         return SegmentRound(*laws, first[0], (first[1], radius))
     return PolygonRound(*laws, first, radius)

@@ -94,6 +94,16 @@ class Force(ABC):
         return None
 
     @property
+    def laws(self) -> tuple[Any, ...]:
+        """Laws that it is made of, each with a ``formula`` and numbers of its own, instead of the type's formula."""
+        return ()
+
+    @property
+    def formulas(self) -> list[str]:
+        """Its law in LaTeX: that of its laws, or of its type."""
+        return [law.formula for law in self.laws] or [self.formula] * bool(self.formula)
+
+    @property
     def acts_along(self) -> bool:
         """Whether it acts along a path, so that :meth:`measured` is something."""
         return hasattr(self, "path")
@@ -121,6 +131,10 @@ class Force(ABC):
             else:
                 total = total + load.value * view.coordinate(load.coordinate)[1]
         return total
+
+    def state_rates(self, view: View) -> tuple[Expr, ...]:
+        """Rates of its states, in the order in which its type names them."""
+        return ()
 
     def remainder(self, view: View) -> list[Load]:
         """What the loads are beyond the slope of the potential, where there is one: friction, damping."""

@@ -1,13 +1,22 @@
-"""Force elements, the law of a one-sided stop: penetration and its rate -> a force that never pulls."""
+"""Force elements, laws of a one-sided stop: penetration and its rate -> a force that never pulls."""
 
 from __future__ import annotations
 
-from ..elements.dimensions import NONE, PUSH, RATE
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import ClassVar
+
+from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE
 from ..elements.entry import Entry
-from ..elements.field import EXPONENT, Field, Fields
-from ..graph.core import Expr
+from ..elements.field import EXPONENT, LINEAR, Field, Fields
+from ..graph.core import Expr, sqrt
 from ..records import dataclass
 from .branches import beyond_zero
+
+_PRESSURE = FORCE.times(LENGTH, -2)
+
+#: Laws of the force along the normal.
+NORMAL_LAWS = ("hunt_crossley", "hertz", LINEAR)
 
 #: Names of the formulas for the dissipation from a coefficient of restitution; see :func:`dissipation_of`.
 RESTITUTIONS = ("hunt_crossley", "lankarani", "flores")
@@ -33,8 +42,34 @@ def dissipation_of(restitution: Expr, velocity: Expr, formula: str) -> Expr:
     return 3.0 * (1.0 - e) / (2.0 * v)
 
 
+class NormalLaw(ABC):
+    """The force along the normal from the penetration and its rate; ``formula`` says it in LaTeX."""
+
+    formula: ClassVar[str] = r"F_n = k d^n (1 + \lambda \dot{d}), \quad d > 0"
+
+    @abstractmethod
+    def force(self, depth: Expr, rate: Expr) -> Expr:
+        """Force (N or N m) from the penetration and its rate."""
+
+    @abstractmethod
+    def elastic(self, depth: Expr) -> Expr:
+        """The part of the force that has a potential."""
+
+    @abstractmethod
+    def energy(self, depth: Expr) -> Expr:
+        """The potential of the elastic part (J)."""
+
+    @abstractmethod
+    def mapped(self, own: Callable[[Expr], Expr]) -> NormalLaw:
+        """The law with other expressions, in the graph of a pair."""
+
+    def at(self, radius: Callable[[], Expr]) -> NormalLaw:
+        """The law of two surfaces of an effective radius R, 1 / R = 1 / R1 + 1 / R2."""
+        return self
+
+
 @dataclass(frozen=True)
-class HuntCrossley:
+class HuntCrossley(NormalLaw):
     """k d^n max(0, 1 + lambda d') of the penetration d > 0, else 0 (Hunt and Crossley, 1975).
 
     With n > 1 the force and its slope are continuous at touch-down.  The force ends at 0 where the surfaces part faster
@@ -58,6 +93,64 @@ class HuntCrossley:
         """The potential of the elastic part, k d^(n + 1) / (n + 1) (J)."""
         power = self.exponent + 1.0
         return beyond_zero(depth, lambda d: self.stiffness * d**power / power)
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> HuntCrossley:
+        return HuntCrossley(own(self.stiffness), own(self.exponent), own(self.dissipation))
+
+
+@dataclass(frozen=True)
+class DampedLinear(NormalLaw):
+    """max(0, k d + c d') of the penetration d > 0, else 0.
+
+    With damping the force begins with a jump to c d'; it ends at 0 where the surfaces part faster than k d / c.
+    """
+
+    formula: ClassVar[str] = r"F_n = \mathrm{max}(0, k d + c \dot{d}), \quad d > 0"
+    stiffness: Expr
+    damping: Expr
+
+    def force(self, depth: Expr, rate: Expr) -> Expr:
+        pull = depth.graph.apply("max", 0.0, self.stiffness * depth + self.damping * rate)
+        return beyond_zero(depth, lambda d: pull)
+
+    def elastic(self, depth: Expr) -> Expr:
+        return beyond_zero(depth, lambda d: self.stiffness * d)
+
+    def energy(self, depth: Expr) -> Expr:
+        return beyond_zero(depth, lambda d: 0.5 * self.stiffness * d * d)
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> DampedLinear:
+        return DampedLinear(own(self.stiffness), own(self.damping))
+
+
+@dataclass(frozen=True)
+class HertzBodies(NormalLaw):
+    """Hertz's law of two elastic bodies, before their radii are known.
+
+    F = (4/3) E sqrt(R) d^(3/2), with 1 / E = (1 - nu1^2) / E1 + (1 - nu2^2) / E2 and 1 / R = 1 / R1 + 1 / R2 (Johnson,
+    Contact Mechanics, 1985, equations 4.22 to 4.24).  ``modulus`` is E (Pa).
+    """
+
+    formula: ClassVar[str] = r"F_n = \frac{4}{3} E \sqrt{R} d^{3/2} (1 + \lambda \dot{d}), \quad d > 0"
+
+    modulus: Expr
+    dissipation: Expr
+
+    def at(self, radius: Callable[[], Expr]) -> HuntCrossley:
+        stiffness = 4.0 / 3.0 * self.modulus * sqrt(radius())
+        return HuntCrossley(stiffness, stiffness.graph.constant(EXPONENT), self.dissipation)
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> HertzBodies:
+        return HertzBodies(own(self.modulus), own(self.dissipation))
+
+    def force(self, depth: Expr, rate: Expr) -> Expr:
+        raise NotImplementedError("radii are missing")
+
+    def elastic(self, depth: Expr) -> Expr:
+        raise NotImplementedError("radii are missing")
+
+    def energy(self, depth: Expr) -> Expr:
+        raise NotImplementedError("radii are missing")
 
 
 NORMAL: Fields = {
@@ -83,13 +176,78 @@ NORMAL: Fields = {
         choices=RESTITUTIONS,
     ),
 }
+#: Which law it is, and what only some laws have.
+NORMAL_CHOICE: Fields = {
+    "normal_law": Field(
+        "choice",
+        "law of the normal force: hunt_crossley, the default; hertz, the same with the exponent 3/2; linear, "
+        "max(0, k d + damping d_dot)",
+        default=NORMAL_LAWS[0],
+        choices=NORMAL_LAWS,
+    ),
+    "damping": Field("expression", "damping c (N s/m) of normal_law linear", dimension=DAMPING),
+}
+#: Of bodies whose radii are known, instead of the stiffness.
+ELASTIC: Fields = {
+    "moduli": Field(
+        "radii", "Young's moduli of both bodies (Pa), instead of the stiffness, with poisson", dimension=_PRESSURE
+    ),
+    "poisson": Field("radii", "Poisson's ratios of both bodies, beside moduli", dimension=NONE),
+}
 
 
-def read_normal_law(e: Entry) -> HuntCrossley:
-    """The law of the keys :data:`NORMAL`."""
+def read_normal_law(e: Entry) -> NormalLaw:
+    """The law of the keys :data:`NORMAL` and :data:`NORMAL_CHOICE`, and :data:`ELASTIC` where the type has them."""
+    kind = e.choice("normal_law")
+    if kind == LINEAR:
+        return _linear(e)
+    e.refuse("damping", f"belongs to normal_law: linear; of {kind} the dissipation is damping / stiffness")
+    if kind == "hertz":
+        e.refuse("exponent", "is 3/2 in the law of Hertz")
+    if "moduli" in e.values or "poisson" in e.values:
+        return _elastic(e, kind)
+    _require_stiffness(e)
     stiffness, exponent = e.positive("stiffness"), e.law("exponent")
     e.require("exponent", exponent, lambda n: n >= 1, "must be at least 1; above 1 the stiffness begins without a jump")
     return HuntCrossley(stiffness, exponent, _dissipation(e))
+
+
+def _require_stiffness(e: Entry) -> None:
+    """Note that the stiffness is missing, of a type that may have moduli instead."""
+    if "stiffness" not in e.values and not e.fields["stiffness"].required:
+        e.fault("stiffness", "is missing", "give it, or moduli and poisson with normal_law: hertz")
+
+
+def _linear(e: Entry) -> DampedLinear:
+    _require_stiffness(e)
+    for key in ("dissipation", "restitution", "velocity", "formula", "exponent", *ELASTIC):
+        e.refuse(key, "has no meaning in normal_law: linear, which has stiffness and damping")
+    damping = e.given("damping")
+    if damping is not None:
+        e.require("damping", damping, lambda c: c >= 0, "must be 0 or greater")
+    return DampedLinear(e.positive("stiffness"), e.graph.zero if damping is None else damping)
+
+
+def _elastic(e: Entry, kind: str) -> NormalLaw:
+    e.refuse("stiffness", "follows from moduli, poisson and the radii")
+    if kind != "hertz":
+        key = "moduli" if "moduli" in e.values else "poisson"
+        e.fault(key, f"belongs to normal_law: hertz, and this is {kind}", "give normal_law: hertz, or stiffness")
+    moduli, ratios = e.several("moduli", 2), e.several("poisson", 2)
+    for key in ELASTIC:
+        if key not in e.values:
+            e.fault(key, "is missing", "give moduli and poisson together, two numbers each")
+    for key, found, right, rule in (
+        ("moduli", moduli, lambda x: x > 0, "must be greater than 0"),
+        ("poisson", ratios, lambda x: -1 < x <= 0.5, "is above -1 and at most 0.5"),
+    ):
+        for k, x in enumerate(found or ()):
+            e.require(f"{key}[{k}]", x, right, rule)
+    dissipation = _dissipation(e)
+    if moduli is None or ratios is None:
+        return HertzBodies(e.stand_in, dissipation)
+    (E1, E2), (nu1, nu2) = moduli, ratios
+    return HertzBodies(1.0 / ((1.0 - nu1 * nu1) / E1 + (1.0 - nu2 * nu2) / E2), dissipation)
 
 
 def _dissipation(e: Entry) -> Expr:

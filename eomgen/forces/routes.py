@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..elements.entry import Entry
@@ -22,7 +23,9 @@ PI = 3.141592653589793
 class Piece(NamedTuple):
     """A piece of a path between two markers: its length, and the directions in which it leaves and arrives.
 
-    ``force`` and ``torque`` are the resultant on the cylinder per unit of force that lengthens the path.
+    ``force`` and ``torque`` are the resultant on the cylinder per unit of force that lengthens the path; ``turns`` are
+    the parts of the torque where the path leaves to its start and to its end, and ``bend`` is the angle by which it
+    turns on the cylinder.
     """
 
     length: Expr
@@ -30,13 +33,21 @@ class Piece(NamedTuple):
     arriving: Vec3
     force: Vec3
     torque: Vec3
+    turns: tuple[Vec3, Vec3]
+    bend: Expr
 
 
 @dataclass(frozen=True)
 class Route(Path):
     """A taut string from one marker to another over via points, which it slides through, and around cylinders (m).
 
-    Without friction its tension is the same all along.  A cylinder stands between two markers of the path.
+    Without friction its tension is the same all along, and with friction on a cylinder a force is that at the start:
+    beyond the cylinder it is smaller by
+
+        exp(-friction bend tanh(v / smoothing)),  v = (v_start - v_end) / 2,
+
+    with the velocities v_start and v_end at which the rope slips off the cylinder to either side (Euler 1769, Eytelwein
+    1808, smoothed).  A cylinder stands between two markers of the path.
     """
 
     start: Marker
@@ -50,16 +61,33 @@ class Route(Path):
         length = view.graph.zero
         for _, _, _, piece in self._pieces(view):
             length = length + piece.length
-        rate = view.graph.zero
-        for load in self.loads(view, view.graph.one):  # loads of a unit force: their power is the rate
-            assert isinstance(load, MarkerLoad)
-            rate = rate + vec.dot(load.force, view.velocity(load.marker))
-            rate = rate + vec.dot(load.torque, view.angular_velocity(load.marker))
-        return length, rate
+        return length, _power(view, self._smooth(view, view.graph.one))  # of a unit force: the rate
+
+    def is_exact(self, view: View) -> bool:
+        return not any(isinstance(stop, WrapCylinder) and stop.friction is not None for stop in self.via)
 
     def loads(self, view: View, force: Expr) -> list[Load]:
-        o = vec.zero(view.graph)
+        if self.is_exact(view):
+            return list(self._smooth(view, force))
+        pieces = self._pieces(view)
+        halves = [half for piece in pieces for half in _halves(view, piece)]
         result: list[Load] = []
+        for k, (_, _, cylinder, piece) in enumerate(pieces):
+            result += _scaled(force, halves[2 * k])
+            if cylinder is not None and cylinder.friction is not None and cylinder.smoothing is not None:
+                before, after = (
+                    _power(view, [load for half in part for load in half])
+                    for part in (halves[: 2 * k + 1], halves[2 * k + 1 :])
+                )
+                slip = view.graph.apply("tanh", 0.5 * (before - after) / cylinder.smoothing)
+                force = force * view.graph.apply("exp", -cylinder.friction * piece.bend * slip)
+            result += _scaled(force, halves[2 * k + 1])
+        return result
+
+    def _smooth(self, view: View, force: Expr) -> list[MarkerLoad]:
+        """Loads of one force all along."""
+        o = vec.zero(view.graph)
+        result: list[MarkerLoad] = []
         for start, end, cylinder, piece in self._pieces(view):
             result.append(MarkerLoad(start, vec.scale(-force, piece.leaving), o))
             result.append(MarkerLoad(end, vec.scale(force, piece.arriving), o))
@@ -81,12 +109,37 @@ class Route(Path):
         return found
 
 
+def _halves(
+    view: View, one: tuple[Marker, Marker, WrapCylinder | None, Piece]
+) -> tuple[list[MarkerLoad], list[MarkerLoad]]:
+    """Loads of a unit force of the part of a piece to its start and of that to its end."""
+    start, end, cylinder, piece = one
+    o = vec.zero(view.graph)
+    first, last = [MarkerLoad(start, vec.neg(piece.leaving), o)], [MarkerLoad(end, piece.arriving, o)]
+    if cylinder is not None:
+        first.append(MarkerLoad(cylinder.marker, piece.leaving, piece.turns[0]))
+        last.append(MarkerLoad(cylinder.marker, vec.neg(piece.arriving), vec.neg(piece.turns[1])))
+    return first, last
+
+
+def _power(view: View, loads: Sequence[MarkerLoad]) -> Expr:
+    total = view.graph.zero
+    for load in loads:
+        total = total + vec.dot(load.force, view.velocity(load.marker))
+        total = total + vec.dot(load.torque, view.angular_velocity(load.marker))
+    return total
+
+
+def _scaled(force: Expr, loads: Sequence[MarkerLoad]) -> list[MarkerLoad]:
+    return [MarkerLoad(one.marker, vec.scale(force, one.force), vec.scale(force, one.torque)) for one in loads]
+
+
 def _straight(view: View, start: Marker, end: Marker) -> Piece:
     reach = Line(start, end).reach(view)
     length = sqrt(vec.dot(reach, reach))
     direction = (reach[0] / length, reach[1] / length, reach[2] / length)
     o = vec.zero(view.graph)
-    return Piece(length, direction, direction, o, o)
+    return Piece(length, direction, direction, o, o, (o, o), view.graph.zero)
 
 
 def _wrap(view: View, start: Marker, end: Marker, around: WrapCylinder) -> Piece:
@@ -116,7 +169,8 @@ def _wrap(view: View, start: Marker, end: Marker, around: WrapCylinder) -> Piece
     arriving: Vec3 = (-q[1] * planar, q[0] * planar, rise)
     first: Vec3 = (r * p[0], r * p[1], a[2] + h * t_a / across)
     last: Vec3 = (r * q[0], r * q[1], b[2] - h * t_b / across)
-    torque = vec.sub(vec.cross(first, leaving), vec.cross(last, arriving))
+    turns = vec.cross(first, leaving), vec.cross(last, arriving)
+    torque = vec.sub(*turns)
 
     # written so that an end inside the cylinder counts as touching, which fails, and not as free
     touching = view.graph.apply("not", view.graph.apply("le", w, 0.0))
@@ -126,20 +180,24 @@ def _wrap(view: View, start: Marker, end: Marker, around: WrapCylinder) -> Piece
         x, y, z = (where(touching, i, k) for i, k in zip(vec.times(rotation, wrapped), free, strict=True))
         return (x, y, z)
 
+    o = vec.zero(view.graph)
     leave, arrive = chosen(leaving, straight.leaving), chosen(arriving, straight.arriving)
     return Piece(
         where(touching, length, straight.length),
         leave,
         arrive,
         vec.sub(leave, arrive),
-        chosen(torque, vec.zero(view.graph)),
+        chosen(torque, o),
+        (chosen(turns[0], o), chosen(turns[1], o)),
+        where(touching, w * across / length, 0.0),
     )
 
 
 VIA = Field(
     "via",
     "points of the path between its ends, in order: markers that it slides through, and cylinders that it wraps "
-    "around, {around: marker, radius: r, sense: positive or negative}, about the z axis of a marker",
+    "around, {around: marker, radius: r, sense: positive or negative}, about the z axis of a marker; with friction and "
+    "smoothing the rope rubs on the cylinder",
     default=(),
 )
 

@@ -11,13 +11,13 @@ from ..elements.field import Field
 from ..graph.core import Expr
 from ..records import dataclass
 from .force import Force, Load, View
-from .normal_laws import NORMAL, HuntCrossley, read_normal_law
+from .normal_laws import NORMAL, NORMAL_CHOICE, NormalLaw, read_normal_law
 from .paths import ON_JOINT, Path, read_coordinate
 
 
 @dataclass(frozen=True)
 class JointStop(Force):
-    """Stops of a joint's coordinate q: beyond ``lower`` or ``upper`` a Hunt-Crossley force pushes it back (N or N m).
+    """Stops of a joint's coordinate q: beyond ``lower`` or ``upper`` a one-sided force pushes it back (N or N m).
 
     Penetrations are q - upper and lower - q.  A stop never pulls.
     """
@@ -25,12 +25,15 @@ class JointStop(Force):
     sentence: ClassVar[str] = (
         "Stops of a joint: beyond its limits a force from the penetration $d$ pushes the coordinate back."
     )
-    formula: ClassVar[str] = r"F = k d^n (1 + \lambda \dot{d}), \quad d > 0"
     uses_value: ClassVar[bool] = True
     path: Path
     lower: Expr | None
     upper: Expr | None
-    law: HuntCrossley
+    law: NormalLaw
+
+    @property
+    def laws(self) -> tuple[NormalLaw, ...]:
+        return (self.law,)
 
     def _depths(self, value: Expr, rate: Expr) -> list[tuple[Expr, Expr, float]]:
         """Penetration, its rate and the sense of the force, of each stop."""
@@ -82,7 +85,7 @@ TYPES = table(
             "stiffness": NORMAL["stiffness"],
             "lower": Field("expression", "lower limit (rad or m)", dimension=REACH),
             "upper": Field("expression", "upper limit (rad or m)", dimension=REACH),
-            **{key: field for key, field in NORMAL.items() if key != "stiffness"},
+            **{key: field for key, field in (NORMAL | NORMAL_CHOICE).items() if key != "stiffness"},
         },
         _stop,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
-from ..describe.mechanism import ANGULAR_MOMENTUM, INERTIA, MASS, MOMENTUM, TURNING, Mechanism, Quantity
+from ..describe.mechanism import ANGULAR_MOMENTUM, INERTIA, MASS, MOMENTUM, STATE_RATE, TURNING, Mechanism, Quantity
 from ..errors import ModelError
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
@@ -180,12 +180,13 @@ class MarkerMotion:
             remedy = "let one of the laws depend on positions and velocities instead"
             raise ModelError([mechanism.problem(f"forces.{element}", f"algebraic loop between laws: {way}", remedy)])
         force = next(force for force in mechanism.forces if force.name == element)
-        measured = force.measured(self)
-        found = (
-            force.power(self)
-            if quantity == "power" or measured is None
-            else {"length": measured.value, "rate": measured.rate, "force": measured.force}[quantity]
-        )
+        measured = None if quantity.startswith(STATE_RATE) else force.measured(self)
+        if quantity.startswith(STATE_RATE):
+            found = force.state_rates(self)[int(quantity.removeprefix(STATE_RATE))]
+        elif quantity == "power" or measured is None:
+            found = force.power(self)
+        else:
+            found = {"length": measured.value, "rate": measured.rate, "force": measured.force}[quantity]
         self._open.append(name)
         mapping = self.derived_symbols(mechanism, symbols_of([found]))
         self._open.pop()

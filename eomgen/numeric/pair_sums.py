@@ -155,7 +155,11 @@ def _stacked(given: Sequence[Any]) -> np.ndarray:
     if all(type(x) is float for x in given):
         return np.array(given)
     kind = float if all(isinstance(x, (int, float, np.ndarray, np.generic)) for x in given) else object
-    return np.array(np.broadcast_arrays(*(np.asarray(x, dtype=kind) for x in given)))
+    spread = np.broadcast_arrays(*(np.asarray(x, dtype=kind) for x in given))
+    stacked = np.empty((len(spread), *spread[0].shape), dtype=kind)
+    for k, x in enumerate(spread):
+        stacked[k] = x[()]  # an array of no axes would stand there as it is
+    return stacked
 
 
 def _table(result: Sequence[Any], count: int, data: np.ndarray) -> np.ndarray:

@@ -174,9 +174,9 @@ FAULTS = (
         ("tests/forces/test_loads.py::test_contact_of_two_bodies[point_plane]",),
     ),
     Fault(
-        "friction-stribeck", "eomgen/forces/friction.py",
-        "self.dynamic + (self.static - self.dynamic) * fall",
-        "self.static + (self.dynamic - self.static) * fall",
+        "friction-stribeck", "eomgen/forces/friction_laws.py",
+        "dynamic + (static - dynamic) * fall",
+        "static + (dynamic - static) * fall",
         "static and dynamic friction are exchanged",
         ("tests/forces/test_loads.py::test_contact_of_two_bodies[point_plane]",),
     ),

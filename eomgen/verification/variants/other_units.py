@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import Description
+from ...describe.element_states import states_of
 from ...describe.fields import MODEL, Field, acts_on_length, fields_of, part_fields
 from ...describe.marker_quantities import ElementQuantity, MarkerQuantity
 from ...describe.mechanism import LEVEL_DIMENSIONS, MOMENTUM, dimension_of
@@ -22,6 +23,7 @@ from .variant import NotApplicable, UnitScales, Variant, coordinates_of, kinds_o
 #: The engineer's units: millimetre, tonne, millisecond.
 MM_T_MS = UnitScales(length=1e3, mass=1e-3, time=1e3)
 #: Keys that keep their SI values because nothing but their zeros, or their own value, counts.
+ALONG = Field("expression", "", along="joint")  #: what is measured along the coordinate of its joint
 _KEPT = ("outputs", "events", "inputs")
 
 
@@ -74,6 +76,10 @@ class _Scaled(Visitor):
             self.names.pop(name, None)
         self.joints = coordinates_of(description)
         self.home = {joint: own[0] for joint, own in self.joints.items() if len(own) == 1}
+        for entry in description.sections["forces"]:
+            for name in states_of(entry):  # deflections of bristles, as long as the way that they follow
+                length = acts_on_length("forces", entry.values, ALONG, self._is_length)
+                self.names[name] = (scales.of(LENGTH if length else NONE), "")
 
     def measured_in(self, slot: Slot) -> Dimension | None:
         """The dimension of a scalar, as the row of its field says."""
@@ -86,9 +92,11 @@ class _Scaled(Visitor):
         assert slot.entry is not None
         if slot.section == "joints":
             return self.kinds.get((self.joints.get(slot.entry.name) or ("",))[0], "") == "length"
-        return acts_on_length(
-            slot.section, slot.entry.values, field, lambda name: self.kinds.get(self.home.get(name, name)) == "length"
-        )
+        return acts_on_length(slot.section, slot.entry.values, field, self._is_length)
+
+    def _is_length(self, name: str) -> bool:
+        """Whether a coordinate, or that of a joint, is a length."""
+        return self.kinds.get(self.home.get(name, name)) == "length"
 
     def scalar(self, value: Any, slot: Slot) -> Any:
         if (slot.section, slot.key) in (("", "initial"), ("", "guess"), ("events", "reset")):

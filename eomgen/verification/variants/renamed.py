@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import GROUND_NAME, Description
+from ...describe.element_states import states_of
 from ...describe.marker_quantities import MarkerQuantity
 from ...describe.names import COM
 from ...describe.rewritten_texts import rewritten
@@ -79,6 +80,9 @@ class _Renamed(Visitor):
         for entry in description.sections["constraints"]:
             if entry.values["type"] == "cam_contact" and "coordinate" not in entry.values:
                 self.words[f"{entry.name}_contact"] = self.words[entry.name] + "_contact"
+        for entry in description.sections["forces"]:
+            for name in states_of(entry):
+                self.words[name] = self.words[entry.name] + name[len(entry.name) :]
         for name in velocities_of(description):
             if not name.endswith("_dot"):  # <joint>_wx
                 joint, _, suffix = name.rpartition("_")

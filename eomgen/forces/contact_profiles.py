@@ -1,0 +1,230 @@
+"""Force elements, contact with a height profile y(x) in the plane: points -> pieces, and how a circle touches a piece.
+
+A piece owns the points whose nearest point of the profile it holds: those between the bisectors at its ends.  Its depth
+counts for them alone, so that every circle meets one piece, or several where it bridges a valley that is narrower.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ..frames import Frame
+from ..graph import vectors as vec
+from ..graph.core import Expr, sqrt
+from ..graph.vectors import Vec3
+from ..limits.contacts import SHARED
+from ..records import dataclass
+from .branches import where
+from .contact import Contact, Touch
+from .force import View
+
+Point = tuple[Expr, Expr]
+
+
+class Piece(NamedTuple):
+    """A piece of a profile: origin and direction of its x axis, y out of the solid; sizes; half of its length.
+
+    ``open`` tells whether it goes on without end.
+    """
+
+    kind: str
+    origin: Point
+    along: Point
+    sizes: tuple[Expr, ...]
+    half: Expr
+    open: bool
+
+    def frame(self, base: Frame) -> Frame:
+        """Its axes in the body of a frame."""
+        zero, one = self.half.graph.zero, self.half.graph.one
+        (c, s), (x, y) = self.along, self.origin
+        turn = ((c, -s, zero), (s, c, zero), (zero, zero, one))
+        return Frame(vec.product(base.rotation, turn), vec.add(base.position, vec.times(base.rotation, (x, y, zero))))
+
+
+def straight_pieces(points: Sequence[Point]) -> list[Piece]:
+    """Edges from point to point; the first and the last go on beyond their ends."""
+    width = SHARED * _length(_minus(points[-1], points[0]))
+    edges = [_minus(b, a) for a, b in itertools.pairwise(points)]
+    ways = [_unit(edge) for edge in edges]
+    return [
+        _edge(points[k], edge, ways[k - 1] if k else None, ways[k + 1] if k + 1 < len(edges) else None, width)
+        for k, edge in enumerate(edges)
+    ]
+
+
+def _edge(start: Point, edge: Point, before: Point | None, after: Point | None, width: Expr) -> Piece:
+    """Sizes: half of its length; at the left and the right end x and y of the bisector and 1, or 0 without an end."""
+    graph, way, half = width.graph, _unit(edge), 0.5 * _length(edge)
+    ends: list[Expr] = []
+    for other, inward in ((before, 1.0), (after, -1.0)):
+        if other is None:
+            ends += [graph.zero, graph.one, graph.zero]
+            continue
+        bisector = _unit((-way[1] - other[1], way[0] + other[0]))  # the sum of both normals
+        ends += [inward * _dot(bisector, way), way[0] * bisector[1] - way[1] * bisector[0], graph.one]
+    middle = (start[0] + 0.5 * edge[0], start[1] + 0.5 * edge[1])
+    return Piece("edge", middle, way, (half, *ends, width), half, before is None or after is None)
+
+
+def smooth_pieces(points: Sequence[Point]) -> list[Piece]:
+    """Two circular arcs of one tangent from point to point (biarcs), and straight lines beyond the ends.
+
+    The tangent at a point is that of the circle through it and its neighbours, so that points of a circle give the
+    circle; the arcs are those of equal tangent lengths (Bolton, 1975, Computer-Aided Design 7, 83-89).
+    """
+    width = SHARED * _length(_minus(points[-1], points[0]))
+    ways = _tangents(points)
+    first, last = _minus(points[1], points[0]), _minus(points[-1], points[-2])
+    ray = _times(ways[0], _length(first))
+    found = [_edge(_minus(points[0], ray), ray, None, ways[0], width)]
+    for (a, b), (s, t) in zip(itertools.pairwise(points), itertools.pairwise(ways), strict=True):
+        v, both = _minus(b, a), (s[0] + t[0], s[1] + t[1])
+        along, square = _dot(v, both), _dot(v, v)
+        d = square / (along + sqrt(along * along + 2.0 * (1.0 - _dot(s, t)) * square))
+        joint = (0.5 * (a[0] + b[0] + d * (s[0] - t[0])), 0.5 * (a[1] + b[1] + d * (s[1] - t[1])))
+        found += [_arc(a, joint, s, width), _arc(joint, b, None, width, t)]
+    return [*found, _edge(points[-1], _times(ways[-1], _length(last)), ways[-1], None, width)]
+
+
+def _tangents(points: Sequence[Point]) -> list[Point]:
+    """Directions of the circles through each point and its neighbours."""
+    chords = [_minus(b, a) for a, b in itertools.pairwise(points)]
+    inner = []
+    for before, after in itertools.pairwise(chords):
+        p, q = _dot(before, before), _dot(after, after)
+        inner.append(_unit((before[0] * q + after[0] * p, before[1] * q + after[1] * p)))
+    return [_mirrored(inner[0], chords[0]), *inner, _mirrored(inner[-1], chords[-1])]
+
+
+def _mirrored(way: Point, chord: Point) -> Point:
+    """The tangent at the other end of a chord of a circle."""
+    c = _unit(chord)
+    along = 2.0 * _dot(way, c)
+    return along * c[0] - way[0], along * c[1] - way[1]
+
+
+def _arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: Point | None = None) -> Piece:
+    """Sizes: curvature; half of the chord; height of the ends over the middle; cos and sin of the half angle."""
+    chord = _minus(end, start)
+    c, half = _unit(chord), 0.5 * _length(chord)
+    if at_start is not None:
+        cosine, sine = _dot(at_start, c), at_start[0] * c[1] - at_start[1] * c[0]
+    else:
+        assert at_end is not None
+        cosine, sine = _dot(at_end, c), c[0] * at_end[1] - c[1] * at_end[0]
+    rise = half * sine / (1.0 + cosine)
+    middle = (start[0] + half * c[0] + rise * c[1], start[1] + half * c[1] - rise * c[0])
+    return Piece(
+        "arc", middle, c, (sine / half, half, rise, cosine, sine, width), sqrt(half * half + rise * rise), False
+    )
+
+
+def peaks(points: Sequence[Point]) -> list[Point]:
+    """Inner points at which the profile turns down, as far as numbers tell: corners that meet what is flat."""
+    found = []
+    for a, b, c in zip(points, points[1:], points[2:], strict=False):
+        before, after = _minus(b, a), _minus(c, b)
+        turn = (before[0] * after[1] - before[1] * after[0]).value
+        if turn is None or turn < 0.0:
+            found.append(b)
+    return found
+
+
+def _minus(a: Point, b: Point) -> Point:
+    return a[0] - b[0], a[1] - b[1]
+
+
+def _times(a: Point, factor: Expr) -> Point:
+    return a[0] * factor, a[1] * factor
+
+
+def _dot(a: Point, b: Point) -> Expr:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def _length(a: Point) -> Expr:
+    return sqrt(_dot(a, a))
+
+
+def _unit(a: Point) -> Point:
+    length = _length(a)
+    return a[0] / length, a[1] / length
+
+
+def _part(side: Expr, width: Expr) -> Expr:
+    """1 on the inner side of a bisector, 0 on the outer; the piece on its other side has the rest of 1."""
+    graph = side.graph
+    return graph.apply("max", 0.0, graph.apply("min", 1.0, 0.5 + 0.5 * side / width))
+
+
+@dataclass(frozen=True)
+class ProfilePiece(Contact):
+    """A circle about the second marker on a piece of a profile in the x-y plane of the first.
+
+    The last of ``sizes`` is how far below the profile its solid reaches; a deeper centre feels nothing.
+    """
+
+    sizes: tuple[Expr, ...]
+    radius: Expr
+
+    def _place(self, view: View) -> tuple[Expr, Expr, Vec3]:
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        x, y, _ = vec.transpose_times(view.rotation(self.first), reach)
+        return x, y, reach
+
+    def _touching(self, view: View, gap: Expr, normal: tuple[Expr, Expr], reach: Vec3) -> Touch:
+        out = vec.times(view.rotation(self.first), (*normal, view.graph.zero))
+        thick = self.sizes[-1]
+        depth = where(view.graph.apply("lt", gap, -thick), -thick, self.radius - gap)
+        second = vec.scale(0.5 * depth - self.radius, out)
+        return out, depth, vec.add(reach, second), second
+
+
+class EdgeRound(ProfilePiece):
+    """On a straight piece, whose ends are corners of the profile or go on."""
+
+    def share(self, view: View) -> Expr:
+        x, y, _ = self._place(view)
+        half, left_x, left_y, left, right_x, right_y, right, width, _ = self.sizes
+        first = _part((x + half) * left_y - y * left_x, width)
+        second = _part((half - x) * right_y - y * right_x, width)
+        return (1.0 - left * (1.0 - first)) * (1.0 - right * (1.0 - second))
+
+    def touch(self, view: View) -> Touch:
+        graph = view.graph
+        x, y, reach = self._place(view)
+        half, _, _, left, _, _, right, _, _ = self.sizes
+        over = right * graph.apply("max", 0.0, x - half) - left * graph.apply("max", 0.0, -half - x)
+        beside = graph.apply("lt", 0.0, over * over)
+        distance = sqrt(where(beside, over * over + y * y, 1.0))
+        signed = where(graph.apply("lt", y, 0.0), -distance, distance)
+        gap = where(beside, signed, y)
+        return self._touching(view, gap, (where(beside, over / signed, 0.0), where(beside, y / signed, 1.0)), reach)
+
+
+class ArcRound(ProfilePiece):
+    """On a circular arc of curvature k: gap (2 y - k (x^2 + y^2)) / (1 + q), q = |(k x, 1 - k y)|.
+
+    The formula holds for k = 0 too.
+    """
+
+    def share(self, view: View) -> Expr:
+        x, y, _ = self._place(view)
+        _, half, rise, cosine, sine, width, _ = self.sizes
+        left = (x + half) * cosine - (y - rise) * sine
+        right = (half - x) * cosine - (y - rise) * sine
+        return _part(left, width) * _part(right, width)
+
+    def touch(self, view: View) -> Touch:
+        graph = view.graph
+        x, y, reach = self._place(view)
+        k = self.sizes[0]
+        up = 1.0 - k * y
+        square = k * k * x * x + up * up
+        apart = graph.apply("lt", 0.0, square)  # from the centre of the arc
+        q = sqrt(where(apart, square, 1.0))
+        gap = (2.0 * y - k * (x * x + y * y)) / (1.0 + q)
+        return self._touching(view, gap, (-k * x / q, up / q), reach)

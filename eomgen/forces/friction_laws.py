@@ -1,0 +1,341 @@
+"""Force elements, laws of dry friction: a sliding velocity -> what opposes it, alone or with states of bristles."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, NamedTuple
+
+from ..elements.dimensions import NONE, RATE, REACH
+from ..elements.entry import Entry
+from ..elements.field import LAW, Field, Fields
+from ..graph import vectors as vec
+from ..graph.core import Expr, sqrt
+from ..graph.vectors import Mat3, Vec3
+from ..limits.contacts import AT_REST
+from ..records import dataclass
+from .branches import where
+
+BRISTLES = "lugre"  #: the law that has states
+#: Laws of dry friction.
+FRICTION_LAWS = ("coulomb", "brown_mcphee", BRISTLES)
+
+
+class DryFriction(ABC):
+    """What opposes sliding: forces for a joint, parts of the normal force for a contact.
+
+    ``formula`` says it of a contact and ``joint_formula`` of a joint, in LaTeX.
+    """
+
+    formula: ClassVar[str]
+    joint_formula: ClassVar[str]
+
+    @abstractmethod
+    def along(self, rate: Expr) -> Expr:
+        """Friction at a velocity along a line, with the sign of the velocity."""
+
+    @abstractmethod
+    def in_plane(self, slip: Slip) -> Vec3:
+        """Friction at a sliding velocity, with the direction of the velocity."""
+
+    @abstractmethod
+    def mapped(self, own: Callable[[Expr], Expr]) -> DryFriction:
+        """The law with other expressions, in the graph of a pair."""
+
+    def rates_along(self, rate: Expr) -> tuple[Expr, ...]:
+        """Rates of its states at a velocity along a line."""
+        return ()
+
+    def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
+        """Rates of its states at a sliding velocity."""
+        return ()
+
+
+class Slip(NamedTuple):
+    """How surfaces slide: velocity and normal (ground axes), penetration, and axes in which states are written."""
+
+    velocity: Vec3
+    normal: Vec3
+    depth: Expr
+    axes: Mat3
+
+
+class SlidingFriction(DryFriction):
+    """Friction that follows from the sliding velocity alone."""
+
+    @abstractmethod
+    def per_velocity(self, squared: Expr) -> Expr:
+        """What times the velocity in a plane is the friction, of the velocity's square; smooth at rest."""
+
+    def in_plane(self, slip: Slip) -> Vec3:
+        return vec.scale(self.per_velocity(vec.dot(slip.velocity, slip.velocity)), slip.velocity)
+
+
+@dataclass(frozen=True)
+class Friction(SlidingFriction):
+    """Coulomb and Stribeck friction; what multiplies the direction of sliding, opposed to it.
+
+    ``dynamic``, ``static`` and ``viscous`` are forces for a joint and parts of the normal force for a contact.
+
+        c(v) = dynamic + (static - dynamic) exp(-(v / stribeck)^2)
+
+    after Armstrong-Helouvry, Dupont and Canudas de Wit (1994), Automatica 30, 1083-1138, section 2.  ``static`` None
+    means dynamic.  At rest friction is 0: a body on a slope creeps, at a part of the velocity ``smoothing``.
+    """
+
+    formula: ClassVar[str] = r"F_t = -F_n (\frac{c(v)}{\sqrt{v^2 + v_s^2}} + b) v"
+    joint_formula: ClassVar[str] = r"F = -c(v) \mathrm{tanh}(v/v_s) - b v"
+    dynamic: Expr
+    smoothing: Expr
+    viscous: Expr
+    static: Expr | None = None
+    stribeck: Expr | None = None
+
+    def level(self, squared: Expr) -> Expr:
+        """c of the squared sliding velocity."""
+        return _level(squared, self.dynamic, self.static, self.stribeck)
+
+    def along(self, rate: Expr) -> Expr:
+        """c tanh(v / smoothing) + viscous v of a velocity along a line."""
+        direction = rate.graph.apply("tanh", rate / self.smoothing)
+        return self.level(rate * rate) * direction + self.viscous * rate
+
+    def per_velocity(self, squared: Expr) -> Expr:
+        """c / sqrt(v^2 + smoothing^2) + viscous: times the velocity in a plane it is the friction; smooth at rest."""
+        size = squared.graph.apply("sqrt", squared + self.smoothing * self.smoothing)
+        return self.level(squared) / size + self.viscous
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> Friction:
+        static, stribeck = (None if x is None else own(x) for x in (self.static, self.stribeck))
+        return Friction(own(self.dynamic), own(self.smoothing), own(self.viscous), static, stribeck)
+
+
+def _level(squared: Expr, dynamic: Expr, static: Expr | None, stribeck: Expr | None) -> Expr:
+    if static is None or stribeck is None:
+        return dynamic
+    fall = squared.graph.apply("exp", -squared / (stribeck * stribeck))
+    return dynamic + (static - dynamic) * fall
+
+
+@dataclass(frozen=True)
+class BrownMcPhee(SlidingFriction):
+    """Friction of continuous derivatives whose largest value is the static friction, close to v = transition.
+
+        c(v) = dynamic tanh(4 x) + (static - dynamic) x / (x^2 / 4 + 3/4)^2 + viscous v,  x = v / transition
+
+    after Brown and McPhee (2016), J. Comput. Nonlinear Dynam. 11, 054502, equation 5.
+    """
+
+    _CURVE: ClassVar[str] = (
+        r"c_d \mathrm{tanh}(4 \frac{v}{v_t}) + (c_s - c_d) \frac{v/v_t}{(\frac{1}{4} (v/v_t)^2 + \frac{3}{4})^2} + b v"
+    )
+    formula: ClassVar[str] = rf"F_t = -F_n ({_CURVE})"
+    joint_formula: ClassVar[str] = rf"F = -({_CURVE})"
+    dynamic: Expr
+    static: Expr
+    transition: Expr
+    viscous: Expr
+
+    def along(self, rate: Expr) -> Expr:
+        x = rate / self.transition
+        return self.dynamic * x.graph.apply("tanh", 4.0 * x) + self._rise(x * x) * x + self.viscous * rate
+
+    def per_velocity(self, squared: Expr) -> Expr:
+        """By the velocity sqrt(v^2 + (AT_REST transition)^2) in tanh(4 x) / v, which is finite at rest then."""
+        graph, small = squared.graph, AT_REST * self.transition
+        speed = graph.apply("sqrt", squared + small * small)
+        slope = graph.apply("tanh", 4.0 * speed / self.transition) / speed
+        return (
+            self.dynamic * slope
+            + self._rise(squared / (self.transition * self.transition)) / self.transition
+            + (self.viscous)
+        )
+
+    def _rise(self, square: Expr) -> Expr:
+        base = 0.25 * square + 0.75
+        return (self.static - self.dynamic) / (base * base)
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> BrownMcPhee:
+        return BrownMcPhee(own(self.dynamic), own(self.static), own(self.transition), own(self.viscous))
+
+
+@dataclass(frozen=True)
+class LuGre(DryFriction):
+    """Friction of bristles whose deflection z is a state; it holds a body at rest.
+
+        z' = v - stiffness |v| / c(v) z,  friction = stiffness z + damping z' + viscous v
+
+    after Canudas de Wit, Olsson, Astrom and Lischinsky (1995), IEEE Trans. Autom. Control 40, 419-425, with c(v) of
+    :class:`Friction`.  In a plane z and v are vectors (Velenis, Tsiotras and Canudas de Wit, 2002); between
+    surfaces that are apart the bristles spring back, z' = -(stiffness / damping) z.
+    """
+
+    formula: ClassVar[str] = (
+        r"F_t = -F_n (\sigma_0 z + \sigma_1 \dot{z} + b v), \quad \dot{z} = v - \sigma_0 \frac{|v|}{c(v)} z"
+    )
+    joint_formula: ClassVar[str] = (
+        r"F = -(\sigma_0 z + \sigma_1 \dot{z} + b v), \quad \dot{z} = v - \sigma_0 \frac{|v|}{c(v)} z"
+    )
+    dynamic: Expr
+    stiffness: Expr
+    damping: Expr
+    viscous: Expr
+    static: Expr | None
+    stribeck: Expr | None
+    deflections: tuple[Expr, ...]
+
+    def along(self, rate: Expr) -> Expr:
+        (z,), (change,) = self.deflections, self.rates_along(rate)
+        return self.stiffness * z + self.damping * change + self.viscous * rate
+
+    def rates_along(self, rate: Expr) -> tuple[Expr, ...]:
+        level = _level(rate * rate, self.dynamic, self.static, self.stribeck)
+        return (rate - self.stiffness * rate.graph.apply("abs", rate) / level * self.deflections[0],)
+
+    def in_plane(self, slip: Slip) -> Vec3:
+        """Of deflections in the axes of the first surface; those along the normal have no effect."""
+        zero = slip.depth.graph.zero
+        pushed = [
+            self.stiffness * z + self.damping * change
+            for z, change in zip(self.deflections, self.rates_in_plane(slip), strict=True)
+        ]
+        x, y, z = (*pushed, zero)[:3]
+        found = vec.times(slip.axes, (x, y, z))
+        across = vec.sub(found, vec.scale(vec.dot(found, slip.normal), slip.normal))
+        return vec.add(across, vec.scale(self.viscous, slip.velocity))
+
+    def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
+        squared = vec.dot(slip.velocity, slip.velocity)
+        moves = squared.graph.apply("lt", 0.0, squared)
+        speed = where(moves, sqrt(where(moves, squared, 1.0)), 0.0)  # the root has no slope at rest
+        decay = self.stiffness * speed / _level(squared, self.dynamic, self.static, self.stribeck)
+        relaxed = self.stiffness / self.damping
+        touches = squared.graph.apply("lt", 0.0, slip.depth)
+        velocity = vec.transpose_times(slip.axes, slip.velocity)
+        return tuple(
+            where(touches, v - decay * z, -relaxed * z) for v, z in zip(velocity, self.deflections, strict=False)
+        )
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> LuGre:
+        raise NotImplementedError("bristles have states, which pairs of groups do not")
+
+
+def has_bristles(values: Mapping[str, Any]) -> bool:
+    """Whether an entry's law of friction has states."""
+    return values.get("friction_law") == BRISTLES
+
+
+#: Of contacts, as parts of the normal force.
+FRICTION: Fields = {
+    "friction": Field("expression", "coefficient of sliding friction", level=LAW, dimension=NONE),
+    "static_friction": Field(
+        "expression",
+        "coefficient of static friction, at the onset of sliding; give stribeck too",
+        level=LAW,
+        dimension=NONE,
+    ),
+    "stribeck": Field(
+        "expression",
+        "Stribeck velocity (m/s): the sliding velocity at which static friction has largely dropped to "
+        "sliding friction",
+        dimension=RATE,
+    ),
+    "viscous_friction": Field(
+        "expression",
+        "viscous friction coefficient per normal force and velocity (s/m)",
+        default=0,
+        level=LAW,
+        dimension=NONE.times(RATE, -1),
+    ),
+    "smoothing": Field("expression", "sliding velocity (m/s) below which friction is smoothed", dimension=RATE),
+}
+#: Which law it is, and what only some laws have; of a contact.
+FRICTION_CHOICE: Fields = {
+    "friction_law": Field(
+        "choice",
+        "law of friction: coulomb, the default, smoothed and with the Stribeck effect if wanted; brown_mcphee; lugre, "
+        "bristles that hold a body at rest",
+        default=FRICTION_LAWS[0],
+        choices=FRICTION_LAWS,
+    ),
+    "transition": Field(
+        "expression", "velocity of friction_law brown_mcphee near which friction is largest", dimension=RATE
+    ),
+    "bristle_stiffness": Field(
+        "expression",
+        "friction of friction_law lugre per deflection of the bristles",
+        dimension=NONE.times(REACH, -1),
+    ),
+    "bristle_damping": Field(
+        "expression",
+        "friction of friction_law lugre per rate of the deflection",
+        dimension=NONE.times(RATE, -1),
+    ),
+}
+_PLAIN = ("stribeck", "smoothing", "transition", "bristle_stiffness", "bristle_damping")
+
+
+def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool = False) -> DryFriction | None:
+    """Dry friction from the keys of its parts; None without Coulomb's part, beside which viscous may stand alone."""
+    if dynamic not in e.values:
+        for key in (static, "friction_law", *_PLAIN, *(() if alone else (viscous,))):
+            if key in e.values:
+                e.fault(key, f"is given without {dynamic}", f"give {dynamic}, or leave {key} out")
+        return None
+    level = e.law(dynamic)
+    e.require(dynamic, level, lambda x: x >= 0, "must be 0 or greater")
+    kind = e.choice("friction_law")
+    along = e.given(viscous)
+    drag = e.graph.zero if along is None else along
+    if kind == "brown_mcphee":
+        return _brown_mcphee(e, level, drag, static)
+    if kind == BRISTLES:
+        return _lugre(e, level, drag, dynamic, static)
+    for key in _PLAIN[2:]:
+        e.refuse(key, f"has no meaning in friction_law: {kind}")
+    if "smoothing" not in e.values:
+        e.fault("smoothing", "is missing", "give the velocity (greater than 0) below which friction is smoothed")
+        return None
+    pair = _onset(e, static)
+    return None if pair is None else Friction(level, e.positive("smoothing"), drag, *pair)
+
+
+def _onset(e: Entry, static: str) -> tuple[Expr | None, Expr | None] | None:
+    """Static friction and Stribeck velocity, or neither; None where only one is given, which is noted."""
+    if (static in e.values) != ("stribeck" in e.values):
+        missing = "stribeck" if static in e.values else static
+        e.fault(missing, "is missing", f"give {static} and stribeck together, or neither")
+        return None
+    onset = e.given(static)
+    if onset is not None:
+        e.require(static, onset, lambda x: x >= 0, "must be 0 or greater")
+    return onset, e.positive("stribeck") if "stribeck" in e.values else None
+
+
+def _brown_mcphee(e: Entry, level: Expr, viscous: Expr, static: str) -> BrownMcPhee | None:
+    for key in ("stribeck", "smoothing", *_PLAIN[3:]):
+        e.refuse(key, "has no meaning in friction_law: brown_mcphee, which has transition")
+    if "transition" not in e.values:
+        e.fault("transition", "is missing", "give the velocity (greater than 0) near which friction is largest")
+        return None
+    onset = e.given(static)
+    if onset is None:
+        onset = level
+    e.require(static, onset, lambda x: x >= 0, "must be 0 or greater")
+    e.require(static, onset - level, lambda x: x >= 0, "this is static minus sliding friction; static is the greater")
+    return BrownMcPhee(level, onset, e.positive("transition"), viscous)
+
+
+def _lugre(e: Entry, level: Expr, viscous: Expr, dynamic: str, static: str) -> LuGre | None:
+    for key in ("smoothing", "transition"):
+        e.refuse(key, "has no meaning in friction_law: lugre")
+    for key in _PLAIN[3:]:
+        if key not in e.values:
+            e.fault(key, "is missing", "friction_law: lugre needs bristle_stiffness and bristle_damping")
+    pair = _onset(e, static)
+    e.require(dynamic, level, lambda x: x > 0, "must be greater than 0 in friction_law: lugre")
+    if pair is None or e.at_fault():
+        return None
+    if pair[0] is not None:
+        e.require(static, pair[0], lambda x: x > 0, "must be greater than 0 in friction_law: lugre")
+    return LuGre(level, e.positive("bristle_stiffness"), e.positive("bristle_damping"), viscous, *pair, e.states())

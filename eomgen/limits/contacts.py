@@ -1,0 +1,13 @@
+"""Limits: contacts, where their laws are written so that they stay finite."""
+
+from __future__ import annotations
+
+#: Part of the transition velocity that tanh(4 v / transition) / v is shifted by: its square, 1e-16, is lost beside 1 in
+#: the value, and the slope, whose cancelling terms have errors of 1e-16 / v^2, stays finite at rest.
+AT_REST = 1e-8
+#: Part of a profile's length over which neighbouring pieces share a circle: beside rounding, 1e-16 of the length, it is
+#: wide, so that their shares add up to 1 within 1e-8, and beside the lengths of pieces it is nothing.
+SHARED = 1e-8
+#: Squared sine of the angle of two rods below which they count as parallel: nearest points of skew rods lose
+#: 1e-16 / sine^2 of their place, which moves them along the rods, where the distance changes by the sine of that.
+PARALLEL = 1e-12
