@@ -24,7 +24,7 @@ def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
             *(_broken(printed.names, printed.names.latex(n), x) for n, x in printed.intermediates),
         ]
     lines += [_broken(printed.names, latex(rate, printed.names), x) for rate, x in printed.states]
-    if told := printed.told_of_numbers:
+    if told := printed.told:
         lines.append(rf"\text{{{told.replace('_', chr(92) + '_')}}}")
     values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
     return [*lines, rf"\text{{with }} {values}"] if values else lines
