@@ -16,8 +16,8 @@ import eomgen as eg
 from eomgen.errors import MissingDependencyError, UsageError
 from eomgen.show import optional
 from eomgen.show.build_scene import build_scene
-from eomgen.show.solids import outline, rounded
 from eomgen.show.scene import Scene
+from eomgen.show.solids import outline, rounded
 
 matplotlib.use("agg")
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -280,7 +280,7 @@ def test_an_outline_is_the_convex_hull() -> None:
 @pytest.mark.parametrize("many", [2, 3, 7])
 @pytest.mark.parametrize("flat", [1e-3, 1.0])
 def test_bars_and_plates_are_hulls_of_balls(many: int, flat: float) -> None:
-    """Convex, closed, of outward faces; no farther from the points than the radius, and out to it round every corner."""
+    """Convex, closed, of outward faces, and as far from the points as the radius, all round."""
     from scipy.spatial import ConvexHull
 
     turn = np.linalg.qr(np.random.default_rng(many).normal(size=(3, 3)))[0]
