@@ -139,7 +139,9 @@ def coordinates(author: Author) -> Section:
     for spec in m.joints:
         for name, coordinate in zip(spec.coordinates, spec.joint.coordinates, strict=True):
             start, end = (_place(m, marker) for marker in (spec.predecessor, spec.successor))
-            kind = {"angle": "angle (rad)", "length": "displacement (m)", "parameter": "Euler parameter"}[coordinate.kind]
+            kind = {"angle": "angle (rad)", "length": "displacement (m)", "parameter": "Euler parameter"}[
+                coordinate.kind
+            ]
             role = "independent" if name in free else "dependent" if name in tree else "at a joint that closes a loop"
             rows.append(
                 (f"${author.symbol(name)}$", f"`{name}`", role, f"{kind} of {end} against {start}, joint `{spec.name}`")

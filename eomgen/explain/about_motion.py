@@ -39,7 +39,9 @@ def motion(author: Author) -> list[Section]:
         position += author.quantity(author.of(r"\mathbf{R}", name), "poses", name, lambda pose: pose[:3, :3])
         velocity += author.quantity(author.of(r"\boldsymbol{\omega}", name), "velocities", name, lambda v: v.angular)
         velocity += author.quantity(author.of(r"\mathbf{v}", name), "velocities", name, lambda v: v.center_of_mass)
-        acceleration += author.quantity(author.of(r"\boldsymbol{\alpha}", name), "accelerations", name, lambda a: a.angular)
+        acceleration += author.quantity(
+            author.of(r"\boldsymbol{\alpha}", name), "accelerations", name, lambda a: a.angular
+        )
         acceleration += author.quantity(
             author.of(r"\mathbf{a}", name), "accelerations", name, lambda a: a.center_of_mass
         )

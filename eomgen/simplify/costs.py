@@ -69,6 +69,8 @@ class Costs:
 
     def of_number(self, value: Number) -> float:
         """A coefficient without its sign, and the sign that joins it; nothing for 1."""
+        if value in (1, -1):
+            return 0.0
         size: Number = value if value > 0 else -value
         if isinstance(size, float):
             return len(repr(size)) + OPERATION + 1.0
