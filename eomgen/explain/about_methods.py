@@ -45,9 +45,9 @@ def steps(author: Author) -> Section | None:
 def _embedding(author: Author) -> list[Piece]:
     return [
         Sentence(
-            "The velocities of all bodies stand below each other in $\\mathbf{v}_b$: for each body $\\mathbf{v}$ of its "
-            "centre of mass, in ground axes, and $\\boldsymbol{\\omega}$ in its own axes. They are "
-            "$\\mathbf{v}_b = \\mathbf{B}_b \\dot{\\mathbf{q}}_i + \\mathbf{b}_b$ with the velocity transformation"
+            "The velocities of all bodies stand below each other in $\\mathbf{v}_b$: for each body "
+            "$\\mathbf{v}$ of its centre of mass, in ground axes, and $\\boldsymbol{\\omega}$ in its own axes. They "
+            "are $\\mathbf{v}_b = \\mathbf{B}_b \\dot{\\mathbf{q}}_i + \\mathbf{b}_b$ with the velocity transformation"
         ),
         *author.quantity(r"\mathbf{B}_b", "body_velocity_transformation"),
         Sentence("The masses and the inertias of the bodies, in the same order, form the block-diagonal matrix"),
@@ -55,9 +55,9 @@ def _embedding(author: Author) -> list[Piece]:
         Sentence("The mass matrix of the independent accelerations is"),
         FormulaLine((r"\mathbf{M}", r"\mathbf{B}_b^T \mathbf{M}_b \mathbf{B}_b")),
         Sentence(
-            "The part of the accelerations $\\dot{\\mathbf{v}}_b$ that holds no $\\ddot{\\mathbf{q}}_i$ and the gyroscopic "
-            "moments of the bodies give the quadratic velocity terms $\\mathbf{Q}_v$. The generalized forces of all "
-            "elements together are $\\mathbf{Q}$:"
+            "The part of the accelerations $\\dot{\\mathbf{v}}_b$ that holds no $\\ddot{\\mathbf{q}}_i$ and the "
+            "gyroscopic moments of the bodies give the quadratic velocity terms $\\mathbf{Q}_v$. The generalized "
+            "forces of all elements together are $\\mathbf{Q}$:"
         ),
         *_right_side(author),
     ]

@@ -19,13 +19,14 @@ def motion(author: Author) -> list[Section]:
     position: list[Piece] = [
         Sentence(
             "For each body, $\\mathbf{r}$ is the position of its origin in ground axes, and the columns of "
-            "$\\mathbf{R}$ are its axes. A point at $\\mathbf{u}$ of the body is at $\\mathbf{r} + \\mathbf{R} \\mathbf{u}$."
+            "$\\mathbf{R}$ are its axes. A point at $\\mathbf{u}$ of the body is at "
+            "$\\mathbf{r} + \\mathbf{R} \\mathbf{u}$."
         )
     ]
     velocity: list[Piece] = [
         Sentence(
-            "For each body, in ground axes: its angular velocity $\\boldsymbol{\\omega}$, and the velocity $\\mathbf{v}$ of "
-            "its centre of mass."
+            "For each body, in ground axes: its angular velocity $\\boldsymbol{\\omega}$, and the velocity "
+            "$\\mathbf{v}$ of its centre of mass."
         )
     ]
     acceleration: list[Piece] = [
@@ -62,8 +63,8 @@ def constraints(author: Author) -> Section:
         return Section("Constraints and degrees of freedom", (Sentence(f"{text}{_freedoms(free)}."),))
     pieces: list[Piece] = [
         Sentence(
-            f"{len(rows)} independent equation{' constrains' if len(rows) == 1 else 's constrain'} the {n} velocities of "
-            f"the tree, which leaves {n} - {len(rows)} = {_freedoms(free)}. "
+            f"{len(rows)} independent equation{' constrains' if len(rows) == 1 else 's constrain'} the {n} velocities "
+            f"of the tree, which leaves {n} - {len(rows)} = {_freedoms(free)}. "
             f"{'It is' if len(rows) == 1 else 'They are'} {', '.join(f'`{row}`' for row in rows)}."
         )
     ]
@@ -122,9 +123,8 @@ def _dead_centres(author: Author) -> list[Piece]:
         return []
     told = Sentence(
         f"The columns of the dependent velocities ({names}) form the square block $\\mathbf{{C}}_d$. Where its "
-        f"determinant "
-        "vanishes, the mechanism is at a dead centre: the independent velocities do not determine the others there, and "
-        "other coordinates must be chosen as independent."
+        "determinant vanishes, the mechanism is at a dead centre: the independent velocities do not determine the "
+        "others there, and other coordinates must be chosen as independent."
     )
     if len(dependent) > EXPANDED:
         return [told]

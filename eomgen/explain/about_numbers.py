@@ -49,8 +49,8 @@ def calculation(author: Author, state: Mapping[str, float], reason: str, moved: 
                 else "The declared initial state, with closed loops and consistent velocities, and the declared "
                 "parameters. "
             )
-            + "Each line repeats the left side of a formula, then the formula with its numbers, then its value. A value "
-            "that is no more than the rounding of the numbers in it is told as 0."
+            + "Each line repeats the left side of a formula, then the formula with its numbers, then its value. A "
+            "value that is no more than the rounding of the numbers in it is told as 0."
         ),
         Table(("symbol", "value"), rows),
     ]

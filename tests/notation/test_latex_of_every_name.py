@@ -127,7 +127,7 @@ initial: {y: -1, x_dot: 1}
     document = equations.explain()
     assert r"\mu_{\rm s}" in document.markdown
     assert r"\mu_{\rm s}" in document.latex
-    assert "<mi>μ</mi>" in document.html  # noqa: RUF001
+    assert "<mi>μ</mi>" in document.html
     assert r"\lambda_1" not in document.markdown
     assert document.difference < 1e-10
     given = {"m": 2, "g": 9.81, "x": 0, "y": -1, "x_dot": 1, "y_dot": 0}

@@ -309,7 +309,7 @@ def test_terms_above_and_below_one_sum_are_not_taken_together() -> None:
         (("m1", "m2", "m3"), "m_123"),
         (("m_B", "m_F", "m_R"), "m_BFR"),
         (("m_B", "k_F", "m_R"), "k0"),
-        (("m_B", "m2"), "k0"),
+        (("m_B", "m2", "m_R"), "k0"),
     ],
 )
 def test_sums_of_parameters_of_one_letter_are_called_by_it(masses: tuple[str, ...], wanted: str) -> None:
