@@ -88,11 +88,12 @@ def moving_state(module: Any, velocities: Sequence[str]) -> tuple[np.ndarray, bo
 def told_state(module: Any, x: np.ndarray) -> dict[str, float]:
     """Numbers of all symbols at a state, in which 0 stands for what rounding left of it."""
     values, layout = state_values(module, x, 0.0), module.layout
-    known = [(module.x_names[: module.n_q], layout.place_scales.q, 1.0)]
-    names = module.x_names[module.n_q : module.n_q + module.n_v]
+    places = np.ones(module.n_q) if layout.metadata["quaternion_slots"] else layout.place_scales.q[: module.n_q]
+    known = [(module.x_names[: module.n_q], places, 1.0)]
+    names, sizes = layout.v[: module.n_v], layout.scales.q[: module.n_v]  # first-order states come after them
     for rates in (names, [acceleration_name(name) for name in names]):
-        largest = max((abs(values[n]) / s for n, s in zip(rates, layout.scales.q, strict=True)), default=0.0)
-        known.append((rates, layout.scales.q, largest))
+        largest = max((abs(values[n]) / s for n, s in zip(rates, sizes, strict=True)), default=0.0)
+        known.append((rates, sizes, largest))
     for group, scales, largest in known:
         values |= {
             name: 0.0

@@ -10,8 +10,16 @@ import pytest
 import sympy
 
 import eomgen as eg
+from eomgen.explain.author import Author
 from eomgen.explain.document import Folded, FormulaLine
-from eomgen.explain.shown_values import is_rounding, known_values, value_of
+from eomgen.explain.shown_values import (
+    is_rounding,
+    known_values,
+    moving_state,
+    state_values,
+    told_state,
+    value_of,
+)
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 x, y, z = sympy.symbols("x y z")
@@ -58,6 +66,20 @@ def test_a_loop_at_rest_moves_consistently() -> None:
     assert "velocities are 1" in moving
     m.initial(theta=0.3, theta_dot=2.0)
     assert "The declared initial state" in section(m.derive(independent=["theta"]))[0]
+
+
+@pytest.mark.parametrize("name", ["satellite", "hydraulic_boom", "quadrotor_load", "car_axis", "kapitza_pendulum"])
+def test_states_of_each_kind_have_numbers(name: str) -> None:
+    """Euler parameters, first-order states, inputs, motions over time: every symbol has a finite number."""
+    equations = eg.load(EXAMPLES / f"{name}.yaml").derive()
+    module = equations.compile("numpy")
+    x, _ = moving_state(module, Author(equations, True).independent_velocities)
+    exact, told = state_values(module, x, 0.0), told_state(module, x)
+    assert told.keys() == exact.keys()
+    largest = max(map(abs, exact.values()))
+    for symbol, value in told.items():
+        assert math.isfinite(value)
+        assert value == exact[symbol] or (value == 0.0 and abs(exact[symbol]) < 1e-12 * largest)
 
 
 @pytest.mark.parametrize(
