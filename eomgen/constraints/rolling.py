@@ -30,7 +30,7 @@ class _Rolling(Constraint):
     """A body that rolls on the x-y plane of marker ``plane``, on the side to which its z axis points."""
 
     sentence: ClassVar[str] = "The body touches the plane, and the point of contact does not slide."
-    formula: ClassVar[str] = r"\mathbf{v} + \mathbf{\omega} \times \mathbf{d} = \mathbf{0}"
+    formula: ClassVar[str] = r"\mathbf{v} + \boldsymbol{\omega} \times \mathbf{d} = \mathbf{0}"
     wheel: Marker  #: centre; its z axis is that of the wheel
     plane: Marker
     radius: Expr

@@ -14,7 +14,7 @@ from .description import items
 from .fields import LAGRANGIAN, MOTION
 from .mechanism import Lagrangian
 from .names import nearest
-from .printed_names import take_coordinates_latex
+from .printed_names import MULTIPLIERS, numbered, take_coordinates_latex
 from .sympy_face import in_order, name_of
 from .values import Reader
 
@@ -42,8 +42,11 @@ def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str
     values["coordinates"] = [name_of(q) for q in listed]
     for k, name in enumerate(values["coordinates"]):
         reader.names.declare("coordinate", name, f"lagrangian.coordinates[{k}]")
-    rates = [f"{name}_dot" for name in values["coordinates"]]
-    take_coordinates_latex(reader, "lagrangian.latex", values["coordinates"], values.get("latex", ()), rates)
+    others = [f"{name}_dot" for name in values["coordinates"]]
+    count = len(items(values.get("constraints", ())) or ())
+    multipliers = [name for word in MULTIPLIERS for name in numbered(word, count)]
+    others += [name for name in multipliers if name not in reader.names.kinds]
+    take_coordinates_latex(reader, "lagrangian.latex", values["coordinates"], values.get("latex", ()), others)
     return values
 
 

@@ -48,7 +48,8 @@ def describe_lagrangian(
     inputs : mapping, optional
         Quantities given over time, by symbol or name: the value that holds while none is given.
     latex : mapping, optional
-        How formulas and plots print coordinates, parameters and inputs, by symbol or name: ``{q: r"\\varphi"}``.
+        How formulas and plots print coordinates, parameters and inputs, by symbol or name: ``{q: r"\\varphi"}``; also
+        velocities, ``"q_dot"``, and the multipliers of the constraints, ``"lambda_1"``.
 
     Returns
     -------

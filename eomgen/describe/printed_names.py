@@ -13,6 +13,20 @@ from .names import nearest
 from .sympy_face import name_of
 from .values import Reader
 
+#: What multipliers of constraint equations are called, with a number; the second word where names look like the first.
+MULTIPLIERS = ("lambda", "multiplier")
+
+
+def numbered(word: str, count: int) -> list[str]:
+    """``lambda_1``, ``lambda_2``, ...
+
+    Parameters
+    ----------
+    word : str
+    count : int
+    """
+    return [f"{word}_{k + 1}" for k in range(count)]
+
 
 def take_latex(reader: Reader, path: str, name: Any, given: Any) -> None:
     """Take in the LaTeX of a name; what is no LaTeX of a symbol is a fault."""

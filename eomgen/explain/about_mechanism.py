@@ -87,14 +87,14 @@ def bodies(author: Author) -> Section | None:
     if m.bodies:
         pieces.append(
             Sentence(
-                "Of each body: mass $m$ (kg), centre of mass $\\mathbf{c}$ (m) from the body's origin, and inertia "
+                "For each body: mass $m$ (kg), centre of mass $\\mathbf{c}$ (m) from the body's origin, and inertia "
                 "$\\mathbf{J}$ (kg m²) about the centre of mass, both in the body's axes."
             )
         )
         formulas: list[Piece] = []
         for body in m.bodies:
             properties = [body.mass, *body.com, *(x for row in body.inertia for x in row)]
-            mass, *rest = author.write("masses and inertias", properties).expressions
+            mass, *rest = map(_as_given, author.write("masses and inertias", properties).expressions)
             formulas.append(FormulaLine((author.of("m", body.name), mass)))
             if any(x != 0 for x in rest[:3]):
                 formulas.append(FormulaLine((author.of(r"\mathbf{c}", body.name), sympy.Matrix(3, 1, rest[:3]))))
@@ -120,6 +120,12 @@ def bodies(author: Author) -> Section | None:
     return Section("Bodies and parameters" if m.bodies else "Parameters", tuple(pieces)) if pieces else None
 
 
+def _as_given(value: Any) -> Any:
+    """A number alone as the decimal that a model file has, 0.4 and not 2/5; all else as it is."""
+    ends = value.is_Rational and not value.is_Integer and 10**6 % value.q == 0
+    return sympy.Float(float(value)) if ends else value
+
+
 def _value(value: float | None) -> str:
     return "none" if value is None else f"{value:.6g}"
 
@@ -133,7 +139,9 @@ def coordinates(author: Author) -> Section:
     for spec in m.joints:
         for name, coordinate in zip(spec.coordinates, spec.joint.coordinates, strict=True):
             start, end = (_place(m, marker) for marker in (spec.predecessor, spec.successor))
-            kind = {"angle": "angle (rad)", "length": "length (m)", "parameter": "Euler parameter"}[coordinate.kind]
+            kind = {"angle": "angle (rad)", "length": "displacement (m)", "parameter": "Euler parameter"}[
+                coordinate.kind
+            ]
             role = "independent" if name in free else "dependent" if name in tree else "at a joint that closes a loop"
             rows.append(
                 (f"${author.symbol(name)}$", f"`{name}`", role, f"{kind} of {end} against {start}, joint `{spec.name}`")
@@ -146,7 +154,7 @@ def coordinates(author: Author) -> Section:
     pieces: list[Piece] = [
         Sentence(
             f"The tree has {_count(len(tree), 'coordinate')}"
-            + (f"; {_count(len(loop), 'further one')} at joints that close loops" if loop else "")
+            + (f", and joints that close loops have {_count(len(loop), 'further one')}" if loop else "")
             + f". The equations of motion are for {_count(len(free), 'independent one')}"
             + (f": {', '.join(f'${author.symbol(n)}$' for n in eqs.independent)}." if free else ".")
         ),

@@ -45,20 +45,19 @@ def steps(author: Author) -> Section | None:
 def _embedding(author: Author) -> list[Piece]:
     return [
         Sentence(
-            "The velocities of all bodies, of each $\\mathbf{v}$ of the centre of mass in ground axes and "
-            "$\\mathbf{\\omega}$ in its own axes, are $\\mathbf{v}_b = \\mathbf{B}_b \\dot{\\mathbf{q}}_i + "
-            "\\mathbf{b}_b$ with "
-            "the velocity transformation"
+            "The velocities of all bodies stand below each other in $\\mathbf{v}_b$: for each body "
+            "$\\mathbf{v}$ of its centre of mass, in ground axes, and $\\boldsymbol{\\omega}$ in its own axes. They "
+            "are $\\mathbf{v}_b = \\mathbf{B}_b \\dot{\\mathbf{q}}_i + \\mathbf{b}_b$ with the velocity transformation"
         ),
         *author.quantity(r"\mathbf{B}_b", "body_velocity_transformation"),
-        Sentence("Masses and inertias of all bodies form"),
+        Sentence("The masses and the inertias of the bodies, in the same order, form the block-diagonal matrix"),
         *author.quantity(r"\mathbf{M}_b", "body_mass_matrix"),
-        Sentence("and the mass matrix of the independent accelerations is"),
+        Sentence("The mass matrix of the independent accelerations is"),
         FormulaLine((r"\mathbf{M}", r"\mathbf{B}_b^T \mathbf{M}_b \mathbf{B}_b")),
         Sentence(
-            "What the accelerations hold beside $\\mathbf{B}_b \\ddot{\\mathbf{q}}_i$ gives the quadratic "
-            "velocity terms "
-            "$\\mathbf{Q}_v$; the generalized forces of all elements together are $\\mathbf{Q}$:"
+            "The part of the accelerations $\\dot{\\mathbf{v}}_b$ that holds no $\\ddot{\\mathbf{q}}_i$ and the "
+            "gyroscopic moments of the bodies give the quadratic velocity terms $\\mathbf{Q}_v$. The generalized "
+            "forces of all elements together are $\\mathbf{Q}$:"
         ),
         *_right_side(author),
     ]
@@ -163,11 +162,11 @@ def _block(author: Author) -> list[Piece]:
 def _augmented(author: Author) -> list[Piece]:
     return [
         Sentence(
-            "The accelerations of the tree and the multipliers $\\mathbf{\\lambda}$ of the constraints are the "
+            "The accelerations of the tree and the multipliers $\\boldsymbol{\\lambda}$ of the constraints are the "
             "unknowns: "
-            "$\\mathbf{M}_t \\ddot{\\mathbf{q}} + \\mathbf{C}_q^T \\mathbf{\\lambda} = \\mathbf{Q} + "
+            "$\\mathbf{M}_t \\ddot{\\mathbf{q}} + \\mathbf{C}_q^T \\boldsymbol{\\lambda} = \\mathbf{Q} + "
             "\\mathbf{Q}_v$ and "
-            "$\\mathbf{C}_q \\ddot{\\mathbf{q}} = -\\mathbf{\\gamma}$."
+            "$\\mathbf{C}_q \\ddot{\\mathbf{q}} = -\\boldsymbol{\\gamma}$."
         ),
         *_block(author),
     ]
@@ -283,8 +282,8 @@ def _prescribed(author: Author) -> list[Piece]:
         return [Sentence(f"{told} Nothing has mass and no forces act, so that the constraints exert none.")]
     pieces: list[Piece] = [
         Sentence(
-            f"{told} The constraints exert the forces $\\mathbf{{C}}_q^T \\mathbf{{\\lambda}} = \\mathbf{{M}} "
-            "\\ddot{\\mathbf{q}} - \\mathbf{f}$. Of $\\mathbf{\\lambda}$, one component belongs to each constraint "
+            f"{told} The constraints exert the forces $\\mathbf{{C}}_q^T \\boldsymbol{{\\lambda}} = \\mathbf{{M}} "
+            "\\ddot{\\mathbf{q}} - \\mathbf{f}$. Of $\\boldsymbol{\\lambda}$, one component belongs to each constraint "
             "equation; that of a driver is the force or torque with which it drives its coordinate."
         )
     ]

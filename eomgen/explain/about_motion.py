@@ -18,29 +18,31 @@ def motion(author: Author) -> list[Section]:
         return []
     position: list[Piece] = [
         Sentence(
-            "Of each body: $\\mathbf{r}$ is the place of its origin in ground axes, and the columns of "
-            "$\\mathbf{R}$ are "
-            "its axes. A point at $\\mathbf{u}$ of the body is at $\\mathbf{r} + \\mathbf{R} \\mathbf{u}$."
+            "For each body, $\\mathbf{r}$ is the position of its origin in ground axes, and the columns of "
+            "$\\mathbf{R}$ are its axes. A point at $\\mathbf{u}$ of the body is at "
+            "$\\mathbf{r} + \\mathbf{R} \\mathbf{u}$."
         )
     ]
     velocity: list[Piece] = [
         Sentence(
-            "In ground axes, of each body: angular velocity $\\mathbf{\\omega}$ and the velocity $\\mathbf{v}$ of its "
-            "centre of mass, the rate of its place."
+            "For each body, in ground axes: its angular velocity $\\boldsymbol{\\omega}$, and the velocity "
+            "$\\mathbf{v}$ of its centre of mass."
         )
     ]
     acceleration: list[Piece] = [
         Sentence(
-            "The rates of these velocities: angular acceleration $\\mathbf{\\alpha}$ and the acceleration "
+            "The rates of these velocities: angular acceleration $\\boldsymbol{\\alpha}$ and the acceleration "
             "$\\mathbf{a}$ of the centre of mass."
         )
     ]
     for name in bodies:
         position += author.quantity(author.of(r"\mathbf{r}", name), "poses", name, lambda pose: pose[:3, 3])
         position += author.quantity(author.of(r"\mathbf{R}", name), "poses", name, lambda pose: pose[:3, :3])
-        velocity += author.quantity(author.of(r"\mathbf{\omega}", name), "velocities", name, lambda v: v.angular)
+        velocity += author.quantity(author.of(r"\boldsymbol{\omega}", name), "velocities", name, lambda v: v.angular)
         velocity += author.quantity(author.of(r"\mathbf{v}", name), "velocities", name, lambda v: v.center_of_mass)
-        acceleration += author.quantity(author.of(r"\mathbf{\alpha}", name), "accelerations", name, lambda a: a.angular)
+        acceleration += author.quantity(
+            author.of(r"\boldsymbol{\alpha}", name), "accelerations", name, lambda a: a.angular
+        )
         acceleration += author.quantity(
             author.of(r"\mathbf{a}", name), "accelerations", name, lambda a: a.center_of_mass
         )
@@ -61,8 +63,9 @@ def constraints(author: Author) -> Section:
         return Section("Constraints and degrees of freedom", (Sentence(f"{text}{_freedoms(free)}."),))
     pieces: list[Piece] = [
         Sentence(
-            f"{len(rows)} equations that do not follow from each other hold the {n} velocities of the tree, so that "
-            f"{n} - {len(rows)} = {_freedoms(free)} remain. The equations are {', '.join(f'`{row}`' for row in rows)}."
+            f"{len(rows)} independent equation{' constrains' if len(rows) == 1 else 's constrain'} the {n} velocities "
+            f"of the tree, which leaves {n} - {len(rows)} = {_freedoms(free)}. "
+            f"{'It is' if len(rows) == 1 else 'They are'} {', '.join(f'`{row}`' for row in rows)}."
         )
     ]
     for element in author.mechanism.constraints:
@@ -71,14 +74,14 @@ def constraints(author: Author) -> Section:
         pieces.append(Sentence(f"{len(eqs.mobility.redundant)} further equations follow from these and are left out."))
     if len(eqs.constraints):
         pieces += author.quantity(r"\mathbf{C}", "constraints")
-        pieces.append(Sentence("$\\mathbf{C} = \\mathbf{0}$ at every position. Its derivatives by the time are"))
+        pieces.append(Sentence("$\\mathbf{C} = \\mathbf{0}$ at every position. Its derivative by the time is"))
     if len(eqs.constraints) < len(rows):
         pieces.append(Sentence("The last equations hold velocities (nonholonomic): they vanish as well."))
     pieces += author.quantity(r"\dot{\mathbf{C}}", "velocity_constraints")
     pieces.append(Sentence("The Jacobian $\\mathbf{C}_q$ is the derivative of $\\dot{\\mathbf{C}}$ by the velocities:"))
     pieces += author.quantity(r"\mathbf{C}_q", "constraint_jacobian")
     pieces.append(Sentence(_second_derivative(eqs.kinematics.constraints.stabilised)))
-    pieces += author.quantity(r"\mathbf{\gamma}", "gamma")
+    pieces += author.quantity(r"\boldsymbol{\gamma}", "gamma")
     pieces += _dead_centres(author)
     if free:
         pieces.append(
@@ -95,7 +98,7 @@ def constraints(author: Author) -> Section:
 
 def _second_derivative(stabilised: tuple[float, float] | None) -> str:
     """What vanishes, and with Baumgarte's terms what of it is gamma."""
-    solved = "\\mathbf{C}_q \\ddot{\\mathbf{q}} + \\mathbf{\\gamma} = \\mathbf{0}$ with"
+    solved = "\\mathbf{C}_q \\ddot{\\mathbf{q}} + \\boldsymbol{\\gamma} = \\mathbf{0}$ with"
     if stabilised is None:
         return f"$\\ddot{{\\mathbf{{C}}}} = {solved}"
     alpha, beta = (f"{x:.6g}" for x in stabilised)
@@ -120,9 +123,8 @@ def _dead_centres(author: Author) -> list[Piece]:
         return []
     told = Sentence(
         f"The columns of the dependent velocities ({names}) form the square block $\\mathbf{{C}}_d$. Where its "
-        f"determinant "
-        "vanishes, the mechanism is at a dead centre: the independent velocities do not tell the others, and other "
-        "coordinates must be chosen as independent."
+        "determinant vanishes, the mechanism is at a dead centre: the independent velocities do not determine the "
+        "others there, and other coordinates must be chosen as independent."
     )
     if len(dependent) > EXPANDED:
         return [told]

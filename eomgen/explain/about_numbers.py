@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import sympy
@@ -10,14 +10,24 @@ import sympy
 from .author import Author, in_numbers, nodes
 from .document import Folded, FormulaLine, Piece, Section, Sentence, Table
 from .shown_against_module import Difference
-from .shown_values import known_values, value_of
+from .shown_values import is_rounding, known_values, value_of
 
 LONG = 60  #: nodes of an expression up to which its numbers are put in
 MOST = 400  #: lines of the calculation
 
 
-def calculation(author: Author, state: Mapping[str, float], reason: str) -> Section:
-    """One state, and every formula that was shown with its numbers."""
+def calculation(author: Author, state: Mapping[str, float], reason: str, moved: bool = False) -> Section:
+    """One state, and every formula that was shown with its numbers.
+
+    Parameters
+    ----------
+    author : Author
+    state : mapping of str to float
+        Numbers by name; empty where there are none, for the ``reason``.
+    reason : str
+    moved : bool
+        Whether the independent velocities are 1 in place of the declared ones, which all are 0.
+    """
     title = "Numbers: one state, line by line"
     if not state:
         return Section(title, (Sentence(f"No numbers: {reason}"),))
@@ -32,9 +42,15 @@ def calculation(author: Author, state: Mapping[str, float], reason: str) -> Sect
     numbers = dict(state)
     pieces: list[Piece] = [
         Sentence(
-            "The declared initial state, with closed loops and consistent velocities, and the declared "
-            "parameters. Each "
-            "line repeats the left side of a formula, then the formula with its numbers, then its value."
+            (
+                "The declared initial position and the declared parameters. The declared velocities are all 0, which "
+                "would hide most terms; here the independent velocities are 1. "
+                if moved
+                else "The declared initial state, with closed loops and consistent velocities, and the declared "
+                "parameters. "
+            )
+            + "Each line repeats the left side of a formula, then the formula with its numbers, then its value. A "
+            "value that is no more than the rounding of the numbers in it is told as 0."
         ),
         Table(("symbol", "value"), rows),
     ]
@@ -46,8 +62,9 @@ def calculation(author: Author, state: Mapping[str, float], reason: str) -> Sect
             found = []
             here = {str(symbol): float(value) for symbol, value in known.items() if isinstance(symbol, sympy.Symbol)}
             for symbol, expression in shown.named:
-                found.append(_line(author.printer.latex(symbol), expression, here, known))
-            found += [_line(left, x, here, known) for left, x in shown.entries if x.free_symbols]
+                found.append(_line(author.printer.latex(symbol), expression, shown.named, here, known, numbers))
+            entries = [entry for entry in shown.entries if entry[1].free_symbols]
+            found += [_line(left, x, shown.named, here, known, numbers) for left, x in entries]
         except (TypeError, ValueError):  # reactions, variations and momenta have no number of their own
             continue
         room = max(0, MOST - len(lines))
@@ -63,8 +80,17 @@ def calculation(author: Author, state: Mapping[str, float], reason: str) -> Sect
     return Section(title, tuple(pieces))
 
 
-def _line(left: str, expression: Any, here: dict[str, float], known: dict[Any, Any]) -> FormulaLine:
+def _line(
+    left: str,
+    expression: Any,
+    named: Sequence[tuple[Any, Any]],
+    here: dict[str, float],
+    known: dict[Any, Any],
+    numbers: dict[str, float],
+) -> FormulaLine:
     value = float(value_of(expression, known))
+    if is_rounding(expression, value, named, numbers):
+        value = 0.0
     if nodes(expression) > LONG:
         return FormulaLine((left, value))
     return in_numbers(left, expression, here, value)
@@ -92,7 +118,7 @@ def counts(author: Author) -> Section:
         (name, str(c.multiplications), str(c.additions), str(c.divisions), str(c.total))
         for name, c in author.source.operations.items()
     )
-    text = f"Operations of each part, of the equations of the tree, derived by method `{author.equations.method}`."
+    text = f"Operations of each part of the equations of the tree, derived by method `{author.equations.method}`."
     head = ("part", "multiplications", "additions", "divisions", "together")
     return Section("Operations", (Sentence(text), Table(head, rows)))
 

@@ -92,6 +92,12 @@ class Author:
         """The variation of a coordinate in SymPy, printed with a delta."""
         return sympy.Function("delta")(sympy.Symbol(name))
 
+    @property
+    def independent_velocities(self) -> list[str]:
+        """Names of the velocities of the independent coordinates."""
+        k = self.equations.kinematics
+        return [k.velocity_names[k.velocity_labels.index(name)] for name in self.equations.independent]
+
     # -- quantities ---------------------------------------------------------------------------------------------------
     def quantity(
         self,

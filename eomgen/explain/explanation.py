@@ -143,7 +143,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
     from . import about_forces, about_mechanism, about_methods, about_motion, about_numbers
     from .author import Author
     from .shown_against_module import compare
-    from .shown_values import state_values
+    from .shown_values import moving_state, told_state
 
     if level not in LEVELS:
         raise UsageError(f"no level {level!r}; there are {', '.join(LEVELS)}")
@@ -159,8 +159,11 @@ def explain(equations: Any, level: str = "full") -> Explanation:
         sections += [about_methods.energies(author), about_methods.steps(author)]
     sections += [about_methods.final(author), about_forces.states(author), about_numbers.counts(author)]
     if full:
-        state = {} if module is None else state_values(module, module.x0(), 0.0)
-        sections.append(about_numbers.calculation(author, state, reason))
+        state, moved = {}, False
+        if module is not None:
+            x, moved = moving_state(module, author.independent_velocities)
+            state = told_state(module, x)
+        sections.append(about_numbers.calculation(author, state, reason, moved))
     found = None if module is None else compare(author, module)
     sections.append(about_numbers.difference(found, reason))
     title = f"Equations of motion of `{equations.name}`, method `{equations.method}`"

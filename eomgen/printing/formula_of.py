@@ -48,11 +48,13 @@ class Formulas:
     ----------
     rounded : bool
         Whether a number has more digits than are printed, in what was made up to now.
+    signs : bool
+        Whether sgn(x) stands for x / |x| in it, which has no value at x = 0.
     """
 
     def __init__(self, order: Order, numbers: Mapping[str, float] | None = None, digits: int = DIGITS) -> None:
         self.order, self.digits = order, digits
-        self.rounded = False
+        self.rounded = self.signs = False
         self._made: dict[Any, Formula] = {sympy.Symbol(name): number(x) for name, x in (numbers or {}).items()}
 
     def __call__(self, expression: Any) -> Formula:
@@ -101,6 +103,8 @@ class Formulas:
                 below.append(sympy.Pow(factor.base, -factor.exp, evaluate=False))
             elif factor != 1:
                 above.append(factor)
+        if below:
+            above, below = self._with_signs(above, below)
         subtracted = is_subtracted(x)
         number = -number if subtracted else number
         upper, lower = self._factors(above), self._factors(below)
@@ -116,6 +120,19 @@ class Formulas:
         else:
             upper = (Quotient(NumberPart(str(number.p)), NumberPart(str(number.q))), *upper)
         return subtracted, Quotient(_product(upper), _product(lower)) if lower else _product(upper)
+
+    def _with_signs(self, above: list[Any], below: list[Any]) -> tuple[list[Any], list[Any]]:
+        """Factors above and below a line with sgn(x) for x / |x|, where |x| is the root of x^2."""
+        for size in list(below):
+            root = _root(size.base) if size.is_Pow and size.exp == sympy.Rational(1, 2) else None
+            for x in () if root is None else (root, -root):
+                found = _without(above, x)
+                if found is not None:
+                    above = [*found, sympy.Function("sgn")(x)]
+                    below.remove(size)
+                    self.signs = True
+                    break
+        return above, below
 
     def _decimal(self, x: Any) -> Formula:
         if not x.is_Float or not x.is_finite:
@@ -153,6 +170,16 @@ def _root(base: Any) -> Any:
             return None
         found.append(sympy.Pow(factor.base, factor.exp / 2))
     return sympy.Mul(*found)
+
+
+def _without(factors: list[Any], x: Any) -> list[Any] | None:
+    """Factors without those of x; None where one is not among them."""
+    left = list(factors)
+    for part in sympy.Mul.make_args(x):
+        if part not in left:
+            return None
+        left.remove(part)
+    return left
 
 
 def _product(factors: tuple[Formula, ...]) -> Formula:

@@ -34,7 +34,7 @@ def equations_html(equations: Readable) -> str:
         still = "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
         return "".join([still, *_states(printed)])
     motion = parts_html(PrintedParts(printed)) if printed.is_long else [*_motion(printed), *_intermediates(printed)]
-    told = f"<p {LEFT}>{printed.told_of_numbers}</p>" if printed.told_of_numbers else ""
+    told = f"<p {LEFT}>{printed.told}</p>" if printed.told else ""
     return "".join([*motion, *_states(printed), told])
 
 

@@ -27,7 +27,7 @@ def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
     if printed.sampled:
         lines.append(rf"\text{{{SAMPLED}}}")
         lines += [_broken(printed.names, latex(state, printed.names), x) for state, x in printed.sampled]
-    if told := printed.told_of_numbers:
+    if told := printed.told:
         lines.append(rf"\text{{{told.replace('_', chr(92) + '_')}}}")
     values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
     return [*lines, rf"\text{{with }} {values}"] if values else lines

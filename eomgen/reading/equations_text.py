@@ -59,7 +59,7 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
             where = "eqs.tree_system" if printed.of_loops else "eqs.mass_matrix, eqs.force, eqs.intermediates"
             rest = f"... and {len(shown) - lines} lines more: {where}"
             found += [rest, "or in a shell: eomgen derive MODEL --format text"]
-        if told := printed.told_of_numbers:
+        if told := printed.told:
             found += ["", *fold(told, columns, "", "  ")]
     if printed.states:
         found += ["", "first-order states"]

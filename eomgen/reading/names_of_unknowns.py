@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
+from ..describe.printed_names import MULTIPLIERS, numbered
 from ..kinematics import Kinematics
 from ..kinematics.state import acceleration_name
 from ..notation.notation import Notation
@@ -34,7 +35,7 @@ def multiplier_names(kinematics: Kinematics, count: int) -> tuple[str, ...]:
     given = kinematics.mechanism.given
     if given is not None and count == len(given.multipliers):
         return given.multipliers
-    return _free(kinematics, ("lambda", "multiplier"), lambda word: [f"{word}_{k + 1}" for k in range(count)])
+    return _free(kinematics, MULTIPLIERS, lambda word: numbered(word, count))
 
 
 def wrench_names(kinematics: Kinematics, joint: str) -> tuple[str, ...]:

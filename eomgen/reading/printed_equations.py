@@ -207,12 +207,15 @@ class PrintedEquations:
         return any(x == NumberPart("0") for row in self.mass_matrix for x in row)
 
     @property
-    def told_of_numbers(self) -> str:
-        """What is said of numbers when all formulas have been made; empty where all of their digits are printed."""
-        if not self.formula.rounded:
-            return ""
-        kept = "eqs.tree_system has" if self.of_loops else "eqs.mass_matrix and eqs.force have"
-        return f"Long numbers are rounded to {self.digits} digits; {kept} all of them."
+    def told(self) -> str:
+        """What is said when all formulas have been made, of digits that are not printed and of signs; often empty."""
+        found = []
+        if self.formula.signs:
+            found.append("sgn(x) is short for x/|x|, which has no value at x = 0.")
+        if self.formula.rounded:
+            kept = "eqs.tree_system has" if self.of_loops else "eqs.mass_matrix and eqs.force have"
+            found.append(f"Long numbers are rounded to {self.digits} digits; {kept} all of them.")
+        return " ".join(found)
 
     def text(self, formula: Formula) -> str:
         """A formula in text."""

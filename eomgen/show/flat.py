@@ -9,8 +9,9 @@ import numpy as np
 from ..limits.pictures import SAME
 from .colors import color_of, style_of
 from .data import Array
-from .label_places import NAME_STYLE, NAMES, name_offsets, outline
+from .label_places import NAME_STYLE, NAMES, name_offsets
 from .scene import ROLES, Item, Scene, passed
+from .solids import outline
 
 SPACE = 7.0  #: largest edge of a figure of its own (inch)
 LEAST = 2.8

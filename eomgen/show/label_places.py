@@ -10,6 +10,7 @@ import numpy as np
 
 from .data import Array
 from .scene import Scene
+from .solids import outline
 
 NAMES = "0.25"  #: colour of names of joints
 SIZE = 8.0  #: of the font
@@ -111,24 +112,3 @@ def places(
         taken.append((point + best, half))
         found.append(best)
     return found
-
-
-def outline(points: Array) -> Array:
-    """Corners (m, 2) of the convex hull of points (n, 2), in order (Andrew's monotone chain)."""
-    order = np.unique(points.round(12), axis=0)
-    if len(order) < 3:
-        return order
-
-    def chain(several: Array) -> list[Array]:
-        found: list[Array] = []
-        for p in several:
-            while len(found) > 1 and _turn(found[-2], found[-1], p) <= 0.0:
-                found.pop()
-            found.append(p)
-        return found[:-1]
-
-    return np.array(chain(order) + chain(order[::-1]))
-
-
-def _turn(a: Array, b: Array, c: Array) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..limits.pictures import SAME
 from .data import Array
 
 Triangles = NDArray[np.int64]
@@ -14,6 +15,8 @@ Mesh = tuple[Array, Triangles]
 
 AROUND = 20  #: corners of a circle
 ROUND = 48  #: those of the circles of a body's own shapes, which may be as large as the picture
+
+LATITUDES = np.linspace(-np.pi / 2, np.pi / 2, 11)[1:-1]  #: of the circles of a ball (rad)
 
 
 def box(size: Sequence[float]) -> Mesh:
@@ -27,12 +30,16 @@ def box(size: Sequence[float]) -> Mesh:
 def turned(radii: Sequence[float], heights: Sequence[float], around: int = AROUND) -> Mesh:
     """A solid of revolution about z: circles of radii at heights, from below to above, closed at both ends."""
     angles = 2.0 * np.pi * np.arange(around) / around
-    rings = [
-        np.column_stack([r * np.cos(angles), r * np.sin(angles), np.full(around, z)])
-        for r, z in zip(radii, heights, strict=True)
-    ]
-    ends = np.array([[0.0, 0.0, heights[0]], [0.0, 0.0, heights[-1]]])
-    vertices = np.vstack([*rings, ends])
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    return closed([(r * circle, z) for r, z in zip(radii, heights, strict=True)])
+
+
+def closed(rings: Sequence[tuple[Array, float]]) -> Mesh:
+    """A solid of rings of as many points (n, 2) each and their heights, from below to above, closed at both ends."""
+    around = len(rings[0][0])
+    layers = [np.column_stack([ring, np.full(around, z)]) for ring, z in rings]
+    ends = np.array([layers[0].mean(axis=0), layers[-1].mean(axis=0)])
+    vertices = np.vstack([*layers, ends])
     low, high = len(vertices) - 2, len(vertices) - 1
     faces = []
     for i in range(around):
@@ -53,8 +60,7 @@ def cylinder(radius: float, length: float, around: int = AROUND) -> Mesh:
 
 def sphere(radius: float) -> Mesh:
     """A sphere about its centre."""
-    way = np.linspace(-np.pi / 2, np.pi / 2, 11)[1:-1]
-    return turned(list(radius * np.cos(way)), list(radius * np.sin(way)))
+    return turned(list(radius * np.cos(LATITUDES)), list(radius * np.sin(LATITUDES)))
 
 
 def capsule(radius: float, length: float) -> Mesh:
@@ -113,6 +119,47 @@ def hull(points: Array) -> Mesh | None:
 
 
 def rounded(points: Array, radius: float) -> Mesh | None:
-    """The hull of quaternions about points (n, 3): a bar between two, a plate with round corners over three."""
-    ball = sphere(radius)[0]
-    return hull((points[:, None] + ball[None]).reshape(-1, 3))
+    """The hull of balls about points (n, 3): a bar between two, a plate with round corners over three."""
+    middle = points.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(points - middle)
+    if len(sizes) == 3 and sizes[2] > SAME * sizes[0]:
+        ball = sphere(radius)[0]
+        return hull((points[:, None] + ball[None]).reshape(-1, 3))
+    axes[2] = np.cross(axes[0], axes[1])
+    vertices, faces = plate(outline((points - middle) @ axes[:2].T), radius)
+    return vertices @ axes + middle, faces
+
+
+def plate(corners: Array, radius: float) -> Mesh:
+    """The hull of balls about the corners (n, 2) of a convex polygon in the plane z = 0, in order."""
+    edges = np.roll(corners, -1, axis=0) - corners
+    normals = np.arctan2(-edges[:, 0], edges[:, 1])
+    rims, ways = [], []
+    for corner, before, turn in zip(corners, np.roll(normals, 1), normals - np.roll(normals, 1), strict=True):
+        turn %= 2.0 * np.pi
+        angles = before + np.linspace(0.0, turn, 2 + int(AROUND * turn / (2.0 * np.pi)))
+        ways.append(np.column_stack([np.cos(angles), np.sin(angles)]))
+        rims.append(np.tile(corner, (len(angles), 1)))
+    rim, way = np.vstack(rims), np.vstack(ways)
+    return closed([(rim + radius * np.cos(a) * way, radius * np.sin(a)) for a in LATITUDES])
+
+
+def outline(points: Array) -> Array:
+    """Corners (m, 2) of the convex hull of points (n, 2), in order (Andrew's monotone chain)."""
+    order = np.unique(points.round(12), axis=0)
+    if len(order) < 3:
+        return order
+
+    def chain(several: Array) -> list[Array]:
+        found: list[Array] = []
+        for p in several:
+            while len(found) > 1 and _turn(found[-2], found[-1], p) <= 0.0:
+                found.pop()
+            found.append(p)
+        return found[:-1]
+
+    return np.array(chain(order) + chain(order[::-1]))
+
+
+def _turn(a: Array, b: Array, c: Array) -> float:
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

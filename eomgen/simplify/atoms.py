@@ -65,11 +65,15 @@ class Atoms:
 
     def names(self, poly: Poly) -> frozenset[int]:
         """The atoms of names that stand in a polynomial, at any depth."""
-        while len(self._names) < len(self.table):  # what is inside an atom has smaller numbers
+        return frozenset().union(*(self.names_in(a) for monomial in poly for a, _ in monomial))
+
+    def names_in(self, atom: int) -> frozenset[int]:
+        """The atoms of names that an atom is made of, itself included."""
+        while len(self._names) <= atom:  # what is inside an atom has smaller numbers
             k = len(self._names)
             own = frozenset({k} if self.table[k].kind == "name" else ())
             self._names.append(own.union(*(self._names[part] for part in self.inside(k))))
-        return frozenset().union(*(self._names[a] for monomial in poly for a, _ in monomial))
+        return self._names[atom]
 
     def without_squared_signs(self, monomial: Monomial, kind: str) -> Monomial:
         """With x^2 for |x|^2; a sum in it is an atom of the kind."""

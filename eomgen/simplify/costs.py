@@ -11,6 +11,7 @@ OPERATION = 4.0  #: characters that an operation weighs: textbooks write about s
 SUM = 2.0  #: parentheses
 MIXED = 10.0  #: around a sum of unlike quantities, such as a length and a length times a cosine
 NESTED = 6.0  #: parentheses in parentheses
+STACKED = 30.0  #: a fraction in a fraction: it is set small, and no line is broken there
 
 
 class Costs:
@@ -21,6 +22,7 @@ class Costs:
         self.rates = rates
         self._of: list[float] = []
         self._roles_of: list[frozenset[str]] = []
+        self._fractions_of: list[int] = []
         self._products: dict[Monomial, float] = {}
 
     def of_atom(self, atom: int) -> float:
@@ -67,6 +69,8 @@ class Costs:
 
     def of_number(self, value: Number) -> float:
         """A coefficient without its sign, and the sign that joins it; nothing for 1."""
+        if value in (1, -1):
+            return 0.0
         size: Number = value if value > 0 else -value
         if isinstance(size, float):
             return len(repr(size)) + OPERATION + 1.0
@@ -82,7 +86,19 @@ class Costs:
         return found
 
     def _product(self, monomial: Monomial) -> float:
-        return sum(self.of_power(a, n) for a, n in monomial) + (OPERATION + 1.0) * (len(monomial) - 1)
+        cost = sum(self.of_power(a, n) for a, n in monomial) + (OPERATION + 1.0) * (len(monomial) - 1)
+        if any(n < 0 for _, n in monomial):
+            cost += STACKED * sum(self._fractions(a) for a, n in monomial if n > 0)
+        return cost
+
+    def _fractions(self, atom: int) -> int:
+        """How many fractions there are in a factored sum, at any depth."""
+        while len(self._fractions_of) <= atom:
+            kind, what = self.atoms.table[len(self._fractions_of)]
+            sums = [monomial for monomial, _ in what] if kind == "factor" else []
+            inside = sum(self._fractions_of[a] for monomial in sums for a, _ in monomial)
+            self._fractions_of.append(inside + sum(any(n < 0 for _, n in monomial) for monomial in sums))
+        return self._fractions_of[atom]
 
     def of_term(self, monomial: Monomial, x: Number) -> float:
         """A term of a sum with the sign that joins it; nothing where x is zero."""

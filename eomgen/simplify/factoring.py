@@ -27,7 +27,7 @@ from .atoms import (
     ratio,
     scaled,
 )
-from .costs import SUM, Costs
+from .costs import STACKED, SUM, Costs
 from .expansion import content
 
 PAIRS = 40  #: terms up to which all pairs are tried for their common factor
@@ -141,6 +141,8 @@ class Factoring:
             inside = [m for m in terms if common(m, divisor) == divisor]
             if len(inside) > 1 and len(inside) <= len(terms):
                 saved = (len(inside) - 1) * (self.costs.of_monomial(divisor) + 5.0) - SUM
+                if any(n < 0 for _, n in divisor):
+                    saved -= STACKED * sum(any(n < 0 for _, n in join(m, inverse(divisor))) for m in inside)
                 scores.append((-saved, divisor))
         return [divisor for saved, divisor in sorted(scores) if saved < 0]
 

@@ -26,6 +26,7 @@ from .inline import EACH, NAME, Named, inlined, is_plain
 from .literal import Literal
 from .mixed import Mixed
 from .shared_sums import SharedSums
+from .signs import with_signs
 
 WHOLE = (10**9,)
 SIZES = (1, 6, 16, 40, 120, *WHOLE)
@@ -280,4 +281,5 @@ class _Attempt:
 
     def _simplified(self, poly: Poly) -> Poly:
         """With fractions that can be divided divided, and sines and cosines joined."""
-        return self.expansion.angles.simplified(without_exact_quotients(poly, self.expansion.atoms))
+        atoms = self.expansion.atoms
+        return self.expansion.angles.simplified(with_signs(without_exact_quotients(poly, atoms), atoms))

@@ -12,6 +12,7 @@ from .costs import Costs
 from .inline import NAME, Named
 
 NUMBERED = re.compile(r"([A-Za-z]+?)_?(\d+)")
+LETTERED = re.compile(r"([A-Za-z]+)_([A-Za-z])")
 ROOT, BELOW = "r", "D"  #: begin names of roots and of denominators
 LONG = 30.0  #: length of a root or denominator from which it is worth a name
 CONSTANT = "k"  #: begins names of what parameters and numbers alone give
@@ -112,16 +113,18 @@ class GoodNames:
         )
 
     def _of_sum(self, poly: Poly) -> str | None:
-        """m_12 of m1 + m2."""
+        """m_12 of m1 + m2, m_FR of m_F + m_R."""
         if any(
             x != 1 or len(m) != 1 or m[0][1] != 1 or self.atoms.table[m[0][0]].kind != "sym" for m, x in poly.items()
         ):
             return None
-        parts = [NUMBERED.fullmatch(self.atoms.table[m[0][0]].what) for m in poly]
-        if len(parts) < 2 or not all(parts) or len({p[1] for p in parts if p}) != 1:
-            return None
-        digits = [p[2] for p in parts if p]
-        return f"{parts[0][1]}_{('' if max(map(len, digits)) == 1 else '_').join(digits)}" if parts[0] else None
+        names = [self.atoms.table[m[0][0]].what for m in poly]
+        for pattern in (NUMBERED, LETTERED):
+            parts = [part for name in names if (part := pattern.fullmatch(name))]
+            if len(parts) == len(names) > 1 and len({part[1] for part in parts}) == 1:
+                below = [part[2] for part in parts]
+                return f"{parts[0][1]}_{('' if max(map(len, below)) == 1 else '_').join(below)}"
+        return None
 
     def _is_constant(self, poly: Poly, constant: set[int]) -> bool:
         """Whether parameters and numbers alone are in it."""

@@ -30,6 +30,7 @@ def inlined(
     """Without names that are not worth it; the atoms in ``fixed`` keep theirs unless they read as well without."""
     costs = factoring.costs.of_terms
     every = [*named, *((-1, poly) for poly in polys)]
+    held = [expansion.atoms.names(poly) for _, poly in every]
     kept: list[int] = []
     same: dict[Frozen, Poly] = {}
 
@@ -37,10 +38,14 @@ def inlined(
         kept.append(k)
         same[freeze(value)] = {((every[k][0], 1),): 1}
 
+    def put_in(n: int, poly: Poly) -> None:
+        every[n] = (every[n][0], poly)
+        held[n] = expansion.atoms.names(poly)
+
     for k in range(len(named)):
         atom, value = every[k]
         value = same.get(freeze(value), value)  # of two of one value the second is the first
-        users = [n for n in range(k + 1, len(every)) if atom in expansion.atoms.names(every[n][1])]
+        users = [n for n in range(k + 1, len(every)) if atom in held[n]]
         if len(value) == 1 and len(users) > 1 and atom not in fixed:
             # named without its symbols and numbers, which may cancel
             inner, outer = _parted(expansion, value)
@@ -48,9 +53,9 @@ def inlined(
             put = [_put_in(expansion, factoring, every[n][1], atom, moved) for n in users]
             if inner != value and all(p is not None for p in put):
                 for n, p in zip(users, put, strict=True):
-                    every[n] = (every[n][0], p or {})
+                    put_in(n, p or {})
                 value = same.get(freeze(inner), inner)
-                every[k] = (atom, inner)
+                put_in(k, inner)
         tried = None
         if is_plain(value, expansion.atoms) or (atom not in fixed and (len(value) == 1 or len(users) == 1)):
             tried = [_put_in(expansion, factoring, every[n][1], atom, value) for n in users]
@@ -62,7 +67,7 @@ def inlined(
             keep(k, value)
             continue
         for n, p in zip(users, tried, strict=True):
-            every[n] = (every[n][0], p or {})
+            put_in(n, p or {})
     return [every[k] for k in kept], [p for a, p in every if a < 0]
 
 
@@ -96,7 +101,7 @@ def _can_replace(atoms: Atoms, poly: Poly, atom: int, value: Poly) -> bool:
             if a == atom:
                 if n != int(n) or (n < 0 and len(value) != 1):
                     return False
-            elif atom in atoms.names({((a, 1),): 1}):
+            elif atom in atoms.names_in(a):
                 kind, what = atoms.table[a]
                 if kind not in SUMS or not _can_replace(atoms, dict(what), atom, value):
                     return False
@@ -110,7 +115,7 @@ def _replaced(atoms: Atoms, poly: Poly, atom: int, value: Poly) -> Poly:
         for a, n in m:
             if a == atom:
                 term = multiply(term, _power(value, int(n)))
-            elif atom in atoms.names({((a, 1),): 1}):
+            elif atom in atoms.names_in(a):
                 kind, what = atoms.table[a]
                 inner = _replaced(atoms, dict(what), atom, value)
                 if kind == "factor" and n == 1 and len(inner) <= FEW:  # so that its terms may join

@@ -7,6 +7,7 @@ from fractions import Fraction
 from ..graph.traverse import reachable
 from .atoms import ONE, Poly, add, constant, freeze, inverse, multiply, number, scaled
 from .expansion import Expansion
+from .signs import factors_with_signs
 
 
 class Literal:
@@ -42,12 +43,14 @@ class Literal:
             return scaled(parts[0], -1)
         if kind == "mul":
             product = multiply(self._one_term(parts[0]), self._one_term(parts[1]))
-            return dict(
+            product = dict(
                 self.atoms.over_roots(self.atoms.without_squared_signs(m, "factor"), x) for m, x in product.items()
             )
+            return factors_with_signs(product, self.atoms)
         if kind == "div" and parts[1]:
             ((below, x),) = self._one_term(parts[1]).items()
-            return multiply(self._one_term(parts[0]), {inverse(below): Fraction(1) / x})
+            quotient = multiply(self._one_term(parts[0]), {inverse(below): Fraction(1) / x})
+            return factors_with_signs(quotient, self.atoms)
         if kind == "sqrt" and parts[0] and next(iter(parts[0])) != ONE:
             return {((self.atoms.id("factor", freeze(parts[0])), Fraction(1, 2)),): 1}
         if kind in ("sin", "cos"):

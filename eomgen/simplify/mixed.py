@@ -15,6 +15,7 @@ from ..graph.traverse import reachable
 from .atoms import ONE, SUMS, TURNS, Atoms, Poly, add, multiply, scaled
 from .expansion import Expansion
 from .factoring import Factoring
+from .signs import factors_with_signs
 
 PLAIN = ("sym", "pi", "name", *TURNS, *SUMS)  #: kinds of atoms of which inertia is made
 
@@ -48,7 +49,7 @@ class Mixed:
 
     def _whole(self, parts: Parts) -> Poly:
         """Both together, with common factors taken out."""
-        return self.factoring.factored(add(parts.kept, self.simplified(parts.out)))
+        return self.factoring.factored(add(factors_with_signs(parts.kept, self.atoms), self.simplified(parts.out)))
 
     def _parts(self, i: int) -> Parts:
         kind, *args = self.expansion.graph.nodes[i]

@@ -13,6 +13,7 @@ from ..graph.core import Graph
 from ..graph.sympy_raise import as_number, raise_operation
 from .atoms import SMALL, TURNS, Atoms, Monomial, Number, Poly
 from .factoring import Factoring
+from .signs import MADE
 
 
 class Raising:
@@ -81,6 +82,9 @@ class Raising:
             return self.expression(self.factoring.factored(dict(what)))
         if kind in TURNS:
             return self.turn(atom)
+        if kind == MADE:
+            of = self.expression(self.factoring.factored(dict(what[0])))
+            return of / sympy.Abs(of)
         return raise_operation(self.graph, kind, [self.expression(self.factoring.factored(dict(p))) for p in what])
 
 

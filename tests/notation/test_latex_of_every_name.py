@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import sympy
 
 import eomgen as eg
 from eomgen.describe.yaml_file import describe_yaml
@@ -108,6 +109,40 @@ def test_the_angle_of_a_contact_point_takes_latex() -> None:
     knife = text.replace("shape: roller", "shape: knife_edge").replace("radius: R}", r"latex: '\beta'}")
     with pytest.raises(ModelError, match="needs no coordinate of its own"):
         model(knife).derive()
+
+
+def test_multipliers_of_a_lagrangian_take_latex() -> None:
+    """A bead on a circle: the multiplier is the tension over twice the radius."""
+    text = r"""
+name: bead
+parameters: {m: 2, g: 9.81}
+lagrangian:
+  coordinates: [x, y]
+  expression: m*(x_dot**2 + y_dot**2)/2 - m*g*y
+  constraints: [x**2 + y**2 - 1]
+  latex: {x: '\xi', lambda_1: '\mu_{\rm s}'}
+initial: {y: -1, x_dot: 1}
+"""
+    equations = model(text).derive("augmented")
+    document = equations.explain()
+    assert r"\mu_{\rm s}" in document.markdown
+    assert r"\mu_{\rm s}" in document.latex
+    assert "<mi>μ</mi>" in document.html
+    assert r"\lambda_1" not in document.markdown
+    assert document.difference < 1e-10
+    given = {"m": 2, "g": 9.81, "x": 0, "y": -1, "x_dot": 1, "y_dot": 0}
+    rows = sympy.Matrix(equations.block_system.matrix).subs(given).LUsolve(equations.block_system.right.subs(given))
+    assert abs(float(rows[2])) == pytest.approx(2 * (9.81 + 1) / 2)  # m (g + v^2) / (2 r)
+
+    x, y = sympy.symbols("x y")
+    rates = sympy.symbols("x_dot y_dot")
+    L = (rates[0] ** 2 + rates[1] ** 2) / 2 - 10 * y
+    latex = {x: r"\xi", "lambda_1": r"\nu"}
+    same = eg.Model.from_lagrangian("bead", L, [x, y], constraints=[x**2 + y**2 - 1], latex=latex)
+    assert r"\nu" in same.derive("augmented").explain().markdown
+    for wrong in ("lambda_2", "lambda_0"):
+        with pytest.raises(ModelError, match=f"no coordinate '{wrong}'"):
+            model(text.replace("lambda_1", wrong)).derive()
 
 
 def test_other_names_are_refused() -> None:

@@ -25,7 +25,13 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.yaml"))
 HIGH = "⁰¹²³⁴⁵⁶⁷⁸⁹"
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "atan2", "hypot", "sqrt", "exp", "tanh")}
-FUNCTIONS |= {"ln": math.log, "sign": lambda x: math.copysign(1.0, x), "min": min, "max": max}
+FUNCTIONS |= {
+    "ln": math.log,
+    "sign": lambda x: math.copysign(1.0, x),
+    "sgn": lambda x: x / abs(x),
+    "min": min,
+    "max": max,
+}
 
 
 class Reader:

@@ -16,8 +16,8 @@ import eomgen as eg
 from eomgen.errors import MissingDependencyError, UsageError
 from eomgen.show import optional
 from eomgen.show.build_scene import build_scene
-from eomgen.show.label_places import outline
 from eomgen.show.scene import Scene
+from eomgen.show.solids import outline, rounded
 
 matplotlib.use("agg")
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -275,6 +275,25 @@ def test_an_outline_is_the_convex_hull() -> None:
     x, y = outline(points).T
     area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
     assert area == pytest.approx(ConvexHull(points).volume, rel=1e-9)
+
+
+@pytest.mark.parametrize("many", [2, 3, 7])
+@pytest.mark.parametrize("flat", [1e-3, 1.0])
+def test_bars_and_plates_are_hulls_of_balls(many: int, flat: float) -> None:
+    """Convex, closed, of outward faces, and as far from the points as the radius, all round."""
+    from scipy.spatial import ConvexHull
+
+    turn = np.linalg.qr(np.random.default_rng(many).normal(size=(3, 3)))[0]
+    points = (np.random.default_rng(2).uniform(-1, 1, (many, 3)) * [1.0, flat, 0.0]) @ turn + [3.0, -2.0, 1.0]
+    vertices, faces = rounded(points, 0.05)
+    inside = vertices - points.mean(axis=0)
+    a, b, c = (inside[faces[:, k]] for k in range(3))
+    volume = float((a * np.cross(b, c)).sum() / 6.0)
+    assert volume == pytest.approx(ConvexHull(vertices).volume, rel=1e-9)
+    for way in np.random.default_rng(3).normal(size=(50, 3)):
+        way /= np.linalg.norm(way)
+        reach = float((vertices @ way).max() - (points @ way).max())
+        assert 0.93 * 0.05 <= reach <= 0.05 * (1.0 + 1e-9)
 
 
 def test_pitch_circles_touch() -> None:

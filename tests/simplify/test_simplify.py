@@ -301,3 +301,24 @@ def test_terms_above_and_below_one_sum_are_not_taken_together() -> None:
     found = Factoring(atoms, Work(WORK)).factored(poly)
     assert len(found) == 2
     assert join(other, below) in found
+
+
+@pytest.mark.parametrize(
+    ("masses", "wanted"),
+    [
+        (("m1", "m2", "m3"), "m_123"),
+        (("m_B", "m_F", "m_R"), "m_BFR"),
+        (("m_B", "k_F", "m_R"), "k0"),
+        (("m_B", "m2", "m_R"), "k0"),
+    ],
+)
+def test_sums_of_parameters_of_one_letter_are_called_by_it(masses: tuple[str, ...], wanted: str) -> None:
+    graph = Graph()
+    total = graph.zero
+    for name in masses:
+        total = total + graph.symbol(name)
+    uses = [total * graph.symbol(f"u{i}") + total / graph.symbol(f"w{i}") for i in range(8)]
+    form = simplify(uses, sizes=(1,))
+    assert form is not None
+    named, _ = form.sympy(parameters=masses)
+    assert [str(symbol) for symbol, _ in named] == [wanted]
