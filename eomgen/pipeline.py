@@ -24,6 +24,7 @@ from .equations.positive import require_inertia
 from .errors import AssemblyError, EomgenError, ToolchainError, UsageError
 from .kinematics import Kinematics, analyse
 from .kinematics.mobility import Mobility, find_mobility
+from .kinematics.other_branches import other_branches
 from .kinematics.report import MechanismReport, report
 from .targets import TARGETS, find_target
 
@@ -191,7 +192,8 @@ def check(model: Builder) -> MechanismReport:
     found = report(equations.kinematics, equations.mobility)
     note = note_lost_digits(equations.kinematics, equations.mobility, equations.tree)
     more = [f"kinematics only (no masses, so no equations of motion): {idle}"] if idle else [note] if note else []
-    return replace(found, notes=[*found.notes, *more])
+    others = other_branches(equations.kinematics, equations.mobility)
+    return replace(found, notes=[*found.notes, *more], other_branches=others)
 
 
 @np.errstate(all="ignore")
