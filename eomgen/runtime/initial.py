@@ -64,7 +64,7 @@ class Initial:
         """Split values into positions and rates; raises UsageError for a name that is neither."""
         layout = self.layout
         rates = layout.v + layout.loop_rates
-        values = without_dots(values)
+        values = without_dots(values, layout.instances)
         for name in values:
             if name in layout.p:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")

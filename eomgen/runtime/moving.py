@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..texts import shown
-from .near_names import plain_name, unknown
+from .near_names import unknown
 from .refined import refined, states_at
 from .show_parts import load_show
 
@@ -53,7 +53,7 @@ def position(trajectory: Any, name: str, model: BoundModel | None = None) -> Arr
     """See :meth:`.trajectory.Trajectory.position`."""
     module = module_of(trajectory, model, "position")
     data = load_show("data").read_picture(module.metadata, module.p)
-    every = poses(trajectory, module)
+    every, name = poses(trajectory, module), module.layout.plain(name)
     if name in data.markers:
         frame = data.markers[name]
         if frame.body < 0:
@@ -75,6 +75,6 @@ def animate(trajectory: Any, file: Path | str | None, model: BoundModel | None, 
         module,
         file,
         states=lambda t: states_at(trajectory, module, t),
-        columns=lambda names: refined(trajectory, tuple(plain_name(name, trajectory.names) for name in names)),
+        columns=lambda names: refined(trajectory, tuple(map(module.layout.plain, names))),
         **options,
     )

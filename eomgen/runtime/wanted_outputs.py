@@ -69,7 +69,7 @@ class WantedInitial(Initial):
 
     def sort(self, values: Mapping[str, float]) -> Given:
         places = {name: value for name, value in values.items() if place_of_marker(name)}
-        others = without_dots({name: value for name, value in values.items() if name not in places})
+        others = {n: x for n, x in without_dots(values, self.layout.instances).items() if n not in places}
         rates = {name: value for name, value in others.items() if name in self.wanted_rates}
         positions = places | {name: value for name, value in others.items() if name in self.wanted_positions}
         given = super().sort({n: x for n, x in others.items() if n not in positions and n not in rates})
@@ -101,7 +101,7 @@ def find_wanted(kernels: Kernels, name: str, t: float) -> WantedPosition | Wante
     """
     if found := place_of_marker(name):
         return _place(kernels, name, found[1], "xyz".index(found[0]))
-    plain = name.replace(".", "_") if isinstance(name, str) else name  # tip_x of an instance leg is leg.tip_x too
+    plain = kernels.layout.plain(name)  # tip_x of an instance leg is leg.tip_x too
     return _output(kernels, plain, t) if plain in kernels.layout.y else None
 
 
@@ -155,10 +155,7 @@ def _scale(layout: Layout, unit: str, slopes: Array) -> float:
 def _place(kernels: Kernels, name: str, marker: str, axis: int) -> WantedPosition:
     layout, poses = kernels.layout, kernels.state("poses")
     data = load_show("data").read_picture(layout.metadata, kernels.context.p)
-    body, _, own = marker.rpartition(".")
-    marker = (
-        marker if marker in data.markers else f"{body.replace('.', '_')}.{own}"
-    )  # leg.thigh.knee of an instance leg
+    marker = layout.plain(marker)  # leg.thigh.knee of an instance leg
     if marker not in data.markers:
         raise unknown("marker", marker, data.markers)
     frame = data.markers[marker]
