@@ -13,7 +13,7 @@ from importlib.resources import files
 
 #: What runs without models, equations and SymPy: files of the root, and folders.  Imports of anything else are for
 #: modules that know their equations, which those of a package do not.
-ALONE = ("errors", "kernel_table", "marker_places", "suggestions", "targets", "texts", "analysis", "api", "device",
+ALONE = ("errors", "instance_names", "kernel_table", "marker_places", "suggestions", "targets", "texts", "analysis", "api", "device",
          "ensembles", "files", "identification", "limits", "notation", "numeric", "operations", "runtime", "show",
          "simulation", "verification")  # fmt: skip
 

@@ -17,7 +17,7 @@ from .initial import Given, Initial
 from .kernels import Kernels
 from .layout import Layout
 from .near_names import require_mapping
-from .room import read_number, read_numbers, read_value
+from .room import read_number, read_numbers
 
 
 class Assembled:
@@ -170,7 +170,7 @@ class Assembled:
         """The assembly to these values, and the values as positions and rates."""
         if values is not None:
             require_mapping("initial values", values)
-        numbers = {name: read_value(name, value) for name, value in {**(values or {}), **named}.items()}
+        numbers = {name: read_number(name, value) for name, value in {**(values or {}), **named}.items()}
         initial = self._initial(t, p, u, numbers)
         return initial, initial.sort(numbers)
 

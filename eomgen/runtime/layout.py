@@ -14,7 +14,7 @@ from ..errors import UsageError
 from ..kernel_table import NAMED, Sizes
 from ..numeric.scales import Array, Scales, Space
 from .near_names import check_names, plain_name, without_dots
-from .room import read_numbers, read_value
+from .room import read_number, read_numbers
 
 ABI = 1  #: layout of the metadata this file reads
 
@@ -200,7 +200,7 @@ class Layout:
             check_names(what, given, names)
             result = np.array(current, dtype=float)
             for name, value in given.items():
-                result[names.index(name)] = read_value(f"{what} {name}", value)
+                result[names.index(name)] = read_number(f"{what} {name}", value)
         else:
             result = read_numbers(f"the {what}s", given)
         if result.shape != (len(names),):

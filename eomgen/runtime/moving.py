@@ -12,6 +12,7 @@ from ..numeric.scales import Array
 from ..texts import shown
 from .near_names import unknown
 from .refined import refined, states_at
+from .room import read_number
 from .show_parts import load_show
 
 if TYPE_CHECKING:
@@ -70,11 +71,12 @@ def animate(trajectory: Any, file: Path | str | None, model: BoundModel | None, 
     """See :meth:`.trajectory.Trajectory.animate`."""
     module = module_of(trajectory, model, "an animation")
     show = load_show("animate")
+    numbers = {k: read_number(k, options[k]) for k in ("fps", "speed", "dpi") if isinstance(options.get(k), str)}
     return show.animate(
         trajectory,
         module,
         file,
         states=lambda t: states_at(trajectory, module, t),
         columns=lambda names: refined(trajectory, tuple(map(module.layout.plain, names))),
-        **options,
+        **(options | numbers),
     )
