@@ -90,7 +90,7 @@ def close_nearest(
 
     best = attempt(aim.start, 0, free._replace(equations=aim.cut) if aim.cut else None)
     for count, place in enumerate(_places(aim, free, held), 1):
-        if best is not None and (best.distance <= MEASURED or count > TURNED and best.distance <= BESIDE):
+        if best is not None and (best.distance <= MEASURED or (count > TURNED and best.distance <= BESIDE)):
             break
         found = attempt(place, count, held)
         if found is not None and (best is None or _nearer(found, best, free)):
@@ -114,9 +114,7 @@ def _nearer(found: Assembly, best: Assembly, free: ClosureSystem) -> bool:
     return found.distance < best.distance - MEASURED
 
 
-def differences(
-    system: ConstraintSystem, q: Array, guess: Mapping[str, float]
-) -> tuple[tuple[str, float, float], ...]:
+def differences(system: ConstraintSystem, q: Array, guess: Mapping[str, float]) -> tuple[tuple[str, float, float], ...]:
     """Guessed coordinates with their guess and their value at a position, the largest scaled difference first."""
     wanted = system.wanted(guess, list(guess))
     if wanted is None:

@@ -106,7 +106,7 @@ def read_vector(what: str, given: Any, n: int, error: type[Exception] = UsageErr
     ------
     error
     """
-    found = as_real(with_numbers(what, given))
+    found = as_real(given)
     if found is None:
         raise error(f"{what} must hold real numbers, ({n},), not {shown(given)}")
     if found.shape != (n,):
@@ -130,7 +130,17 @@ def read_times(what: str, given: Any, per_time: int) -> Array:
 
 
 def read_number(what: str, given: Any) -> float:
-    """One finite real number.
+    """One finite real number, or an expression of numbers as text: ``"10*pi/180"``.
+
+    Raises
+    ------
+    UsageError
+    """
+    return read_plain(what, read_text(what, given) if isinstance(given, str) else given)
+
+
+def read_plain(what: str, given: Any) -> float:
+    """One finite real number, as compiled code takes it, which reads no texts.
 
     Raises
     ------
@@ -139,7 +149,7 @@ def read_number(what: str, given: Any) -> float:
     if type(given) is float:
         result = given
     else:
-        found = as_real(read_text(what, given) if isinstance(given, str) else given)
+        found = as_real(given)
         if found is None or found.ndim:
             raise UsageError(f"{what} must be a number, not {shown(given)}")
         result = float(found)

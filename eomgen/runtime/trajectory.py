@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .near_names import find_lacking, require, plain_name, unknown
+from .near_names import find_lacking, plain_name, require, unknown
 from .room import read_numbers
 from .run_parts import Named, Residuals
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -178,8 +179,11 @@ def _marker(kernels: Kernels, name: str, what: str, marker: str) -> WantedPositi
 
     sizes = np.where([kind == "length" for kind in layout.coordinate_kinds], layout.length, 1.0)
 
+    def moved(q: Array, step: Array, t: float, h: float) -> float:
+        return value(q + h * step, t)
+
     def rate(q: Array, t: float) -> tuple[Array, float]:
-        by_q = [_slope(lambda h, k=k: value(q + h * sizes * (np.arange(len(q)) == k), t)) for k in range(len(q))]
+        by_q = [_slope(partial(moved, q, step, t)) for step in np.diag(sizes)]
         moves = np.stack([layout.scales.rates(q, unit) for unit in np.eye(layout.n_v)], axis=1)
         return np.array(by_q) / sizes @ moves, 0.0  # places depend on time by coordinates alone
 

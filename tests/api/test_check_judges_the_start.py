@@ -55,7 +55,11 @@ WRONG = [  # the text, and the place and the words of the fault
     (arm("square: 1"), "initial.square", "not linearly"),
     (arm("q: k", value=""), "parameters.k", "has no value"),
     (arm("A_e0: 0.5, A_e1: 0.5", BALL), "", "length 0.707107, not 1"),
-    (four_bar("theta: 1.0, theta_dot: 1, psi_dot: 100"), "initial.theta_dot", "velocities theta_dot = 1, psi_dot = 100"),
+    (
+        four_bar("theta: 1.0, theta_dot: 1, psi_dot: 100"),
+        "initial.theta_dot",
+        "velocities theta_dot = 1, psi_dot = 100",
+    ),
     (four_bar("theta: 1.0, psi: 0.1"), "joints.C", "inconsistent"),
 ]
 
@@ -91,10 +95,11 @@ def test_both_refuse(text: str, place: str, said: str, tmp_path: Path) -> None:
 
 
 def test_a_start_beyond_a_limit_is_noted_as_a_run_warns(tmp_path: Path) -> None:
+    path = tmp_path / "model.yaml"
+    path.write_text(arm("q: 2"), encoding="utf-8")
+    mod = eg.load(path).compile(target="numpy")
     with pytest.warns(UserWarning, match="passes limits of joints: q upper 1"):
-        path = tmp_path / "model.yaml"
-        path.write_text(arm("q: 2"), encoding="utf-8")
-        eg.load(path).compile(target="numpy").simulate((0, 1e-3))
+        mod.simulate((0, 1e-3))
     (note,) = (note for note in check(arm("q: 2"), tmp_path).notes if "limit" in note)
     assert note.startswith("q starts at 2, beyond its upper limit 1")
     assert not [note for note in check(arm("q: 1"), tmp_path).notes if "limit" in note]

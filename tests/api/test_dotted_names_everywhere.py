@@ -31,7 +31,10 @@ add:
   b: {component: arm, prefix: PREFIXb, at: a.rod.end}
 """
 # with an underscore, as is usual, and without
-PREFIXES = {"a_": TEXT.replace("PREFIXa", "a_").replace("PREFIXb", "b_"), "a": TEXT.replace("PREFIXa", "a").replace("PREFIXb", "b")}
+PREFIXES = {
+    "a_": TEXT.replace("PREFIXa", "a_").replace("PREFIXb", "b_"),
+    "a": TEXT.replace("PREFIXa", "a").replace("PREFIXb", "b"),
+}
 RANGE = np.linspace(0.0, 0.5, 4)
 
 
@@ -61,7 +64,7 @@ DOORS: dict[str, Door] = {
                                         inputs={n("b.tau"): 0.1}).x,
     "column": lambda m, n: m.simulate(0.1)[n("b.height")],
     "position of a run": lambda m, n: m.simulate(0.1).position(n("b.rod.end")),
-    "simulate_many": lambda m, n: m.simulate_many(0.1, initial={n("a.q"): [0.1, 0.2]}, parameters={n("b.l"): [0.4, 0.5]},
+    "simulate_many": lambda m, n: m.simulate_many(0.1, {n("a.q"): [0.1, 0.2]}, {n("b.l"): [0.4, 0.5]},
                                                   inputs={n("a.tau"): [0.0, 0.1]})[n("b.q")],
     "simulate_many of a place": lambda m, n: m.simulate_many(0.1, initial={f"x({n('a.rod.end')})": [0.1, 0.2]}).x,
     "grid": lambda m, n: m.simulate_many(0.1, grid={n("a.q"): [0.1, 0.2], n("b.l"): (0.4, 0.5, 2)}).x,
@@ -73,7 +76,8 @@ DOORS: dict[str, Door] = {
     "motion_range": lambda m, n: m.motion_range(n("a.q"), within=(-0.5, 0.5)).upper,
     "workspace": lambda m, n: m.workspace({n("a.q"): (0, 1, 4), n("b.q"): (0, 1, 3)}, n("b.height")).values,
     "consistent": lambda m, n: m.consistent(m.x0() + 1e-3, weights={n("a.q"): 3.0}, hold=[n("b.q")]),
-    "actuator_forces": lambda m, n: m.actuator_forces(0.0, m.x0(), {n("a.q"): 1.0}, actuated=[n("a.q"), n("b.q")]).forces,
+    "actuator_forces": lambda m, n: m.actuator_forces(0.0, m.x0(), {n("a.q"): 1.0}, actuated=[n("a.q"), n("b.q")])
+    .forces,
     "fit": lambda m, n: m.fit(m.simulate(0.1, t_eval=[0.0, 0.05, 0.1]), parameters=[n("a.l")]).values,
 }  # fmt: skip
 

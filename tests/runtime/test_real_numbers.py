@@ -103,11 +103,9 @@ DOORS: dict[str, Callable[[Any, Any], Any]] = {
 
 
 #: Doors of one number that a user writes, which may be an expression of numbers as text.
-WRITTEN = ("named", "named parameter", "initial", "end", "guess", "tolerance", "size of a step", "time of a step",
-           "reactions")  # fmt: skip
+WRITTEN = ("named", "named parameter", "initial", "end", "guess", "tolerance", "reactions")
 #: Doors of lists of numbers, in which there may be such texts.
-LISTED = ("parameters", "step", "late kernel", "integrator", "bound", "independent", "minimal", "times kept", "table",
-          "runs", "range")  # fmt: skip
+LISTED = ("late kernel", "bound", "independent", "minimal", "times kept", "table", "runs", "range")
 TEXTS = {"text", "text in an array", "text as an object"}
 LOOPS = ("state", "constraints", "independent", "minimal", "reactions", "late kernel")
 PLACES = [("pendulum", door) for door in DOORS] + [("four_bar", door) for door in LOOPS]

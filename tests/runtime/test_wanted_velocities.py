@@ -125,7 +125,9 @@ def written(folder: Path, text: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    "give", [given_to_x0, given_to_simulate, given_to_many, given_in_the_file, given_in_python], ids=lambda f: f.__name__
+    "give",
+    [given_to_x0, given_to_simulate, given_to_many, given_in_the_file, given_in_python],
+    ids=lambda f: f.__name__,
 )
 def test_every_place_of_initial_values_takes_them(give: Callable[[str, str, Path], float], tmp_path: Path) -> None:
     assert give(ARM, "-0.3", tmp_path) == pytest.approx(0.3 / (0.8 * sin(0.6)), rel=1e-12)
