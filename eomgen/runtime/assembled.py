@@ -52,8 +52,9 @@ class Assembled:
         ----------
         values, **named : float
             Coordinates and velocities (``theta``, ``theta_dot``) of the tree or of cut joints, outputs of positions or
-            velocities (``tip_x``) and places of markers (``"x(rod.tip)"``), held exactly; the rest is solved.  Without
-            any, the declared initial values are held; else they are kept where they leave room.
+            velocities (``tip_x``), places and velocities of markers (``"x(rod.tip)"``, ``"vx(rod.tip)"``), held
+            exactly; the rest is solved.  Without any, the declared initial values are held; else they are kept where
+            they leave room.
         t : float
             Time (s); matters for driven constraints only.
         p, u : optional
