@@ -89,8 +89,8 @@ def close_nearest(
         return Assembly(q, residual, count, float(np.linalg.norm(aim.distances(q))))
 
     best = attempt(aim.start, 0, free._replace(equations=aim.cut) if aim.cut else None)
-    for count, place in enumerate(_places(aim, free, held), 1):
-        if best is not None and (best.distance <= MEASURED or (count > TURNED and best.distance <= BESIDE)):
+    for count, (place, enough) in enumerate(_places(aim, free, held), 1):
+        if best is not None and best.distance <= enough:
             break
         found = attempt(place, count, held)
         if found is not None and (best is None or _nearer(found, best, free)):
@@ -98,12 +98,14 @@ def close_nearest(
     return best and best._replace(distance=largest(aim.distances(best.q)))
 
 
-def _places(aim: Guess, free: ClosureSystem, held: ClosureSystem) -> Iterator[Array]:
-    """Where to begin: other places of what is not guessed, then of all that may move."""
+def _places(aim: Guess, free: ClosureSystem, held: ClosureSystem) -> Iterator[tuple[Array, float]]:
+    """Where to begin: other places of what is not guessed, then of all that may move; and the distance of a position
+    beside which no further one is looked for."""
     scales = aim.system.scales
-    if held.free.any():
-        yield from islice(starts(aim.start, held.free, scales, TURNED), TURNED)
-    yield from islice(starts(aim.start, free.free, scales, 4 * SHIFTED), 1, SHIFTED + 1)
+    for place in islice(starts(aim.start, held.free, scales, TURNED), TURNED if held.free.any() else 0):
+        yield place, MEASURED
+    for place in islice(starts(aim.start, free.free, scales, 4 * SHIFTED), 1, SHIFTED + 1):
+        yield place, BESIDE
 
 
 def _nearer(found: Assembly, best: Assembly, free: ClosureSystem) -> bool:
