@@ -12,7 +12,7 @@ from ..errors import UsageError
 from ..limits.constraints import STATE as RANK
 from ..numeric import algebra
 from ..numeric.scales import Array, Scales
-from ..runtime.room import as_real, read_numbers
+from ..runtime.room import as_real, read_number, read_numbers, with_numbers
 from ..texts import shown
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: An
         raise UsageError(f"x of shape {state.shape} contains no state")
     single = state.ndim == 1
     columns = state[:, None] if single else state
-    time = as_real(t)
+    time = as_real(read_number("t", t) if isinstance(t, str) else with_numbers("t", t))
     if time is None:
         raise UsageError(f"t must be a number or an array of them, not {shown(t)}")
     if time.ndim > 1 or (time.ndim == 1 and len(time) != columns.shape[1]):

@@ -14,7 +14,7 @@ from ..runtime.assembled import initial_of
 from ..runtime.initial import Initial
 from ..runtime.near_names import read_names, unknown
 from ..runtime.refusals import refuse_sampled, require_velocities
-from ..runtime.room import read_number, read_numbers, read_value
+from ..runtime.room import read_number, read_numbers
 from .balance_search import find_balance
 from .balanced import Equilibrium, describe, read_coordinates
 from .search import Search
@@ -75,7 +75,7 @@ def equilibrium(
     unknowns = read_names("unknowns", unknowns)
     by_name = isinstance(hold, Mapping)
     wanted: dict[str, float | None] = dict(hold) if by_name else dict.fromkeys(read_names("hold", hold))  # type: ignore[arg-type]
-    given = {name: read_value(f"hold: {name}", value) for name, value in wanted.items() if value is not None}
+    given = {name: read_number(f"hold: {name}", value) for name, value in wanted.items() if value is not None}
     initial = Initial(module.kernels, time)
     if initial.sort(given).rates:
         raise UsageError(f"hold takes coordinates, not rates or states: {', '.join(initial.sort(given).rates)}")
@@ -102,7 +102,7 @@ def _states(module: BoundModel, guess: Any) -> Array:
     layout = module.layout
     if guess is None or isinstance(guess, Mapping):
         given = {**layout.initial, **(guess or {})}
-        return np.array([read_value(name, given.get(name, 0.0)) for name in layout.states])
+        return np.array([read_number(name, given.get(name, 0.0)) for name in layout.states])
     whole = np.array(read_numbers("guess", guess))
     if whole.shape == (layout.n_x,):
         return whole[layout.n_x - len(layout.states) :]
@@ -114,7 +114,7 @@ def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) 
     initial = initial_of(module.kernels, t, guess if isinstance(guess, Mapping) else ())
     if guess is None or isinstance(guess, Mapping):
         named = {name: value for name, value in (guess or {}).items() if name not in module.layout.states}
-        values = {name: read_value(name, value) for name, value in named.items()}
+        values = {name: read_number(name, value) for name, value in named.items()}
         if initial.sort(values).rates:
             raise UsageError("guess is a position: name coordinates in it, not rates")
         loose = {name: value for name, value in values.items() if name not in held}

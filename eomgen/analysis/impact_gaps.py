@@ -12,6 +12,7 @@ from ..limits.impacts import ELSEWHERE
 from ..numeric.scales import Array
 from ..runtime.input_kinds import Expressed
 from ..runtime.layout import Layout
+from ..runtime.near_names import without_dots
 from ..runtime.room import read_number
 from ..runtime.signal_rates import derive, drift, moving_inputs, rate_pairs
 from ..runtime.tapes import DeclaredSignal
@@ -191,9 +192,10 @@ def check_gaps(
         raise UsageError("an impact needs gaps={name: restitution} or lock=[coordinates]")
     if layout.given_rates:
         raise UsageError("impacts need a model with q' = v, and the rates of this model's coordinates are given")
+    gaps, locked = without_dots(gaps or {}, layout.instances), [layout.plain(name) for name in locked]
     coordinates = [*layout.velocity_labels, *layout.loops]
     placed = [name for name in coordinates if name in layout.q + layout.loops]
-    for what, names, allowed in ((word, gaps or {}, [*placed, *layout.y]), (other, locked, coordinates)):
+    for what, names, allowed in ((word, gaps, [*placed, *layout.y]), (other, locked, coordinates)):
         for name in names:
             if name not in allowed:
                 near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")

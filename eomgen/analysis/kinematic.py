@@ -20,7 +20,7 @@ from ..numeric.scales import Array
 from ..runtime.given_start import Start, last_state
 from ..runtime.near_names import unknown
 from ..runtime.refusals import refuse_states, require_velocities
-from ..runtime.room import read_flag, read_numbers, read_value, require_room
+from ..runtime.room import read_flag, read_number, read_numbers, require_room
 from ..texts import shown
 from .driven_coordinates import DrivenCoordinates, DrivenPath
 from .followed_path import FollowedPath
@@ -198,7 +198,7 @@ def start_from(module: BoundModel, initial: Start, t0: float) -> tuple[float, Ar
             return t0, Initial(module.kernels, t0).assembled({})
     here = Initial(module.kernels, t0)
     if isinstance(initial, Mapping):
-        given = here.sort({name: read_value(name, value) for name, value in initial.items()})
+        given = here.sort({name: read_number(name, value) for name, value in initial.items()})
         if given.rates:
             raise UsageError(f"initial takes positions only, not {', '.join(given.rates)}")
         return t0, here.assembled(given.positions)

@@ -12,7 +12,7 @@ from types import MethodType
 from typing import TYPE_CHECKING, Any
 
 from ..errors import left_out
-from ..runtime.argument_names import both_names
+from ..runtime.argument_names import both_names, plain_names
 from ..runtime.bound_model import BoundModel
 from ..runtime.near_names import find_lacking
 
@@ -130,7 +130,7 @@ class LateMethod:
     @cached_property
     def function(self) -> Any:
         found = CALLS[self.name]
-        return both_names(found if callable(found) else find_function(found, self.name))
+        return plain_names(both_names(found if callable(found) else find_function(found, self.name)))
 
 
 class Module(BoundModel):

@@ -11,9 +11,11 @@ from importlib import import_module
 
 import click
 
+from ..errors import UsageError
 from ..suggestions import hint
 from ..texts import visible
-from .failures import USAGE
+from .failures import USAGE, to_dict
+from .screen import print_json
 
 #: verb -> what it does; the file of the same name in this folder holds the command of the same name.
 VERBS = {
@@ -116,6 +118,8 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
             code = eomgen.main(words, prog_name="eomgen", standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:  # wrong options, unknown verbs, files that cannot be read
+        if "--json" in words:
+            print_json(to_dict(UsageError(error.format_message())))
         vars(error)["message"] = visible(error.message)
         error.show()
         return USAGE

@@ -15,7 +15,7 @@ def _read(value: Any, what: str) -> Any:
     try:
         return float(value)
     except ValueError:
-        from ..runtime.constant_texts import constant
+        from ..describe.constant_texts import constant
 
     try:
         return constant(value, what)

@@ -82,11 +82,11 @@ def check_columns(module: Module, picture: Picture) -> None:
     UsageError
     """
     from ..runtime.columns import column_names
-    from ..runtime.near_names import plain_name, unknown
+    from ..runtime.near_names import unknown
 
     known = ("t", *column_names(module.layout))
     for name in (*picture.columns, *((picture.against,) if picture.against else ())):
-        if plain_name(name, known) not in known:
+        if module.layout.plain(name) not in known:
             raise unknown("column", name, known)
 
 

@@ -13,7 +13,7 @@ from ..analysis.tables import without_noise
 from ..errors import UsageError
 from ..limits.descriptions import RESTING
 from ..marker_places import place_of_marker
-from ..runtime.near_names import plain_name, unknown
+from ..runtime.near_names import unknown
 from ..runtime.storage import RUNS
 from .failures import after_integration, reports_failures
 from .number_option import NumberRange
@@ -196,7 +196,7 @@ def sort_settings(
     initial_names = [*module.x_names, *loops, *(name for name in module.y_names if name not in module.p_names)]
     groups = [[*initial_names, *filter(place_of_marker, settings)], module.p_names, module.u_names]
     known = [name for group in groups for name in group]
-    settings = {plain_name(name, known): value for name, value in settings.items()}  # leg1.hip of an instance
+    settings = {module.layout.plain(name): value for name, value in settings.items()}  # leg1.hip of an instance
     for name in settings:
         if name not in known:
             raise unknown("parameter, input or initial value", name, known)

@@ -249,21 +249,22 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
             result[name] = reader.expression(path, value)
         elif section == "initial" and (place := place_of_marker(name)):
             result[f"{place[0]}({place[1]})"] = reader.expression(path, value)
-            _check_place(reader, path, place[1])
+            _check_place(reader, path, *place)
         else:
             remedy = nearest(shown(name), known, _listed([_PLURAL[kind] for kind in kinds], "and"))
             reader.faults.add(path, f"no {_listed(kinds, 'or')} {quoted(name)}", remedy)
     return result
 
 
-def _check_place(reader: Reader, path: str, label: str) -> None:
-    """Note what is wrong with a marker whose place is an initial value."""
+def _check_place(reader: Reader, path: str, what: str, label: str) -> None:
+    """Note what is wrong with a marker whose place or velocity is an initial value."""
     marker = reader.markers.get(label) if "." in label else None
     if marker is None:
         named = [known for known, marker in reader.markers.items() if "." in known and marker.body != GROUND]
         reader.faults.add(path, f"no marker {quoted(label)}", nearest(label, named, "markers"))
     elif marker.body == GROUND:
-        reader.faults.add(path, "is a position on the ground, which does not move", "name a marker of another body")
+        kind = "velocity" if what.startswith("v") else "position"
+        reader.faults.add(path, f"is a {kind} on the ground, which does not move", "name a marker of another body")
 
 
 def _listed(words: Sequence[str], last: str) -> str:

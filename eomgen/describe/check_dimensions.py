@@ -90,7 +90,9 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
         if section == "states" and entry is not None and entry.path in units and steps[0] not in ("period", "offset"):
             wanted = units[entry.path].dimension.times(TIME, -1 if steps[0] == "rate" else 0)
         if steps and steps[0] in ("initial", "guess", "reset"):
-            wanted = LENGTH if place_of_marker(steps[-1]) else names.get(str(steps[-1]), Known(None)).dimension
+            wanted = names.get(str(steps[-1]), Known(None)).dimension
+            if place := place_of_marker(path.partition(".")[2]):
+                wanted = SPEED if place[0].startswith("v") else LENGTH
         certain = section == "outputs" and check.is_certain(expression)
         mass = _plain_mass(entry) if wanted == INERTIA and section == "bodies" else 0.0
         for message, remedy in check.faults(expression, wanted, certain, mass):

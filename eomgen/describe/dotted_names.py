@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..instance_names import undotted as undotted_name
 from .description import Description
 from .marker_quantities import ElementQuantity, MarkerQuantity
 from .rewritten_texts import rewritten
@@ -25,11 +26,7 @@ class Undotted(Visitor):
 
     def coordinate(self, name: str) -> str:
         """A name whose first part is an instance: its prefix and the rest, instances within instances too."""
-        head, _, rest = name.partition(".")
-        while rest and head in self.instances:
-            name = self.instances[head] + rest
-            head, _, rest = name.partition(".")
-        return name
+        return undotted_name(name, self.instances)
 
     body = coordinate
 

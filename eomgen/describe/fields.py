@@ -299,8 +299,8 @@ ADDED: Fields = {
     "prefix": Field("prefix", "text before each name of the component (the entry's name and _ unless given)"),
     "for": Field("loops", "variables and their lists of values; one instance for each value, numbered 1, 2, ..."),
     "at": Field("attached", "a marker for each attachment, or one for the only attachment or for its ground"),
-    "parameters": Field("values", "its parameters: numbers, or expressions that replace them"),
-    "inputs": Field("values", "its inputs: numbers, or expressions that replace them"),
+    "parameters": Field("measured", "its parameters: numbers, {value, unit}, or expressions that replace them"),
+    "inputs": Field("measured", "its inputs: numbers, {value, unit}, or expressions that replace them"),
     "initial": Field("values", "initial values, by names within the component"),
     "guess": Field("values", "rough coordinates, by names within the component"),
 }

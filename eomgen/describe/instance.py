@@ -10,6 +10,7 @@ from ..errors import Problem
 from .component_names import Attached, OwnNames, Renaming
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
 from .dotted_names import Undotted
+from .instance_values import read_given
 from .names import nearest
 from .placed_on import is_constant
 from .repetition import Fault
@@ -80,7 +81,7 @@ def add_instance(target: Description, component: Component, instance: Instance, 
     values = _values(component, instance, path, faults.add, told)
     if attached is None or values is None:
         return
-    numbers, texts = values
+    numbers, texts, units = values
     origins = {
         f"{section}.{entry.name}": f"{section}.{instance.prefix}{entry.name}"
         for section, entries in component.description.sections.items()
@@ -96,6 +97,7 @@ def add_instance(target: Description, component: Component, instance: Instance, 
                 made = visit_entry(section, entry, renaming)
                 if section in ("parameters", "inputs") and entry.name in numbers:
                     made.values["value"] = numbers[entry.name]
+                    made.values |= {"unit": units[entry.name]} if entry.name in units else {}
                 made.name = f"{instance.prefix}{entry.name}"
                 made.path = f"{section}.{made.name}"
                 target.sections[section].append(made)
@@ -160,8 +162,8 @@ def _attached(target: Description, reference: Any) -> Attached | None:
 
 def _values(
     component: Component, instance: Instance, path: str, fault: Fault, told: Fault
-) -> tuple[dict[str, Any], dict[str, str]] | None:
-    """Numbers of parameters and inputs that stay, and texts in the place of those that do not."""
+) -> tuple[dict[str, Any], dict[str, str], dict[str, str]] | None:
+    """Numbers of parameters and inputs that stay, texts in the place of those that do not; units given with numbers."""
     sound = True
     for name in instance.values:
         if name not in component.given:
@@ -169,11 +171,16 @@ def _values(
             place = instance.places.get(name, name)
             fault(f"{path}.{place}", f"{component.name} has no parameter or input {name!r}", remedy)
             sound = False
-    numbers, texts = dict[str, Any](), dict[str, str]()
+    numbers, texts, units = dict[str, Any](), dict[str, str](), dict[str, str]()
     for name, entry in component.given.items():
-        given = instance.values.get(name)
+        read = read_given(entry, instance.values.get(name), f"{path}.{instance.places.get(name, name)}", fault)
+        if read is None:
+            sound = False
+            continue
+        given = read.value
         if given is not None and is_constant(given):
             numbers[name] = given
+            units |= {} if read.unit is None else {name: read.unit}
         elif given is not None:
             texts[name] = str(given)
         elif not is_constant(value := entry.values.get("value")):  # in parameters of its own that stand before it
@@ -184,7 +191,7 @@ def _values(
                 sound = False
             renaming = Renaming(component.names, instance.prefix, dict(texts), {}, component.closed, told)
             texts[name] = str(renaming.scalar(value, Slot("parameters", "", "value", (), entry)))
-    return (numbers, texts) if sound else None
+    return (numbers, texts, units) if sound else None
 
 
 def _is_converted(unit: Any) -> bool:

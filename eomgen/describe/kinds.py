@@ -61,4 +61,5 @@ KINDS = {
     "loops": "a mapping of variables to lists, counts or {from, to, step}",
     "attached": "a marker, or a mapping of attachments to markers",
     "values": "a mapping of names to numbers or expressions",
+    "measured": "a mapping of names to numbers, expressions or {value, unit}",
 }

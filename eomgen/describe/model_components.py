@@ -82,7 +82,16 @@ class ComponentMethods(Described):
         self._description.values["attachments"] = [*self._description.values.get("attachments", ()), name]
         return MarkerHandle(self, name)
 
-    def add(self, component: Any, /, prefix: str = "", at: Any = None, **parameters: Any) -> InstanceHandle:
+    def add(
+        self,
+        component: Any,
+        /,
+        prefix: str = "",
+        at: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        inputs: Mapping[str, Any] | None = None,
+        **values: Any,
+    ) -> InstanceHandle:
         """Add all parts of another model (bodies, joints, forces, ...) with a prefix before their names.
 
         The component is copied: later changes of it do not change this model.  Its gravity, independent
@@ -97,9 +106,10 @@ class ComponentMethods(Described):
         at : marker, or mapping of names to markers, optional
             For each :meth:`attachment` the marker of this model in its place.  One marker alone stands for the only
             attachment; where there is none, for the component's ground.
-        **parameters
+        parameters, inputs, **values
             Values of its parameters and inputs.  A number makes it a parameter of this model with that value, so does
-            none; an expression of this model's parameters takes its place.
+            none; an expression of this model's parameters takes its place.  A number is in the component's unit, or in
+            that of a mapping: ``l={"value": 500, "unit": "mm"}``.
 
         Returns
         -------
@@ -115,7 +125,14 @@ class ComponentMethods(Described):
         part = _component(component)
         if prefix and fault_of_name(prefix):
             raise UsageError(f"prefix={prefix!r} cannot begin a name; use letters, digits and underscores")
-        values = {name: _plain(value) for name, value in parameters.items() if value is not None}
+        groups = {"parameters": parameters or {}, "inputs": inputs or {}, "": values}
+        for what, group in groups.items():
+            if not isinstance(group, Mapping):
+                raise UsageError(f"add {part.name}: {what} must be a mapping of names to values, not {group!r}")
+        given = [name for group in groups.values() for name in group]
+        if twice := sorted({name for name in given if given.count(name) > 1}):
+            raise UsageError(f"add {part.name}: {', '.join(twice)} given twice; give each value once")
+        numbers = {n: _plain(value) for group in groups.values() for n, value in group.items() if value is not None}
         description = self._description
         made = replace(description, lines=dict(description.lines), origins=dict(description.origins), problems=[])
         made.values, made.instances = dict(description.values), dict(description.instances)
@@ -124,7 +141,7 @@ class ComponentMethods(Described):
         faults = Faults(Description())
         named = named_attachments(part, self._references(at), "at", faults.add)
         name = prefix.rstrip("_") or part.name
-        instance = Instance(name, prefix, named or {}, values)
+        instance = Instance(name, prefix, named or {}, numbers)
         if named is not None and claim(made, instance, "prefix", faults.add):
             add_instance(made, part, instance, "add", faults)
         if faults:

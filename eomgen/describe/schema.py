@@ -169,6 +169,15 @@ _KINDS: dict[str, Schema] = {
     "matrix": {"type": "array", "items": {"type": "array", "items": _ref("expression")}},
     "prefix": {"type": "string", "pattern": "^([A-Za-z][A-Za-z0-9_]*)?$"},
     "values": {"type": "object", "additionalProperties": _ref("expression")},
+    "measured": {
+        "type": "object",
+        "additionalProperties": {
+            "anyOf": [
+                _ref("expression"),
+                _object({"value": _ref("expression"), "unit": {"type": "string"}}, ["value"]),
+            ]
+        },
+    },
     "loops": {
         "type": "object",
         "propertyNames": _ref("name"),

@@ -13,9 +13,9 @@ from importlib.resources import files
 
 #: What runs without models, equations and SymPy: files of the root, and folders.  Imports of anything else are for
 #: modules that know their equations, which those of a package do not.
-ALONE = ("errors", "kernel_table", "marker_places", "suggestions", "targets", "texts", "analysis", "api", "device",
-         "ensembles", "files", "identification", "limits", "notation", "numeric", "operations", "runtime", "show",
-         "simulation", "verification")  # fmt: skip
+ALONE = ("errors", "instance_names", "kernel_table", "marker_places", "suggestions", "targets", "texts", "analysis",
+         "api", "device", "ensembles", "files", "identification", "limits", "notation", "numeric", "operations",
+         "runtime", "show", "simulation", "verification")  # fmt: skip
 
 _TYPES = re.compile(r"^if TYPE_CHECKING:.*\n(?:(?: {4}.*)?\n)+", re.M)
 _IMPORT = re.compile(r"^( *)from (\.+)([\w.]*) import (?:\(([^)]*)\)|(.*))$", re.M)

@@ -37,7 +37,7 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
         A name that is not there, or given twice; a group that is an array.
     """
     require_mapping("grid", grid)
-    grid = without_dots(grid)
+    grid = without_dots(grid, module.layout.instances)
     if not grid:
         raise UsageError("grid has no names; give values by name, such as {'theta': (0, 1, 11)}")
     layout = module.layout
@@ -46,7 +46,7 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
     for what, given in zip(("initial", "parameters", "inputs"), groups, strict=True):
         if given is not None and not isinstance(given, Mapping):
             raise UsageError(f"{what} must be given by name beside a grid")
-        if twice := sorted({*grid} & {*without_dots(given or {})}):
+        if twice := sorted({*grid} & {*without_dots(given or {}, layout.instances)}):
             raise UsageError(f"grid: {', '.join(twice)} is given in {what} too; give it once")
     axes = grid_axes(grid)
     count = math.prod(map(len, axes.values()))
@@ -61,4 +61,4 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
 
 def grid_axes(grid: Mapping[str, Any]) -> dict[str, Array]:
     """The values of each name of a grid."""
-    return {name: np.asarray(read_axis(f"grid {name}", values)) for name, values in without_dots(grid).items()}
+    return {name: np.asarray(read_axis(f"grid {name}", values)) for name, values in grid.items()}

@@ -121,6 +121,7 @@ class Ensemble:
         return self.count
 
     def __getitem__(self, name: str) -> Array:
+        name = self._module.layout.plain(name)
         if name not in self.names:
             raise unknown("column", name, self.names)
         row = self.names.index(name)

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import EomgenError, UsageError
+from ..errors import AssemblyError, EomgenError, UsageError
 from ..marker_places import place_of_marker
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.assembled import initial_of
 from ..runtime.given_start import last_state
-from ..runtime.near_names import check_names
+from ..runtime.near_names import check_names, without_dots
 from ..runtime.room import read_numbers, require_room
 from ..simulation.clocks import at_next_samples
 from ..simulation.run_arguments import find_state
@@ -104,14 +104,17 @@ def collect_cases(
         Unknown names, values that are not finite, and lengths that differ, all named.
     """
     lengths: dict[str, int] = {} if count is None else {"count": read_count("count, of runs,", count)}
-    p = _bound("parameter", module.p_names, module.p, parameters, lengths)
-    u = _bound("input", module.u_names, module.u, inputs, lengths)
+    p = _bound("parameter", module, parameters, lengths)
+    u = _bound("input", module, inputs, lengths)
     states, values = None, {}
     if isinstance(initial, Mapping):
-        values = {str(name): _numbers(f"initial {name}", x, lengths) for name, x in initial.items()}
         layout = module.layout
+        initial = without_dots(initial, layout.instances)
+        values = {str(name): _numbers(f"initial {name}", x, lengths) for name, x in initial.items()}
         known = (*layout.x, *layout.loops, *layout.loop_rates, *layout.y, *filter(place_of_marker, values))
         check_names("coordinate or rate", values, known)
+        with suppress(AssemblyError):  # of values, which differ between runs
+            initial_of(module.kernels, 0.0, values).sort(dict.fromkeys(values, 0.0))  # names that no run can take
     elif initial is not None:
         states = _columns("initial", last_state(initial, module.x_names), module.x_names, lengths)
     _require_one_length(lengths)
@@ -233,12 +236,15 @@ def _shared(cases: Cases) -> dict[str, Any]:
     return {name: a for name, a in (("p", cases.p), ("u", cases.u)) if a.ndim == 1}
 
 
-def _bound(what: str, names: tuple[str, ...], base: Array, given: Any, lengths: dict[str, int]) -> Array:
+def _bound(what: str, module: BoundModel, given: Any, lengths: dict[str, int]) -> Array:
     """Values (n,) or (n, k) of parameters or inputs; those not given keep the bound ones."""
+    layout = module.layout
+    names, base = (layout.p, module.p) if what == "parameter" else (layout.u, module.u)
     if given is None:
         return base
     if not isinstance(given, Mapping):
         return _columns(f"{what}s", given, names, lengths)
+    given = without_dots(given, layout.instances)
     check_names(what, given, names)
     values = {name: _numbers(f"{what} {name}", x, lengths) for name, x in given.items()}
     _require_one_length(lengths)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric.counts import read_count
 from ..runtime.given_start import Span
-from ..runtime.near_names import check_names
+from ..runtime.near_names import check_names, without_dots
 from ..runtime.room import require_room, require_steps
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
@@ -171,7 +171,7 @@ def simulate_many(
                 store_of.save(index, *value)
     try:
         ensemble = _gather(module, cases, plan, reduction, parts, kept)
-        ensemble.grid = {} if grid is None else grid_axes(grid)
+        ensemble.grid = {} if grid is None else grid_axes(without_dots(grid, module.layout.instances))
         return ensemble
     except (KeyError, ValueError, TypeError, IndexError) as error:
         if store_of is None:

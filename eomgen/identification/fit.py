@@ -17,7 +17,7 @@ from ..limits.identification import MEASURED, ROUNDS
 from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array
 from ..runtime.near_names import check_names, read_names, require, require_mapping, unknown
-from ..runtime.room import read_value
+from ..runtime.room import read_number
 from .experiments import Experiment, read_experiments, read_sigma
 from .fit_result import Fit
 from .run_slopes import run_slopes
@@ -134,7 +134,7 @@ class _Problem:
         self.initial_names = tuple(name for name in self.names if name in self.states)
         self.sigma: dict[str, float] = {}
         self._check_starts()
-        self.start = np.array([read_value(name, start[name]) if start else self._bound(name) for name in self.names])
+        self.start = np.array([read_number(name, start[name]) if start else self._bound(name) for name in self.names])
 
     def _check_starts(self) -> None:
         for one in self.experiments:
@@ -155,7 +155,7 @@ class _Problem:
             return float(module.u[module.u_names.index(name)])
         given = self.experiments[0].initial or {}
         if name in given:
-            return read_value(name, given[name])
+            return read_number(name, given[name])
         x = module.x0(given, t=float(self.experiments[0].t[0]))
         if name in module.x_names:
             return float(x[module.x_names.index(name)])

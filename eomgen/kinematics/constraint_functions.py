@@ -12,6 +12,7 @@ from ..graph.evaluate import compile_evaluator
 from ..numeric import Assembly, Scales
 from ..numeric.closure import close
 from ..numeric.constraint_system import RESTARTS, ConstraintSystem, CutJoints
+from ..numeric.nearest_branch import close_nearest
 from ..numeric.scales import Space
 from .kinematics import Kinematics
 from .row_scales import row_scales
@@ -102,7 +103,21 @@ class ConstraintFunctions:
         rough = system.wanted(guess)
         if rough is not None:  # come near the guessed coordinates of cut joints first
             start = close(system.closure(given)._replace(equations=rough), start)[0]
-        for (name, _), value in zip(self.kinematics.hints, self._hints(start, system.t), strict=True):
-            if name not in given and name not in guess and np.isfinite(value):
-                start = system.with_values(start, {name: value})
-        return system.close(start, given, restarts)
+        return system.close(self._hinted(start, {**given, **guess}, system.t), given, restarts)
+
+    def close_nearest(self, given: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+        """Assemble with the given values exact, on the branch that is nearest to the guess."""
+        settled = self.system.settle(given), self.system.settle(guess)
+        known = {**settled[0], **settled[1]}
+        if guess:
+            found = close_nearest(self.system, self.neutral, *settled, lambda q: self._hinted(q, known, self.system.t))
+            if found is not None:
+                return found
+        return self.close(given, guess)
+
+    def _hinted(self, q: Array, known: Mapping[str, float], t: float) -> Array:
+        """A position with the coordinates of contact points that nobody knows where they may be."""
+        for (name, _), value in zip(self.kinematics.hints, self._hints(q, t), strict=True):
+            if name not in known and np.isfinite(value):
+                q = self.system.with_values(q, {name: value})
+        return q

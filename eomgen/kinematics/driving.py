@@ -48,7 +48,7 @@ def close_driven(functions: ConstraintFunctions, given: Mapping[str, float], gue
     """
     drivers = driver_rows(functions)
     try:
-        found = functions.close(given, guess)
+        found = functions.close_nearest(given, guess)
     except AssemblyError as error:
         if not drivers:
             raise

@@ -18,6 +18,7 @@ from ..numeric import (
     independent_rows,
     rank,
 )
+from ..numeric.nearest_branch import differences
 from ..records import dataclass
 from ..suggestions import hint, joined
 from .candidates import rate_candidates
@@ -68,6 +69,8 @@ class Mobility:
     assumed: bool = False
     residual: float = 0.0  #: largest scaled residual of the loops at the reference
     restarts: int = 0  #: further starts the assembly needed; 0 means it went straight from the initial values and guess
+    guessed: tuple[tuple[str, float, float], ...] = ()  #: coordinate, its guess, its value; largest difference first
+    guess_distance: float = 0.0  #: largest scaled difference of a guessed coordinate
     samples: tuple[tuple[float, ...], ...] = ()  #: the configurations, the reference first
     n_positions: int = 0
     instantaneous: int = 0  #: degrees of freedom at the reference, more than n_dof at a change point
@@ -117,7 +120,14 @@ def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mo
     require_finite(functions, found.q)
     later = follow_drivers(functions, found.q)
     judged = _partition(functions, [found.q, *_probe(functions, found.q), *later], wanted)
-    return replace(judged, residual=found.residual, restarts=found.restarts)
+    rough = {name: value for name, value in guess.items() if name in known and name not in positions}
+    return replace(
+        judged,
+        residual=found.residual,
+        restarts=found.restarts,
+        guessed=differences(functions.system, found.q, rough),
+        guess_distance=found.distance if rough else 0.0,
+    )
 
 
 def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:

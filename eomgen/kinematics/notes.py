@@ -12,6 +12,7 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import symbols_of
 from ..graph.traverse import reachable
 from ..limits.inertia import ACROSS
+from ..limits.motions import SLACK
 from ..operations import CHOICE, OPERATIONS
 from .kinematics import Kinematics
 from .mobility import Mobility
@@ -66,7 +67,23 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
         "or a joint that turns the body about the axis of its only moment"
         for name in _turned_out_of_plane(kinematics)
     ]
-    return notes
+    return notes + _beyond_limits(kinematics, mobility)
+
+
+def _beyond_limits(kinematics: Kinematics, mobility: Mobility) -> list[str]:
+    """Coordinates that start beyond a declared limit of their joint."""
+    m, at = kinematics.mechanism, dict(zip(kinematics.names, mobility.q_reference, strict=True))
+    declared = [pair for j in m.joints for pair in zip(j.coordinates, j.limits, strict=False)]
+    found = []
+    for name, limits in declared if m.limits_told and not mobility.assumed else ():
+        for key, limit in limits:
+            beyond = {"lower": limit - at.get(name, limit), "upper": at.get(name, limit) - limit}.get(key, 0.0)
+            if beyond > SLACK * (1.0 + abs(limit)):
+                found.append(
+                    f"{name} starts at {at[name]:.6g}, beyond its {key} limit {limit:g}; limits alone stop nothing: "
+                    "give another initial value, or add a force of type stop"
+                )
+    return found
 
 
 def _turned_out_of_plane(kinematics: Kinematics) -> list[str]:

@@ -13,6 +13,8 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
+from ..limits.constraints import MEASURED
+from ..limits.motions import BESIDE
 from ..records import dataclass
 from ..texts import html_text
 from .kinematics import Kinematics
@@ -44,6 +46,12 @@ class MechanismReport:
     candidates : dict of str to float
         Coordinates that can be independent at the reference configuration, the best first, and their conditioning: 1 is
         perfect, 0 not at all.
+    guessed : dict of str to list of two floats
+        The guess of a coordinate and the value found, the largest difference first; ``guess_distance`` is that
+        difference, angles in rad, lengths as a part of ``length_scale``.
+    other_branches : list of dict
+        Further closed positions with the same independent coordinates, which fit the initial values and the guess as
+        well: one coordinate that tells each apart, and its value there.
     notes : list of str
         Facts that deserve attention, each with a remedy.
     """
@@ -76,6 +84,9 @@ class MechanismReport:
     assembly_restarts: int
     assumed: bool
     elements: list[dict[str, Any]]
+    guessed: dict[str, list[float]]
+    guess_distance: float
+    other_branches: list[dict[str, float]]
 
     def draw(self, file: str | Path | None = None, ax: Any = None) -> Any:
         """Draw the mechanism as a graph: bodies above the bodies that carry them, joints between them.
@@ -144,17 +155,36 @@ class MechanismReport:
         if len(self.candidates) > len(self.independent):
             say("can be independent", _list([f"{name} {value:.2g}" for name, value in self.candidates.items()]))
         if self.loop_joints and not self.assumed:
-            tries = f"{self.assembly_restarts} restart{'s' * (self.assembly_restarts != 1)}"
-            away = f"after {tries}: one of several ways to close the loops; give a guess to choose one"
-            say("assembled", away if self.assembly_restarts else "on the branch next to the initial values and guess")
+            say("assembled", self._assembled())
+            if self.other_branches:
+                there = " or ".join(dict.fromkeys(_values(other) for other in self.other_branches))
+                say("", f"as near is a branch with {there}; a guess of {next(iter(self.other_branches[0]))} chooses")
         if self.assumed:
             lines.append("  some parameters have no value; random values were used to find the rank")
         lines += [f"  note: {note}" for note in self.notes]
         return "\n".join(lines)
 
+    def _assembled(self) -> str:
+        """On which branch the loops are closed."""
+        if self.guessed:
+            name, (guess, value) = next(iter(self.guessed.items()))
+            found = f"{name} = {value:.6g}, guessed {guess:.6g}"
+            if self.guess_distance > BESIDE:
+                return f"the guess lies next to no closed position; on the nearest branch found {found}"
+            exact = self.guess_distance <= MEASURED
+            return "at the guess" if exact else f"on the branch nearest to the guess ({found})"
+        if self.assembly_restarts:
+            tries = f"{self.assembly_restarts} restart{'s' * (self.assembly_restarts != 1)}"
+            return f"after {tries}: one of several ways to close the loops; give a guess to choose one"
+        return "from the initial values, and from 0 where there are none"
+
     def _repr_html_(self) -> str:
         text = f"<pre style='font-family:monospace'>{html_text(str(self))}</pre>"
         return side_by_side(picture_html(lambda: new_figure(self)), text) if self.bodies else text
+
+
+def _values(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
 
 
 def _list(names: list[str], limit: int = 12) -> str:
@@ -226,6 +256,9 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
             {"name": e.name, "type": e.type_name, "bodies": [names[k + 1] for k in _touched(kinematics, e)]}
             for e in m.constraints
         ],
+        guessed={name: [guess, value] for name, guess, value in mobility.guessed},
+        guess_distance=mobility.guess_distance,
+        other_branches=[],
     )
 
 

@@ -43,3 +43,6 @@ FLAT_CELL = 1e-12
 EXTREME = 1e-4
 #: Part of a path in time over which constraints are differenced at a position that stands still: the root of rounding.
 DRIFTED = 1e-6
+#: Scaled distance (rad, lengths) between a guess and a closed position that lie beside each other: angles then turn
+#: directions by less than a twentieth of a turn, and cosines, which close loops, by 5 %.
+BESIDE = 0.3

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..describe.constant_texts import constant
 from ..describe.description import Description
 from ..describe.names import nearest
 from ..errors import ModelError, UsageError
@@ -116,6 +117,7 @@ def _names(key: str, given: Any) -> Any:
     if key == "actuate" and isinstance(given, bool | np.bool_):
         return bool(given)
     if key == "lock" and isinstance(given, Mapping):
+        given = {name: constant(x, f"lock of {name}") if isinstance(x, str) else x for name, x in given.items()}
         for name, value in given.items():
             if not _is_number(value):
                 message = f"the value must be a finite number (rad or m), at most {LARGEST:g}"

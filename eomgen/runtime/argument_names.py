@@ -1,13 +1,16 @@
-"""Stage runtime: p and parameters, u and inputs name the same arguments, whichever of them a function has."""
+"""Stage runtime: p and parameters, u and inputs name the same arguments; ``leg.hip`` of an instance is ``leg_hip``."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
 from inspect import signature
-from typing import TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import UsageError
+
+if TYPE_CHECKING:
+    from .layout import Layout
 
 Function = TypeVar("Function", bound=Callable[..., object])
 PAIRS = (("p", "parameters"), ("u", "inputs"), ("parameters", "p"), ("inputs", "u"))
@@ -34,3 +37,31 @@ def both_names(function: Function) -> Function:
         return function(*args, **given)
 
     return call  # type: ignore[return-value]
+
+
+def plain_names(function: Function) -> Function:
+    """The same function of a model, which takes names of instances with dots, in lists and mappings too.
+
+    Texts that name nothing of the model, such as those of files, stay as they are.
+    """
+
+    @wraps(function)
+    def call(model, *args, **given):  # type: ignore[no-untyped-def]
+        layout = model.layout
+        if layout.instances:
+            args = tuple(_plain(layout, value) for value in args)
+            given = _plain(layout, given)
+        return function(model, *args, **given)
+
+    return call  # type: ignore[return-value]
+
+
+def _plain(layout: Layout, value: Any) -> Any:
+    if isinstance(value, str):
+        found = layout.plain(value)
+        return found if found in layout.names or found.partition(".")[0] in layout.bodies else value
+    if isinstance(value, dict):
+        return {_plain(layout, name): _plain(layout, x) for name, x in value.items()}
+    if type(value) in (list, tuple) and any(isinstance(x, str | dict | tuple) for x in value):
+        return type(value)(_plain(layout, x) for x in value)
+    return value

@@ -16,8 +16,8 @@ from .argument_names import both_names
 from .initial import Given, Initial
 from .kernels import Kernels
 from .layout import Layout
-from .near_names import require_mapping, without_dots
-from .room import read_number, read_numbers, read_value
+from .near_names import require_mapping
+from .room import read_number, read_numbers
 
 
 class Assembled:
@@ -52,8 +52,9 @@ class Assembled:
         ----------
         values, **named : float
             Coordinates and velocities (``theta``, ``theta_dot``) of the tree or of cut joints, outputs of positions or
-            velocities (``tip_x``) and places of markers (``"x(rod.tip)"``), held exactly; the rest is solved.  Without
-            any, the declared initial values are held; else they are kept where they leave room.
+            velocities (``tip_x``), places and velocities of markers (``"x(rod.tip)"``, ``"vx(rod.tip)"``), held
+            exactly; the rest is solved.  Without any, the declared initial values are held; else they are kept where
+            they leave room.
         t : float
             Time (s); matters for driven constraints only.
         p, u : optional
@@ -170,7 +171,7 @@ class Assembled:
         """The assembly to these values, and the values as positions and rates."""
         if values is not None:
             require_mapping("initial values", values)
-        numbers = {name: read_value(name, value) for name, value in {**(values or {}), **named}.items()}
+        numbers = {name: read_number(name, value) for name, value in {**(values or {}), **named}.items()}
         initial = self._initial(t, p, u, numbers)
         return initial, initial.sort(numbers)
 
@@ -195,7 +196,7 @@ class Assembled:
 def initial_of(kernels: Kernels, t: float, names: Iterable[str]) -> Initial:
     """The assembly of a model to values of these names; outputs and places of markers may be among them."""
     names = [*map(str, names), *kernels.layout.metadata.get("initial_outputs", ())]
-    if not any("(" in name or name in kernels.layout.y for name in without_dots(dict.fromkeys(names))):
+    if not any("(" in name or name in kernels.layout.y for name in map(kernels.layout.plain, names)):
         return Initial(kernels, t)
     from .wanted_outputs import WantedInitial
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from .room import read_number, with_numbers
 from .show_parts import load_show
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def draw(
     AssemblyError
         The loops do not close with these values.
     """
-    return load_show("draw").draw(model, x, ax, t=t, names=names, axes=axes)
+    return load_show("draw").draw(model, with_numbers("x", x), ax, t=read_number("t", t), names=names, axes=axes)
 
 
 def explore(model: BoundModel, /, x: Any = None) -> Any:
@@ -79,7 +80,7 @@ def explore(model: BoundModel, /, x: Any = None) -> Any:
     UsageError
         The model has no bodies, or x does not fit.
     """
-    start = load_show("draw").position(model, x, 0.0)
+    start = load_show("draw").position(model, with_numbers("x", x), 0.0)
     return load_show("explore").explore(model, start)
 
 

@@ -22,6 +22,7 @@ from ..numeric.assembly_velocity import VelocityEquations, assemble_velocity
 from ..numeric.closure import close, closed
 from ..numeric.constraint_system import RESTARTS
 from ..numeric.held_path import follow
+from ..numeric.nearest_branch import close_nearest
 from ..numeric.projection import largest
 from ..numeric.ranks import rank
 from ..numeric.scales import Array
@@ -63,7 +64,7 @@ class Initial:
         """Split values into positions and rates; raises UsageError for a name that is neither."""
         layout = self.layout
         rates = layout.v + layout.loop_rates
-        values = without_dots(values)
+        values = without_dots(values, layout.instances)
         for name in values:
             if name in layout.p:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")
@@ -172,8 +173,9 @@ class Initial:
         start = self.system.with_values(self.system.with_values(layout.q_reference, declared), guess)
         soft = self.compatible(start, {}, {**ordered, **{k: v for k, v in declared.items() if k not in guess}})
         for held in (soft, {k: v for k, v in soft.items() if k in guess}):
-            with suppress(AssemblyError):
-                return self.system.close(start, held, restarts=0).q
+            found = close_nearest(self.system, start, held, guess)
+            if found is not None:
+                return found.q
         return self.system.close(start, {}).q
 
     def branches(self, given: Mapping[str, float], first: Array, tries: int = 60, many: int = 16) -> list[Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from copy import copy
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,8 @@ import numpy as np
 from ..errors import UsageError
 from ..kernel_table import NAMED, Sizes
 from ..numeric.scales import Array, Scales, Space
-from .near_names import check_names, without_dots
-from .room import read_numbers, read_value
+from .near_names import check_names, plain_name, without_dots
+from .room import read_number, read_numbers
 
 ABI = 1  #: layout of the metadata this file reads
 
@@ -106,6 +107,7 @@ class Layout:
             Scales.of_kinds(self.coordinate_kinds, rows[: self.n_h], self.length) if self.given_rates else self.scales
         )
         self.units: dict[str, str] = data.get("units", {})
+        self.instances: dict[str, str] = data.get("instances", {})  #: of components: name -> prefix of their names
         self.loop_kinds: tuple[str, ...] = tuple(
             data.get("loop_kinds") or ("length" if self.units.get(name) == "m" else "angle" for name in self.loops)
         )
@@ -180,16 +182,27 @@ class Layout:
                 return f"{self.units[base]}/{per}"
         return "s" if name == "t" else ""
 
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """All names of numbers, bodies and joints."""
+        rates = (*self.loop_rates, *self.a, *self.loop_accelerations, *self.parameter_rates, *self.velocity_labels)
+        elements = (*self.bodies, *self.metadata.get("joint_names", ()))
+        return frozenset((*self.x, *self.loops, *self.u, *self.p, *self.y, *rates, *elements))
+
+    def plain(self, name: Any) -> Any:
+        """A name as the model has it: ``leg1_hip`` for ``leg1.hip`` of an instance of a component."""
+        return plain_name(name, self.instances)
+
     def values(self, what: str, names: Sequence[str], given: object, current: Array) -> Array:
         """A full vector from a mapping of names (the others keep their current values) or from an array."""
         if given is None:
             return current
         if isinstance(given, Mapping):
-            given = without_dots(given)
+            given = without_dots(given, self.instances)
             check_names(what, given, names)
             result = np.array(current, dtype=float)
             for name, value in given.items():
-                result[names.index(name)] = read_value(f"{what} {name}", value)
+                result[names.index(name)] = read_number(f"{what} {name}", value)
         else:
             result = read_numbers(f"the {what}s", given)
         if result.shape != (len(names),):

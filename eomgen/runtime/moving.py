@@ -10,8 +10,9 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..texts import shown
-from .near_names import plain_name, unknown
+from .near_names import unknown
 from .refined import refined, states_at
+from .room import read_number
 from .show_parts import load_show
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def position(trajectory: Any, name: str, model: BoundModel | None = None) -> Arr
     """See :meth:`.trajectory.Trajectory.position`."""
     module = module_of(trajectory, model, "position")
     data = load_show("data").read_picture(module.metadata, module.p)
-    every = poses(trajectory, module)
+    every, name = poses(trajectory, module), module.layout.plain(name)
     if name in data.markers:
         frame = data.markers[name]
         if frame.body < 0:
@@ -70,11 +71,12 @@ def animate(trajectory: Any, file: Path | str | None, model: BoundModel | None, 
     """See :meth:`.trajectory.Trajectory.animate`."""
     module = module_of(trajectory, model, "an animation")
     show = load_show("animate")
+    numbers = {k: read_number(k, options[k]) for k in ("fps", "speed", "dpi") if isinstance(options.get(k), str)}
     return show.animate(
         trajectory,
         module,
         file,
         states=lambda t: states_at(trajectory, module, t),
-        columns=lambda names: refined(trajectory, tuple(plain_name(name, trajectory.names) for name in names)),
-        **options,
+        columns=lambda names: refined(trajectory, tuple(map(module.layout.plain, names))),
+        **(options | numbers),
     )

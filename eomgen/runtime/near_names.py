@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Container, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from types import ModuleType
 from typing import Any
 
 from ..errors import MissingDependencyError, UsageError
+from ..instance_names import undotted
 from ..texts import shown
 
 _SHOWS = ("animate", "animation", "film", "gif", "movie", "play", "plot", "show", "video", "view")
@@ -19,15 +20,14 @@ class UnknownNameError(UsageError, KeyError):
         return str(self.args[0]) if self.args else ""
 
 
-def without_dots(given: Mapping[Any, Any]) -> dict[Any, Any]:
+def without_dots(given: Mapping[Any, Any], instances: Mapping[str, str]) -> dict[Any, Any]:
     """Values by name; ``leg1.hip`` of an instance of a component is ``leg1_hip``."""
-    return {name.replace(".", "_") if isinstance(name, str) else name: value for name, value in given.items()}
+    return {plain_name(name, instances): value for name, value in given.items()}
 
 
-def plain_name(name: object, known: Container[str]) -> Any:
-    """The name, or that of ``leg1.hip`` as ``leg1_hip``, if only this is known."""
-    plain = name.replace(".", "_") if isinstance(name, str) else name
-    return plain if name not in known and plain in known else name
+def plain_name(name: object, instances: Mapping[str, str]) -> Any:
+    """The name as the model has it; ``leg1.hip`` of an instance of a component is ``leg1_hip``."""
+    return undotted(name, instances) if isinstance(name, str) else name
 
 
 def unknown(what: str, name: object, allowed: Iterable[str]) -> UnknownNameError:

@@ -71,8 +71,9 @@ def choose(
     """
     known = ("t", *trajectory.names)
     asked = [one for name in names for one in read_names("a column", name)]  # a list of names is taken too
-    names = tuple(plain_name(name, known) for name in (*asked, *(() if y is None else read_names("y", y))))
-    x = plain_name(x, known)
+    instances = trajectory.metadata.get("instances", {})
+    names = tuple(plain_name(name, instances) for name in (*asked, *(() if y is None else read_names("y", y))))
+    x = plain_name(x, instances)
     for name in (*names, *(() if x is None else (x,))):  # unknown names fail before a figure opens
         if name not in known:
             raise unknown("column", name, known)

@@ -96,7 +96,7 @@ def read_numbers(what: str, given: Any, width: float = 1.0) -> Array:
     shape = np.shape(given) if isinstance(given, np.ndarray) else ()
     if len(shape) > 1:
         require_room(f"{what} of shape {shape}", float(np.prod(shape[1:], dtype=float)) * width, "give fewer columns")
-    return _floats(given, f"{what} must hold real numbers")
+    return _floats(what, given, f"{what} must hold real numbers")
 
 
 def read_vector(what: str, given: Any, n: int, error: type[Exception] = UsageError) -> Array:
@@ -126,11 +126,21 @@ def read_times(what: str, given: Any, per_time: int) -> Array:
     except Exception:  # one number, or what is no list of times
         length = 0
     require_room(f"{what} with {length} times", length * per_time, "give fewer times, or run in parts")
-    return np.array(_floats(given, f"{what} must be a list of times in seconds"))
+    return np.array(_floats(what, given, f"{what} must be a list of times in seconds"))
 
 
 def read_number(what: str, given: Any) -> float:
-    """One finite real number.
+    """One finite real number, or an expression of numbers as text: ``"10*pi/180"``.
+
+    Raises
+    ------
+    UsageError
+    """
+    return read_plain(what, read_text(what, given) if isinstance(given, str) else given)
+
+
+def read_plain(what: str, given: Any) -> float:
+    """One finite real number, as compiled code takes it, which reads no texts.
 
     Raises
     ------
@@ -148,21 +158,32 @@ def read_number(what: str, given: Any) -> float:
     return result
 
 
-def read_value(what: str, given: Any) -> float:
-    """One finite real number, or an expression of numbers as text: ``"10*pi/180"``.
+def read_text(what: str, given: str) -> float:
+    """The value of an expression of numbers as text: ``"10*pi/180"``.
 
     Raises
     ------
     UsageError
         Texts are read where eomgen is: a generated package has no parser.
     """
-    if not isinstance(given, str):
-        return read_number(what, given)
     try:
-        from .constant_texts import constant
+        from ..describe.constant_texts import constant
     except ImportError:
         raise UsageError(f"{what} must be a number, not {given!r}; only eomgen itself reads texts") from None
-    return read_number(what, constant(given, what))
+    return constant(given, what)
+
+
+def with_numbers(what: str, given: Any, depth: int = 0) -> Any:
+    """Lists and tuples of numbers with the values of the texts in them; anything else as it is.
+
+    Raises
+    ------
+    UsageError
+        A text that is no number.
+    """
+    if not isinstance(given, (list, tuple)) or depth > DEEPEST or PLAIN.issuperset(map(type, given)):
+        return given
+    return [read_text(what, one) if isinstance(one, str) else with_numbers(what, one, depth + 1) for one in given]
 
 
 def read_flag(what: str, given: Any) -> bool:
@@ -177,8 +198,8 @@ def read_flag(what: str, given: Any) -> bool:
     return bool(given)
 
 
-def _floats(given: Any, wanted: str) -> Array:
-    found = as_real(given)
+def _floats(what: str, given: Any, wanted: str) -> Array:
+    found = as_real(with_numbers(what, given))
     if found is None:
         raise UsageError(f"{wanted}, not {shown(given)}")
     return found

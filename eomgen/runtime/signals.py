@@ -174,7 +174,7 @@ class Forcing:
     def __init__(self, layout: Layout, inputs: Mapping[str, Any] | None) -> None:
         given = {} if inputs is None else inputs
         require_mapping("inputs", given)
-        given = without_dots(given)
+        given = without_dots(given, layout.instances)
         check_names("input", given, (*layout.u, *(name for name in layout.input_rates if name not in layout.u)))
         self.layout = layout
         self.constants: dict[str, float] = {}

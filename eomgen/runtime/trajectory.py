@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .near_names import find_lacking, require, unknown
+from .near_names import find_lacking, plain_name, require, unknown
 from .room import read_numbers
 from .run_parts import Named, Residuals
 
@@ -137,8 +137,8 @@ class Trajectory:
     def __getitem__(self, name: str) -> Array:
         if name == "t":
             return self.t
-        if name not in self.names and (plain := str(name).replace(".", "_")) in self.names:
-            name = plain  # leg1.hip, of an instance of a component
+        if name not in self.names:
+            name = plain_name(name, self.metadata.get("instances", {}))  # leg1.hip, of an instance of a component
         if name not in self.names:
             raise unknown("column", name, ("t", *self.names))
         return self._columns[name]

@@ -1,19 +1,20 @@
-"""Stage runtime: outputs and places of markers by name -> functions of q and v that a state can be assembled to.
+"""Stage runtime: outputs, places and velocities of markers by name -> functions of q and v to assemble a state to.
 
 An output of q and t alone, and a place such as ``x(rod.tip)``, is wanted of a position; an output that is linear in the
-velocities, such as ``vx(rod.tip)``, of the velocities.
+velocities, and a velocity such as ``vx(rod.tip)``, of the velocities.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import UsageError
-from ..limits.runs import DIFFERENCE
+from ..limits.runs import DIFFERENCE, WIDE_DIFFERENCE
 from ..marker_places import place_of_marker
 from ..numeric.constraint_system import ConstraintSystem, CutJoints
 from ..numeric.scales import Array
@@ -69,8 +70,9 @@ class WantedInitial(Initial):
 
     def sort(self, values: Mapping[str, float]) -> Given:
         places = {name: value for name, value in values.items() if place_of_marker(name)}
-        others = without_dots({name: value for name, value in values.items() if name not in places})
-        rates = {name: value for name, value in others.items() if name in self.wanted_rates}
+        others = {n: x for n, x in without_dots(values, self.layout.instances).items() if n not in places}
+        rates = {name: value for name, value in (places | others).items() if name in self.wanted_rates}
+        places = {name: value for name, value in places.items() if name not in rates}
         positions = places | {name: value for name, value in others.items() if name in self.wanted_positions}
         given = super().sort({n: x for n, x in others.items() if n not in positions and n not in rates})
         return Given(given.positions | positions, given.rates | rates)
@@ -100,8 +102,8 @@ def find_wanted(kernels: Kernels, name: str, t: float) -> WantedPosition | Wante
         An output that depends on accelerations, or on velocities otherwise than linearly; no such marker.
     """
     if found := place_of_marker(name):
-        return _place(kernels, name, found[1], "xyz".index(found[0]))
-    plain = name.replace(".", "_") if isinstance(name, str) else name  # tip_x of an instance leg is leg.tip_x too
+        return _marker(kernels, name, *found)
+    plain = kernels.layout.plain(name)  # tip_x of an instance leg is leg.tip_x too
     return _output(kernels, plain, t) if plain in kernels.layout.y else None
 
 
@@ -147,30 +149,49 @@ def _output(kernels: Kernels, name: str, t: float) -> WantedPosition | WantedRat
     return WantedRate(name, scale, rate) if by_v.any() else WantedPosition(name, scale, position)
 
 
+def _slope(function: Callable[[float], float]) -> float:
+    """The derivative at 0 by the central formula of sixth order."""
+    h = WIDE_DIFFERENCE
+    one, two, three = (function(k * h) - function(-k * h) for k in (1, 2, 3))
+    return (45.0 * one - 9.0 * two + three) / (60.0 * h)
+
+
 def _scale(layout: Layout, unit: str, slopes: Array) -> float:
     known = {"m": layout.length, "rad": 1.0}
     return known.get(unit) or float(np.abs(slopes).max(initial=0.0)) or 1.0
 
 
-def _place(kernels: Kernels, name: str, marker: str, axis: int) -> WantedPosition:
-    layout, poses = kernels.layout, kernels.state("poses")
+def _marker(kernels: Kernels, name: str, what: str, marker: str) -> WantedPosition | WantedRate:
+    """A coordinate of a marker's place, or of its velocity."""
+    layout, poses, axis = kernels.layout, kernels.state("poses"), "xyz".index(what[-1])
     data = load_show("data").read_picture(layout.metadata, kernels.context.p)
-    body, _, own = marker.rpartition(".")
-    marker = (
-        marker if marker in data.markers else f"{body.replace('.', '_')}.{own}"
-    )  # leg.thigh.knee of an instance leg
+    marker = layout.plain(marker)  # leg.thigh.knee of an instance leg
     if marker not in data.markers:
         raise unknown("marker", marker, data.markers)
     frame = data.markers[marker]
     if frame.body < 0:
-        raise UnknownNameError(f"{name!r} is a position on the ground, which does not move")
+        kind = "velocity" if what.startswith("v") else "position"
+        raise UnknownNameError(f"{name!r} is a {kind} on the ground, which does not move")
 
     def value(q: Array, t: float) -> float:
         pose = poses(q, t=t)[frame.body]
         return float(pose[axis, :3] @ frame.position + pose[axis, 3])
 
+    sizes = np.where([kind == "length" for kind in layout.coordinate_kinds], layout.length, 1.0)
+
+    def moved(q: Array, step: Array, t: float, h: float) -> float:
+        return value(q + h * step, t)
+
+    def rate(q: Array, t: float) -> tuple[Array, float]:
+        by_q = [_slope(partial(moved, q, step, t)) for step in np.diag(sizes)]
+        moves = np.stack([layout.scales.rates(q, unit) for unit in np.eye(layout.n_v)], axis=1)
+        return np.array(by_q) / sizes @ moves, 0.0  # places depend on time by coordinates alone
+
+    if what.startswith("v"):
+        return WantedRate(name, layout.length, rate)
+
     def evaluate(q: Array, t: float) -> tuple[float, Array]:
-        steps = DIFFERENCE * np.where([kind == "length" for kind in layout.coordinate_kinds], layout.length, 1.0)
+        steps = DIFFERENCE * sizes
         moves = np.diag(steps)
         slope = [(value(q + dq, t) - value(q - dq, t)) / (2.0 * h) for dq, h in zip(moves, steps, strict=True)]
         return value(q, t), np.array(slope)

@@ -54,7 +54,9 @@ def build_scene(
     """
     data = read_picture(module.metadata, module.p)
     layout = module.layout
-    tracked = [_tracked(data, name) for name in trace]  # unknown names fail before anything is evaluated
+    tracked = [
+        _tracked(data, module.layout.plain(name)) for name in trace
+    ]  # unknown names fail before anything is evaluated
     poses = module.poses(q, t=t, u=u)
     if not np.isfinite(poses).all():
         raise UsageError(

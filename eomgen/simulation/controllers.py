@@ -99,7 +99,7 @@ class ControlledEvents(Events):
 def _by_event(layout: Layout, given: Any) -> dict[int, list[Controller]]:
     """Controllers by the event at which they act, in the order of renewal."""
     require_mapping("controllers", given)
-    wanted: Mapping[str, Any] = without_dots(given)
+    wanted: Mapping[str, Any] = without_dots(given, layout.instances)
     clocks: list[dict[str, Any]] = layout.metadata.get("clocks", [])
     taken = [name for clock in clocks for name in clock["open"]]
     if wanted and not taken:

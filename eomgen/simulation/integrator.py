@@ -14,7 +14,7 @@ from ..numeric.scales import Array
 from ..runtime.argument_names import both_names
 from ..runtime.late import eager
 from ..runtime.near_names import check_names
-from ..runtime.room import read_number, read_vector, require_steps
+from ..runtime.room import read_plain, read_vector, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run
 from .compiled import RESET_FAILED, TOO_SMALL, can_run, stepper_options
@@ -128,7 +128,7 @@ class Integrator:
         """
         try:
             if not (isinstance(t, float) and isinstance(h, float) and isfinite(t + h)):
-                t, h = read_number("t", t), read_number("h", h)
+                t, h = read_plain("t", t), read_plain("h", h)
             end = t + h
             if not isfinite(end):
                 raise ValueError(f"t + h must be finite, not {t} + {h}")

@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start, last_state
-from ..runtime.room import as_real, read_numbers, read_times, read_value
+from ..runtime.room import as_real, read_number, read_numbers, read_times
 from ..runtime.signals import Forcing
 from ..texts import shown
 from .tolerances import check_step
@@ -30,12 +30,12 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
         return 0.0, declared
     if isinstance(span, (tuple, list)):
         what = "span must be (start, end) in seconds: an end"
-        span = [read_value(what, end) if isinstance(end, str) else end for end in span]
+        span = [read_number(what, end) if isinstance(end, str) else end for end in span]
         if len(span) == 2 and all(type(end) is float and isfinite(end) for end in span):
             return float(span[0]), float(span[1])
     pair = as_real(span)
     if isinstance(span, str) or (pair is not None and not pair.ndim):
-        return 0.0, read_value("the end of the span", span)
+        return 0.0, read_number("the end of the span", span)
     if pair is None or pair.shape != (2,) or not np.isfinite(pair).all():
         raise UsageError(f"span must be (start, end) in seconds, not {shown(span)}; t_eval= chooses times to keep")
     return float(pair[0]), float(pair[1])

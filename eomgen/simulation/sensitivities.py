@@ -21,7 +21,7 @@ from ..runtime.failure import place
 from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names, read_names, unknown
 from ..runtime.refusals import require_projection, require_velocities
-from ..runtime.room import read_value, require_steps
+from ..runtime.room import read_number, require_steps
 from ..runtime.signals import Forcing
 from .events import Events, told_by_the_caller, warn_of_unknown
 from .input_slopes import SlopesNow
@@ -107,7 +107,7 @@ def sensitivities(
     forcing.enter(*nodes[:2])
     x0 = find_state(bound, initial, start, forcing)
     here = bound.bind(u=forcing(start, x0))
-    given = {n: read_value(n, x) for n, x in initial.items()} if isinstance(initial, Mapping) else None
+    given = {n: read_number(n, x) for n, x in initial.items()} if isinstance(initial, Mapping) else None
     held = held_names(here, start, x0, given) if hold is None else _checked(bound, hold)
     columns = split_columns(layout, read_names("names", names), held)
     run = Variational(bound, forcing, columns)

@@ -14,7 +14,7 @@ from ..numeric.scales import Array
 from ..runtime.kernels import fitting
 from ..runtime.late import eager
 from ..runtime.near_names import require
-from ..runtime.room import read_number, read_vector
+from ..runtime.room import read_plain, read_vector
 from .compiled import no_series, stepper_options
 from .events import Events
 from .tolerances import IMPLICIT
@@ -173,7 +173,7 @@ def step(
         if status == 0:
             return np.asarray(result)
     # in Python, or once more in Python to tell which of the four evaluations failed
-    t, h, start = read_number("t", t), read_number("h", h), read_vector("x", x, module.n_x)
+    t, h, start = read_plain("t", t), read_plain("h", h), read_vector("x", x, module.n_x)
     if out is not None:
         fitting(out, start.shape)
     k = [module.rhs(t, start, u=u)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.runs import LEAST_RTOL
-from ..runtime.room import as_real, read_flag, read_number, read_value
+from ..runtime.room import as_real, read_flag, read_number
 from ..texts import shown
 
 IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods: the Jacobian, if not the model's own
@@ -62,7 +62,7 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
 def _tolerance(name: str, given: Any, n: int) -> Any:
     if type(given) is float and 0.0 <= given < np.inf:
         return given
-    values = as_real(read_value(name, given) if isinstance(given, str) else given)
+    values = as_real(read_number(name, given) if isinstance(given, str) else given)
     if values is None:
         raise UsageError(f"{name} must be a number, or one for each of the {n} states, not {shown(given)}")
     if values.shape not in ((), (n,)):
@@ -76,7 +76,7 @@ def check_step(name: str, given: Any) -> float:
     """A length of steps (s), or a UsageError that names it."""
     if type(given) is float and 0.0 < given < np.inf:
         return given
-    found = as_real(read_value(name, given) if isinstance(given, str) else given)
+    found = as_real(read_number(name, given) if isinstance(given, str) else given)
     if found is None or found.ndim:
         raise UsageError(f"{name} must be a number of seconds, not {shown(given)}")
     value = float(found)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from eomgen.cli.command import VERBS
+
 from .conftest import EXAMPLES, Call, Result
 
 PENDULUM = (EXAMPLES / "pendulum.yaml").read_text()
@@ -154,3 +156,32 @@ def test_the_doctor_tries_whether_the_cache_takes_a_file(tmp_path: Path, monkeyp
     assert not verb_doctor._cache().ok
     monkeypatch.setenv("EOMGEN_CACHE_DIR", str(tmp_path / "cache"))
     assert verb_doctor._cache().ok
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_wrong_options_as_json(call: Call, verb: str) -> None:
+    for words in ((verb, "--json", "--no-such-option"), (verb, "--no-such-option", "--json")):
+        result = call(*words)
+        assert result.code == 2
+        error = result.json["error"]
+        assert set(error) == {"type", "exit_code", "message", "problems"}
+        assert (error["type"], error["exit_code"], error["problems"]) == ("UsageError", 2, [])
+        assert error["message"] in result.err  # people read it on stderr as without --json
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("rum",), "no verb 'rum'"),
+        (("run",), "Missing argument 'MODEL'"),
+        (("run", "model.yaml", "--end", "soon"), "'--end'"),
+        (("derive", "model.yaml", "--target", "fortran"), "--target"),
+        (("run", "model.yaml", "more.yaml"), "more.yaml"),
+        ((), "--json"),
+    ],
+)
+def test_other_slips_of_usage_as_json(call: Call, words: tuple[str, ...], message: str) -> None:
+    result = call(*words, "--json")
+    assert result.code == 2
+    assert message in result.json["error"]["message"]
+    assert call(*words).out == "" or not words  # without words: help

@@ -19,7 +19,8 @@ REPORT_KEYS = {
     "constraints", "constraints_declared", "rank", "ranks", "degrees_of_freedom", "configuration_freedoms",
     "nonholonomic", "gruebler_kutzbach",
     "gruebler_kutzbach_planar", "redundant", "conditioning", "length_scale", "reference", "assumed",
-    "assembly_restarts", "instantaneous_freedoms", "candidates", "notes", "elements",
+    "assembly_restarts", "instantaneous_freedoms", "candidates", "notes", "elements", "guessed", "guess_distance",
+    "other_branches",
 }  # fmt: skip
 MODELS = sorted(EXAMPLES.glob("*.yaml"))
 

@@ -1,13 +1,13 @@
-"""Stage runtime: an expression of numbers as text -> its value; read like those of model files, never executed.
+"""Stage describe: an expression of numbers as text -> its value; read like those of model files, never executed.
 
 A generated package has no parser and is without this file.
 """
 
 from __future__ import annotations
 
-from ..describe.expressions import parse
 from ..errors import ExpressionError, UsageError
 from ..graph.core import Expr, Graph
+from .expressions import parse
 
 
 def constant(text: str, what: str) -> float:
