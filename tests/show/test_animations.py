@@ -24,8 +24,8 @@ import eomgen as eg
 from eomgen.cli.command import eomgen
 from eomgen.errors import MissingDependencyError, UsageError
 from eomgen.show import animate as eomgen_animate
-from eomgen.show.animate import ShownColumn
-from eomgen.show.film_frames import Frames, draw_curves
+from eomgen.show.curves import ShownColumn, draw_curves
+from eomgen.show.film_frames import Frames
 from eomgen.show.shown_motion import moving_scene, sample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -327,7 +327,7 @@ def test_curves_over_a_range_name_its_unit(module: Any, monkeypatch: pytest.Monk
     turn = module.kinematic_analysis(theta=np.linspace(0, 6, 9))
     motion = sample(turn, lambda t: (turn.x, None), 25, None)
     ax = Figure().add_subplot()
-    draw_curves(ax, [ShownColumn("s (m)", motion.over, turn["s"])], motion)
+    draw_curves([ax], [[ShownColumn("s", "m", motion.over, turn["s"])]], motion)
     assert ax.get_xlabel() == r"$\theta$ (rad)"
 
 
