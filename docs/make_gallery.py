@@ -84,7 +84,8 @@ def draw(shown: Shown) -> Path:
     motion = sample(trajectory, lambda t: states_at(trajectory, module, t), rate, float(trajectory.t[-1]) / LASTS)
     if moving:
         scene = moving_scene(module, motion, False, False, shown.options.trace)
-        file.write_bytes(gif_bytes(Frames.of(scene, motion, (), SPATIAL if scene.view is None else MOVING), FILM_COLORS))
+        dots = SPATIAL if scene.view is None else MOVING
+        file.write_bytes(gif_bytes(Frames.of(scene, motion, (), dots), FILM_COLORS))
         return file
     moment = round(MOMENTS.get(file.stem, AT) * (len(motion.t) - 1))
     if not shown.options.trace:  # its surroundings alone, however far the mechanism goes

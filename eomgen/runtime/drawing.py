@@ -20,6 +20,7 @@ def draw(
     t: float = 0.0,
     names: bool | None = None,
     axes: bool = False,
+    **named: float | str,
 ) -> Any:
     """Draw the mechanism at a configuration, true to scale.
 
@@ -40,6 +41,8 @@ def draw(
         Whether bodies and joints are named; by default where they are few.
     axes : bool
         Whether the axes of all bodies are drawn.
+    **named : float or str
+        Values of coordinates by name, as in a mapping x: ``draw(theta=0.3)``.
 
     Returns
     -------
@@ -54,7 +57,7 @@ def draw(
     AssemblyError
         The loops do not close with these values.
     """
-    return load_show("draw").draw(model, x, ax, t=t, names=names, axes=axes)
+    return load_show("draw").draw(model, x, ax, t=t, names=names, axes=axes, named=named)
 
 
 def explore(model: BoundModel, /, x: Any = None) -> Any:

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from .branch_views import usual_view
 from .colors import color_of
 from .data import Array
 from .flat import joined_limits
 from .label_places import NAME_STYLE, NAMES, name_offsets
-from .plane import page_axes
 from .pieces import Pieces, eye_of
+from .plane import page_axes
 from .scene import Scene
 
-ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees), from the axis that runs to the right
 ZOOM = 0.88  #: leaves room for the names of the axes
 IN_FRONT = 1e6  #: place of names over solids, of which each has a place of its own
 
@@ -53,9 +53,11 @@ class Axes3DPicture:
     ----------
     scene : Scene
     ax : matplotlib Axes3D
+    view : (float, float), optional
+        Elevation and azimuth of the eye (degrees).
     """
 
-    def __init__(self, scene: Scene, ax: Any) -> None:
+    def __init__(self, scene: Scene, ax: Any, view: tuple[float, float] | None = None) -> None:
         self.scene, self.ax = scene, ax
         vertical, right = page_axes(scene.up)
         depth = 3 - vertical - right
@@ -67,9 +69,8 @@ class Axes3DPicture:
         self.pieces = Pieces(scene)
         self.drawn = piece_collection(self.pieces)
         ax.add_collection(self.drawn, autolim=False)
-        # matplotlib counts azimuths from the axis after the vertical one
-        azimuth = AZIMUTH if right == (vertical + 1) % 3 else 90.0 + AZIMUTH
-        ax.view_init(ELEVATION, azimuth, vertical_axis="xyz"[vertical])  # first: the shape of the box is set for it
+        elevation, azimuth = view or usual_view(scene)
+        ax.view_init(elevation, azimuth, vertical_axis="xyz"[vertical])  # first: the shape of the box is set for it
         ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
         ax.set_box_aspect(np.abs(np.diff(limits)[:, 0]), zoom=ZOOM)
         ax.set_xlabel("x (m)", fontsize=8)

@@ -127,7 +127,7 @@ def _over_time(times: list[float], values: list[Array]) -> Any:
 def _layer(scene: Scene, item: Item) -> Array:
     """By how much an item is drawn nearer to the reader of a page (m, ground axes).
 
-    Parts of a planar mechanism lie in one plane, and where two surfaces coincide a browser shows now this one, now that.
+    Parts of a planar mechanism lie in one plane, and where two surfaces coincide a browser shows either by turns.
     """
     if scene.view is None:
         return np.zeros(3)

@@ -45,7 +45,9 @@ class Frames:
         width, height = figure_size(scene) if scene.view is not None else SPACE
         panels = by_unit(curves)
         below = [BELOW] * len(panels)
-        figure = matplotlib("figure", "an animation").Figure((width, height + sum(below)), dpi=dpi, layout="constrained")
+        figure = matplotlib("figure", "an animation").Figure(
+            (width, height + sum(below)), dpi=dpi, layout="constrained"
+        )
         grid = figure.add_gridspec(1 + len(panels), 1, height_ratios=[height, *below])
         spatial = {} if scene.view is not None else {"projection": "3d"}
         frames = cls(figure, motion)

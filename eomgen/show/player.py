@@ -7,7 +7,6 @@ import json
 from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
-from typing import Any
 
 from .curves import ShownColumn, by_unit, draw_curves
 from .optional import matplotlib
