@@ -351,18 +351,20 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         write_whole(path, self.to_yaml())
 
     # -- display --------------------------------------------------------------------------------------------------
-    def __getattr__(self, name: str) -> Any:
-        if not name.startswith("_"):
-            method = self._method(name)
-            if method is not None:
-                return method
-        raise AttributeError(f"a Model has no attribute {name!r}; {self._near(name)}")
+    if not TYPE_CHECKING:  # type checkers know all attributes
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        """Set what a Model knows; another name would be set without any effect, so it is refused."""
-        if not name.startswith("_") and not isinstance(getattr(type(self), name, None), property):
-            raise AttributeError(f"a Model has no attribute {name!r} to set; {self._near(name)}")
-        super().__setattr__(name, value)
+        def __getattr__(self, name: str) -> Any:
+            if not name.startswith("_"):
+                method = self._method(name)
+                if method is not None:
+                    return method
+            raise AttributeError(f"a Model has no attribute {name!r}; {self._near(name)}")
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            """Set what a Model knows; another name would be set without any effect, so it is refused."""
+            if not name.startswith("_") and not isinstance(getattr(type(self), name, None), property):
+                raise AttributeError(f"a Model has no attribute {name!r} to set; {self._near(name)}")
+            super().__setattr__(name, value)
 
     def _near(self, name: str) -> str:
         """A suggestion for a name that does not exist."""

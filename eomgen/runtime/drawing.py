@@ -8,6 +8,10 @@ from typing import TYPE_CHECKING, Any
 from .show_parts import load_show
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from ..show.explore import Explorer
     from .bound_model import BoundModel
 
 
@@ -15,13 +19,13 @@ def draw(
     model: BoundModel,
     /,
     x: Any = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     *,
     t: float = 0.0,
     names: bool | None = None,
     axes: bool = False,
     **named: float | str,
-) -> Any:
+) -> Axes:
     """Draw the mechanism at a configuration, true to scale.
 
     A mechanism that moves in a plane is drawn in this plane, a spatial one in space.  Bodies are the shapes that their
@@ -57,10 +61,11 @@ def draw(
     AssemblyError
         The loops do not close with these values.
     """
-    return load_show("draw").draw(model, x, ax, t=t, names=names, axes=axes, named=named)
+    drawn: Axes = load_show("draw").draw(model, x, ax, t=t, names=names, axes=axes, named=named)
+    return drawn
 
 
-def explore(model: BoundModel, /, x: Any = None) -> Any:
+def explore(model: BoundModel, /, x: Any = None) -> Explorer:
     """Show the mechanism in a notebook with sliders for its independent coordinates and its lengths.
 
     At each position the loops are closed near the previous one; a line of text says where that is not possible.
@@ -83,7 +88,8 @@ def explore(model: BoundModel, /, x: Any = None) -> Any:
         The model has no bodies, or x does not fit.
     """
     start = load_show("draw").position(model, x, 0.0)
-    return load_show("explore").explore(model, start)
+    shown: Explorer = load_show("explore").explore(model, start)
+    return shown
 
 
 def draw_branches(
@@ -94,7 +100,7 @@ def draw_branches(
     t: float = 0.0,
     names: bool | None = None,
     **named: float | str,
-) -> Any:
+) -> NDArray[Any]:
     """Draw all positions in which the loops close with the given values, side by side at the same scale.
 
     Parameters
@@ -109,4 +115,5 @@ def draw_branches(
     array of matplotlib Axes
         In the order of ``module.branches``.
     """
-    return load_show("draw").draw_branches(model, values, t=t, names=names, named=named)
+    panels: NDArray[Any] = load_show("draw").draw_branches(model, values, t=t, names=names, named=named)
+    return panels

@@ -19,8 +19,8 @@ ZOOM = 0.88  #: leaves room for the names of the axes
 IN_FRONT = 1e6  #: place of names over solids, of which each has a place of its own
 
 
-def piece_collection(pieces: Pieces) -> Any:
-    """A collection of matplotlib that draws pieces as the eye of its axes sees them; ``move`` gives it their corners.
+def piece_collection(pieces: Pieces, ax: Any) -> Any:
+    """A collection of matplotlib that draws pieces as the eye of axes sees them; ``move`` gives it their corners.
 
     The class stands here because its base is an optional library's.
     """
@@ -34,13 +34,13 @@ def piece_collection(pieces: Pieces) -> Any:
 
         def do_3d_projection(self) -> float:
             """Project what is seen; the depth of it all, by which matplotlib orders collections."""
-            projection = self.axes.M
+            projection = ax.get_proj()
             shown = pieces.seen(self.corners, eye_of(projection))
             x, y, z = proj_transform(*shown.corners.reshape(-1, 3).T, projection)
-            self.set_verts(np.column_stack([x, y]).reshape(-1, 3, 2))
-            self.set_facecolor(shown.colors)
-            self.set_edgecolor(shown.colors)
-            self.set_linewidth(shown.widths)
+            corners: Any = np.column_stack([x, y]).reshape(-1, 3, 2)
+            colors: Any = shown.colors
+            widths: Any = shown.widths
+            self.set(verts=corners, facecolor=colors, edgecolor=colors, linewidth=widths)
             return float(np.min(z, initial=np.inf))
 
     return PieceCollection([], capstyle="round", joinstyle="round")
@@ -67,7 +67,7 @@ class Axes3DPicture:
                 limits[k] = limits[k][::-1]
         limits = joined_limits(ax, "xyz", limits)
         self.pieces = Pieces(scene)
-        self.drawn = piece_collection(self.pieces)
+        self.drawn = piece_collection(self.pieces, ax)
         ax.add_collection(self.drawn, autolim=False)
         elevation, azimuth = view or usual_view(scene)
         ax.view_init(elevation, azimuth, vertical_axis="xyz"[vertical])  # first: the shape of the box is set for it

@@ -16,6 +16,7 @@ from .plane import page_axes
 from .player import WIDE, player_html, player_script
 from .scene import ROLES, Item, Scene
 from .shown_motion import ShownMotion
+from .solids import Triangles
 
 NAMES = "#222222"  #: colour of names
 LAYER = 0.15  #: by which roles of a planar mechanism stand before each other (sizes of a symbol)
@@ -137,7 +138,7 @@ def _layer(scene: Scene, item: Item) -> Array:
     return nearer
 
 
-def _looks_round(points: Array, faces: Array) -> bool:
+def _looks_round(points: Array, faces: Triangles) -> bool:
     """Whether a solid has no edges: no two neighbouring faces meet at a sharp angle."""
     normals = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
     lengths = np.linalg.norm(normals, axis=1)

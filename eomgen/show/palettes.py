@@ -38,8 +38,8 @@ def indices_in(palette: Image, image: Image) -> Image:
     packed, where = np.unique(_packed(image), return_inverse=True)
     own, known = _unpacked(packed).astype(float), palette.astype(float)
     distances = (own**2).sum(axis=1)[:, None] - 2 * own @ known.T + (known**2).sum(axis=1)
-    nearest: Image = distances.argmin(axis=1).astype(np.uint8)
-    return nearest[where].reshape(image.shape[:2])
+    nearest: Image = distances.argmin(axis=1).astype(np.uint8)[where].reshape(image.shape[:2])
+    return nearest
 
 
 def _packed(image: Image) -> NDArray[np.int64]:
@@ -48,4 +48,5 @@ def _packed(image: Image) -> NDArray[np.int64]:
 
 
 def _unpacked(packed: NDArray[np.int64]) -> Image:
-    return (packed[:, None] // SHADES % 256).astype(np.uint8)
+    colors: Image = (packed[:, None] // SHADES % 256).astype(np.uint8)
+    return colors

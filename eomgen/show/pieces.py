@@ -128,8 +128,9 @@ class Pieces:
         if float(np.linalg.norm(right)) < SAME:  # seen from above
             right = np.eye(3)[int(np.argmin(np.abs(toward)))]
         right = right / float(np.linalg.norm(right))
-        light: Array = np.array(LIGHT) @ np.array([right, np.cross(toward, right), toward])
-        return light / float(np.linalg.norm(light))
+        ways = np.array([right, np.cross(toward, right), toward])
+        light: Array = np.array(LIGHT) @ ways / float(np.linalg.norm(LIGHT))
+        return light
 
 
 def eye_of(projection: Array) -> Array:
