@@ -7,6 +7,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import MissingDependencyError, UsageError
+from ..suggestions import closest
 from ..texts import shown
 
 _SHOWS = ("animate", "animation", "film", "gif", "movie", "play", "plot", "show", "video", "view")
@@ -51,15 +52,13 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
         return own.__get__(one, type(one))
     public = sorted(n for n in {*dir(type(one)), *vars(one)} if not n.startswith("_"))
     answer = "simulate(...) returns a run, which has animate() and plot(); a module has draw() and explore()"
-    meant = answer if name in _SHOWS else _hint(name, public, len(public))
+    meant = answer if name in _SHOWS and "rhs" in public else _hint(name, public, len(public))
     raise AttributeError(f"{kind} has no attribute {name!r}; {meant}", name=name)
 
 
 def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
-    from difflib import get_close_matches  # only needed when something went wrong
-
     choice = list(dict.fromkeys(allowed))
-    near = get_close_matches(str(name), choice, n=3, cutoff=0.6)
+    near = closest(name, choice, 3)
     if near:
         return f"did you mean {' or '.join(near)}?"
     if not choice:

@@ -140,10 +140,13 @@ def eye_of(projection: Array) -> Array:
     """
     eye: Array = np.linalg.svd(projection[[0, 1, 3]])[2][3]
     if abs(eye[3]) > SAME * float(np.abs(eye).max()):
-        return eye / eye[3]
-    eye = eye / float(np.linalg.norm(eye))
+        eye /= eye[3]
+        return eye
+    eye /= float(np.linalg.norm(eye))
     eye[3] = 0.0
-    return eye if projection[2] @ eye < 0.0 else -eye  # depth grows away from the eye
+    if float(projection[2] @ eye) > 0.0:  # depth grows away from the eye
+        eye *= -1.0
+    return eye
 
 
 def _corners_of(item: Item) -> NDArray[np.int64]:
