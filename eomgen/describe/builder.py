@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
 from ..constraints import CONSTRAINTS
+from ..errors import UnavailableError
 from ..forces import FORCES
 from ..joints import JOINTS
 from ..suggestions import hint
@@ -358,12 +359,12 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
                 method = self._method(name)
                 if method is not None:
                     return method
-            raise AttributeError(f"a Model has no attribute {name!r}; {self._near(name)}")
+            raise UnavailableError(f"a Model has no attribute {name!r}; {self._near(name)}", name=name)
 
         def __setattr__(self, name: str, value: Any) -> None:
             """Set what a Model knows; another name would be set without any effect, so it is refused."""
             if not name.startswith("_") and not isinstance(getattr(type(self), name, None), property):
-                raise AttributeError(f"a Model has no attribute {name!r} to set; {self._near(name)}")
+                raise UnavailableError(f"a Model has no attribute {name!r} to set; {self._near(name)}")
             super().__setattr__(name, value)
 
     def _near(self, name: str) -> str:

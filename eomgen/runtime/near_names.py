@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from types import ModuleType
 from typing import Any
 
-from ..errors import MissingDependencyError, UsageError
+from ..errors import MissingDependencyError, UnavailableError, UsageError
 from ..suggestions import closest
 from ..texts import shown
 
@@ -43,8 +43,8 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
 
     Raises
     ------
-    AttributeError
-        With near misses; a property that raised one raises its own again.
+    UnavailableError
+        With near misses, an AttributeError too; a property that raised one raises its own again.
     """
     if name.startswith("_"):
         raise AttributeError(f"{kind} has no attribute {name!r}", name=name)
@@ -53,7 +53,7 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
     public = sorted(n for n in {*dir(type(one)), *vars(one)} if not n.startswith("_"))
     answer = "simulate(...) returns a run, which has animate() and plot(); a module has draw() and explore()"
     meant = answer if name in _SHOWS and "rhs" in public else _hint(name, public, len(public))
-    raise AttributeError(f"{kind} has no attribute {name!r}; {meant}", name=name)
+    raise UnavailableError(f"{kind} has no attribute {name!r}; {meant}", name=name)
 
 
 def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:

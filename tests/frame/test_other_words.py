@@ -24,7 +24,13 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 def held() -> dict[str, Any]:
     equations = eg.load(EXAMPLES / "pendulum.yaml").derive()
     module = equations.compile(target="numpy")
-    return {"Model": eg.Model("m"), "Module": module, "Trajectory": module.simulate(0.1), "Equations": equations}
+    return {
+        "eomgen": eg,
+        "Model": eg.Model("m"),
+        "Module": module,
+        "Trajectory": module.simulate(0.1),
+        "Equations": equations,
+    }
 
 
 def test_every_suggestion_names_something_that_exists(held: dict[str, Any]) -> None:
@@ -45,9 +51,9 @@ def test_every_suggestion_names_something_that_exists(held: dict[str, Any]) -> N
     assert sorted(meant - known) == []
 
 
-def test_no_word_is_explained_twice_by_the_same_name() -> None:
-    pairs = [(word, other) for words, meant in SYNONYMS.items() for word in words.split() for other in meant.split()]
-    assert sorted({pair for pair in pairs if pairs.count(pair) > 1}) == []
+def test_a_word_stands_once() -> None:
+    words = [word for words in SYNONYMS for word in words.split()]
+    assert sorted({word for word in words if words.count(word) > 1}) == []
 
 
 @pytest.mark.parametrize(
@@ -69,7 +75,7 @@ def test_no_word_is_explained_twice_by_the_same_name() -> None:
         ("Trajectory", "df", "to_pandas"), ("Trajectory", "positions", "q"), ("Trajectory", "show", "plot"),
         ("Trajectory", "export", "save"), ("Trajectory", "sample", "at"), ("Trajectory", "energy", "energies"),
         ("Equations", "M", "mass_matrix"), ("Equations", "L", "lagrangian"), ("Equations", "forcing", "force"),
-        ("Equations", "latex", "explain"), ("Equations", "simulate", "compile"),
+        ("Equations", "latex", "explain"), ("eomgen", "modle", "Model"), ("Equations", "simulate", "compile"),
     ],
 )  # fmt: skip
 def test_words_of_other_programs_in_python(held: dict[str, Any], kind: str, word: str, meant: str) -> None:
@@ -120,3 +126,35 @@ def test_spelling_comes_before_a_word_that_is_less_alike() -> None:
     assert closest("hinge", ["hinges", "revolute"]) == ["revolute"]
     assert closest("hinge", ["hinges"]) == ["hinges"]
     assert closest("qwerty", ["theta"]) == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "m.hinge('A', m.ground, rod)",
+        "m.gravty = (0, 0, 1)",
+        "mod.simulat(1.0)",
+        "run.tt",
+        "equations.mass_matrx",
+        "eg.Modle",
+    ],
+)
+def test_a_notebook_shows_the_line_of_the_user_and_no_other(held: dict[str, Any], line: str) -> None:
+    """Through IPython's own shell: the cell, its line and the message, and nothing of eomgen's files."""
+    from IPython.core.interactiveshell import InteractiveShell
+    from IPython.utils.capture import capture_output
+
+    shell = InteractiveShell()
+    names = {"m": held["Model"], "mod": held["Module"], "run": held["Trajectory"], "equations": held["Equations"]}
+    shell.user_ns.update(names, eg=eg, rod=None)
+    with capture_output() as captured:
+        result = shell.run_cell(f"def mine():\n    {line}\nmine()", store_history=True)
+    InteractiveShell.clear_instance()
+    assert isinstance(result.error_in_exec, AttributeError)
+    text = captured.stdout + captured.stderr
+    assert "in mine" in text
+    assert line in text
+    assert "did you mean" in text
+    assert "near_names" not in text
+    assert "builder.py" not in text
+    assert len(text.splitlines()) <= 8
