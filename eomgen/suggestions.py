@@ -31,6 +31,9 @@ SYNONYMS = {
     "frame site connector reference_frame port": "marker", "joint": "coordinate", "dof": "coordinate independent",
     "world earth fixed_frame fixed_base": "ground", "variable state_variable": "state input parameter",
     "sensor observable probe measurement measure": "output", "control signal": "input", "include import_model": "add",
+    # functions of expressions
+    "ln": "log", "arctan": "atan", "arcsin": "asin", "arccos": "acos", "arctan2": "atan2", "radians": "deg",
+    "sgn signum": "sign", "power pow": "sqrt exp", "step_function theta_function": "heaviside", "ifelse iff": "where",
     # sections and keys of a model file
     "links parts rigid_bodies segments particles": "bodies", "hinges connections": "joints",
     "constants": "parameters", "controls signals": "inputs", "sensors observables measurements probes": "outputs",

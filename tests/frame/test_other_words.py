@@ -13,6 +13,7 @@ import eomgen as eg
 from eomgen.cli.command import VERBS, Verbs, eomgen
 from eomgen.constraints import CONSTRAINTS
 from eomgen.describe.fields import BODY, MODEL, SIMULATION
+from eomgen.describe.names import function_words
 from eomgen.forces import FORCES
 from eomgen.joints import JOINTS
 from eomgen.suggestions import SYNONYMS, closest
@@ -35,7 +36,7 @@ def held() -> dict[str, Any]:
 
 def test_every_suggestion_names_something_that_exists(held: dict[str, Any]) -> None:
     known = {name for one in held.values() for name in dir(one)} | {*VERBS, *MODEL, *BODY, "ground", "marker", "output"}
-    known |= {*JOINTS, *FORCES, *CONSTRAINTS, *SIMULATION}
+    known |= {*JOINTS, *FORCES, *CONSTRAINTS, *SIMULATION, *function_words()}
     for section, table in (("joints", JOINTS), ("forces", FORCES), ("constraints", CONSTRAINTS)):
         for name in table:
             known |= {*inspect.signature(getattr(eg.Model, name)).parameters}
