@@ -199,6 +199,13 @@ class Module(BoundModel):
         F(t, y, y') = 0 with multipliers, for differential-algebraic solvers.
     """
 
+    #: solvers for SciPy's ``solve_ivp``, made when asked for
+    DOP853: type[Any]
+    RK45: type[Any]
+    RK23: type[Any]
+    Radau: type[Any]
+    Taylor: type[Any]
+
     if TYPE_CHECKING:  # what type checkers and editors read; at run time each is a Call
         simulate = _simulate
         simulate_many = _simulate_many
@@ -237,11 +244,6 @@ class Module(BoundModel):
         canonical: Canonical
         dae: Dae
 
-        DOP853: type[Any]
-        RK45: type[Any]
-        RK23: type[Any]
-        Radau: type[Any]
-        Taylor: type[Any]
     else:
 
         def __getattr__(self, name: str) -> Any:

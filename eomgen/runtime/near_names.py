@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Container, Iterable, Mapping
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
 from ..errors import MissingDependencyError, UnavailableError, UsageError
-from ..suggestions import closest
 from ..texts import shown
 
 _SHOWS = ("animate", "animation", "film", "gif", "movie", "play", "plot", "show", "video", "view")
@@ -58,13 +58,24 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
 
 def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
     choice = list(dict.fromkeys(allowed))
-    near = closest(name, choice, 3)
+    near = _closest(name, choice)
     if near:
         return f"did you mean {' or '.join(near)}?"
     if not choice:
         return "there are none"
     first = ", ".join(choice[:most])
     return f"there {'is' if len(choice) == 1 else 'are'} {first}{' ...' if len(choice) > most else ''}"
+
+
+def _closest(name: object, choice: list[str]) -> list[str]:
+    """The likeliest names; a slim package, which has no table of words, looks at the spelling alone."""
+    try:
+        near: list[str] = import_module("..suggestions", __package__).closest(name, choice, 3)
+    except ModuleNotFoundError:
+        from difflib import get_close_matches  # only needed when something went wrong
+
+        near = get_close_matches(str(name), choice, n=3, cutoff=0.6)
+    return near
 
 
 def check_names(
@@ -107,8 +118,6 @@ def require_mapping(what: str, given: Any) -> None:
 
 def require(module: str, extra: str, purpose: str) -> ModuleType:
     """Import an optional package, or say in one line what to install."""
-    from importlib import import_module
-
     try:
         return import_module(module)
     except ImportError as error:
