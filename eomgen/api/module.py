@@ -199,7 +199,7 @@ class Module(BoundModel):
         F(t, y, y') = 0 with multipliers, for differential-algebraic solvers.
     """
 
-    #: solvers for SciPy's ``solve_ivp``, made when asked for
+    # solvers for SciPy's ``solve_ivp``, made when asked for
     DOP853: type[Any]
     RK45: type[Any]
     RK23: type[Any]
