@@ -87,7 +87,7 @@ def _late(name: str) -> Any:
     if home is None:
         near = "" if name.startswith("_") else import_module(".suggestions", __name__).hint(name, __all__)
         text = f"module {__name__!r} has no attribute {name!r}; {near}".removesuffix("; ")
-        raise import_module(".errors", __name__).UnavailableError(text, name=name)
+        raise import_module(".errors", __name__).UnavailableError(text)
     value = getattr(import_module(f".{home}", __name__), name)
     globals()[name] = value
     return value

@@ -146,17 +146,7 @@ class UnavailableError(UsageError, AttributeError):
     """An attribute that there is not, or that a module of this method or kind does not have, such as ``canonical``.
 
     It is an AttributeError too, so that ``hasattr``, ``inspect`` and the completion of notebooks pass over it.
-
-    Attributes
-    ----------
-    name : str or None
-        The attribute that was asked for, if it is one.
     """
-
-    def __init__(self, message: str = "", name: str | None = None) -> None:
-        super().__init__(message)
-        if name is not None:
-            self.name = name
 
 
 def left_out(what: str) -> UnavailableError:

@@ -199,13 +199,6 @@ class Module(BoundModel):
         F(t, y, y') = 0 with multipliers, for differential-algebraic solvers.
     """
 
-    # solvers for SciPy's ``solve_ivp``, made when asked for
-    DOP853: type[Any]
-    RK45: type[Any]
-    RK23: type[Any]
-    Radau: type[Any]
-    Taylor: type[Any]
-
     if TYPE_CHECKING:  # what type checkers and editors read; at run time each is a Call
         simulate = _simulate
         simulate_many = _simulate_many
@@ -243,6 +236,11 @@ class Module(BoundModel):
         minimal: Minimal
         canonical: Canonical
         dae: Dae
+        DOP853: type[Any]
+        RK45: type[Any]
+        RK23: type[Any]
+        Radau: type[Any]
+        Taylor: type[Any]
 
     else:
 

@@ -359,7 +359,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
                 method = self._method(name)
                 if method is not None:
                     return method
-            raise UnavailableError(f"a Model has no attribute {name!r}; {self._near(name)}", name=name)
+            raise UnavailableError(f"a Model has no attribute {name!r}; {self._near(name)}")
 
         def __setattr__(self, name: str, value: Any) -> None:
             """Set what a Model knows; another name would be set without any effect, so it is refused."""

@@ -136,7 +136,6 @@ class ReadingView(Displayed):
                 raise UnavailableError(
                     f"a view of equations has no {name!r}: values are put into what is read, not into what is "
                     f"compiled and counted; take it of the equations themselves, which are .source of the view",
-                    name=name,
                 )
             return find_lacking(self, "a view of equations", name)
 

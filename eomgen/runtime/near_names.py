@@ -53,29 +53,21 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
     public = sorted(n for n in {*dir(type(one)), *vars(one)} if not n.startswith("_"))
     answer = "simulate(...) returns a run, which has animate() and plot(); a module has draw() and explore()"
     meant = answer if name in _SHOWS and "rhs" in public else _hint(name, public, len(public))
-    raise UnavailableError(f"{kind} has no attribute {name!r}; {meant}", name=name)
+    raise UnavailableError(f"{kind} has no attribute {name!r}; {meant}")
 
 
 def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
     choice = list(dict.fromkeys(allowed))
-    near = _closest(name, choice)
+    try:
+        near: list[str] = import_module("..suggestions", __package__).closest(name, choice, 3)
+    except ModuleNotFoundError:  # a slim package has no table of words
+        near = import_module("difflib").get_close_matches(str(name), choice, 3)
     if near:
         return f"did you mean {' or '.join(near)}?"
     if not choice:
         return "there are none"
     first = ", ".join(choice[:most])
     return f"there {'is' if len(choice) == 1 else 'are'} {first}{' ...' if len(choice) > most else ''}"
-
-
-def _closest(name: object, choice: list[str]) -> list[str]:
-    """The likeliest names; a slim package, which has no table of words, looks at the spelling alone."""
-    try:
-        near: list[str] = import_module("..suggestions", __package__).closest(name, choice, 3)
-    except ModuleNotFoundError:
-        from difflib import get_close_matches  # only needed when something went wrong
-
-        near = get_close_matches(str(name), choice, n=3, cutoff=0.6)
-    return near
 
 
 def check_names(
