@@ -42,8 +42,10 @@ class Verb(click.Command):
         except click.NoSuchOption as error:
             names = {opt.lstrip("-"): opt for p in self.get_params(ctx) for opt in p.opts if opt.startswith("--")}
             near = closest(error.option_name.lstrip("-"), names)
-            error.possibilities = [names[one] for one in near]
-            raise
+            if not near:
+                raise
+            meant = f"No such option {error.option_name!r}; did you mean {names[near[0]]}?"
+            raise click.NoSuchOption(error.option_name, meant, ctx=ctx) from None
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         listed: dict[str, list[tuple[str, str]]] = {section: [] for section in ("Options", *SHARED)}
