@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..limits.pictures import NOTHING, SAME
+from ..numeric import algebra
 from .colors import color_of, style_of
 from .data import Array
 from .scene import Item, Scene, passed
 
 LONGEST = 2.0  #: edge of a piece (sizes of a symbol), unless there would be too many
+FINEST = 80.0  #: pieces along the picture, at most
 MOST = 30_000  #: pieces of a picture
 FEWER = 1.3  #: factor of the longest edge, until there are no more
 #: Sizes of a symbol by which roles are drawn nearer, as if in front of what they lie in.
@@ -59,13 +61,14 @@ class Pieces:
         self._corners = [_corners_of(item) for item in scene.items]
         start = scene.frames[0]
         first = [item.at(start)[corners] for item, corners in zip(scene.items, self._corners, strict=True)]
-        longest = LONGEST * scene.symbol
+        longest = max(LONGEST * scene.symbol, float((scene.high - scene.low).max()) / FINEST)
+        most = max(MOST, sum(map(len, first)))  # meshes of many triangles are not divided
         while True:
             self._parts = [
                 _divided(triangles, item.faces is None, longest)
                 for item, triangles in zip(scene.items, first, strict=True)
             ]
-            if sum(len(of) for of, _ in self._parts) <= MOST:
+            if sum(len(of) for of, _ in self._parts) <= most:
                 break
             longest *= FEWER
         colors, widths, nearer, closed, lines = [], [], [], [], []
@@ -138,7 +141,7 @@ def eye_of(projection: Array) -> Array:
 
     x, y and w of the page are zero there: it is the one point that has no place on the page.
     """
-    eye: Array = np.linalg.svd(projection[[0, 1, 3]])[2][3]
+    eye: Array = algebra.svd(projection[[0, 1, 3]], full_matrices=True)[2][3]
     if abs(eye[3]) > SAME * float(np.abs(eye).max()):
         eye /= eye[3]
         return eye

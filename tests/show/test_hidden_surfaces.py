@@ -141,3 +141,11 @@ def test_pieces_of_a_run_follow_its_bodies() -> None:
                 assert mine.min(axis=(0, 1)) == pytest.approx(points.min(axis=0), abs=1e-9)
                 assert mine.max(axis=(0, 1)) == pytest.approx(points.max(axis=0), abs=1e-9)
     assert counts[0] == counts[-1] > counts[3] > counts[1] > 0
+
+
+def test_scenes_of_more_triangles_than_pieces_are_drawn_undivided(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = blocks()
+    scene = build_scene(module, module.x0()[: module.n_q, None])
+    raw = sum(len(item.points) - 1 if item.faces is None else len(item.faces) for item in scene.items)
+    monkeypatch.setattr("eomgen.show.pieces.MOST", 10)
+    assert len(Pieces(scene).at(0)) == raw
