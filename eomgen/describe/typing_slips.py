@@ -126,7 +126,8 @@ def _times(text: str) -> Slip | None:
         first, second = found[1] or found[3], found[2] or found[4]
         power = second in ("e", "E") and text[found.end() : found.end() + 1] in ("+", "-")
         if second not in _KEYWORDS and not power:
-            return Slip("a multiplication sign is missing", found.end() - len(second) + 1, f"write {first}*{second}")
+            remedy = f"write * between ) and {second}" if found[3] else f"write {first}*{second}"
+            return Slip("a multiplication sign is missing", found.end() - len(second) + 1, remedy)
     for found in _BESIDE.finditer(text):
         if not {found[1], found[2]} & _KEYWORDS:
             remedy = f"write {found[1]}*{found[2]} if a product is meant; allowed are + - * / ** and comparisons"

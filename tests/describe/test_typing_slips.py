@@ -15,7 +15,7 @@ SLIPS = {
     "2pi*A": ("a multiplication sign is missing", 2, "write 2*pi"),
     "2a": ("a multiplication sign is missing", 2, "write 2*a"),
     "2(a + b)": ("a multiplication sign is missing", 2, "write 2*("),
-    "(a + b)(2)": ("a multiplication sign is missing", 8, "write )*("),
+    "(a + b)(2)": ("a multiplication sign is missing", 8, "write * between ) and ("),
     "2 pi": ("a multiplication sign is missing", 3, "write 2*pi"),
     "3 mm": ("a number with a unit is not an expression", 3, "write 0.003, the number in m, or 3*mm if mm is a name"),
     "5 N*m": ("a number with a unit is not an expression", 3, "write 5, the number in N*m"),
