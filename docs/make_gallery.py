@@ -18,13 +18,14 @@ from PIL import Image
 import eomgen as eg
 from eomgen.runtime.refined import states_at
 from eomgen.show.film_frames import Frames
+from eomgen.show.palettes import indices_in, palette_of
 from eomgen.show.shown_motion import moving_scene, sample
 from eomgen.show.writers import gif_bytes
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
 STILL, MOVING, SPATIAL = 70.0, 42.0, 54.0  #: dots in an inch of a picture, of a film in the plane and of one in space
-COLORS = 48  #: of a picture that stands still
+COLORS, FILM_COLORS = 48, 64  #: of a picture that stands still, of a film
 LASTS, FPS = 4.0, 10.0  #: seconds of a film, frames in a second
 SMOOTH = 6  #: times as many points for a path in a picture that stands still
 QUICK = ("furuta_pendulum", "quadrotor_load")  #: films of twice as many frames, for the sake of their paths
@@ -83,7 +84,8 @@ def draw(shown: Shown) -> Path:
     motion = sample(trajectory, lambda t: states_at(trajectory, module, t), rate, float(trajectory.t[-1]) / LASTS)
     if moving:
         scene = moving_scene(module, motion, False, False, shown.options.trace)
-        file.write_bytes(gif_bytes(Frames.of(scene, motion, (), SPATIAL if scene.view is None else MOVING)))
+        dots = SPATIAL if scene.view is None else MOVING
+        file.write_bytes(gif_bytes(Frames.of(scene, motion, (), dots), FILM_COLORS))
         return file
     moment = round(MOMENTS.get(file.stem, AT) * (len(motion.t) - 1))
     if not shown.options.trace:  # its surroundings alone, however far the mechanism goes
@@ -91,8 +93,11 @@ def draw(shown: Shown) -> Path:
         motion = motion._replace(t=motion.t[one], x=motion.x[:, one], u=inputs, words=motion.words[one])
         moment = 0
     scene = moving_scene(module, motion, False, False, shown.options.trace)
-    image = Image.fromarray(Frames.of(scene, motion, (), STILL).image(moment))
-    image.quantize(COLORS, dither=Image.Dither.NONE).save(file, optimize=True)
+    image = Frames.of(scene, motion, (), STILL).image(moment)
+    palette = palette_of([image], COLORS)
+    reduced = Image.fromarray(indices_in(palette, image), "P")
+    reduced.putpalette(palette.tobytes())
+    reduced.save(file, optimize=True)
     return file
 
 

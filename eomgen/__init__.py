@@ -11,8 +11,28 @@ from time import time
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from . import errors as errors
     from .api.model import Model as Model
     from .api.model import from_sympy as from_sympy
+    from .errors import AssemblyError as AssemblyError
+    from .errors import EomgenError as EomgenError
+    from .errors import EquilibriumError as EquilibriumError
+    from .errors import EvaluationError as EvaluationError
+    from .errors import ExpressionError as ExpressionError
+    from .errors import MissingDependencyError as MissingDependencyError
+    from .errors import ModelError as ModelError
+    from .errors import NoDerivativeError as NoDerivativeError
+    from .errors import NonFiniteError as NonFiniteError
+    from .errors import PartitionError as PartitionError
+    from .errors import ProjectionError as ProjectionError
+    from .errors import SimulationError as SimulationError
+    from .errors import SimulationInterrupted as SimulationInterrupted
+    from .errors import SingularMassMatrixError as SingularMassMatrixError
+    from .errors import ToolchainError as ToolchainError
+    from .errors import UnavailableError as UnavailableError
+    from .errors import UnsolvedError as UnsolvedError
+    from .errors import UsageError as UsageError
+    from .errors import ZenoError as ZenoError
     from .loading import load as load
     from .loading import load_example as load_example
     from .runtime import Signal as Signal
@@ -59,16 +79,22 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def _late(name: str) -> Any:
     """Load a public name on first use (PEP 562)."""
     if name == "errors":
         return import_module(".errors", __name__)
     home = _HOMES.get(name)
     if home is None:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        near = "" if name.startswith("_") else import_module(".suggestions", __name__).hint(name, __all__)
+        text = f"module {__name__!r} has no attribute {name!r}; {near}".removesuffix("; ")
+        raise import_module(".errors", __name__).UnavailableError(text)
     value = getattr(import_module(f".{home}", __name__), name)
     globals()[name] = value
     return value
+
+
+if not TYPE_CHECKING:  # type checkers know all names
+    __getattr__ = _late
 
 
 def __dir__() -> list[str]:

@@ -19,7 +19,7 @@
     |- ToolchainError        no compiler, or the compiler failed; .command and .output say what it said
     |- MissingDependencyError       an optional package is needed; the message says what to install
     '- UsageError            a call with names or shapes that do not fit the model
-       '- UnavailableError          an attribute that this model does not have; hasattr says so too
+       '- UnavailableError          an attribute that there is not; hasattr says so too
 
     KeyboardInterrupt
     '- SimulationInterrupted Ctrl-C during a run; .trajectory has what there was
@@ -143,7 +143,7 @@ class UsageError(EomgenError, ValueError):
 
 
 class UnavailableError(UsageError, AttributeError):
-    """An attribute that a module of this method or kind does not have, such as ``canonical``.
+    """An attribute that there is not, or that a module of this method or kind does not have, such as ``canonical``.
 
     It is an AttributeError too, so that ``hasattr``, ``inspect`` and the completion of notebooks pass over it.
     """

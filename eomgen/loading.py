@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Unpack
 
 from .api.model import Model
 from .describe import describe_yaml_file
@@ -15,13 +15,20 @@ from .shipped import example_files, find_example
 from .suggestions import hint
 from .texts import shown
 
+if TYPE_CHECKING:
+    from .runtime.option_types import LoadOptions, RobotKeywords
+
 #: Suffix of a file -> what it is; the table of what can be loaded.
 SUFFIXES = {".yaml": "a model file (YAML 1.2)", ".yml": "a model file (YAML 1.2)"}
 ROBOTS = {".urdf": "a robot (URDF)", ".xml": "a robot (MJCF or URDF)"}
 
 
 def load(
-    path: str | os.PathLike[str], *, allow_native: bool = False, check_inertia: bool | str | None = None, **robot: Any
+    path: str | os.PathLike[str],
+    *,
+    allow_native: bool = False,
+    check_inertia: bool | str | None = None,
+    **robot: Unpack[RobotKeywords],
 ) -> Model:
     """Load a model from a file; the ending of its name says what it is.
 
@@ -60,9 +67,8 @@ def load(
     if suffix in ROBOTS:
         from .robots import describe_file  # only where it is needed: MJCF brings its own compiler
 
-        if check_inertia is not None:
-            robot["check_inertia"] = check_inertia
-        return _with_notes(Model.from_description(describe_file(path, **robot)))
+        checks = {} if check_inertia is None else {"check_inertia": check_inertia}
+        return _with_notes(Model.from_description(describe_file(path, **checks, **robot)))
     if suffix not in SUFFIXES:
         known = ", ".join(f"{s} {what}" for s, what in {**SUFFIXES, **ROBOTS}.items())
         example = f"; the example is load_example({path!r})" if find_example(path, example_files()) else ""
@@ -79,7 +85,7 @@ def load(
     return _with_notes(model)
 
 
-def load_example(name: str, **options: Any) -> Model:
+def load_example(name: str, **options: Unpack[LoadOptions]) -> Model:
     """One of the examples that come with eomgen; ``eomgen examples`` and the gallery list them.
 
     Parameters

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,6 +34,8 @@ from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+    from ..runtime.option_types import FilmOptions
+    from ..show.player import InlineFilm, InlinePage
 
 
 COLUMNS = 12  #: of mode shapes in the table of a notebook
@@ -141,6 +143,16 @@ class Modes:
         title = f"<b>{html_text(f'Modes of {self.name}')}</b>"
         return f"{title}<table><tr>{head}</tr>{cells}</table>{as_html('', damped) if damped else ''}"
 
+    @overload
+    def animate(self, mode: int, file: str | Path, **options: Unpack[FilmOptions]) -> Path: ...
+    @overload
+    def animate(
+        self, mode: int = 1, *, format: Literal["gif", "mp4"], **options: Unpack[FilmOptions]
+    ) -> InlineFilm: ...
+    @overload
+    def animate(
+        self, mode: int = 1, file: None = None, *, format: Literal["html"] | None = None, **options: Unpack[FilmOptions]
+    ) -> InlinePage: ...
     def animate(self, mode: int = 1, file: str | Path | None = None, **options: Any) -> Any:
         """Show an animation of a mode shape, enlarged so that it is visible; loops stay closed.
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from .. import pipeline
 from ..derivation import Derivation
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..device.arrays_on_device import Device
     from ..device.device_module import DeviceModule
     from ..explain import Explanation
+    from ..runtime.option_types import BuildOptions
 
 
 DRAWN = 30  #: bodies of a mechanism that is drawn whenever a notebook shows its equations
@@ -94,7 +95,9 @@ class Equations(Derivation):
 
         return explain(equations, level)
 
-    def compile(self, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any) -> Module:
+    def compile(
+        self, target: str = "cython", kernels: Sequence[str] | None = None, **options: Unpack[BuildOptions]
+    ) -> Module:
         """Generate code, compile it and load it.
 
         Parameters

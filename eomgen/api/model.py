@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from .. import pipeline
 from ..describe.builder import Builder
@@ -14,7 +14,10 @@ from ..files.inline_pictures import picture_html, side_by_side
 from .equations import Equations, derive
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from ..kinematics.report import MechanismReport
+    from ..runtime.option_types import BuildOptions
     from .module import Module
 
 
@@ -62,7 +65,16 @@ class Model(Builder):
         """Check all that can be checked before a simulation, assembly included; see ``eomgen.pipeline.check``."""
         return pipeline.check(self)
 
-    def draw(self, x: Any = None, ax: Any = None, **options: Any) -> Any:
+    def draw(
+        self,
+        x: Any = None,
+        ax: Axes | None = None,
+        *,
+        t: float = 0.0,
+        names: bool | None = None,
+        axes: bool = False,
+        **named: float | str,
+    ) -> Axes:
         """Draw the mechanism at a configuration, without a compiler; arguments as for :meth:`.module.Module.draw`.
 
         Examples
@@ -72,7 +84,7 @@ class Model(Builder):
         >>> hinge = model.revolute("hinge", model.ground, rod, coordinate="theta")
         >>> axes = model.draw({"theta": 0.3})  # doctest: +SKIP
         """
-        return self.compile(target="numpy").draw(x, ax, **options)
+        return self.compile(target="numpy").draw(x, ax, t=t, names=names, axes=axes, **named)
 
     def _repr_html_(self) -> str:
         table = super()._repr_html_()
@@ -105,7 +117,7 @@ class Model(Builder):
         target: str = "cython",
         independent: Sequence[Any] | None = None,
         baumgarte: tuple[float, float] | None = None,
-        **options: Any,
+        **options: Unpack[BuildOptions],
     ) -> Module:
         """Derive, generate and compile a module; see :meth:`~.equations.Equations.compile`."""
         module = self.derive(method, independent, baumgarte).compile(target, **options)

@@ -236,18 +236,25 @@ class Module(BoundModel):
         minimal: Minimal
         canonical: Canonical
         dae: Dae
+        DOP853: type[Any]
+        RK45: type[Any]
+        RK23: type[Any]
+        Radau: type[Any]
+        Taylor: type[Any]
 
-    def __getattr__(self, name: str) -> Any:
-        if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
-            from ..simulation.steppers import find_solver
+    else:
 
-            return find_solver(self, name)
-        if name in CALLS:  # an analysis of a user's own
-            return LateMethod(name).__get__(self, type(self))
-        if name in FORMS:
-            form = self.__dict__[name] = find_function(FORMS[name], name.capitalize())(self)
-            return form
-        return find_lacking(self, "a Module", name)
+        def __getattr__(self, name: str) -> Any:
+            if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
+                from ..simulation.steppers import find_solver
+
+                return find_solver(self, name)
+            if name in CALLS:  # an analysis of a user's own
+                return LateMethod(name).__get__(self, type(self))
+            if name in FORMS:
+                form = self.__dict__[name] = find_function(FORMS[name], name.capitalize())(self)
+                return form
+            return find_lacking(self, "a Module", name)
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *CALLS, *FORMS})

@@ -7,6 +7,8 @@ from typing import Any, TypeVar
 
 import click
 
+from ..suggestions import closest
+
 DERIVATION = "Derivation and compilation"
 INTEGRATION = "Integration"
 ROBOTS = "Robot files (URDF, MJCF)"
@@ -32,7 +34,18 @@ def shared_option(section: str, *names: str, **attributes: Any) -> Callable[[F],
 
 
 class Verb(click.Command):
-    """A command whose help has a section for each kind of options."""
+    """A command whose help has a section for each kind of options, and which knows other words for them."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            names = {opt.lstrip("-"): opt for p in self.get_params(ctx) for opt in p.opts if opt.startswith("--")}
+            near = closest(error.option_name.lstrip("-"), names)
+            if not near:
+                raise
+            meant = f"No such option {error.option_name!r}; did you mean {names[near[0]]}?"
+            raise click.NoSuchOption(error.option_name, meant, ctx=ctx) from None
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         listed: dict[str, list[tuple[str, str]]] = {section: [] for section in ("Options", *SHARED)}

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
 from ..constraints import CONSTRAINTS
+from ..errors import UnavailableError
 from ..forces import FORCES
 from ..joints import JOINTS
 from ..suggestions import hint
@@ -326,18 +327,20 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
         write_whole(path, self.to_yaml())
 
     # -- display --------------------------------------------------------------------------------------------------
-    def __getattr__(self, name: str) -> Any:
-        if not name.startswith("_"):
-            method = self._method(name)
-            if method is not None:
-                return method
-        raise AttributeError(f"a Model has no attribute {name!r}; {self._near(name)}")
+    if not TYPE_CHECKING:  # type checkers know all attributes
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        """Set what a Model knows; another name would be set without any effect, so it is refused."""
-        if not name.startswith("_") and not isinstance(getattr(type(self), name, None), property):
-            raise AttributeError(f"a Model has no attribute {name!r} to set; {self._near(name)}")
-        super().__setattr__(name, value)
+        def __getattr__(self, name: str) -> Any:
+            if not name.startswith("_"):
+                method = self._method(name)
+                if method is not None:
+                    return method
+            raise UnavailableError(f"a Model has no attribute {name!r}; {self._near(name)}")
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            """Set what a Model knows; another name would be set without any effect, so it is refused."""
+            if not name.startswith("_") and not isinstance(getattr(type(self), name, None), property):
+                raise UnavailableError(f"a Model has no attribute {name!r} to set; {self._near(name)}")
+            super().__setattr__(name, value)
 
     def _near(self, name: str) -> str:
         """A suggestion for a name that does not exist."""

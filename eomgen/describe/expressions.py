@@ -19,6 +19,7 @@ from ..operations import OPERATIONS
 from ..syntax_trees import parse_statement
 from .marker_quantities import ElementQuantity, MarkerQuantity
 from .names import OF_ELEMENTS, QUANTITIES, function_words, nearest
+from .typing_slips import find_slip
 
 LENGTH = 4000  #: characters of one expression
 DEPTH = 60  #: nesting
@@ -33,14 +34,11 @@ Locate = Callable[[MarkerQuantity | ElementQuantity], Expr]
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/()<>=! \t\r\n]")
 #: A number that runs into a word: Python reads it as two, with a warning of its own.
 _JOINED = re.compile(r"(?<![A-Za-z0-9_])[0-9.][0-9A-Za-z_.]*?(and|or|not|if|is|in|else)")
-#: A number with a unit: ``150 mm``, ``5cm``, ``30°``.
-_WITH_UNIT = re.compile(r"\s*([0-9.]+(?:e[+-]?[0-9]+)?)\s*(°|%|[A-Za-zµμ][A-Za-z0-9µμ*/^²³·-]*)\s*")
 #: Keywords of motions that Python does not allow as such, and what stands for them in its tree.
 _KEYWORDS = {"in": "_n", "from": "_rom"}
 _KEYWORD = re.compile(r"\b(in|from)(?=\s*=(?!=))")
 _UNFINISHED = "close the bracket; between { } of a model file an expression with commas must stand in quotes"
 _HINTS = {
-    "^": "write ** for powers",
     "%": "there is no remainder operator",
     "'": "text is not allowed in an expression",
     '"': "text is not allowed in an expression",
@@ -108,7 +106,7 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         raise ExpressionError("the expression is empty", 1, allowed(), text)
     foreign = _FOREIGN.search(text)
     if foreign:
-        _refuse_unit(text)
+        _refuse_slip(text)
         mark = foreign.group()
         raise ExpressionError(
             f"{mark!r} is not allowed in an expression", foreign.start() + 1, _HINTS.get(mark, allowed()), text
@@ -124,7 +122,8 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     try:
         tree = parse_statement(line[start:].rstrip() + "\n")
     except SyntaxError as error:
-        _refuse_unit(text)
+        if "never closed" not in error.msg:
+            _refuse_slip(text)
         column = (error.offset or 1) + start
         remedy = _UNFINISHED if "never closed" in error.msg else allowed()
         raise ExpressionError(f"not a valid expression ({error.msg})", column, remedy, text) from None
@@ -132,18 +131,18 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         raise ExpressionError("nested too deeply", 1, f"at most {DEPTH} levels", text) from None
     body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
+        _refuse_slip(text)
         raise ExpressionError("this is a statement, not an expression", start + 1, allowed(), text)
+    if isinstance(body[0].value, ast.Tuple):
+        _refuse_slip(text)
     return _Walker(text, start, graph, resolve, locate, any_function).walk(body[0].value, 0)
 
 
-def _refuse_unit(text: str) -> None:
-    """Raise ExpressionError if the text is a number with a unit."""
-    measured = _WITH_UNIT.fullmatch(text)
-    if measured is not None:
-        number, unit = measured.groups()
-        angle = unit.lower() in ("deg", "degree", "degrees", "°")
-        remedy = f"write deg({number})" if angle else "write the number in SI units; a parameter may have another unit"
-        raise ExpressionError("a number with a unit is not an expression", measured.start(2) + 1, remedy, text)
+def _refuse_slip(text: str) -> None:
+    """Raise ExpressionError if a text that is no expression has a slip that is known, such as a decimal comma."""
+    slip = find_slip(text)
+    if slip is not None:
+        raise ExpressionError(slip.message, slip.column, slip.remedy, text)
 
 
 def names_in(text: str) -> list[str]:
@@ -232,7 +231,8 @@ class _Walker:
         for link in reversed(chain):
             operation = _BINARY.get(type(link.op))
             if operation is None:
-                raise self.fault(link, f"the operator {type(link.op).__name__} is not allowed in an expression")
+                sign = "//" if isinstance(link.op, ast.FloorDiv) else type(link.op).__name__
+                raise self.fault(link, f"the operator {sign} is not allowed in an expression", "write / for a quotient")
             self.size += 1
             value = self.apply(link, operation, value, self.walk(link.right, depth + 1))
         return value
@@ -258,6 +258,7 @@ class _Walker:
 
     def call(self, node: ast.Call, depth: int) -> Expr:
         if not isinstance(node.func, ast.Name):
+            _refuse_slip(self.text)
             raise self.fault(node, "only the listed functions can be called")
         name = node.func.id
         if name in QUANTITIES and name not in self.words:

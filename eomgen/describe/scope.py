@@ -9,11 +9,12 @@ from ..errors import ExpressionError
 from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.substitute import symbols_of
+from ..suggestions import joined
 from .description import Faults
 from .fields import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
 from .marker_quantities import ONE_OR_TWO, ElementQuantity, MarkerQuantity, element_quantity, marker_quantity
 from .mechanism import TURNING, Quantity
-from .names import ACCELERATIONS, COM, QUANTITIES, TOTALS, fault_of_name, nearest
+from .names import ACCELERATIONS, COM, CONSTANTS, QUANTITIES, TOTALS, fault_of_name, nearest
 
 #: Kind of name -> the least level of a field in which it may stand.
 LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": MOTION, "velocity": MOTION}
@@ -169,6 +170,7 @@ class Scope:
         elif kind is None:
             known = [*self.local, *(n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level)]
             remedy = f"{nearest(name, known, 'known here')}; or declare a parameter of that name"
+            remedy = joined(CONSTANTS.get(name.lower(), ""), remedy)
             self.names.faults.add(self.path, f"unknown name {name!r}", remedy)
         elif LEVELS[kind] > self.level:
             self._refuse(name, kind)

@@ -44,7 +44,7 @@ _PINT = {
     "[temperature]": _TEMPERATURE,
 }  # fmt: skip
 #: Words that are suggested for unknown ones.
-_COMMON = (
+COMMON = (
     *SI,
     "mm",
     "cm",
@@ -199,7 +199,7 @@ def _looked_up(word: str, text: str) -> tuple[Dimension, float, bool]:
         unit = registry.Unit("percent" if word == "%" else word)
         one = registry.Quantity(1.0, unit)
     except Exception as error:  # of many classes: the word may be any
-        near = closest(word, _COMMON)
+        near = closest(word, COMMON)
         raise UnitError(unknown, (f"did you mean {near[0]!r}? " if near else "") + _FORM) from error
     if not one._is_multiplicative:
         raise UnitError(

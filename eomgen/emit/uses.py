@@ -9,6 +9,9 @@ from typing import NamedTuple, TypeGuard
 
 from ..syntax_trees import parse_module
 
+#: Signatures of a method that only type checkers tell apart.
+OVERLOAD = re.compile(r"^( +)@overload\n\1def .*\n(?:\1[ )].*\n)*", re.M)
+
 
 class Import(NamedTuple):
     """One imported name."""
@@ -38,6 +41,7 @@ class SourceText:
     """
 
     def __init__(self, name: str, text: str) -> None:
+        text = OVERLOAD.sub("", text)
         self.name, self.text, self.tree = name, text, parse_module(text)
         self.definitions: dict[str, ast.stmt] = {}
         self.imports: dict[str, Import] = {}

@@ -23,6 +23,7 @@ from .reductions import KeptStates, Reduction, Statistics, names_of, summarise, 
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.axes import Axes
 
     from ..runtime.bound_model import BoundModel
     from ..runtime.trajectory import Trajectory
@@ -294,7 +295,7 @@ class Ensemble:
             np.savez_compressed(file, names=np.array(self.names), header=header, **runs, **arrays)
         return target
 
-    def plot(self, name: str, ax: Any = None, limit: int = 200) -> Any:
+    def plot(self, name: str, ax: Axes | None = None, limit: int = 200) -> Axes:
         """Lines of a column over time, mean and spread for statistics, a histogram where there are last states only.
 
         Parameters
@@ -306,7 +307,8 @@ class Ensemble:
         """
         from .column_picture import draw
 
-        return draw(self, name, ax, limit)
+        drawn: Axes = draw(self, name, ax, limit)
+        return drawn
 
     def unit(self, name: str) -> str:
         """The unit of a column."""

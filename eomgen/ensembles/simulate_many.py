@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,6 +34,7 @@ from .store import stored_length
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.layout import Layout
+    from ..runtime.option_types import Number, StepOptions
 
 STORED = 64  #: blocks at least that a store keeps of a large ensemble
 WIDEST = 8  #: runs side by side in one thread, at most
@@ -60,9 +61,9 @@ def simulate_many(
     store: str | Path | None = None,
     block: int | None = None,
     max_steps: int = 1_000_000,
-    step: float | None = None,
+    step: Number | None = None,
     progress: bool | None = None,
-    **options: Any,
+    **options: Unpack[StepOptions],
 ) -> Ensemble:
     """Integrate the equations of motion for many initial values, parameters and inputs.
 
@@ -131,7 +132,7 @@ def simulate_many(
     cases = collect_cases(module, initial, parameters, constants, count)
     reduction = choose_reduction(reduce)
     named = tuple(constants) if isinstance(constants, Mapping) else () if constants is None else module.u_names
-    plan = _plan(module, span, method, t_eval, tables, named, max_steps, step, options, (events, keep_events))
+    plan = _plan(module, span, method, t_eval, tables, named, max_steps, step, {**options}, (events, keep_events))
     threads = (os.cpu_count() or 1) if threads is None else read_count("threads", threads, 1)
     watch = Progress(0.0, float(cases.count), 0.0 if progress else 2.0, "{:.0f} runs") if wanted(progress) else None
     each = module.n_x * (1 if plan.t_eval is None else len(plan.t_eval))
@@ -208,7 +209,7 @@ def _gather(
 
 def _plan(
     module: BoundModel, span: Any, method: Any, t_eval: Any, tables: dict[str, Any],
-    constants: tuple[str, ...], max_steps: int, step: float | None, options: dict[str, Any], watched: tuple[Any, int],
+    constants: tuple[str, ...], max_steps: int, step: Number | None, options: dict[str, Any], watched: tuple[Any, int],
 ) -> Plan:  # fmt: skip
     declared = declare(module)
     start, end = find_span(span, float(declared["end"]))

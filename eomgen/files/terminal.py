@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 from collections.abc import Sequence
@@ -11,8 +12,14 @@ NARROWEST = 40  #: characters of a line, however narrow the terminal is
 
 
 def terminal_width() -> int | None:
-    """Characters of a line where the standard output is a terminal; None where it is a file, a pipe or a notebook."""
-    return max(shutil.get_terminal_size().columns, NARROWEST) if sys.stdout.isatty() else None
+    """Characters of a line: what the variable ``COLUMNS`` says, else the width of the terminal that is printed to.
+
+    None where the standard output is a file, a pipe or a notebook and ``COLUMNS`` is no positive number.
+    """
+    said = os.environ.get("COLUMNS", "")
+    if not sys.stdout.isatty() and not (said.isdecimal() and int(said) > 0):
+        return None
+    return max(shutil.get_terminal_size().columns, NARROWEST)  # which looks at COLUMNS first
 
 
 def fold(text: str, width: int, first: str = "", rest: str = "") -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..files.inline_pictures import picture_html, side_by_side
 from ..files.terminal import fold, terminal_width
@@ -21,6 +21,9 @@ from .kinematics import Kinematics
 from .mobility import Mobility
 from .notes import find_notes
 from .picture import draw, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 WIDTH = 110  #: of the lines of a report, at most
 
@@ -88,7 +91,7 @@ class MechanismReport:
     guess_distance: float
     other_branches: list[dict[str, float]]
 
-    def draw(self, file: str | Path | None = None, ax: Any = None) -> Any:
+    def draw(self, file: str | Path | None = None, ax: Axes | None = None) -> Axes:
         """Draw the mechanism as a graph: bodies above the bodies that carry them, joints between them.
 
         Joints of the spanning tree are solid lines, those that close loops dashed; constraint elements are diamonds.
@@ -111,7 +114,8 @@ class MechanismReport:
         UsageError
             A file name whose ending is no kind of picture.
         """
-        return draw(self, file, ax)
+        drawn: Axes = draw(self, file, ax)
+        return drawn
 
     def to_dict(self) -> dict[str, Any]:
         """The report as plain values, for JSON."""

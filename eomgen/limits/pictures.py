@@ -8,6 +8,8 @@ HELD = 1e-6
 STEP = 1e-5
 #: Amplitudes that a spectrum shows at least, of the greatest.
 FAINT = 1e-9
+#: Relative difference of a coordinate between two branches that is printed in three digits.
+SEEN = 1e-3
 #: Relative size of rounding in numbers of order 1 that have gone through a few operations.
 ROUNDED = 1e-12
 #: Divisors below it are zero: the smallest numbers without subnormal ones.

@@ -133,10 +133,9 @@ class ReadingView(Displayed):
         def __getattr__(self, name: str) -> Any:
             lacks = not name.startswith("_") and not hasattr(type(self), name)
             if lacks and hasattr(type(self.source), name):
-                raise AttributeError(
+                raise UnavailableError(
                     f"a view of equations has no {name!r}: values are put into what is read, not into what is "
                     f"compiled and counted; take it of the equations themselves, which are .source of the view",
-                    name=name,
                 )
             return find_lacking(self, "a view of equations", name)
 

@@ -9,6 +9,10 @@ from .room import read_number, with_numbers
 from .show_parts import load_show
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from ..show.explore import Explorer
     from .bound_model import BoundModel
 
 
@@ -16,12 +20,13 @@ def draw(
     model: BoundModel,
     /,
     x: Any = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     *,
     t: float = 0.0,
     names: bool | None = None,
     axes: bool = False,
-) -> Any:
+    **named: float | str,
+) -> Axes:
     """Draw the mechanism at a configuration, true to scale.
 
     A mechanism that moves in a plane is drawn in this plane, a spatial one in space.  Bodies are the shapes that their
@@ -41,6 +46,8 @@ def draw(
         Whether bodies and joints are named; by default where they are few.
     axes : bool
         Whether the axes of all bodies are drawn.
+    **named : float or str
+        Values of coordinates by name, as in a mapping x: ``draw(theta=0.3)``.
 
     Returns
     -------
@@ -55,10 +62,12 @@ def draw(
     AssemblyError
         The loops do not close with these values.
     """
-    return load_show("draw").draw(model, with_numbers("x", x), ax, t=read_number("t", t), names=names, axes=axes)
+    x, t = with_numbers("x", x), read_number("t", t)
+    drawn: Axes = load_show("draw").draw(model, x, ax, t=t, names=names, axes=axes, named=named)
+    return drawn
 
 
-def explore(model: BoundModel, /, x: Any = None) -> Any:
+def explore(model: BoundModel, /, x: Any = None) -> Explorer:
     """Show the mechanism in a notebook with sliders for its independent coordinates and its lengths.
 
     At each position the loops are closed near the previous one; a line of text says where that is not possible.
@@ -81,7 +90,8 @@ def explore(model: BoundModel, /, x: Any = None) -> Any:
         The model has no bodies, or x does not fit.
     """
     start = load_show("draw").position(model, with_numbers("x", x), 0.0)
-    return load_show("explore").explore(model, start)
+    shown: Explorer = load_show("explore").explore(model, start)
+    return shown
 
 
 def draw_branches(
@@ -92,7 +102,7 @@ def draw_branches(
     t: float = 0.0,
     names: bool | None = None,
     **named: float | str,
-) -> Any:
+) -> NDArray[Any]:
     """Draw all positions in which the loops close with the given values, side by side at the same scale.
 
     Parameters
@@ -107,4 +117,5 @@ def draw_branches(
     array of matplotlib Axes
         In the order of ``module.branches``.
     """
-    return load_show("draw").draw_branches(model, values, t=t, names=names, named=named)
+    panels: NDArray[Any] = load_show("draw").draw_branches(model, values, t=t, names=names, named=named)
+    return panels

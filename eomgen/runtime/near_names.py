@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Mapping
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-from ..errors import MissingDependencyError, UsageError
+from ..errors import MissingDependencyError, UnavailableError, UsageError
 from ..instance_names import undotted
 from ..texts import shown
 
@@ -42,8 +43,8 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
 
     Raises
     ------
-    AttributeError
-        With near misses; a property that raised one raises its own again.
+    UnavailableError
+        With near misses, an AttributeError too; a property that raised one raises its own again.
     """
     if name.startswith("_"):
         raise AttributeError(f"{kind} has no attribute {name!r}", name=name)
@@ -51,15 +52,16 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
         return own.__get__(one, type(one))
     public = sorted(n for n in {*dir(type(one)), *vars(one)} if not n.startswith("_"))
     answer = "simulate(...) returns a run, which has animate() and plot(); a module has draw() and explore()"
-    meant = answer if name in _SHOWS else _hint(name, public, len(public))
-    raise AttributeError(f"{kind} has no attribute {name!r}; {meant}", name=name)
+    meant = answer if name in _SHOWS and "rhs" in public else _hint(name, public, len(public))
+    raise UnavailableError(f"{kind} has no attribute {name!r}; {meant}")
 
 
 def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
-    from difflib import get_close_matches  # only needed when something went wrong
-
     choice = list(dict.fromkeys(allowed))
-    near = get_close_matches(str(name), choice, n=3, cutoff=0.6)
+    try:
+        near: list[str] = import_module("..suggestions", __package__).closest(name, choice, 3)
+    except ModuleNotFoundError:  # a slim package has no table of words
+        near = import_module("difflib").get_close_matches(str(name), choice, 3)
     if near:
         return f"did you mean {' or '.join(near)}?"
     if not choice:
@@ -108,8 +110,6 @@ def require_mapping(what: str, given: Any) -> None:
 
 def require(module: str, extra: str, purpose: str) -> ModuleType:
     """Import an optional package, or say in one line what to install."""
-    from importlib import import_module
-
     try:
         return import_module(module)
     except ImportError as error:

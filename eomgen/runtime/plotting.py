@@ -49,7 +49,7 @@ class Curves(NamedTuple):
 
 def plot(
     trajectory: TrajectoryLike,
-    names: Sequence[str],
+    names: Sequence[str | Sequence[str]],
     ax: Any = None,
     x: str | None = None,
     y: str | Sequence[str] | None = None,
@@ -60,7 +60,11 @@ def plot(
 
 
 def choose(
-    trajectory: TrajectoryLike, names: Sequence[str], x: str | None, y: str | Sequence[str] | None, kind: str
+    trajectory: TrajectoryLike,
+    given: Sequence[str | Sequence[str]],
+    x: str | None,
+    y: str | Sequence[str] | None,
+    kind: str,
 ) -> tuple[list[Curves], str]:
     """Panels of what is asked for, and the label of their horizontal axis.
 
@@ -70,9 +74,11 @@ def choose(
         Unknown names, or wishes that do not go together.
     """
     known = ("t", *trajectory.names)
-    asked = [one for name in names for one in read_names("a column", name)]  # a list of names is taken too
+    asked = [one for name in given for one in read_names("a column", name)]  # a list of names is taken too
     instances = trajectory.metadata.get("instances", {})
-    names = tuple(plain_name(name, instances) for name in (*asked, *(() if y is None else read_names("y", y))))
+    names: tuple[str, ...] = tuple(
+        plain_name(name, instances) for name in (*asked, *(() if y is None else read_names("y", y)))
+    )
     x = plain_name(x, instances)
     for name in (*names, *(() if x is None else (x,))):  # unknown names fail before a figure opens
         if name not in known:

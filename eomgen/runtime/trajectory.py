@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,22 +19,14 @@ from .run_parts import Named, Residuals
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
+    from ..show.player import InlineFilm, InlinePage
     from .bound_model import BoundModel
     from .change_points import ChangePoint
-
-
-class Source(Protocol):
-    """Named columns (n_t,)."""
-
-    names: tuple[str, ...]
-
-    @property
-    def energies(self) -> Array: ...
-    @property
-    def has_energies(self) -> bool: ...
-
-    def __getitem__(self, name: str) -> Array: ...
+    from .option_types import AnimationOptions
+    from .protocols import Source
 
 
 class Trajectory:
@@ -310,6 +302,14 @@ class Trajectory:
 
         return position(self, name, model)
 
+    @overload
+    def animate(self, file: str | Path, **options: Unpack[AnimationOptions]) -> Path: ...
+    @overload
+    def animate(self, *, format: Literal["gif", "mp4"], **options: Unpack[AnimationOptions]) -> InlineFilm: ...
+    @overload
+    def animate(
+        self, file: None = None, *, format: Literal["html"] | None = None, **options: Unpack[AnimationOptions]
+    ) -> InlinePage: ...
     def animate(self, file: str | Path | None = None, *, model: BoundModel | None = None, **options: Any) -> Any:
         """Show the motion of the mechanism as an animation.
 
@@ -353,7 +353,19 @@ class Trajectory:
 
         return animate(self, file, model, options)
 
-    def plot(self, *names: str, x: str | None = None, y: Any = None, kind: str = "time", ax: Any = None) -> Any:
+    @overload
+    def plot(self, name: str, /, *, kind: Literal["time", "spectrum"] = "time", ax: Axes | None = None) -> Axes: ...
+    @overload
+    def plot(
+        self, *names: str | Sequence[str], x: str | None = None, y: Any = None, kind: str = "time", ax: Axes
+    ) -> Axes: ...
+    @overload
+    def plot(
+        self, *names: str | Sequence[str], x: str | None = None, y: Any = None, kind: str = "time", ax: None = None
+    ) -> Axes | NDArray[Any]: ...
+    def plot(
+        self, *names: str | Sequence[str], x: str | None = None, y: Any = None, kind: str = "time", ax: Any = None
+    ) -> Any:
         """Plot columns over time, or against each other; columns of one unit share a panel.
 
         Parameters

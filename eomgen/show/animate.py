@@ -4,28 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
-from ..notation.labels import label
 from ..notation.notation import Notation
 from ..texts import shown
+from .curves import ShownColumn
 from .film_frames import DPI, MOST_DOTS, Frames
 from .force_arrows import with_arrows
 from .player import InlineFilm, InlinePage
 from .scene import Scene
 from .shown_motion import ShownMotion, States, moving_scene, sample, with_fine_traces
 from .writers import FILMS, WRITERS, kind_of, require_target
-
-
-class ShownColumn(NamedTuple):
-    """A column of the run that is drawn along: its name as it is printed and unit, its values over what goes on."""
-
-    label: str
-    over: Any
-    values: Any
 
 
 def animate(
@@ -66,7 +58,7 @@ def animate(
     times, values = columns(plot) if plot else (trajectory.t, {})
     over = motion.over if still else times
     printed, units = Notation.of(trajectory.metadata).mathtext, trajectory.units
-    curves = [ShownColumn(label(printed(n), units.get(n, "")), over, row) for n, row in values.items()]
+    curves = [ShownColumn(printed(n), units.get(n, ""), over, row) for n, row in values.items()]
     return write(file, scene, motion, curves, dpi, format)
 
 

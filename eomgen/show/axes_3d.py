@@ -6,18 +6,44 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.pictures import NOTHING
-from .colors import color_of, style_of
+from .branch_views import usual_view
+from .colors import color_of
 from .data import Array
 from .flat import joined_limits
 from .label_places import NAME_STYLE, NAMES, name_offsets
+from .pieces import Pieces, eye_of
 from .plane import page_axes
-from .scene import Item, Scene, passed
-from .solids import Triangles
+from .scene import Scene
 
-ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees), from the axis that runs to the right
 ZOOM = 0.88  #: leaves room for the names of the axes
 IN_FRONT = 1e6  #: place of names over solids, of which each has a place of its own
+
+
+def piece_collection(pieces: Pieces, ax: Any) -> Any:
+    """A collection of matplotlib that draws pieces as the eye of axes sees them; ``move`` gives it their corners.
+
+    The class stands here because its base is an optional library's.
+    """
+    from matplotlib.collections import PolyCollection
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    class PieceCollection(PolyCollection):
+        def move(self, corners: Array) -> None:
+            self.corners = corners
+            self.stale = True
+
+        def do_3d_projection(self) -> float:
+            """Project what is seen; the depth of it all, by which matplotlib orders collections."""
+            projection = ax.get_proj()
+            shown = pieces.seen(self.corners, eye_of(projection))
+            x, y, z = proj_transform(*shown.corners.reshape(-1, 3).T, projection)
+            corners: Any = np.column_stack([x, y]).reshape(-1, 3, 2)
+            colors: Any = shown.colors
+            widths: Any = shown.widths
+            self.set(verts=corners, facecolor=colors, edgecolor=colors, linewidth=widths)
+            return float(np.min(z, initial=np.inf))
+
+    return PieceCollection([], capstyle="round", joinstyle="round")
 
 
 class Axes3DPicture:
@@ -27,12 +53,11 @@ class Axes3DPicture:
     ----------
     scene : Scene
     ax : matplotlib Axes3D
+    view : (float, float), optional
+        Elevation and azimuth of the eye (degrees).
     """
 
-    def __init__(self, scene: Scene, ax: Any) -> None:
-        from matplotlib.colors import to_rgb
-        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
+    def __init__(self, scene: Scene, ax: Any, view: tuple[float, float] | None = None) -> None:
         self.scene, self.ax = scene, ax
         vertical, right = page_axes(scene.up)
         depth = 3 - vertical - right
@@ -41,28 +66,11 @@ class Axes3DPicture:
             for k in (vertical, depth):
                 limits[k] = limits[k][::-1]
         limits = joined_limits(ax, "xyz", limits)
-        self.artists: list[tuple[Item, Any, Triangles | None]] = []
-        light = np.array([0.4, -0.5, 0.77])
-        for item in scene.items:
-            style, color = style_of(item.role), color_of(item)
-            if item.faces is None:
-                line = ax.plot([], [], [], color=color, linewidth=style.width)[0]
-                self.artists.append((item, line, None))
-                continue
-            corners = item.at(scene.frames[0])[item.faces]
-            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), NOTHING)
-            bright = 0.62 + 0.38 * np.clip(normals @ light, -0.4, 1.0)
-            base = np.array(to_rgb(style.face or color))
-            faces = np.clip(base * bright[:, None], 0.0, 1.0)
-            alpha = style.alpha if item.role in ("shape", "wheel") else 1.0
-            collection = Poly3DCollection(corners, facecolors=np.column_stack([faces, np.full(len(faces), alpha)]))
-            collection.set_edgecolor("none")
-            ax.add_collection3d(collection)
-            self.artists.append((item, collection, item.faces))
-        # matplotlib counts azimuths from the axis after the vertical one
-        azimuth = AZIMUTH if right == (vertical + 1) % 3 else 90.0 + AZIMUTH
-        ax.view_init(ELEVATION, azimuth, vertical_axis="xyz"[vertical])  # first: the shape of the box is set for it
+        self.pieces = Pieces(scene)
+        self.drawn = piece_collection(self.pieces, ax)
+        ax.add_collection(self.drawn, autolim=False)
+        elevation, azimuth = view or usual_view(scene)
+        ax.view_init(elevation, azimuth, vertical_axis="xyz"[vertical])  # first: the shape of the box is set for it
         ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
         ax.set_box_aspect(np.abs(np.diff(limits)[:, 0]), zoom=ZOOM)
         ax.set_xlabel("x (m)", fontsize=8)
@@ -96,14 +104,6 @@ class Axes3DPicture:
 
     def show(self, frame: int) -> None:
         """Move everything to a frame."""
-        poses = self.scene.frames[frame]
-        for item, artist, faces in self.artists:
-            points = item.at(poses, frame)
-            if faces is not None:
-                artist.set_verts(points[faces])
-            else:
-                if item.role == "trace":
-                    points = passed(points, frame, len(self.scene.frames))
-                artist.set_data_3d(*points.T)
+        self.drawn.move(self.pieces.at(frame))
         for label, text in zip(self.scene.labels, self.labels, strict=True):
-            text.set_position_3d(label.at(poses))
+            text.set_position_3d(label.at(self.scene.frames[frame]))

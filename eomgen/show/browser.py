@@ -14,10 +14,16 @@ from .data import Array
 from .optional import k3d
 from .plane import page_axes
 from .player import WIDE, player_html, player_script
-from .scene import Item, Scene
+from .scene import ROLES, Item, Scene
 from .shown_motion import ShownMotion
+from .solids import Triangles
 
 NAMES = "#222222"  #: colour of names
+LAYER = 0.15  #: by which roles of a planar mechanism stand before each other (sizes of a symbol)
+WIDE_ANGLE, NARROW_ANGLE = 35.0, 10.0  #: of the camera (degrees), in space and before a page, where no side shows
+FARTHER = float(np.tan(np.radians(WIDE_ANGLE / 2)) / np.tan(np.radians(NARROW_ANGLE / 2)))  #: it stands before a page
+RIM, BEHIND = 1.3, 0.98  #: size of the dark edge of a joint in the page, and thickness, of the joint's
+BLUNT = 0.7  #: cosine of the greatest angle between neighbouring faces of what looks round
 
 
 def _number(color: str) -> int:
@@ -44,7 +50,7 @@ def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 60
         grid=[*low.tolist(), *high.tolist()],
         menu_visibility=True,
         axes_helper=0.8,
-        camera_fov=35.0,
+        camera_fov=WIDE_ANGLE if scene.view is None else NARROW_ANGLE,
         axes=["x", "y", "z"],
     )
     times = [0.0] if motion is None else motion.clock.tolist()
@@ -53,7 +59,7 @@ def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 60
     middle = 0.5 * (low + high)
     if scene.view is not None:
         middle, toward, up = middle @ scene.view, scene.view[2], scene.view[1]
-        reach = float(max(span[1], WIDE * span[0])) * 1.75
+        reach = float(max(span[1], WIDE * span[0])) * FARTHER * 1.75
     else:
         up = scene.up
         depth = np.cross(np.eye(3)[page_axes(up)[1]], up)
@@ -69,10 +75,13 @@ def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 60
 
 def _objects(viewer: Any, scene: Scene, times: list[float]) -> list[Any]:
     """What k3d shows of a scene: items, then names."""
-    found = [
-        _solid(viewer, scene, item, times) if item.faces is not None else _line(viewer, scene, item, times)
-        for item in scene.items
-    ]
+    found = []
+    for item in scene.items:
+        found.append(
+            _solid(viewer, scene, item, times) if item.faces is not None else _line(viewer, scene, item, times)
+        )
+        if scene.view is not None and item.role == "joint" and item.faces is not None and item.follow is None:
+            found.append(_rim(viewer, scene, item, times))
     for label in scene.labels:
         places = [
             scene.frames[k, label.body, :3, :3] @ label.point + scene.frames[k, label.body, :3, 3]
@@ -116,20 +125,58 @@ def _over_time(times: list[float], values: list[Array]) -> Any:
     return {f"{t:.6f}": np.asarray(value, dtype=np.float32) for t, value in zip(times, values, strict=True)}
 
 
+def _layer(scene: Scene, item: Item) -> Array:
+    """By how much an item is drawn nearer to the reader of a page (m, ground axes).
+
+    Parts of a planar mechanism lie in one plane, and where two surfaces coincide a browser shows either by turns.
+    """
+    if scene.view is None:
+        return np.zeros(3)
+    bodies = scene.frames.shape[1]
+    place = ROLES.index(item.role) + (item.body + 1) % bodies / bodies
+    nearer: Array = LAYER * scene.symbol * place * scene.view[2]
+    return nearer
+
+
+def _looks_round(points: Array, faces: Triangles) -> bool:
+    """Whether a solid has no edges: no two neighbouring faces meet at a sharp angle."""
+    normals = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
+    lengths = np.linalg.norm(normals, axis=1)
+    edges: dict[tuple[int, int], Array] = {}
+    for face, normal, length in zip(faces, normals, lengths, strict=True):
+        if length > 0.0:
+            for k in range(3):
+                edges[int(face[k]), int(face[k - 1])] = normal / length
+    return all(float(n @ edges[b, a]) > BLUNT for (a, b), n in edges.items() if (b, a) in edges)
+
+
 def _solid(viewer: Any, scene: Scene, item: Item, times: list[float]) -> Any:
     style, color = style_of(item.role), color_of(item)
     look = {
         "color": _number(style.face or color),
         "opacity": style.alpha if item.role in ("wheel", "shape") else 1.0,
         "side": "double",
-        "flat_shading": item.role != "joint",
+        "flat_shading": item.role != "joint" or item.faces is None or not _looks_round(item.points, item.faces),
         "name": f"{item.role} {item.name}",
     }
     faces = item.faces.astype(np.uint32) if item.faces is not None else None
     if item.follow is not None:
-        points = [item.follow(scene.frames[k]) for k in range(len(times))]
+        points = [item.follow(scene.frames[k]) + _layer(scene, item) for k in range(len(times))]
         return viewer.mesh(_over_time(times, points), faces, **look)
     return _carried(viewer.mesh(item.points.astype(np.float32), faces, **look), scene, item, times)
+
+
+def _rim(viewer: Any, scene: Scene, item: Item, times: list[float]) -> Any:
+    """A dark edge about the symbol of a joint as a page shows it, which is white as the paper."""
+    assert scene.view is not None and item.faces is not None
+    normal = scene.frames[0, item.body, :3, :3].T @ scene.view[2]
+    middle = item.points.mean(axis=0)
+    way = item.points - middle
+    depth = np.outer(way @ normal, normal)
+    points = middle + RIM * (way - depth) + BEHIND * depth
+    look = {"color": _number(color_of(item)), "flat_shading": True, "name": f"rim {item.name}"}
+    mesh = viewer.mesh(points.astype(np.float32), item.faces.astype(np.uint32), **look)
+    return _carried(mesh, scene, item, times)
 
 
 def _line(viewer: Any, scene: Scene, item: Item, times: list[float]) -> Any:
@@ -140,14 +187,16 @@ def _line(viewer: Any, scene: Scene, item: Item, times: list[float]) -> Any:
     pairs = [(places[k], places[k + 1]) for k in range(len(item.points) - 1) if there[k] and there[k + 1]]
     look |= {"indices": np.array(pairs, dtype=np.uint32), "indices_type": "segment"}
     if item.follow is not None or item.path is not None:
-        points = [item.at(scene.frames[k], k)[there] for k in range(len(times))]
+        points = [item.at(scene.frames[k], k)[there] + _layer(scene, item) for k in range(len(times))]
         return viewer.lines(_over_time(times, points), **look)
     return _carried(viewer.lines(item.points[there].astype(np.float32), **look), scene, item, times)
 
 
 def _carried(shape: Any, scene: Scene, item: Item, times: list[float]) -> Any:
     """A shape that its body carries along."""
-    shape.model_matrix = _over_time(times, [scene.frames[k, item.body] for k in range(len(times))])
+    nearer = np.eye(4)
+    nearer[:3, 3] = _layer(scene, item)
+    shape.model_matrix = _over_time(times, [nearer @ scene.frames[k, item.body] for k in range(len(times))])
     return shape
 
 

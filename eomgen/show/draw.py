@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..texts import shown
+from .branch_views import telling_values, telling_view
 from .build_scene import build_scene
 from .data import Array
 from .optional import matplotlib
@@ -26,6 +27,10 @@ def position(module: Any, x: Any, t: float) -> Array:
         given = np.asarray(x, dtype=float)
     except (TypeError, ValueError):
         raise UsageError(f"x must be a state, a position or values by name, not {shown(x)}") from None
+    if given.shape == () and "x" in module.q_names:
+        raise UsageError(
+            f'x is a whole state here; give the coordinate called x in a mapping: draw({{"x": {given:g}}})'
+        )
     if given.shape not in ((module.n_x,), (module.n_q,)):
         raise UsageError(
             f"x has shape {given.shape}; give a state ({module.n_x},), a position ({module.n_q},) or values by name"
@@ -36,17 +41,30 @@ def position(module: Any, x: Any, t: float) -> Array:
 
 
 def draw(
-    module: Any, x: Any = None, ax: Any = None, *, t: float = 0.0, names: bool | None = None, axes: bool = False
+    module: Any,
+    x: Any = None,
+    ax: Any = None,
+    *,
+    t: float = 0.0,
+    names: bool | None = None,
+    axes: bool = False,
+    named: Mapping[str, float | str] | None = None,
 ) -> Any:
     """See :func:`eomgen.runtime.drawing.draw`."""
+    if named:
+        if x is not None and not isinstance(x, Mapping):
+            raise UsageError(
+                f"give either a state or values by name, not both; {', '.join(named)} came beside {shown(x)}"
+            )
+        x = {**(x or {}), **named}
     scene = build_scene(module, position(module, x, t)[:, None], t, names=names, axes=axes)
     return draw_scene(scene, ax)
 
 
-def draw_scene(scene: Scene, ax: Any = None, title: str | None = None) -> Any:
+def draw_scene(scene: Scene, ax: Any = None, title: str | None = None, view: tuple[float, float] | None = None) -> Any:
     """Draw the first frame of a scene; returns the axes."""
     pyplot = matplotlib("pyplot", "draw") if ax is None else None
-    artist = new_artist(scene, pyplot, ax)
+    artist = new_artist(scene, pyplot, ax, view)
     artist.show(0)
     if title is not None or not artist.ax.get_title():
         artist.ax.set_title(scene.name if title is None else title, fontsize=10, parse_math=False)
@@ -82,7 +100,7 @@ def small_figure(module: Any) -> Any:
     return figure
 
 
-def new_artist(scene: Scene, pyplot: Any, ax: Any = None) -> Any:
+def new_artist(scene: Scene, pyplot: Any, ax: Any = None, view: tuple[float, float] | None = None) -> Any:
     """Flat or Axes3DPicture, on the given axes or a new figure.
 
     Raises
@@ -104,7 +122,7 @@ def new_artist(scene: Scene, pyplot: Any, ax: Any = None) -> Any:
 
     if ax is None:
         ax = pyplot.figure(figsize=(7.0, 6.4), layout="constrained").add_subplot(projection="3d")
-    return Axes3DPicture(scene, ax)
+    return Axes3DPicture(scene, ax, view)
 
 
 def draw_branches(
@@ -118,10 +136,13 @@ def draw_branches(
     rows = -(-len(scenes) // columns)
     figure = pyplot.figure(figsize=(4.2 * columns, 4.0 * rows), layout="constrained")
     panels = []
+    view = telling_view(scenes) if scenes[0].view is None else None
+    values_told = telling_values(module.q_names, found)
     low, high = np.min([s.low for s in scenes], axis=0), np.max([s.high for s in scenes], axis=0)
     for k, scene in enumerate(scenes):
         spatial = {} if scene.view is not None else {"projection": "3d"}
         ax = figure.add_subplot(rows, columns, k + 1, **spatial)
         title = f"branch {k + 1}" + (" (the declared one)" if k == 0 and not (values or named) else "")
-        panels.append(draw_scene(scene._replace(low=low, high=high), ax, title))
+        title += f"\n{values_told[k]}" if values_told[k] else ""
+        panels.append(draw_scene(scene._replace(low=low, high=high), ax, title, view))
     return np.array(panels, dtype=object)

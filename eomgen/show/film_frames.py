@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .curves import ShownColumn, by_unit, draw_curves
 from .draw import new_artist
 from .flat import figure_size
 from .optional import matplotlib
@@ -18,7 +19,7 @@ LETTER = 0.0836  #: width of a letter of a title (inch)
 TITLE_MARGIN = 4.0  #: beside a title (dots)
 LEAST_TITLE = 4.5  #: size of its letters (points)
 MOST_DOTS = 1200.0  #: in an inch
-BELOW = 1.7  #: height of the plot below (inch)
+BELOW = 1.7  #: height of a plot below (inch)
 SPACE = (6.4, 5.6)  #: of a spatial mechanism (inch)
 
 
@@ -39,19 +40,22 @@ class Frames:
         self.titles: list[Any] = []
 
     @classmethod
-    def of(cls, scene: Scene, motion: ShownMotion, curves: Sequence[Any] = (), dpi: float = DPI) -> Frames:
+    def of(cls, scene: Scene, motion: ShownMotion, curves: Sequence[ShownColumn] = (), dpi: float = DPI) -> Frames:
         """One scene, and curves below it."""
         width, height = figure_size(scene) if scene.view is not None else SPACE
-        below = BELOW if curves else 0.0
-        figure = matplotlib("figure", "an animation").Figure((width, height + below), dpi=dpi, layout="constrained")
-        grid = figure.add_gridspec(2 if curves else 1, 1, height_ratios=[height, below] if curves else [1])
+        panels = by_unit(curves)
+        below = [BELOW] * len(panels)
+        figure = matplotlib("figure", "an animation").Figure(
+            (width, height + sum(below)), dpi=dpi, layout="constrained"
+        )
+        grid = figure.add_gridspec(1 + len(panels), 1, height_ratios=[height, *below])
         spatial = {} if scene.view is not None else {"projection": "3d"}
         frames = cls(figure, motion)
         letters = len(f"{scene.name}  {motion.words[0]}{motion.pace}   {scene.note}")
         note = f"{'   ' if LETTER * letters < width else chr(10)}{scene.note}" if scene.note else ""
         frames.add_scene(scene, figure.add_subplot(grid[0], **spatial), f"{scene.name}  {{}}{note}")
-        if curves:
-            frames.add_curves(figure.add_subplot(grid[1]), curves)
+        if panels:
+            frames.add_curves([figure.add_subplot(grid[1 + k]) for k in range(len(panels))], panels)
         frames.settle()
         return frames
 
@@ -67,11 +71,16 @@ class Frames:
         self.updates.append(update)
         self.titles.append(above)
 
-    def add_curves(self, ax: Any, curves: Sequence[Any]) -> None:
-        """Draw curves, with a line where the frame is."""
-        draw_curves(ax, curves, self.motion)
-        cursor = ax.axvline(self.motion.over[0], color="0.3", linewidth=1.0)
-        self.updates.append(lambda k: cursor.set_xdata([self.motion.over[k]] * 2))
+    def add_curves(self, axes: Sequence[Any], panels: Sequence[Sequence[ShownColumn]]) -> None:
+        """Draw curves, one axes for each unit, with a line where the frame is."""
+        draw_curves(axes, panels, self.motion)
+        cursors = [ax.axvline(self.motion.over[0], color="0.3", linewidth=1.0) for ax in axes]
+
+        def update(k: int) -> None:
+            for cursor in cursors:
+                cursor.set_xdata([self.motion.over[k]] * 2)
+
+        self.updates.append(update)
 
     def settle(self) -> None:
         """Find the places of all axes, which then stay where they are."""
@@ -97,14 +106,3 @@ class Frames:
         self.show(k)
         self.canvas.draw()
         return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
-
-
-def draw_curves(ax: Any, curves: Sequence[Any], motion: ShownMotion) -> None:
-    """Columns of a run over time, or over what is led."""
-    for curve in curves:
-        ax.plot(curve.over, curve.values, linewidth=1.1, label=curve.label)
-    beside = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.05), "frameon": False}
-    ax.legend(fontsize=7, **beside)
-    ax.set_xlabel(motion.across, fontsize=8)
-    ax.tick_params(labelsize=7)
-    ax.grid(alpha=0.3)

@@ -7,15 +7,15 @@ import json
 from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
-from typing import Any
 
-from .film_frames import draw_curves
+from .curves import ShownColumn, by_unit, draw_curves
 from .optional import matplotlib
 from .shown_motion import ShownMotion
 
 WIDE = 0.55  #: height over width of the window for which the camera is set
 BAR = 40  #: height of the bar (dots)
-PLOT = 190  #: of the curves above it
+PLOT = 190  #: of the curves of one unit above it
+LOWER = 90  #: and of each further unit
 #: What a page says where a browser cannot draw it.
 NO_WEBGL = (
     "This animation needs WebGL 2, which this browser does not offer here. Switch on hardware acceleration, open the "
@@ -67,27 +67,36 @@ class InlineFilm:
         return f'<video controls loop autoplay muted src="data:video/{self.format};base64,{text}"></video>'
 
 
-def curves_html(motion: ShownMotion, curves: Sequence[Any]) -> str:
+def plots_height(curves: Sequence[ShownColumn]) -> int:
+    """Height of the curves of all units (dots)."""
+    return PLOT + LOWER * (len(by_unit(curves)) - 1) if curves else 0
+
+
+def curves_html(motion: ShownMotion, curves: Sequence[ShownColumn]) -> str:
     """The curves as one picture, with a line over it; the ends of its axes stand in its data."""
-    figure = matplotlib("figure", "curves beside an animation").Figure((9.0, PLOT / 100), dpi=200, layout="constrained")
-    ax = figure.add_subplot()
-    draw_curves(ax, curves, motion)
-    ax.set_xlim(float(motion.over.min()), float(motion.over.max()))
+    panels = by_unit(curves)
+    size = (9.0, plots_height(curves) / 100)
+    figure = matplotlib("figure", "curves beside an animation").Figure(size, dpi=200, layout="constrained")
+    axes = figure.subplots(len(panels), squeeze=False)[:, 0]
+    draw_curves(axes, panels, motion)
+    for ax in axes:
+        ax.set_xlim(float(motion.over.min()), float(motion.over.max()))
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png")
-    box = ax.get_position()
+    box, top = axes[-1].get_position(), axes[0].get_position().y1
     data = b64encode(buffer.getvalue()).decode()
     return (
         f'<div id="curves" data-left="{box.x0:.5f}" data-right="{box.x1:.5f}" data-low="{float(motion.over.min())!r}" '
         f'data-high="{float(motion.over.max())!r}"><img alt="curves" src="data:image/png;base64,{data}">'
-        '<div id="cursor"></div></div>'
+        f'<div id="cursor" style="top: {1.0 - top:.3%}; bottom: {box.y0:.3%}"></div></div>'
     )
 
 
-def player_html(motion: ShownMotion, curves: Sequence[Any], title: str) -> str:
+def player_html(motion: ShownMotion, curves: Sequence[ShownColumn], title: str) -> str:
     """Style and elements, to stand at the beginning of a page's body."""
     plot = curves_html(motion, curves) if curves else ""
-    below = BAR + (PLOT if curves else 0)
+    high = plots_height(curves)
+    below = BAR + high
     # the values are seconds of the animation in one of the clock; what is read: seconds of the mechanism in one of it
     speeds = "".join(
         f'<option value="{s}"{" selected" if s == 1.0 else ""}>x{s * motion.speed:.2g}</option>' for s in SPEEDS
@@ -98,11 +107,11 @@ def player_html(motion: ShownMotion, curves: Sequence[Any], title: str) -> str:
 #player {{ position: fixed; left: 0; right: 0; bottom: 0; height: {BAR}px; display: flex; gap: 10px; padding: 0 14px;
   align-items: center; background: #fff; font: 14px sans-serif; box-sizing: border-box; border-top: 1px solid #ddd; }}
 #player button {{ width: 34px; height: 28px; }} #player input {{ flex: 1; }} #words {{ min-width: 9em; }}
-#curves {{ position: fixed; bottom: {BAR}px; height: {PLOT}px; left: 50%; transform: translateX(-50%); }}
+#curves {{ position: fixed; bottom: {BAR}px; height: {high}px; left: 50%; transform: translateX(-50%); }}
 #curves {{ box-shadow: 0 0 0 100vmax #fff; clip-path: inset(0 -100vmax); }}
 #curves img {{ height: 100%; }}
 #missing {{ position: fixed; top: 40%; left: 10%; right: 10%; font: 16px sans-serif; text-align: center; z-index: 6; }}
-#cursor {{ position: absolute; top: 2%; bottom: 20%; width: 1px; background: #333; }}
+#cursor {{ position: absolute; width: 1px; background: #333; }}
 #title {{ position: fixed; left: 14px; top: 10px; font: 15px sans-serif; white-space: pre; z-index: 5;
   pointer-events: none; }}
 </style>

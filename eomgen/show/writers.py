@@ -16,9 +16,9 @@ from ..files.writing import refuse_link, whole_file
 from ..texts import shown
 from .film_frames import Frames
 from .optional import k3d, matplotlib
+from .palettes import COLORS, indices_in, palette_of
 
-COLORS = 64  #: of a GIF
-PALETTE_OF = 4  #: frames from which these are taken
+PALETTE_OF = 8  #: frames of a GIF from which its colours are taken
 FOLDER = "a folder for PNG frames"
 
 
@@ -99,17 +99,17 @@ def _find_ffmpeg() -> str:
         ) from None
 
 
-def gif_bytes(frames: Frames) -> bytes:
-    """All frames as a GIF that goes round."""
+def gif_bytes(frames: Frames, colors: int = COLORS) -> bytes:
+    """All frames as a GIF of so many colours that goes round."""
     from PIL import Image
 
-    images = [Image.fromarray(frames.image(k)) for k in range(len(frames))]
-    several = images[:: max(1, len(images) // PALETTE_OF)]  # colours that only some frames have
-    sheet = Image.new("RGB", (images[0].width, images[0].height * len(several)))
-    for k, image in enumerate(several):
-        sheet.paste(image, (0, k * image.height))
-    palette = sheet.quantize(COLORS)
-    reduced = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    images = [frames.image(k) for k in range(len(frames))]
+    palette = palette_of(images[:: max(1, len(images) // PALETTE_OF)], colors)  # colours that only some frames have
+    reduced = []
+    for image in images:
+        one = Image.fromarray(indices_in(palette, image), "P")
+        one.putpalette(palette.tobytes())
+        reduced.append(one)
     # a GIF counts hundredths of a second; pillow joins equal frames, which keeps the time
     duration = max(20, round(100.0 / frames.motion.fps) * 10)
     buffer = io.BytesIO()

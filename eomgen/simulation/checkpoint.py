@@ -54,7 +54,7 @@ class Checkpoint:
         Values that cannot be.
     """
 
-    def __init__(self, file: Any, every: float, resume: bool | None) -> None:
+    def __init__(self, file: Any, every: float | str, resume: bool | None) -> None:
         path = as_path("checkpoint", file)
         every = read_number("checkpoint_every", every)
         if every < 0.0:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..analysis.impact import Impact
 from ..numeric.scales import Array
-from ..runtime.trajectory import Source, Trajectory
+from ..runtime.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from ..runtime.protocols import Source
 
 
 class ImpactRun(Trajectory):

@@ -7,7 +7,7 @@ Equations I, 1993, section I.14), S(0) from the assembly of the initial state.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,6 +40,7 @@ from .variational import Variational
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+    from ..runtime.option_types import Number, ReducedOptions
     from ..runtime.trajectory import Trajectory
 
 OPTIONS = ("max_step", "first_step", "min_step")  #: of solvers, besides tolerances
@@ -56,11 +57,11 @@ def sensitivities(
     *,
     hold: Sequence[str] | None = None,
     method: Any = "DOP853",
-    rtol: float = SENSITIVITY_RTOL,
-    atol: float = SENSITIVITY_ATOL,
+    rtol: Number = SENSITIVITY_RTOL,
+    atol: Number | ArrayLike = SENSITIVITY_ATOL,
     t_eval: ArrayLike | None = None,
     events: Any = None,
-    **options: Any,
+    **options: Unpack[ReducedOptions],
 ) -> Sensitivities:
     """Integrate a run together with its derivatives by parameters, inputs and initial values.
 
@@ -112,30 +113,30 @@ def sensitivities(
     columns = split_columns(layout, read_names("names", names), held)
     run = Variational(bound, forcing, columns)
     watched = Events(layout, events)
-    options = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **options})
-    require_steps("max_step", float(options.get("max_step", np.inf)), start, stop)
+    settings = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **options})
+    require_steps("max_step", float(settings.get("max_step", np.inf)), start, stop)
     alone = None
     if watched:
         with told_by_the_caller():
-            alone = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **options)
+            alone = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **settings)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     S0 = start_sensitivity(here, start, x0, held, columns, _inputs(run, start, x0))
     solver = choose_solver(method)
     width = layout.n_x * (1 + len(columns.names))
-    if np.ndim(options["atol"]):  # of each state, and of its derivatives alike
-        options["atol"] = np.concatenate([options["atol"], np.repeat(options["atol"], len(columns.names))])
+    if np.ndim(settings["atol"]):  # of each state, and of its derivatives alike
+        settings["atol"] = np.concatenate([settings["atol"], np.repeat(settings["atol"], len(columns.names))])
     times = None if t_eval is None else ordered_times(t_eval, start, stop, width)
     z0 = run.joined(x0, S0)
-    salts = Saltation(run, watched, (start, stop), (rtol, atol), corners)
+    salts = Saltation(run, watched, (start, stop), (settings["rtol"], settings["atol"]), corners)
     fail, title = bound.kernels.fail, solver.__name__
-    longest = float(options.get("max_step", np.inf))
+    longest = float(settings.get("max_step", np.inf))
     numbers = len(z0) if times is None else 0
     troubled = lambda t, z: fail.trouble(z[: layout.n_x], t) is not None  # noqa: E731
     stall_check = StallCheck(start, stop, z0, layout.n_q, longest, troubled, numbers)
     try:
         with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
             solution = integrate(
-                run, nodes, z0, solver, times, salts.watched, False, options, stall_check, salts.reset, forcing.enter
+                run, nodes, z0, solver, times, salts.watched, False, settings, stall_check, salts.reset, forcing.enter
             )
     except Crawling as crawl:
         _refuse_change_point(bound, forcing, crawl.t, crawl.x[: layout.n_x])
@@ -159,7 +160,7 @@ def sensitivities(
         t=solution.t[kept], x=solution.x[:n, kept], t_events=t_events, x_events=x_events, steps=steps
     )
     raw = solution.x[n:, kept].reshape(n, k, -1) / run.weights[:, None]
-    trajectory = record(bound, forcing, states, title, options, watched.names)
+    trajectory = record(bound, forcing, states, title, settings, watched.names)
     if alone is not None:
         _require_same(trajectory, alone)
     refuse_lost_branches(bound, forcing, trajectory, columns)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +27,7 @@ from .tolerances import IMPLICIT, check_tolerances
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+    from ..runtime.option_types import Number, SolverOptions
     from ..runtime.trajectory import Trajectory
 
 OPTIONS = (
@@ -44,20 +45,20 @@ def simulate(
     inputs: Mapping[str, Any] | None = None,
     *,
     method: Any = None,
-    rtol: float | None = None,
-    atol: Any = None,
+    rtol: Number | ArrayLike | None = None,
+    atol: Number | ArrayLike | None = None,
     t_eval: ArrayLike | None = None,
     events: Any = None,
     controllers: Mapping[str, Callable[[float, Any], Any]] | None = None,
     dense_output: bool = False,
-    max_step: float | None = None,
-    first_step: float | None = None,
+    max_step: Number | None = None,
+    first_step: Number | None = None,
     progress: bool | None = None,
-    step: float | None = None,
+    step: Number | None = None,
     checkpoint: str | FilePath | None = None,
-    checkpoint_every: float = 60.0,
+    checkpoint_every: Number = 60.0,
     resume: bool | None = None,
-    **options: Any,
+    **options: Unpack[SolverOptions],
 ) -> Trajectory:
     """Integrate the equations of motion.
 
@@ -131,6 +132,7 @@ def simulate(
     MissingDependencyError
         The run needs SciPy, which is not installed.
     """
+    settings: dict[str, Any] = {**options}
     kept = pause = None
     if checkpoint is not None:
         from .checkpoint import Checkpoint, identify
@@ -142,7 +144,7 @@ def simulate(
     if (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof):
         from .driven import follow_drivers
 
-        steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **options}
+        steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **settings}
         motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, kept, steps)
         if motion is not None:
             return motion
@@ -156,16 +158,16 @@ def simulate(
 
         watched = ControlledEvents(module.layout, events, controllers, kept is not None)
     forcing = Forcing(module.layout, inputs)
-    compiled = can_run(module, method, forcing) and options.keys().isdisjoint(IMPLICIT)
+    compiled = can_run(module, method, forcing) and settings.keys().isdisjoint(IMPLICIT)
     if method == "RK4" and not compiled:
         raise UsageError("method RK4 needs compiled code: use target='cython', and no input that is a function")
     if compiled:
         solver, title = None, str(method)
-        check_names("option of simulate", options, (), OPTIONS)
+        check_names("option of simulate", settings, (), OPTIONS)
     else:
         solver = choose_solver(method)
         title = solver.__name__
-        check_options(solver, options, OPTIONS)
+        check_options(solver, settings, OPTIONS)
     start, end = find_span(span, float(declared["end"]))
     if step is not None:
         require_steps("step", step, start, end)
@@ -187,27 +189,27 @@ def simulate(
         "atol": declared["atol"] if atol is None else atol,
     }
     steps = {key: value for key, value in (("max_step", max_step), ("first_step", first_step)) if value is not None}
-    options = {**tolerances, **steps, **options}
+    settings = {**tolerances, **steps, **settings}
     if compiled or solver.__module__.startswith("scipy."):  # another's solver may take anything
-        options = check_tolerances(module.n_x, abs(end - start), options)
-        require_steps("max_step", float(options.get("max_step", np.inf)), start, end)
+        settings = check_tolerances(module.n_x, abs(end - start), settings)
+        require_steps("max_step", float(settings.get("max_step", np.inf)), start, end)
     if not compiled and takes_jacobian(solver):
-        options.setdefault("jac", run.jacobian)
+        settings.setdefault("jac", run.jacobian)
     watch = watch_run(start, end, progress)
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
-    longest = float(options.get("max_step", np.inf))
+    longest = float(settings.get("max_step", np.inf))
     numbers = (1 + module.n_x) * ((stored is None) + 8 * bool(dense_output))  # of each step
     many = abs(end - start) / longest if longest > 0.0 else 0.0  # a solver of another refuses what it does not take
     require_room(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
     if kept is not None:
         pause = None if compiled else Pause(kept, solver, dense_output)
-        own = {name: value for name, value in options.items() if name != "jac" or value != run.jacobian}
+        own = {name: value for name, value in settings.items() if name != "jac" or value != run.jacobian}
         kept.open(identify(bound, forcing, watched, nodes, x0, title, stored, dense_output, own))
     stall_check = run.stall_check(start, end, x0, longest, numbers)
     try:
         if compiled:
             solution, failure, raised = integrate_compiled(
-                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, stall_check, watched, kept
+                bound, forcing, nodes, x0, title, stored, dense_output, settings, watch, stall_check, watched, kept
             )
             run.last = None if failure is None else ("rhs", *failure)
             if isinstance(raised, KeyboardInterrupt):
@@ -218,7 +220,7 @@ def simulate(
             with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
                 listed = watched.listed(bound, forcing)
                 solution = integrate(
-                    run.watched(watch), nodes, x0, solver, stored, listed, dense_output, options, stall_check,
+                    run.watched(watch), nodes, x0, solver, stored, listed, dense_output, settings, stall_check,
                     partial(watched.reset, bound, forcing), forcing.enter, pause,
                 )  # fmt: skip
                 warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])
@@ -226,10 +228,10 @@ def simulate(
         solution = interrupt.solution
         raise SimulationInterrupted(
             f"interrupted at t = {solution.ends[1]:.6g} s of {end:.6g} s",
-            lambda: record(bound, forcing, solution, title, options, watched.names),
+            lambda: record(bound, forcing, solution, title, settings, watched.names),
         ) from interrupt.__cause__
     except Crawling as crawl:
-        raise run.gave_up(crawl, end, title, options) from None
+        raise run.gave_up(crawl, end, title, settings) from None
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         if run.last is None:
             raise
@@ -239,13 +241,13 @@ def simulate(
             watch.close()
     _check(run, solution, start, end, title)
     try:
-        made = record(bound, forcing, solution, title, options, watched.names)
+        made = record(bound, forcing, solution, title, settings, watched.names)
     except EvaluationError as error:
         where = "?" if error.time is None else f"{error.time:.6g}"
         raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error
     if bound.layout.limits:
-        atol = float(np.max(options.get("atol", 0.0)))
-        warn_of_limits(made, bound.layout, float(options.get("rtol", 0.0)), atol)
+        atol = float(np.max(settings.get("atol", 0.0)))
+        warn_of_limits(made, bound.layout, float(settings.get("rtol", 0.0)), atol)
     return made
 
 

@@ -35,33 +35,109 @@ SEEN = {
     "mod.linearize()": "Linearization",
     "mod.equilibrium()": "Equilibrium",
     "mod.modes()": "Modes",
+    "mod.bind({'l': 0.5})": "Module",
+    "m.compile(target='numpy', optimize=2)": "Module",
+    "eg.load_example('slider_crank')": "Model",
+    "m.draw(theta=0.3)": "Axes",
+    "mod.draw({'theta': 0.3}, axes=True)": "Axes",
+    "mod.draw_branches(theta=0.3)": "ndarray",
+    "mod.explore()": "Explorer",
+    "m.check().draw()": "Axes",
+    "mod.simulate(1.0).plot('theta')": "Axes",
+    "mod.simulate(1.0).plot('theta', kind='spectrum')": "Axes",
+    "mod.simulate(1.0).plot('theta', ax=ax)": "Axes",
+    "mod.simulate(1.0).animate('run.gif', fps=10, trace='rod')": "Path",
+    "mod.simulate(1.0).animate(plot=['theta'])": "InlinePage",
+    "mod.simulate(1.0).animate(format='gif')": "InlineFilm",
+    "mod.simulate_many(1.0, rtol='1e-6').plot('theta')": "Axes",
+    "mod.simulate('2*pi', rtol='1e-6', atol='1e-9', max_step='0.1', p={'l': 0.5})": "Trajectory",
+    "mod.sensitivities(['l'], 1.0, rtol='1e-8')": "Sensitivities",
 }
+#: What may be several things, as a checker writes it.
+UNIONS = {"mod.simulate(1.0).plot()": ("Axes", "ndarray"), "mod.simulate(1.0).plot('a', 'b')": ("Axes", "ndarray")}
 BEGIN = """import eomgen as eg
+import matplotlib.pyplot as plt
 m = eg.Model("pendulum", gravity=(0, -9.81, 0))
 rod = m.body("rod", mass=1, com=(0, -0.5, 0), inertia={"zz": 0.1})
 mod = m.compile()
+ax = plt.figure().add_subplot()
 """
-WRONG = """mod.simulate(1.0).qq
-m.revolute("hinge", m.ground)
-mod.x0(theta=object())
-"""
+#: A wrong line of a user's file -> what a checker says of it.
+WRONG = {
+    "mod.simulate(1.0).qq": '"Trajectory" has no attribute "qq"',
+    "m.revolute('hinge', m.ground)": 'Missing positional argument "successor"',
+    "mod.x0(theta=object())": "incompatible type",
+    "mod.simulat(1.0)": '"Module" has no attribute "simulat"; maybe "simulate"?',
+    "mod.simulate(foo=1)": 'Unexpected keyword argument "foo"',
+    "mod.simulate(1.0, rtol=object())": "incompatible type",
+    "mod.simulate_many(1.0, foo=1)": 'Unexpected keyword argument "foo"',
+    "m.hinge('A', m.ground, rod)": '"Model" has no attribute "hinge"',
+    "m.gravty = (0, 0, 0)": '"Model" has no attribute "gravty"',
+    "m.derive().mass_matrx": '"Equations" has no attribute "mass_matrx"',
+    "m.compile(optimise=2)": 'Unexpected keyword argument "optimise"',
+    "eg.load('robot.urdf', limit='off')": 'Unexpected keyword argument "limit"',
+    "mod.draw(theta=[1])": "incompatible type",
+    "mod.simulate(1.0).plot('theta').plott()": '"Axes" has no attribute "plott"',
+    "mod.simulate(1.0).animate('run.gif', fsp=10)": "No overload variant",
+    "mod.simulate(1.0).animate(format='gfi')": "No overload variant",
+}
 
 
-@pytest.mark.slow
-def test_a_checker_names_results_and_finds_slips(built: Path, tmp_path: Path) -> None:  # noqa: F811
+def check(tmp_path: Path, built: Path, text: str) -> list[str]:  # noqa: F811
+    """Lines that mypy prints of a user's file, with the wheel unpacked beside it."""
     site = tmp_path / "site"
     with zipfile.ZipFile(next(built.glob("*.whl"))) as wheel:
         wheel.extractall(site)
-    text = BEGIN + "".join(f"reveal_type({expression})\n" for expression in SEEN) + WRONG
     (tmp_path / "mine.py").write_text(text)
     command = [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", "--config-file=", "mine.py"]
     done = subprocess.run(
         command, cwd=tmp_path, env={"MYPYPATH": str(site), "PATH": ""}, capture_output=True, text=True
     )
-    seen = re.findall(r'Revealed type is "(?:builtins\.)?(?:[\w.]+\.)?(\w+)', done.stdout)
-    assert dict(zip(SEEN, seen, strict=True)) == SEEN, done.stdout + done.stderr
-    errors = [line.partition(": error: ")[2] for line in done.stdout.splitlines() if ": error: " in line]
-    assert len(errors) == 3, done.stdout
-    assert '"Trajectory" has no attribute "qq"' in errors[0]
-    assert 'Missing positional argument "successor"' in errors[1]
-    assert "incompatible type" in errors[2]
+    return (done.stdout + done.stderr).splitlines()
+
+
+@pytest.mark.slow
+def test_a_checker_names_results_and_finds_slips(built: Path, tmp_path: Path) -> None:  # noqa: F811
+    first = BEGIN.count("\n") + len(SEEN) + len(UNIONS) + 1
+    text = BEGIN + "".join(f"reveal_type({expression})\n" for expression in (*SEEN, *UNIONS))
+    lines = check(tmp_path, built, text + "".join(f"{line}\n" for line in WRONG))
+    seen = [line.partition('Revealed type is "')[2] for line in lines if "Revealed type is" in line]
+    names = [re.match(r"(?:builtins\.)?(?:[\w.]+\.)?(\w+)", one) for one in seen]
+    assert dict(zip(SEEN, (name[1] if name else "" for name in names), strict=False)) == SEEN, lines
+    for several, one in zip(UNIONS.values(), seen[len(SEEN) :], strict=True):
+        assert all(re.search(rf"\b{name}\b", one) for name in several), one
+        assert "Any" not in one.replace("tuple[Any, ...]", "").replace("dtype[Any]", ""), one
+    errors: dict[int, str] = {}
+    for line in lines:
+        if found := re.match(r"mine\.py:(\d+): error: (.*)", line):
+            errors.setdefault(int(found[1]), found[2])
+    assert sorted(errors) == list(range(first, first + len(WRONG))), lines
+    for (wrong, expected), said in zip(WRONG.items(), (errors[k] for k in sorted(errors)), strict=True):
+        assert expected in said, wrong
+
+
+def test_options_have_the_types_of_what_takes_them() -> None:
+    """The keywords that type checkers know are the fields and arguments that there are."""
+    from dataclasses import fields
+    from inspect import signature
+
+    from eomgen.compilation import Options
+    from eomgen.ensembles.simulate_many import OPTIONS as MANY
+    from eomgen.loading import load
+    from eomgen.robots import RobotOptions
+    from eomgen.runtime import option_types as types
+    from eomgen.show.animate import animate
+    from eomgen.show.mode_shapes import animate_mode
+    from eomgen.simulation.sensitivities import OPTIONS as SENSITIVE
+
+    bound = set(types.BoundValues.__annotations__)
+    assert set(types.BuildOptions.__annotations__) == {field.name for field in fields(Options)}
+    assert set(types.StepOptions.__annotations__) - bound == set(MANY)
+    assert set(types.ReducedOptions.__annotations__) - bound == set(SENSITIVE)
+    robot = set(types.RobotKeywords.__annotations__)
+    assert robot | {"check_inertia"} == {field.name for field in fields(RobotOptions)}
+    assert set(types.LoadOptions.__annotations__) == (set(signature(load).parameters) - {"path", "robot"}) | robot
+    taken = set(signature(animate).parameters) - {"trajectory", "module", "file", "states", "columns", "format"}
+    assert set(types.AnimationOptions.__annotations__) - {"model"} == taken
+    taken = set(signature(animate_mode).parameters) - {"module", "x", "shape", "file", "format"}
+    assert set(types.FilmOptions.__annotations__) == taken

@@ -343,5 +343,6 @@ def test_type_checkers_read_the_same_table() -> None:
     (block,) = [node for node in own.body if isinstance(node, ast.If)]
     methods = [f"{name} = _{name}" for name in CALLS]
     forms = [f"{name}: {name.capitalize()}" for name in FORMS]
-    assert [ast.unparse(line) for line in block.body] == [*methods, "jacobian: JacobianCall", *forms]
+    solvers = [f"{name}: type[Any]" for name in ("DOP853", "RK45", "RK23", "Radau", "Taylor")]
+    assert [ast.unparse(line) for line in block.body] == [*methods, "jacobian: JacobianCall", *forms, *solvers]
     assert homes == CALLS

@@ -24,9 +24,14 @@ import eomgen as eg
 from eomgen.cli.command import eomgen
 from eomgen.errors import MissingDependencyError, UsageError
 from eomgen.show import animate as eomgen_animate
-from eomgen.show.animate import ShownColumn
-from eomgen.show.film_frames import Frames, draw_curves
+from eomgen.show import writers
+from eomgen.show.browser import _looks_round, scene_plot
+from eomgen.show.build_scene import build_scene
+from eomgen.show.curves import ShownColumn, draw_curves
+from eomgen.show.film_frames import Frames
+from eomgen.show.palettes import indices_in, palette_of
 from eomgen.show.shown_motion import moving_scene, sample
+from eomgen.show.solids import box, cylinder, sphere
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -327,7 +332,7 @@ def test_curves_over_a_range_name_its_unit(module: Any, monkeypatch: pytest.Monk
     turn = module.kinematic_analysis(theta=np.linspace(0, 6, 9))
     motion = sample(turn, lambda t: (turn.x, None), 25, None)
     ax = Figure().add_subplot()
-    draw_curves(ax, [ShownColumn("s (m)", motion.over, turn["s"])], motion)
+    draw_curves([ax], [[ShownColumn("s", "m", motion.over, turn["s"])]], motion)
     assert ax.get_xlabel() == r"$\theta$ (rad)"
 
 
@@ -357,3 +362,63 @@ def test_a_page_says_what_it_lacks(run: Any, tmp_path: Path) -> None:
         browser.open(file.as_uri())
         browser.wait_for("document.getElementById('missing') !== null")
         assert "needs WebGL 2" in browser.evaluate("document.getElementById('missing').textContent")
+
+
+def test_curves_of_two_units_have_an_axis_each(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Frames] = []
+    monkeypatch.setitem(writers.FILMS, "gif", lambda frames: made.append(frames) or b"")
+    run.animate(format="gif", plot=["theta", "s", "pin_x"], fps=4)
+    axes = made[0].figure.axes
+    assert [ax.get_ylabel() for ax in axes[1:]] == ["rad", "m"]
+    assert [[line.get_ydata()[0] for line in ax.lines[:-1]] for ax in axes[1:]] == [
+        [run["theta"][0]], [run["s"][0], run["pin_x"][0]],
+    ]  # fmt: skip
+    made[0].show(3)
+    assert [ax.lines[-1].get_xdata()[0] for ax in axes[1:]] == [made[0].motion.over[3]] * 2
+    run.animate(format="gif", plot=["s", "pin_x"], fps=4)
+    assert len(made[1].figure.axes) == 2
+    page = str(run.animate(plot=["theta", "s"], fps=4))
+    heights = [int(h) for h in re.findall(r"#curves \{ position: fixed; bottom: 40px; height: (\d+)px", page)]
+    assert heights == [280]
+
+
+def test_a_gif_keeps_the_colours_of_its_frames() -> None:
+    """Of a spatial model, whose solids have many shades; 64 colours by number of dots were wrong by 54 of 255."""
+    module = eg.load(EXAMPLES / "stewart_platform.yaml").compile(target="numpy")
+    run = module.simulate(0.1)
+    motion = sample(run, lambda t: (np.repeat(run.x[:, :1], len(t), axis=1), None), 2, None)
+    frames = Frames.of(moving_scene(module, motion, None, False, ()), motion)
+    with Image.open(io.BytesIO(writers.gif_bytes(frames))) as film:
+        stored = np.asarray(film.convert("RGB")).astype(int)
+    wrong = np.abs(stored - frames.image(0)).max(axis=2)
+    assert wrong.mean() < 0.5
+    assert np.percentile(wrong, 99.9) <= 16
+
+
+def test_few_colours_stay_as_they_are() -> None:
+    image = np.array([[[255, 255, 255], [1, 2, 3]], [[4, 5, 6], [255, 255, 254]]], dtype=np.uint8)
+    palette = palette_of([image], 8)
+    assert (palette[indices_in(palette, image)] == image).all()
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "jansen_leg"])
+def test_parts_of_a_page_lie_in_layers(name: str) -> None:
+    """No two bodies share a depth, and joints lie before all of them, by less than a few symbols."""
+    pytest.importorskip("k3d")
+    module = eg.load(EXAMPLES / f"{name}.yaml").compile(target="numpy")
+    scene = build_scene(module, module.x0()[: module.n_q, None])
+    depths: dict[str, set[float]] = {}
+    for one in scene_plot(scene).objects:
+        role, _, _ = one.name.partition(" ")
+        if role in ("link", "joint", "rim"):
+            depths.setdefault(role, set()).add(round(float(scene.view[2] @ one.model_matrix[:3, 3]) / scene.symbol, 4))
+    bodies = {item.name for item in scene.items if item.role == "link"}
+    assert len(depths["link"]) == len(bodies)
+    assert min(depths["joint"]) > max(depths["link"]) > min(depths["link"]) > 0.0
+    assert max(depths["joint"]) < 2.0
+    assert depths["rim"] == depths["joint"]
+
+
+def test_a_hinge_is_a_cylinder_and_a_ball_is_round() -> None:
+    for mesh, round_ in ((cylinder(1.0, 2.5), False), (sphere(1.0), True), (box((1, 1, 1)), False)):
+        assert _looks_round(*mesh) is round_

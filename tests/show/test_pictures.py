@@ -335,3 +335,25 @@ def test_a_missing_library_is_named(monkeypatch: pytest.MonkeyPatch, module: Any
         module.draw()
     with pytest.raises(MissingDependencyError, match="k3d>=3.2"):
         optional.k3d("a page")
+
+
+def test_coordinates_may_be_keywords(module: Any) -> None:
+    def names(**how: Any) -> list[list[float]]:
+        ax = module.draw(**how)
+        return [np.asarray(patch.get_xy()).round(9).tolist() for patch in ax.patches]
+
+    assert names(theta=0.7) == names(x={"theta": 0.7}) == names(x={"theta": 0.1}, theta="0.7") != names()
+    assert eg.load(SLIDER_CRANK).draw(theta=0.7, names=False).get_title() == "slider_crank"
+    with pytest.raises(UsageError, match="did you mean theta"):
+        module.draw(thata=0.7)
+    with pytest.raises(UsageError, match="give either a state or values by name, not both; theta came beside"):
+        module.draw(np.zeros(module.n_q), theta=0.7)
+
+
+def test_a_coordinate_called_x_is_given_in_a_mapping() -> None:
+    m = eg.Model("cart")
+    m.prismatic("slide", m.ground, m.body("cart", mass=1), axis="x", coordinate="x")
+    module = m.compile(target="numpy")
+    with pytest.raises(UsageError, match=r'give the coordinate called x in a mapping: draw\(\{"x": 0.3\}\)'):
+        module.draw(x=0.3)
+    assert module.draw({"x": 0.3}).get_title() == "cart"
