@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterable, Sequence
 
 from ..graph.core import Graph
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
-from ..numeric.pair_sums import PLACE, POSE
+from ..numeric.pair_sums import MOTION, PLACE, POSE, REST
 
 
 def work_of(function: PairFunction) -> int:
     """Numbers that a sum works with: its shapes and their rates, and in lanes copies of what is given and found."""
-    shapes = sum(len(rows) * (POSE + len(rows[0]) - PLACE + 3) for rows in function.tables)
+    shapes = sum(len(rows) * (POSE + len(rows[0]) - PLACE - REST + 4) for rows in function.tables)
     return 2 * shapes + 2 * function.count + function.results
 
 
@@ -44,7 +44,7 @@ class PairLists:
                 continue
             function = call.function
             self._places[i] = end
-            end += function.count if call.part == "given" else function.results
+            end += {"given": function.count, "meeting": 1 + MOTION * function.bodies}.get(call.part, function.results)
             if call.part == "slope" and function.name not in self._rates:
                 self._rates[function.name] = end
                 end += function.count
@@ -82,6 +82,11 @@ class PairLists:
         given = self._places[operands[0]]
         if call.part == "sum":
             return [f"pairs_{function.name}_sum(w + {given}, w + {place}, w + {work});"]
+        if call.part == "meeting":
+            return [
+                *(f"w[{place + 1 + k}] = {text(x)};" for k, x in enumerate(operands[1:])),
+                f"pairs_{function.name}_meeting(w + {given}, w + {place + 1}, w + {place}, w + {work});",
+            ]
         rates = self._rates[function.name]
         low, high = _moved(function, call.numbers)
         return [

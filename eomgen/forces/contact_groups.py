@@ -18,14 +18,14 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
-from ..graph.pair_calls import LOSSES, PairFunction, PairKind, pair_sum
+from ..graph.pair_calls import LOSSES, PairFunction, PairKind, pair_meeting, pair_sum
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..numeric.pair_sums import POSE
 from ..records import dataclass
 from .contact import SpherePlane
 from .contact_shapes import PLANAR, AtHeight, ContactShape, Feature, ShapeMotion, meet, touching
-from .force import Force, Load, MarkerLoad, View
+from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction import FRICTION, Friction, read_friction
 from .normal_laws import NORMAL, HuntCrossley, read_normal_law
 
@@ -105,8 +105,18 @@ class ContactGroups(Force):
             for k, marker in enumerate(markers)
         ]
 
+    def meeting_time(self, view: MovingView) -> Expr:
+        markers, function, operands = self._operands(view, "")
+        accelerations = [x for m in markers for x in (*view.acceleration(m), *view.angular_acceleration(m))]
+        return pair_meeting(view.graph, function, operands, accelerations)
+
     def _results(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], list[Expr]]:
         """The bodies as markers at their origins, force and torque on each, and the energy; at rest, if asked."""
+        markers, function, operands = self._operands(view, part, still)
+        return markers, pair_sum(view.graph, function, operands)
+
+    def _operands(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], PairFunction, list[Expr]]:
+        """The bodies as markers at their origins, the sum over pairs and what it is given."""
         graph = view.graph
         bodies = sorted({shape.marker.body for shape in (*self.first, *self.second)})
         labels = {shape.marker.body: shape.marker.label.partition(".")[0] for shape in (*self.first, *self.second)}
@@ -120,7 +130,7 @@ class ContactGroups(Force):
             operands += [graph.zero if still else x for v in moving for x in v]
         data = _SharedData(len(operands), graph)
         function = self._function(f"{part}{self.name}", bodies, data, bool(part))
-        return markers, pair_sum(graph, function, [*operands, *data.values])
+        return markers, function, [*operands, *data.values]
 
     def _function(self, name: str, bodies: Sequence[int], data: _SharedData, lost: bool) -> PairFunction:
         groups = [_features(self.first), _features(self.second)] if self.second else [_features(self.first)]
@@ -184,8 +194,10 @@ class ContactGroups(Force):
         names += [f"l{k}" for k in range(len(places))]
         seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
         slopes = jvp(results, seeds)
-        nodes, renamed = _kept(graph, [*results, *slopes])
-        ids = [renamed[x.id] for x in (*results, *slopes)]
+        across, depth, _, _ = contact.touch(view)
+        touch = [*across, depth]
+        nodes, renamed = _kept(graph, [*results, *slopes, *touch])
+        ids, seen = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch))
         rates = [f"d_{name}" for name in names]
         return PairKind(
             f"{kinds[0]}_{kinds[1]}_{tables[0]}_{tables[1]}",
@@ -196,6 +208,7 @@ class ContactGroups(Force):
             (*names, *rates),
             tuple(ids[: len(results)]),
             tuple(ids[len(results) :]),
+            tuple(seen),
         )
 
 
@@ -217,7 +230,7 @@ class _SharedData:
         frame = feature.frame
         entries = [*frame.position, *(x for row in frame.rotation for x in row), *feature.sizes]
         bound = -1 if feature.bound is None else self.place(feature.bound)
-        return (body, *(self.place(x) for x in entries), bound)
+        return (body, *(self.place(x) for x in entries), bound, self.place(feature.thickness))
 
 
 def _features(shapes: Sequence[ContactShape]) -> dict[str, list[tuple[int, Feature]]]:

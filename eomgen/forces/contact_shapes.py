@@ -6,6 +6,8 @@ shapes, which are round of radius 0 or of the shape's own.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import reduce
 from typing import NamedTuple
 
 from ..elements.dimensions import LENGTH
@@ -52,16 +54,32 @@ _ON = {
 SHAPE_FIELDS: dict[str, Fields] = {kind: {**_ON, **sizes} for kind, sizes in _SIZES.items()}
 #: Shapes of mechanisms in the plane; the others are shapes in space.
 PLANAR = ("circle", "segment", "box", "polygon", "half_plane")
+_SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
 _EDGE = 5  #: numbers of an edge: its first corner, its outward normal, its length
 
 
 class Feature(NamedTuple):
-    """A part of a shape: its class, frame in the body, sizes, and the radius about it within which the part lies."""
+    """A part of a shape.
+
+    Attributes
+    ----------
+    kind : str
+        Its class.
+    frame : Frame
+        In the body.
+    sizes : tuple of Expr
+    bound : Expr or None
+        The radius about the frame's origin within which it lies.
+    thickness : Expr
+        How far another body goes from one side of the shape to the other at least; greater than 0 but for a half-plane,
+        which has no other side.
+    """
 
     kind: str
     frame: Frame
     sizes: tuple[Expr, ...]
     bound: Expr | None
+    thickness: Expr
 
 
 @dataclass(frozen=True)
@@ -84,14 +102,15 @@ class ContactShape:
         """Its parts."""
         frame, zero = self.marker.frame, self.marker.frame.position[0].graph.zero
         if self.kind in ("circle", "sphere"):
-            return [Feature("round", frame, self.sizes, self.sizes[0])]
+            return [Feature("round", frame, self.sizes, self.sizes[0], 2.0 * self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
-            return [Feature("half", self._facing(frame), (), None)]
+            return [Feature("half", self._facing(frame), (), None, zero)]
         if self.kind in ("segment", "capsule"):
             along = frame if self.kind == "segment" else _turned(frame, (2, 0, 1))
             half, radius = 0.5 * self.sizes[0], self.sizes[1]
-            ends = [Feature("corner", _moved(along, (x, zero, zero)), (radius,), radius) for x in (-half, half)]
-            return [Feature("segment", along, (half, radius), half + radius), *ends]
+            thick = zero.graph.apply("max", 2.0 * radius, _SLIM * half)
+            ends = [Feature("corner", _moved(along, (x, zero, zero)), (radius,), radius, thick) for x in (-half, half)]
+            return [Feature("segment", along, (half, radius), half + radius, thick), *ends]
         corners = list(zip(self.sizes[::2], self.sizes[1::2], strict=True))
         edges: list[Expr] = []
         reach = zero
@@ -100,8 +119,9 @@ class ContactShape:
             length = sqrt(dx * dx + dy * dy)
             edges += [x, y, dy / length, -dx / length, length]
             reach = reach.graph.apply("max", reach, x * x + y * y)
-        points = [Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero) for x, y in corners]
-        return [Feature(f"polygon{len(corners)}", frame, tuple(edges), sqrt(reach)), *points]
+        thick = _width(edges, corners)
+        points = [Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, thick) for x, y in corners]
+        return [Feature(f"polygon{len(corners)}", frame, tuple(edges), sqrt(reach), thick), *points]
 
     def _facing(self, frame: Frame) -> Frame:
         """The frame whose z axis points out of the solid: y of a half-plane's marker, z of a half-space's."""
@@ -117,6 +137,17 @@ class ContactShape:
         frames = [feature.frame for feature in self.features()[1:]]
         closed = frames if self.kind in ("segment", "capsule") else [*frames, frames[0]]
         return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in closed))]
+
+
+def _width(edges: Sequence[Expr], corners: Sequence[tuple[Expr, Expr]]) -> Expr:
+    """The least distance of two parallel lines that hold a polygon between them: one lies along an edge."""
+    graph = edges[0].graph
+    widths: list[Expr] = []
+    for k in range(0, len(edges), _EDGE):
+        px, py, nx, ny, _ = edges[k : k + _EDGE]
+        across = [nx * (px - x) + ny * (py - y) for x, y in corners]
+        widths.append(reduce(lambda a, b: graph.apply("max", a, b), across))
+    return reduce(lambda a, b: graph.apply("min", a, b), widths)
 
 
 def _moved(frame: Frame, by: Vec3) -> Frame:

@@ -34,6 +34,13 @@ class View(Protocol):
         ...
 
 
+class MovingView(View, Protocol):
+    """Motion of markers up to accelerations."""
+
+    def acceleration(self, marker: Marker) -> Vec3: ...
+    def angular_acceleration(self, marker: Marker) -> Vec3: ...
+
+
 class MarkerLoad(NamedTuple):
     """A wrench on the marker's body: force at the marker's origin and torque, in ground axes (N, N m)."""
 
@@ -120,6 +127,10 @@ class Force(ABC):
             else:
                 total = total + load.value * view.coordinate(load.coordinate)[1]
         return total
+
+    def meeting_time(self, view: MovingView) -> Expr | None:
+        """Time (s) that a step of a run may take at this motion without passing over a force; None for any."""
+        return None
 
     def remainder(self, view: View) -> list[Load]:
         """What the loads are beyond the slope of the potential, where there is one: friction, damping."""

@@ -11,12 +11,19 @@ from typing import Any
 
 import numpy as np
 
+from ..limits.runs import BEYOND, UP_TO, WITHIN
+
 #: Numbers that say how a body or a shape stands and moves: position, rotation by rows, velocity, angular velocity.
 POSE = 18
 #: Numbers that a pair gives: force on the second shape, torques on both about their centres, the first first, energy.
 RESULT = 10
 #: Columns of a row of a table of shapes before the sizes: the body, and where its position and rotation stand.
 PLACE = 13
+#: Columns behind the sizes: where the radius of the sphere that bounds the shape and its thickness stand.
+REST = 2
+#: Numbers that say how the motion of a body changes: acceleration, angular acceleration.
+MOTION = 6
+NEVER = 1e300  #: (s) where no shapes come towards each other
 
 Narrow = Callable[[Sequence[Any]], Sequence[Any]]
 
@@ -28,16 +35,18 @@ class PairSum:
     ----------
     bodies : int
         How many bodies are given, ground among them; ``POSE`` numbers each stand before the data.
-    tables : sequence of (n, PLACE + sizes + 1) integers
+    tables : sequence of (n, PLACE + sizes + REST) integers
         Shapes of one kind: body, then places in the data of the position (3) and rotation (9) in the body, of the
-        sizes, and of the radius of a sphere that bounds the shape (-1: none does).
-    kinds : sequence of (first, second, planar, law, value, slope)
+        sizes, of the radius of a sphere that bounds the shape (-1: none does), and of the thickness of the body.
+    kinds : sequence of (first, second, planar, law, value, slope, touch)
         Tables of the first and the second shape; whether distances count across z of the first only; places of the
         law's numbers; the function of one pair and its directional derivative, of the numbers of the first shape, of
-        the second, and of the law (and of their rates in the same order).
+        the second, and of the law (and of their rates in the same order); normal and penetration of the pair.
     """
 
-    def __init__(self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[int, int, bool, Any, Narrow, Narrow]]):
+    def __init__(
+        self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[int, int, bool, Any, Narrow, Narrow, Narrow]]
+    ):
         self.bodies = bodies
         self.tables = [np.array(table, dtype=int) for table in tables]
         self.kinds = [(*kind, *self._pairs(*kind[:2])) for kind in kinds]
@@ -68,12 +77,77 @@ class PairSum:
             every[k] = rate
         return self.slope(given, every)
 
+    def meeting(self, given: Sequence[Any], accelerations: Sequence[Any]) -> list[Any]:
+        """Time (s) within which no two shapes that are apart meet, or get deeper than a part of their thickness.
+
+        Distances and their rates are those of the shapes, as seen from the first one, or of the spheres about them
+        where those are apart; a convex shape is at least as far as the tangent to its distance says, so that only the
+        relative acceleration, here that of the present, can bring two closer.
+
+        Parameters
+        ----------
+        given : sequence
+        accelerations : sequence of ``MOTION`` numbers for each body
+            Of its origin and angular, ground axes.
+
+        Returns
+        -------
+        list of one number or array
+        """
+        both = _stacked([*given, *accelerations])
+        data, own = both[: len(given)], both[len(given) :].reshape(self.bodies, MOTION, *both.shape[1:])
+        placed = [self._place(table, data, None)[:2] for table in self.tables]
+        least = np.full(data.shape[1:], NEVER, dtype=data.dtype)
+        for first, second, planar, law, _, _, touch, i, j in self.kinds:
+            (a, arm_a), (b, arm_b) = placed[first], placed[second]
+            tables = self.tables[first], self.tables[second]
+            if not len(i):
+                continue
+            change_a, change_b = (
+                _changed(x, arm, own[t[:, 0]]) for x, arm, t in zip((a, b), (arm_a, arm_b), tables, strict=True)
+            )
+            a, b, change_a, spin = a[i], b[j], change_a[i], own[tables[0][i, 0]][:, 3:6]
+            reach, speed, change = b[:, 0:3] - a[:, 0:3], b[:, 12:15] - a[:, 12:15], change_b[j] - change_a
+            if planar:
+                across = a[:, [5, 8, 11]]  # z of the first shape
+                reach, speed, change = (x - _dot(across, x)[:, None] * across for x in (reach, speed, change))
+            distance = np.sqrt(_dot(reach, reach))
+            bound = tables[0][i, -REST], tables[1][j, -REST]
+            gap = distance - data[np.maximum(bound[0], 0)] - data[np.maximum(bound[1], 0)]
+            free = ((bound[0] < 0) | (bound[1] < 0)).reshape(-1, *([1] * (data.ndim - 1)))
+            near = free | ~(gap > 0.0)
+            closing, towards = (
+                -_dot(reach, speed) / np.where(distance > 0.0, distance, 1.0),
+                np.sqrt(_dot(change, change)),
+            )
+            if near.any():
+                numbers = [*np.moveaxis(a, 1, 0), *np.moveaxis(b, 1, 0), *data[list(law)][:, None]]
+                nx, ny, nz, depth = _table(touch(numbers), len(i), data)
+                normal, turning = np.stack([nx, ny, nz], axis=1), a[:, 15:18]
+                seen = speed - _across(turning, reach)
+                felt = (
+                    change
+                    - _across(spin, reach)
+                    - _across(turning, _across(turning, reach))
+                    - 2.0 * _across(turning, seen)
+                )
+                gap, closing = np.where(near, -depth, gap), np.where(near, -_dot(normal, seen), closing)
+                towards = np.where(near, np.sqrt(_dot(felt, felt)), towards)
+            thick = data[tables[0][i, -1]] + data[tables[1][j, -1]]
+            reached = np.maximum(gap * np.where(free, BEYOND, UP_TO), WITHIN * thick)
+            with np.errstate(all="ignore"):
+                root = np.sqrt(closing * closing + 2.0 * towards * reached)
+                time = np.where(closing > 0.0, 2.0 * reached / (closing + root), (root - closing) / towards)
+            time = np.where((gap > 0.0) & (time > 0.0), time, NEVER)
+            least = np.minimum(least, time.min(axis=0))
+        return [least if least.ndim else float(least)]
+
     def _sum(self, data: np.ndarray, rates: np.ndarray | None) -> list[Any]:
         placed = [self._place(table, data, rates) for table in self.tables]
         out = np.zeros((6 * self.bodies + 1, *data.shape[1:]), dtype=data.dtype)
         if data.dtype == object:
             out = out + data[0] * 0
-        for first, second, planar, law, value, slope, i, j in self.kinds:
+        for first, second, planar, law, value, slope, _, i, j in self.kinds:
             (a, arm_a, da, d_arm_a), (b, arm_b, db, d_arm_b) = placed[first], placed[second]
             near = self._near(a, b, planar, i, j, (self.tables[first], self.tables[second]), data)
             i, j = i[near], j[near]
@@ -111,7 +185,7 @@ class PairSum:
         local, turn = data[table[:, 1:4]], data[table[:, 4:PLACE]].reshape(len(table), 3, 3, *data.shape[1:])
         p, R, v, w = _parts(poses)
         arm = _times(R, local)
-        numbers = [p + arm, _flat(_product(R, turn)), v + _across(w, arm), w, data[table[:, PLACE:-1]]]
+        numbers = [p + arm, _flat(_product(R, turn)), v + _across(w, arm), w, data[table[:, PLACE:-REST]]]
         if rates is None:
             return np.concatenate(numbers, axis=1), arm, None, None
         moving = rates[: POSE * self.bodies].reshape(self.bodies, POSE, *rates.shape[1:])[table[:, 0]]
@@ -124,7 +198,7 @@ class PairSum:
             _flat(_product(dR, turn) + _product(R, d_turn)),
             dv + _across(dw, arm) + _across(w, d_arm),
             dw,
-            rates[table[:, PLACE:-1]],
+            rates[table[:, PLACE:-REST]],
         ]
         return np.concatenate(numbers, axis=1), arm, np.concatenate(changes, axis=1), d_arm
 
@@ -139,7 +213,7 @@ class PairSum:
         data: np.ndarray,
     ) -> np.ndarray:
         """Pairs whose bounding spheres meet, in any column."""
-        bounds = tables[0][i, -1], tables[1][j, -1]
+        bounds = tables[0][i, -REST], tables[1][j, -REST]
         reach = b[j, 0:3] - a[i, 0:3]
         square = (reach * reach).sum(axis=1)
         if planar:
@@ -149,6 +223,17 @@ class PairSum:
         apart = np.asarray(square > size * size, dtype=bool)
         every = np.asarray(apart.all(axis=tuple(range(1, apart.ndim))))
         return np.asarray(~every | (bounds[0] < 0) | (bounds[1] < 0))
+
+
+def _changed(shapes: np.ndarray, arm: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Accelerations of the centres of shapes (n, 3, ...) from those of their bodies."""
+    turning = shapes[:, 15:18]
+    return np.asarray(own[:, 0:3] + _across(own[:, 3:6], arm) + _across(turning, _across(turning, arm)))
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> Any:
+    """Products of vectors (n, 3, ...)."""
+    return (a * b).sum(axis=1)
 
 
 def _stacked(given: Sequence[Any]) -> np.ndarray:

@@ -210,6 +210,7 @@ class BlockMaker:
             "canonical": lambda: terms.canonical,
             "dae_residual": lambda: self._dae_residual,
             "finite_forces": lambda: terms.finite_forces,
+            "meeting_time": lambda: terms.meeting_times,
             "events": lambda: terms.events,
             "resets": lambda: terms.resets,
             "event_slopes": lambda: derivatives(terms, terms.events, (*terms.q, *terms.v)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 from ..describe.input_names import rate_of, split_rate
@@ -83,6 +83,7 @@ def collect_terms(
         paired=kinematics.coordinate_of if kinematics.given_rates else (),
         coordinate_slopes=c.slopes,
         finite_forces=tuple(flag for _, flag in flag_forces(kinematics)),
+        meeting_times=tuple(_meeting_times(kinematics)),
         accelerations=equations.accelerations,
         pivots=equations.pivots,
         wrenches=find_wrenches(kinematics),
@@ -99,6 +100,13 @@ def collect_terms(
         slopes=partial(ForceSlopes, kinematics) if can_differentiate(kinematics) else None,
     )
     return with_states(terms, kinematics.state_names, kinematics.state_rates)
+
+
+def _meeting_times(kinematics: Kinematics) -> list[Expr]:
+    """How long a step may be that passes over no force, if there are such forces: one or none."""
+    each = [force.meeting_time(kinematics.motion) for force in kinematics.mechanism.forces]
+    found = kinematics.resolve([time for time in each if time is not None])
+    return [reduce(lambda a, b: a.graph.apply("min", a, b), found)] if found else []
 
 
 def _independent(kinematics: Kinematics, mobility: Mobility) -> tuple[int, ...]:

@@ -211,7 +211,7 @@ def simulate(
                 listed = watched.listed(bound, forcing)
                 solution = integrate(
                     run.watched(watch), nodes, x0, solver, stored, listed, dense_output, options, stall_check,
-                    partial(watched.reset, bound, forcing), forcing.enter, pause,
+                    partial(watched.reset, bound, forcing), forcing.enter, pause, run.longest(end >= start),
                 )  # fmt: skip
                 warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])
     except Interrupted as interrupt:
