@@ -11,7 +11,7 @@ from typing import Any
 
 from ..graph.pair_calls import PairFunction, PairKind, PairPart
 from ..limits.runs import BEYOND, UP_TO, WITHIN
-from ..numeric.pair_sums import MOTION, NEVER, PLACE, POSE, REST, RESULT
+from ..numeric.pair_sums import APART, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
 from ..program import Program
 from .c_text import print_pieces, used_helpers
 from .pair_sums_used import UsedSum, used_sums
@@ -57,7 +57,9 @@ def _file(program: Program, used: UsedSum) -> str:
             helpers += [helper for helper in needed if helper not in helpers]
         kinds.append(
             {
+                "n": len(kinds),
                 "name": kind.name,
+                "sorted": _is_sorted(function, kind),
                 "function": named,
                 "first": tables[kind.first],
                 "second": tables[kind.second],
@@ -79,6 +81,9 @@ def _file(program: Program, used: UsedSum) -> str:
         "kinds": kinds,
         "functions": functions,
         "helpers": helpers,
+        "most": max((len(kind["second"]["rows"]) for kind in kinds if kind["sorted"]), default=0),
+        "longest": max(table["length"] for table in tables),
+        "apart": repr(APART),
         "sums": used.sums,
         "slopes": used.slopes,
         "meets": used.meets,
@@ -89,6 +94,12 @@ def _file(program: Program, used: UsedSum) -> str:
         "scratch": sum(len(table["rows"]) * table["length"] for table in tables),
     }
     return render("c/pairs.c.j2", context)
+
+
+def _is_sorted(function: PairFunction, kind: PairKind) -> bool:
+    """Whether pairs are found along an axis: where they are many and every shape has bounds."""
+    rows = function.tables[kind.first], function.tables[kind.second]
+    return len(rows[0]) * len(rows[1]) >= SORTED and all(row[-REST] >= 0 for table in rows for row in table)
 
 
 def _law(
@@ -131,31 +142,29 @@ def _declared(program: str, used: UsedSum) -> str:
         text += _each(f"pairs_{function.name}_meeting", f"{prefix}_meeting", (n, MOTION * function.bodies, 1))
     if used.slopes:
         text += (
-            f"EOMGEN_PIECE void {prefix}_slope(const double *given, const double *rates, double *out, double *work, "
-            "int low, int high);\n"
+            f"EOMGEN_PIECE void {prefix}_slope(const double *given, const double *rates, double *out, double *work);\n"
         )
-        text += _each(f"pairs_{function.name}_slope", f"{prefix}_slope", (n, n, results), ends=True)
+        text += _each(f"pairs_{function.name}_slope", f"{prefix}_slope", (n, n, results))
     return text
 
 
-def _each(name: str, called: str, sizes: tuple[int, int, int], ends: bool = False) -> str:
+def _each(name: str, called: str, sizes: tuple[int, int, int]) -> str:
     """The function that calls a sum in every lane; sizes of what is given, of its rates and of the results."""
     n, more, results = sizes
     rates, passed = (", const real *rates", ", rates") if more else ("", "")
-    ends_given, bounds = (", int low, int high", ", low, high") if ends else ("", "")
     taken = n + more
     also = (
         f"        for (int i = 0; i < {more}; i++) {{ plain[{n} + i] = EOMGEN_LANE(rates[i], k); }}\n" if more else ""
     )
     lanes = f"plain, plain + {n}" if more else "plain"
     return (
-        f"EOMGEN_SHARED inline void {name}(const real *given{rates}, real *out, real *work{ends_given})\n{{\n"
-        f"#ifdef EOMGEN_PLAIN\n    {called}(given{passed}, out, work{bounds});\n#else\n"
+        f"EOMGEN_SHARED inline void {name}(const real *given{rates}, real *out, real *work)\n{{\n"
+        f"#ifdef EOMGEN_PLAIN\n    {called}(given{passed}, out, work);\n#else\n"
         "    typedef double __attribute__((may_alias)) number;\n"
         "    number *const plain = (number *)work;\n"
         "    for (int k = 0; k < EOMGEN_WIDTH; k++) {\n"
         f"        for (int i = 0; i < {n}; i++) {{ plain[i] = EOMGEN_LANE(given[i], k); }}\n{also}"
-        f"        {called}({lanes}, plain + {taken}, plain + {taken + results}{bounds});\n"
+        f"        {called}({lanes}, plain + {taken}, plain + {taken + results});\n"
         f"        for (int i = 0; i < {results}; i++) {{ EOMGEN_LANE(out[i], k) = plain[{taken} + i]; }}\n"
         "    }\n#endif\n}\n"
     )

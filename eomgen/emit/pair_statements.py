@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 
 from ..graph.core import Graph
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
@@ -88,15 +88,8 @@ class PairLists:
                 f"pairs_{function.name}_meeting(w + {given}, w + {place + 1}, w + {place}, w + {work});",
             ]
         rates = self._rates[function.name]
-        low, high = _moved(function, call.numbers)
         return [
             f"for (int i = 0; i < {function.count}; i++) {{ w[{rates} + i] = same(0.0); }}",
             *(f"w[{rates + k}] = {text(x)};" for k, x in zip(call.numbers, operands[1:], strict=True)),
-            f"pairs_{function.name}_slope(w + {given}, w + {rates}, w + {place}, w + {work}, {low}, {high});",
+            f"pairs_{function.name}_slope(w + {given}, w + {rates}, w + {place}, w + {work});",
         ]
-
-
-def _moved(function: PairFunction, numbers: Sequence[int]) -> tuple[int, int]:
-    """The first and the last body that have rates; all where the data have some."""
-    bodies = [k // POSE for k in numbers]
-    return (0, function.bodies - 1) if max(bodies) >= function.bodies else (min(bodies), max(bodies))

@@ -211,6 +211,12 @@ def has_pair_sums(graph: Graph) -> bool:
     return any(isinstance(function, PairCall) for function, _ in graph.calls.values())
 
 
+def pairs_of_bodies(graph: Graph) -> int:
+    """How many blocks of six by six the derivatives of all sums have by the motion of bodies."""
+    sums = {call.function.element: call.function for call, _ in graph.calls.values() if isinstance(call, PairCall)}
+    return sum(1 + len(others) for function in sums.values() for others in function.touching)
+
+
 def opaque_names(graph: Graph) -> list[str]:
     """What expressions call that has no formula of its own: declared functions and sums over pairs."""
     sums = {function.function.element for function, _ in graph.calls.values() if isinstance(function, PairCall)}

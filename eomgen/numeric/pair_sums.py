@@ -23,6 +23,10 @@ PLACE = 13
 REST = 2
 #: Numbers that say how the motion of a body changes: acceleration, angular acceleration.
 MOTION = 6
+SORTED = 256  #: pairs of tables from which on near ones are found along an axis: below, testing all is as quick
+#: Part of distances from the ground's origin by which shapes count as nearer while they are sorted out: rounding of
+#: their places moves none across it, and the distance itself is tested after.
+APART = 1e-12
 NEVER = 1e300  #: (s) where no shapes come towards each other
 
 Narrow = Callable[[Sequence[Any]], Sequence[Any]]
@@ -149,6 +153,7 @@ class PairSum:
             out = out + data[0] * 0
         for first, second, planar, law, value, slope, _, i, j in self.kinds:
             (a, arm_a, da, d_arm_a), (b, arm_b, db, d_arm_b) = placed[first], placed[second]
+            i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
             near = self._near(a, b, planar, i, j, (self.tables[first], self.tables[second]), data)
             i, j = i[near], j[near]
             if not len(i):
@@ -201,6 +206,50 @@ class PairSum:
             rates[table[:, PLACE:-REST]],
         ]
         return np.concatenate(numbers, axis=1), arm, np.concatenate(changes, axis=1), d_arm
+
+    def counts(self, given: Sequence[Any]) -> list[tuple[int, int]]:
+        """For each kind how many pairs are tested for their distance, and of how many the law is evaluated."""
+        data = _stacked(given)
+        placed = [self._place(table, data, None)[0] for table in self.tables]
+        found = []
+        for first, second, planar, _, _, _, _, i, j in self.kinds:
+            a, b, tables = placed[first], placed[second], (self.tables[first], self.tables[second])
+            i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
+            found.append((len(i), int(self._near(a, b, planar, i, j, tables, data).sum())))
+        return found
+
+    def _candidates(
+        self, a: np.ndarray, b: np.ndarray, planar: bool, which: tuple[int, int], data: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Pairs whose spheres may meet, from the order of their centres along an axis; None where all are to be tested.
+
+        They come in the order of all pairs, so that sums keep their bits.
+        """
+        first, second = (self.tables[k] for k in which)
+        if data.ndim > 1 or data.dtype != float or len(first) * len(second) < SORTED:
+            return None
+        if min(first[:, -REST].min(), second[:, -REST].min()) < 0:
+            return None
+        radii, others = data[first[:, -REST]], data[second[:, -REST]]
+        spread = np.ptp(b[:, 0:3], axis=0)
+        if planar:  # only axes across z of the first shapes keep distances
+            spread[(a[:, [5, 8, 11]] != 0.0).any(axis=0)] = -1.0
+        axis = int(np.argmax(spread))
+        if spread[axis] < 0.0 or not (np.isfinite(a[:, 0:3]).all() and np.isfinite(b[:, 0:3]).all()):
+            return None
+        order = np.argsort(b[:, axis], kind="stable")
+        places, middle = b[order, axis], a[:, axis]
+        wide = radii + max(others.max(), 0.0)
+        reach = wide + APART * (np.abs(middle) + np.abs(places).max() + wide)
+        low, high = places.searchsorted(middle - reach), places.searchsorted(middle + reach, "right")
+        i = np.repeat(np.arange(len(first)), high - low)
+        j = order[np.arange(len(i)) - np.repeat(np.cumsum(high - low) - high, high - low)]
+        keep = first[i, 0] != second[j, 0]
+        if which[0] == which[1]:
+            keep &= i < j
+        i, j = i[keep], j[keep]
+        sort = np.lexsort((j, i))
+        return i[sort], j[sort]
 
     def _near(
         self,
