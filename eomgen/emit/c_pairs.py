@@ -11,7 +11,7 @@ from typing import Any
 
 from ..graph.pair_calls import PairFunction, PairKind, PairPart
 from ..limits.runs import BEYOND, UP_TO, WITHIN
-from ..numeric.pair_sums import APART, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
+from ..numeric.pair_sums import APART, MEETING, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
 from ..program import Program
 from .c_text import print_pieces, used_helpers
 from .pair_sums_used import UsedSum, used_sums
@@ -29,8 +29,10 @@ def _tables(function: PairFunction) -> list[dict[str, Any]]:
     """The tables of shapes, and where the shapes stand in the work array."""
     found: list[dict[str, Any]] = []
     start = 0
+    number = 0
     for k, rows in enumerate(function.tables):
-        found.append(_table(k, rows, start))
+        found.append({**_table(k, rows, start), "number": number})
+        number += len(rows)
         start += len(rows) * found[-1]["length"]
     return found
 
@@ -48,7 +50,7 @@ def _file(program: Program, used: UsedSum) -> str:
     tables = _tables(function)
     functions: list[str] = []
     helpers: list[str] = []
-    kinds = []
+    kinds: list[dict[str, Any]] = []
     for kind in function.kinds:
         named = f"{function.name}_{kind.name}"
         for part, ending in parts:
@@ -88,6 +90,7 @@ def _file(program: Program, used: UsedSum) -> str:
         "slopes": used.slopes,
         "meets": used.meets,
         "never": repr(NEVER),
+        "meeting": MEETING,
         "beyond": repr(BEYOND),
         "up_to": repr(UP_TO),
         "within": repr(WITHIN),
@@ -139,7 +142,7 @@ def _declared(program: str, used: UsedSum) -> str:
             f"EOMGEN_PIECE void {prefix}_meeting(const double *given, const double *accelerations, double *out, "
             "double *work);\n"
         )
-        text += _each(f"pairs_{function.name}_meeting", f"{prefix}_meeting", (n, MOTION * function.bodies, 1))
+        text += _each(f"pairs_{function.name}_meeting", f"{prefix}_meeting", (n, MOTION * function.bodies, MEETING))
     if used.slopes:
         text += (
             f"EOMGEN_PIECE void {prefix}_slope(const double *given, const double *rates, double *out, double *work);\n"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 
 from ..graph.core import Graph
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
-from ..numeric.pair_sums import MOTION, PLACE, POSE, REST
+from ..numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST
 
 
 def work_of(function: PairFunction) -> int:
@@ -44,7 +44,9 @@ class PairLists:
                 continue
             function = call.function
             self._places[i] = end
-            end += {"given": function.count, "meeting": 1 + MOTION * function.bodies}.get(call.part, function.results)
+            end += {"given": function.count, "meeting": MEETING + MOTION * function.bodies}.get(
+                call.part, function.results
+            )
             if call.part == "slope" and function.name not in self._rates:
                 self._rates[function.name] = end
                 end += function.count
@@ -84,8 +86,8 @@ class PairLists:
             return [f"pairs_{function.name}_sum(w + {given}, w + {place}, w + {work});"]
         if call.part == "meeting":
             return [
-                *(f"w[{place + 1 + k}] = {text(x)};" for k, x in enumerate(operands[1:])),
-                f"pairs_{function.name}_meeting(w + {given}, w + {place + 1}, w + {place}, w + {work});",
+                *(f"w[{place + MEETING + k}] = {text(x)};" for k, x in enumerate(operands[1:])),
+                f"pairs_{function.name}_meeting(w + {given}, w + {place + MEETING}, w + {place}, w + {work});",
             ]
         rates = self._rates[function.name]
         return [

@@ -105,7 +105,12 @@ class ContactGroups(Force):
             for k, marker in enumerate(markers)
         ]
 
-    def meeting_time(self, view: MovingView) -> Expr:
+    def met_shapes(self) -> list[str]:
+        groups = [_features(self.first), *([_features(self.second)] if self.second else [])]
+        parts = [shape for group in groups for features in group.values() for shape, _ in features]
+        return [f"{shape.kind} on {shape.marker.label}" for shape in parts]
+
+    def meeting(self, view: MovingView) -> list[Expr]:
         markers, function, operands = self._operands(view, "")
         accelerations = [x for m in markers for x in (*view.acceleration(m), *view.angular_acceleration(m))]
         return pair_meeting(view.graph, function, operands, accelerations)
@@ -136,7 +141,7 @@ class ContactGroups(Force):
         groups = [_features(self.first), _features(self.second)] if self.second else [_features(self.first)]
         place = {body: k for k, body in enumerate(bodies)}
         keys = [(g, kind) for g, group in enumerate(groups) for kind in group]
-        tables = [tuple(data.row(place[body], f) for body, f in groups[g][kind]) for g, kind in keys]
+        tables = [tuple(data.row(place[shape.marker.body], f) for shape, f in groups[g][kind]) for g, kind in keys]
         planar = any(shape.kind in PLANAR for shape in (*self.first, *self.second))
         kinds = []
         for i, (g, first) in enumerate(keys):
@@ -233,12 +238,12 @@ class _SharedData:
         return (body, *(self.place(x) for x in entries), bound, self.place(feature.thickness))
 
 
-def _features(shapes: Sequence[ContactShape]) -> dict[str, list[tuple[int, Feature]]]:
-    """Features of shapes with their bodies, by class."""
-    found: dict[str, list[tuple[int, Feature]]] = {}
+def _features(shapes: Sequence[ContactShape]) -> dict[str, list[tuple[ContactShape, Feature]]]:
+    """Features of shapes, by class."""
+    found: dict[str, list[tuple[ContactShape, Feature]]] = {}
     for shape in shapes:
         for feature in shape.features():
-            found.setdefault(feature.kind, []).append((shape.marker.body, feature))
+            found.setdefault(feature.kind, []).append((shape, feature))
     return found
 
 

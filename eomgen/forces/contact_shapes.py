@@ -160,11 +160,32 @@ def _turned(frame: Frame, columns: tuple[int, int, int]) -> Frame:
     return Frame((rows[0], rows[1], rows[2]), frame.position)
 
 
+def direction(reach: Vec3, otherwise: Vec3) -> tuple[Vec3, Expr]:
+    """The unit vector along another and its length; ``otherwise`` where that is 0, so that coincident centres part."""
+    square = vec.dot(reach, reach)
+    apart = square.graph.apply("lt", 0.0, square)
+    length = sqrt(where(apart, square, 1.0))
+    x, y, z = (where(apart, a / length, b) for a, b in zip(reach, otherwise, strict=True))
+    return (x, y, z), where(apart, length, 0.0)
+
+
+@dataclass(frozen=True)
+class RoundRound(SphereSphere):
+    """Two circles or spheres; where their centres coincide the second is pushed along x of the first marker."""
+
+    def touch(self, view: View) -> Touch:
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        normal, distance = direction(reach, vec.transpose(view.rotation(self.first))[0])
+        depth = self.radii[0] + self.radii[1] - distance
+        first = vec.scale(self.radii[0] - 0.5 * depth, normal)
+        return normal, depth, first, vec.scale(0.5 * depth - self.radii[1], normal)
+
+
 @dataclass(frozen=True)
 class SegmentRound(Contact):
     """A circle or sphere about the second marker on a segment along x of the first, which has a radius of its own.
 
-    Undefined where the centre lies on the segment.
+    A centre on the segment is pushed along y of the first marker.
     """
 
     half: Expr
@@ -175,8 +196,7 @@ class SegmentRound(Contact):
         reach = vec.sub(view.position(self.second), view.position(self.first))
         place = graph.apply("max", -self.half, graph.apply("min", self.half, vec.dot(along, reach)))
         across = vec.sub(reach, vec.scale(place, along))
-        distance = sqrt(vec.dot(across, across))
-        normal: Vec3 = (across[0] / distance, across[1] / distance, across[2] / distance)
+        normal, distance = direction(across, vec.transpose(view.rotation(self.first))[1])
         depth = self.radii[0] + self.radii[1] - distance
         first = vec.add(vec.scale(place, along), vec.scale(self.radii[0] - 0.5 * depth, normal))
         return normal, depth, first, vec.scale(0.5 * depth - self.radii[1], normal)
@@ -268,7 +288,7 @@ def touching(
     laws = (law.name, *markers, law.normal_law, law.friction)
     first, radius = sizes[0], sizes[1][0]
     if kinds[0] == "round":
-        return SphereSphere(*laws, (first[0], radius))
+        return RoundRound(*laws, (first[0], radius))
     if kinds[0] == "half":
         return SpherePlane(*laws, radius)
     if kinds[0] == "segment":

@@ -128,9 +128,13 @@ class Force(ABC):
                 total = total + load.value * view.coordinate(load.coordinate)[1]
         return total
 
-    def meeting_time(self, view: MovingView) -> Expr | None:
-        """Time (s) that a step of a run may take at this motion without passing over a force; None for any."""
-        return None
+    def met_shapes(self) -> list[str]:
+        """What may meet, of a force that acts between many shapes."""
+        return []
+
+    def meeting(self, view: MovingView) -> list[Expr]:
+        """Of a force that acts between shapes: when they may meet, and which two are deepest in each other."""
+        return []
 
     def remainder(self, view: View) -> list[Load]:
         """What the loads are beyond the slope of the potential, where there is one: friction, damping."""

@@ -3,7 +3,7 @@
 The law of one kind of pair is a small graph of its own (:class:`PairKind`), so that the nodes of a sum do not grow with
 the number of pairs.  ``pairs <name>(given)`` holds the operands, ``pairs <name>(sum)`` and ``pairs <name>(slope)`` are
 lists of results and of their directional derivatives, ``pairs <name>(k)`` is one entry of such a list.
-``pairs <name>(meeting)`` is a list of one number, the time in which shapes that are apart may meet.
+``pairs <name>(meeting)`` is a list of when shapes that are apart may meet, and of the deepest two.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 from ..errors import UsageError
-from ..numeric.pair_sums import MOTION, POSE, PairSum
+from ..numeric.pair_sums import MEETING, MOTION, POSE, PairSum
 from ..records import dataclass
 from .core import Expr, Graph
 from .nodes import Node
@@ -246,13 +246,15 @@ def pair_sum(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -> 
     return [Expr(graph, _item(graph, function, total, k)) for k in range(function.results)]
 
 
-def pair_meeting(graph: Graph, function: PairFunction, operands: Sequence[Expr], accelerations: Sequence[Expr]) -> Expr:
-    """The time (s) in which shapes that are apart may meet: see :meth:`~eomgen.numeric.pair_sums.PairSum.meeting`."""
+def pair_meeting(
+    graph: Graph, function: PairFunction, operands: Sequence[Expr], accelerations: Sequence[Expr]
+) -> list[Expr]:
+    """When shapes that are apart may meet, and more: see :meth:`~eomgen.numeric.pair_sums.PairSum.meeting`."""
     assert len(accelerations) == MOTION * function.bodies
     given = _node(graph, PairCall(function, "given"), f"pairs {function.name}(given)", [x.id for x in operands])
     ids = [given, *(x.id for x in accelerations)]
     listed = _node(graph, PairCall(function, "meeting"), f"pairs {function.name}(meeting)", ids)
-    return Expr(graph, _item(graph, function, listed, 0))
+    return [Expr(graph, _item(graph, function, listed, k)) for k in range(MEETING)]
 
 
 def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:

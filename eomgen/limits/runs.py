@@ -22,6 +22,9 @@ SLOPE, SIZE = 1.5e-8, 1e-3  #: part of a variable over which its slope is differ
 #: In a body that is passed through there are then at least 1 / WITHIN steps, each with some ten stages.
 UP_TO, BEYOND, WITHIN = 0.75, 2.0, 0.0625
 UNHURRIED = 1e3  #: the least step, over which contacts shorten none further
+SUNK = (
+    0.1  #: penetration at the start of a run, relative to the thickness of the two shapes, that is no rest on a floor
+)
 SLOW = 1e-3  #: rate of Newton's iterations in a Radau step above which the Jacobian is renewed
 
 # -- runs that stall -------------------------------------------------------------------------------------------------

@@ -23,6 +23,8 @@ PLACE = 13
 REST = 2
 #: Numbers that say how the motion of a body changes: acceleration, angular acceleration.
 MOTION = 6
+#: Numbers that say how shapes meet: time, penetration and thickness of the deepest pair, and its two shapes.
+MEETING = 5
 SORTED = 256  #: pairs of tables from which on near ones are found along an axis: below, testing all is as quick
 #: Part of distances from the ground's origin by which shapes count as nearer while they are sorted out: rounding of
 #: their places moves none across it, and the distance itself is tested after.
@@ -86,7 +88,9 @@ class PairSum:
 
         Distances and their rates are those of the shapes, as seen from the first one, or of the spheres about them
         where those are apart; a convex shape is at least as far as the tangent to its distance says, so that only the
-        relative acceleration, here that of the present, can bring two closer.
+        relative acceleration, here that of the present, can bring two closer.  Then how deep the deepest two are in
+        each other (0 where none are), the sum of their thicknesses, and which they are: numbers of rows, over all
+        tables.
 
         Parameters
         ----------
@@ -96,12 +100,14 @@ class PairSum:
 
         Returns
         -------
-        list of one number or array
+        list of ``MEETING`` numbers or arrays
         """
         both = _stacked([*given, *accelerations])
         data, own = both[: len(given)], both[len(given) :].reshape(self.bodies, MOTION, *both.shape[1:])
         placed = [self._place(table, data, None)[:2] for table in self.tables]
         least = np.full(data.shape[1:], NEVER, dtype=data.dtype)
+        deepest = np.zeros((MEETING - 1, *data.shape[1:]), dtype=data.dtype)
+        starts = np.cumsum([0, *map(len, self.tables)])
         for first, second, planar, law, _, _, touch, i, j in self.kinds:
             (a, arm_a), (b, arm_b) = placed[first], placed[second]
             tables = self.tables[first], self.tables[second]
@@ -137,14 +143,23 @@ class PairSum:
                 )
                 gap, closing = np.where(near, -depth, gap), np.where(near, -_dot(normal, seen), closing)
                 towards = np.where(near, np.sqrt(_dot(felt, felt)), towards)
-            thick = data[tables[0][i, -1]] + data[tables[1][j, -1]]
+            thick = np.broadcast_to(data[tables[0][i, -1]] + data[tables[1][j, -1]], gap.shape)
             reached = np.maximum(gap * np.where(free, BEYOND, UP_TO), WITHIN * thick)
             with np.errstate(all="ignore"):
                 root = np.sqrt(closing * closing + 2.0 * towards * reached)
                 time = np.where(closing > 0.0, 2.0 * reached / (closing + root), (root - closing) / towards)
             time = np.where((gap > 0.0) & (time > 0.0), time, NEVER)
             least = np.minimum(least, time.min(axis=0))
-        return [least if least.ndim else float(least)]
+            far = np.argmin(gap, axis=0)[None]
+            depth = np.maximum(-np.take_along_axis(gap, far, axis=0)[0], 0.0)
+            names = [np.broadcast_to(x.reshape(free.shape), gap.shape) for x in (starts[first] + i, starts[second] + j)]
+            mine = [
+                depth,
+                *(np.take_along_axis(np.broadcast_to(x, gap.shape), far, axis=0)[0] for x in (thick, *names)),
+            ]
+            deepest = np.where(depth > deepest[0], np.array(mine), deepest)
+        found = [least, *deepest]
+        return [x if np.ndim(x) else float(x) for x in found]
 
     def _sum(self, data: np.ndarray, rates: np.ndarray | None) -> list[Any]:
         placed = [self._place(table, data, rates) for table in self.tables]

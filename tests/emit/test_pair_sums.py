@@ -81,7 +81,7 @@ def test_derivatives_by_direction_as_pair_by_pair(target: str) -> None:
     q = np.column_stack([0.1 * (np.arange(12) % 4), 0.055 + 0.1 * (np.arange(12) // 4), rng.uniform(-3, 3, 12)])
     x = np.concatenate([(q + rng.uniform(-1e-3, 1e-3, q.shape)).ravel(), rng.uniform(-1, 1, 36)])
     found, wanted = bulk.jacobian(0.0, x), single.jacobian(0.0, x)
-    assert np.count_nonzero(np.abs(wanted[36:]) > 1.0) > 500
+    assert np.count_nonzero(np.abs(wanted[36:]) > 1.0) > 400
     assert np.abs(found - wanted).max() <= 1e-12 * np.abs(wanted).max()
     steps = 1e-7 * np.eye(72)
     slopes = np.array([(bulk.rhs(0.0, x + h) - bulk.rhs(0.0, x - h)) / 2e-7 for h in steps]).T

@@ -120,7 +120,7 @@ static EOMGEN_APART double longest_of(const eomgen_ensemble *e, const lane_run *
 {
     const eomgen_model *const model = e->model;
     double *const x = run->alone, *const u = x + 2 * run->n, *const c = u + run->n_u, *const w = c + model->n_const;
-    double time = e->max_step;
+    double found[5];
     for (int i = 0; i < run->n; i++) {
         x[i] = i < e->n_q ? run->y[i][l] : run->y[i][l] * direction;
     }
@@ -134,8 +134,8 @@ static EOMGEN_APART double longest_of(const eomgen_ensemble *e, const lane_run *
     for (int i = 0; i < model->n_const; i++) {
         c[i] = run->c[i][l];
     }
-    const int status = e->meeting(run->t[l], x, u, c, &time, w);
-    return status == 0 && time < e->max_step ? fmin(e->max_step, fmax(time, RUNS_UNHURRIED * least)) : e->max_step;
+    const int status = e->meeting(run->t[l], x, u, c, found, w);
+    return status == 0 && found[0] < e->max_step ? fmin(e->max_step, fmax(found[0], RUNS_UNHURRIED * least)) : e->max_step;
 }
 
 static void choose_steps(eomgen_ensemble *e, lane_run *run, double direction, double *constants)

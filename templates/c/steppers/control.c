@@ -108,7 +108,7 @@ static int too_small(const eomgen_run *run, double h)
 
 double eomgen_longest(eomgen_run *run)
 {
-    double longest = run->max_step, time = longest;
+    double longest = run->max_step;
 #ifndef EOMGEN_ALONE
     if (run->meeting != NULL) { /* backwards in time velocities are opposite, accelerations are not */
         double *const motion = run->K;
@@ -120,8 +120,9 @@ double eomgen_longest(eomgen_run *run)
         if (run->signals != NULL) {
             eomgen_force(run, run->t, run->y);
         }
-        if (run->meeting(run->t, motion, run->u, run->c, &time, run->w) == 0 && time < longest) {
-            longest = fmin(longest, fmax(time, RUNS_UNHURRIED * least_step(run)));
+        double found[5];
+        if (run->meeting(run->t, motion, run->u, run->c, found, run->w) == 0 && found[0] < longest) {
+            longest = fmin(longest, fmax(found[0], RUNS_UNHURRIED * least_step(run)));
         }
     }
 #endif

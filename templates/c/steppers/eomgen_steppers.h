@@ -58,7 +58,7 @@ typedef struct {
     long (*callback)(void *callback_data, const double *t); /* the next until_callback, or 0 to stop the run */
     void *callback_data;
     eomgen_function jacobian;     /* of implicit methods */
-    eomgen_function meeting;      /* of (q, v, a): a time in which no shapes meet, or NULL; n_q: coordinates */
+    eomgen_function meeting;      /* of (q, v, a): a time in which no shapes meet, and 4 numbers, or NULL; n_q: coordinates */
     int n_q;
     long differentiations, factorizations;
     const eomgen_series *series;  /* of Taylor's method */
