@@ -99,9 +99,9 @@ def build(description: Description) -> Mechanism:
     given = build_equations(reader, given_values)
     constraints = build_elements(around, "constraint", sections["constraints"], CONSTRAINTS)
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
-    states, begun = build_states(reader, declared)
+    states, begun, clocks, samplings = build_states(reader, declared)
     outputs = read_outputs()
-    events = build_events(reader, sections["events"])
+    events = (*build_events(reader, sections["events"]), *samplings)
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
     kinds = ("coordinate", "velocity", *(("state",) if declared else ()))
     starts = _initial(reader, "initial", values.get("initial", {}), (*kinds, "output"))
@@ -140,6 +140,7 @@ def build(description: Description) -> Mechanism:
         forces=forces,
         outputs=outputs,
         states=states,
+        clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
         element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked},

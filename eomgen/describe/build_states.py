@@ -2,15 +2,37 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from ..graph.core import Expr
+from .build_clocks import Timing, build_clocks, group_by_clock
 from .build_quantities import in_si, read_described
 from .description import DescribedEntry
 from .fields import LAW, STATE
-from .mechanism import FirstOrderState
+from .mechanism import Clock, Event, FirstOrderState
 from .values import Reader, is_number
 
 
-def declare_states(reader: Reader, entries: list[DescribedEntry], bare: bool) -> list[DescribedEntry]:
+class DeclaredStates(NamedTuple):
+    """The entries whose names are taken in, and those that are sampled by clock."""
+
+    entries: list[DescribedEntry]
+    timings: list[Timing]
+
+    def __bool__(self) -> bool:
+        return bool(self.entries)
+
+
+class BuiltStates(NamedTuple):
+    """The states in the order of their declaration, counters of clocks last, and what belongs to them."""
+
+    states: tuple[FirstOrderState, ...]
+    initial: dict[str, Expr]
+    clocks: tuple[Clock, ...]
+    events: tuple[Event, ...]  #: one a clock
+
+
+def declare_states(reader: Reader, entries: list[DescribedEntry], bare: bool) -> DeclaredStates:
     """Take in the names of all states before any expression is read; those that can be used are returned.
 
     Parameters
@@ -30,22 +52,43 @@ def declare_states(reader: Reader, entries: list[DescribedEntry], bare: bool) ->
             reader.faults.add(entry.path, f"{entry.name!r} is the name of a rate, not of a state", remedy)
         if reader.names.declare("state", entry.name, entry.path):
             usable.append(entry)
-    return usable
+    return DeclaredStates(usable, group_by_clock(reader, usable))
 
 
-def build_states(reader: Reader, entries: list[DescribedEntry]) -> tuple[tuple[FirstOrderState, ...], dict[str, Expr]]:
-    """The states in the order of their declaration, and their initial values by name; faults are noted."""
+def build_states(reader: Reader, declared: DeclaredStates) -> BuiltStates:
+    """The states, their initial values and sampling; faults are noted."""
     states: list[FirstOrderState] = []
     initial: dict[str, Expr] = {}
-    for entry in entries:
+    for entry in declared.entries:
         unit, doc = read_described(reader, entry, STATE)
-        given = entry.values.get("rate")
-        rate = reader.stand_in if given is None else reader.expression(f"{entry.path}.rate", given, LAW)
         start, path = entry.values.get("initial"), f"{entry.path}.initial"
         if is_number(start):
             value = in_si(reader, path, reader.number(path, start), unit)
             initial[entry.name] = reader.graph.constant(0.0 if value is None else value)
         elif start is not None:
             initial[entry.name] = reader.expression(path, start)
-        states.append(FirstOrderState(str(entry.name), rate, unit.si, doc))
-    return tuple(states), initial
+        rate, sampled = _motion(reader, entry)
+        states.append(FirstOrderState(str(entry.name), rate, unit.si, doc, sampled))
+    new = {state.name: state.sampled for state in states if state.sampled is not None}
+    clocks, events = build_clocks(reader, declared.timings, new)
+    zero = reader.graph.zero
+    counters = (FirstOrderState(c.counter, zero, doc=f"samples of {', '.join(c.states)} so far") for c in clocks)
+    return BuiltStates((*states, *counters), initial, clocks, events)
+
+
+def _motion(reader: Reader, entry: DescribedEntry) -> tuple[Expr, Expr | None]:
+    """The rate of a state, and its new value at sampling times if it is sampled."""
+    values, path = entry.values, entry.path
+    if "rate" in values and "sampled" in values:
+        reader.faults.add(path, "has a rate and is sampled", "give rate, or sampled and period")
+    if "sampled" in values:
+        return reader.graph.zero, reader.expression(f"{path}.sampled", values["sampled"], LAW)
+    if "period" in values and "rate" not in values:  # a function of the run renews it
+        return reader.graph.zero, reader.graph.symbol(str(entry.name))
+    for key in ("period", "offset"):
+        if key in values:
+            reader.faults.add(f"{path}.{key}", "is a key of states that are sampled", "give sampled instead of rate")
+    if values.get("rate") is None:
+        reader.faults.add(f"{path}.rate", "is missing", "give the derivative of the state, or sampled and period")
+        return reader.stand_in, None
+    return reader.expression(f"{path}.rate", values["rate"], LAW), None

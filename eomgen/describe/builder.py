@@ -17,6 +17,7 @@ from .keywords import check_keywords, keywords_of
 from .model_bodies import BodyMethods
 from .model_components import ComponentMethods
 from .model_functions import FunctionMethods
+from .model_states import StateMethods
 from .model_totals import TotalMethods
 from .sympy_face import symbol
 
@@ -29,7 +30,7 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
-class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, ComponentMethods):
+class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalMethods, ComponentMethods):
     """What a :class:`~..api.model.Model` is told: methods that add to its description."""
 
     def __init__(
@@ -134,32 +135,6 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         self._quantity("inputs", name, value, unit, doc, latex)
         if signal is not None:
             self._description.sections["inputs"][-1].values["signal"] = signal
-        return symbol(name)
-
-    def state(
-        self, name: str, rate: Value = None, initial: Value = 0.0, unit: str = "", doc: str = "", latex: str = ""
-    ) -> Any:
-        """Declare a first-order state s with s' = rate: an activation, a pressure, what a filter or controller holds.
-
-        Parameters
-        ----------
-        name : str
-            Identifier; its rate is ``<name>_dot``.
-        rate : number, str or SymPy expression
-            In t, parameters, inputs, coordinates, their rates, states, positions and velocities of markers, outputs
-            of these and quantities of force elements.
-        initial : number, str or SymPy expression, optional
-            Where runs begin, 0 unless given; of parameters, if an expression.
-        unit, doc, latex : str, optional
-            Those of :meth:`parameter`; an initial value that is a number has this unit.
-
-        Returns
-        -------
-        sympy.Symbol
-        """
-        given = {"rate": rate, "initial": initial, "unit": unit, "doc": doc, "latex": latex}
-        defaults = {"rate": None, "initial": 0.0, "unit": "", "doc": "", "latex": ""}
-        self._description.add("states", name, without_defaults(given, defaults))
         return symbol(name)
 
     def output(self, name: str, expression: Value, unit: str = "", doc: str = "", latex: str = "") -> None:

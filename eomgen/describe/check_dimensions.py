@@ -87,7 +87,7 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
         wanted = None if field is None else field.measured_in(values, numbers, length(field))
         if section in ("outputs", "inputs") and entry is not None and entry.path in units:
             wanted = units[entry.path].dimension
-        if section == "states" and entry is not None and entry.path in units:
+        if section == "states" and entry is not None and entry.path in units and steps[0] not in ("period", "offset"):
             wanted = units[entry.path].dimension.times(TIME, -1 if steps[0] == "rate" else 0)
         if steps and steps[0] in ("initial", "guess", "reset"):
             wanted = LENGTH if place_of_marker(steps[-1]) else names.get(str(steps[-1]), Known(None)).dimension

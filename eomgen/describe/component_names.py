@@ -9,6 +9,7 @@ from ..errors import UsageError
 from ..joints import JOINTS
 from ..notation import with_instance
 from .build_cam_points import needs_point
+from .build_clocks import COUNTER, EVENT
 from .build_joints import coordinate_names, sketch
 from .description import GROUND_NAME, Description
 from .marker_quantities import ElementQuantity, MarkerQuantity
@@ -44,6 +45,9 @@ class OwnNames:
             joint = sketch(kind, entry.values)
             self.symbols |= {str(name) for name in coordinate_names(kind, entry.name, entry.values, joint)[0]}
             self.symbols |= {entry.name + velocity.suffix for velocity in joint.velocities if velocity.of is None}
+        for entry in sections["states"]:
+            if "period" in entry.values and isinstance(entry.name, str):
+                self.symbols |= {entry.name + COUNTER, entry.name + EVENT}
         for entry in sections["constraints"]:
             if needs_point(entry.values):
                 self.symbols.add(str(entry.values.get("coordinate", f"{entry.name}_contact")))

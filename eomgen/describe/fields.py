@@ -68,9 +68,15 @@ STATE: Fields = {
     "rate": Field(
         "expression",
         "its derivative: of t, parameters, inputs, coordinates, rates, states, positions and velocities of markers",
-        required=True,
         level=LAW,
     ),
+    "sampled": Field(
+        "expression",
+        "instead of rate: its new value at each sampling time, held in between; without it a run's controllers give it",
+        level=LAW,
+    ),
+    "period": Field("expression", "time from one sampling time to the next (s)", dimension=TIME),
+    "offset": Field("expression", "a sampling time (s)", default=0, dimension=TIME),
     "initial": Field("expression", "its value where a run begins", default=0),
     "unit": Field("unit", "unit of the state; an initial value that is a number is converted to SI", default=""),
     "doc": _DOC,

@@ -174,12 +174,30 @@ class Output:
 
 @dataclass(frozen=True)
 class FirstOrderState:
-    """A first-order state s with s' = rate, beside the coordinates and velocities of the mechanism."""
+    """A first-order state s with s' = rate, beside the coordinates and velocities of the mechanism.
+
+    One that is sampled is held between the times of its clock, where it becomes the value of ``sampled``.
+    """
 
     name: str
     rate: Expr
     unit: str = ""
     doc: str = ""
+    sampled: Expr | None = None
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The sampling times offset + k period, k = 0, 1, .., of states that are sampled together.
+
+    The state ``counter`` holds the k of the next time; ``event`` happens there.
+    """
+
+    counter: str
+    event: str
+    states: tuple[str, ...]
+    period: Expr
+    offset: Expr
 
 
 @dataclass(frozen=True)
@@ -253,6 +271,7 @@ class Mechanism:
     forces: tuple[Force, ...]
     outputs: tuple[Output, ...]
     states: tuple[FirstOrderState, ...] = ()
+    clocks: tuple[Clock, ...] = ()
     events: tuple[Event, ...] = ()
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
     element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element

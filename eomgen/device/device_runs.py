@@ -78,6 +78,11 @@ def carry_out(
     like = cast("BoundModel", module)  # metadata and n_dof are all that is read
     declared, device, n = declare(like), module.device, module.n_x
     start, end = find_span(span, float(declared["end"]))
+    if module.metadata.get("clocks") and (start != 0.0 or end < 0.0):
+        raise UsageError(
+            f"runs on a device of a model with sampled states begin at 0 s and go forward, not from {start:.6g} s to "
+            f"{end:.6g} s; use simulate_many of the module"
+        )
     method, step = own_step(like, declared["method"] if method is None else method, step)
     methods = [name.upper() for name in module.facts["methods"]]
     if method not in methods:

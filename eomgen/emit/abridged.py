@@ -13,7 +13,7 @@ from textwrap import fill
 from textwrap import indent as indented
 
 from ..texts import WIDTH
-from .selection import Selection
+from .selection import NOT_REACHED, Selection
 from .uses import Import, SourceText, assigned, is_text, is_typing
 
 
@@ -36,7 +36,7 @@ class _AbridgedText:
         """The text; one empty line between definitions."""
         kept = [line for line in self.lines if line is not None]
         text = re.sub(r"\n{3,}", "\n\n", "\n".join(kept))
-        return re.sub(r"\n\n(?= +(?:elif|else|except|finally)\b)", "\n", text).strip() + "\n"
+        return re.sub(rf"\n\n(?= +(?:(?:elif|else|except|finally)\b|{NOT_REACHED}))", "\n", text).strip() + "\n"
 
     def _visit(self, node: ast.stmt) -> None:
         selection, source = self.selection, self.source

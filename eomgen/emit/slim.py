@@ -34,6 +34,7 @@ LEFT_OUT = {
     "simulation/solver_state": "checkpoint=",
     "simulation/steppers": "step and classes of solvers",
 }
+OF_CLOCKS = ("simulation/clocks", "simulation/controllers")
 #: Classes whose methods users call.
 PUBLIC = (
     ("api/module", "Module"),
@@ -46,7 +47,7 @@ PUBLIC = (
 CALLS = ("simulate",)
 
 
-def carry_slim(package: Mapping[str, str], signals: bool, states: bool) -> dict[str, str]:
+def carry_slim(package: Mapping[str, str], signals: bool, states: bool, clocks: bool) -> dict[str, str]:
     """Files of eomgen for a slim package, by name: what is reached of each, and refusals in place of others.
 
     Parameters
@@ -57,9 +58,12 @@ def carry_slim(package: Mapping[str, str], signals: bool, states: bool) -> dict[
         Whether the model declares inputs over time, whose expressions runs in Python have to play.
     states : bool
         Whether the model has first-order states.
+    clocks : bool
+        Whether some of these are sampled.
     """
     left_out = LEFT_OUT if signals else LEFT_OUT | {"runtime/tapes": "inputs that a model declares"}
     left_out = left_out if states else left_out | {"runtime/mechanical": "first-order states"}
+    left_out = left_out if clocks else left_out | dict.fromkeys(OF_CLOCKS, "sampled states")
     own = {name: text for name, text in package.items() if name.endswith(".py")}
     typed = [SourceText("", text) for name, text in package.items() if name.endswith(".pyi")]
     selection = Selection(carry(package) | own, left_out)

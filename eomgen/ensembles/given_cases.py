@@ -19,6 +19,7 @@ from ..runtime.assembled import initial_of
 from ..runtime.given_start import last_state
 from ..runtime.near_names import check_names
 from ..runtime.room import read_numbers, require_room
+from ..simulation.clocks import at_next_samples
 from ..simulation.run_arguments import find_state
 
 if TYPE_CHECKING:
@@ -143,6 +144,16 @@ def assemble_states(
     words : list of str
         Why, for each of these in order.
     """
+    x, failed, words = _assemble_all(module, cases, t, forcing_of)
+    if module.metadata.get("clocks"):
+        for k in np.flatnonzero(~failed).tolist():
+            x[:, k] = at_next_samples(module.bind(**cases.column(k)), t, x[:, k])
+    return x, failed, words
+
+
+def _assemble_all(
+    module: BoundModel, cases: Cases, t: float, forcing_of: Callable[[int], Forcing]
+) -> tuple[Array, Mask, list[str]]:
     free = not module.n_rows and not module.layout.space
     failed: Mask = np.zeros(cases.count, dtype=bool)
     words: list[str] = []

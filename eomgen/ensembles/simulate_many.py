@@ -18,6 +18,7 @@ from ..runtime.near_names import check_names
 from ..runtime.room import require_room, require_steps
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
+from ..simulation.clocks import require_forward
 from ..simulation.compiled import can_run
 from ..simulation.progress import Progress, wanted
 from ..simulation.run_arguments import check_method, declare, find_span, ordered_times, own_step
@@ -211,6 +212,7 @@ def _plan(
 ) -> Plan:  # fmt: skip
     declared = declare(module)
     start, end = find_span(span, float(declared["end"]))
+    require_forward(module, start, end)
     method, step = own_step(module, declared["method"] if method is None else method, step)
     if not isinstance(method, str):
         raise UsageError(f"method of simulate_many must be the name of a method, not {method!r}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import sympy
@@ -47,17 +48,33 @@ def forces(author: Author) -> list[Section]:
 
 def states(author: Author) -> Section | None:
     """The rates of the first-order states, None without any."""
-    names = author.equations.kinematics.state_names
-    if not names:
+    k = author.equations.kinematics
+    held = {name for clock in k.mechanism.clocks for name in (*clock.states, clock.counter)}
+    rates = [(name, x) for name, x in zip(k.state_names, k.state_rates, strict=True) if name not in held]
+    if not k.state_names:
         return None
     text = "Beside the coordinates and velocities the model has states of its own, with these equations of first order."
-    pieces: list[Piece] = [Sentence(text)]
-    written = author.write("rates of first-order states", list(author.equations.kinematics.state_rates), "S_")
-    author.printer.meet(str(symbol) for symbol, _ in written.intermediates)
-    pieces += [FormulaLine((author.printer.latex(s), x)) for s, x in written.intermediates]
-    left = (author.symbol(f"{name}_dot") for name in names)
-    pieces += [FormulaLine(pair) for pair in zip(left, written.expressions, strict=True)]
+    pieces: list[Piece] = [Sentence(text), *_lines(author, "rates of first-order states", rates, "S_", "_dot")]
+    if k.sampled:
+        told = (
+            "These states are sampled: they keep their values until the time t, where they become, one after the other,"
+        )
+        pieces = pieces if rates else []
+        pieces += [Sentence(told), *_lines(author, "new values of sampled states", k.sampled, "D_")]
+        counters = ", ".join(f"`{clock.counter}`" for clock in k.mechanism.clocks)
+        pieces.append(Sentence(f"Each time {counters} grows by 1."))
     return Section("First-order states", tuple(pieces))
+
+
+def _lines(
+    author: Author, what: str, pairs: Sequence[tuple[str, Expr]], prefix: str, suffix: str = ""
+) -> Iterator[Piece]:
+    """Named quantities and their formulas, after what stands in these."""
+    written = author.write(what, [x for _, x in pairs], prefix)
+    author.printer.meet(str(symbol) for symbol, _ in written.intermediates)
+    yield from (FormulaLine((author.printer.latex(s), x)) for s, x in written.intermediates)
+    left = (author.symbol(f"{name}{suffix}") for name, _ in pairs)
+    yield from (FormulaLine(pair) for pair in zip(left, written.expressions, strict=True))
 
 
 def _work(author: Author, column: Any) -> Any:

@@ -115,6 +115,16 @@ class Kinematics:
         """s' of the first-order states, of (t, q, v, s, u)."""
         return tuple(self.resolve([s.rate for s in self.mechanism.states]))
 
+    @cached_property
+    def sampled(self) -> tuple[tuple[str, Expr], ...]:
+        """Of each clock ``t``, the time of its next sample, then its states with their new values."""
+        given = {s.name: s.sampled for s in self.mechanism.states if s.sampled is not None}
+        found: list[tuple[str, Expr]] = []
+        for own in self.mechanism.clocks:
+            found.append(("t", own.offset + own.period * self.graph.symbol(own.counter)))
+            found += ((name, given[name]) for name in own.states)
+        return tuple(zip((name for name, _ in found), self.resolve([x for _, x in found]), strict=True))
+
     @property
     def euler_parameters(self) -> tuple[tuple[str, ...], ...]:
         """Names of the coordinates that are Euler parameters, four by four."""

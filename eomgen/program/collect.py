@@ -173,6 +173,22 @@ def resolved_outputs(kinematics: Kinematics, equations: TreeEquations) -> list[E
     return resolved([o.expression for o in kinematics.mechanism.outputs], kinematics, equations)
 
 
+def _clocks(kinematics: Kinematics) -> list[dict[str, Any]]:
+    """Of each clock its event, the place of its counter in x, and the states that it renews."""
+    events = [event.name for event in kinematics.mechanism.events]
+    states = (*kinematics.names, *kinematics.velocity_names, *kinematics.state_names)
+    lawless = {s.name for s in kinematics.mechanism.states if s.sampled == kinematics.graph.symbol(s.name)}
+    return [
+        {
+            "event": events.index(c.event),
+            "counter": states.index(c.counter),
+            "states": list(c.states),
+            "open": [name for name in c.states if name in lawless],
+        }
+        for c in kinematics.mechanism.clocks
+    ]
+
+
 def _resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:
     """Event, state and its new value, of all resets."""
     names = (*kinematics.names, *kinematics.velocity_names, *kinematics.state_names)
@@ -297,6 +313,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             if m.events
             else {}
         ),
+        **({"clocks": _clocks(kinematics)} if m.clocks else {}),
         **_signals(kinematics, equations),
         **({"input_rates": rates} if (rates := _input_rates(kinematics)) else {}),
         **({"constraint_inputs": used} if (used := _constraint_inputs(kinematics)) else {}),

@@ -13,7 +13,7 @@ from ..printing.formula_mathml import fenced, row, sum_line
 from ..printing.formula_of import ROUNDED
 from ..printing.formula_tree import Formula, MatrixOf, Name, is_group
 from ..texts import html_text
-from .printed_equations import PrintedEntry, PrintedEquations
+from .printed_equations import SAMPLED, PrintedEntry, PrintedEquations
 from .printed_parts import PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
@@ -151,6 +151,9 @@ def _states(printed: PrintedEquations) -> Iterator[str]:
     if printed.states:
         yield f"<p {LEFT}>first-order states</p>"
         yield from (_line(printed.names, mathml(rate, printed.names), x) for rate, x in printed.states)
+    if printed.sampled:
+        yield f"<p {LEFT}>{SAMPLED}</p>"
+        yield from (_line(printed.names, mathml(state, printed.names), x) for state, x in printed.sampled)
 
 
 def parts_html(parts: PrintedParts) -> Iterator[str]:

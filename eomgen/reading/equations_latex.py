@@ -8,7 +8,7 @@ from ..notation.notation import Notation
 from ..printing import latex, sums_in_lines
 from ..printing.formula_of import DIGITS, ROUNDED
 from ..printing.formula_tree import Formula, MatrixOf, is_group
-from .printed_equations import PrintedEquations
+from .printed_equations import SAMPLED, PrintedEquations
 from .printed_parts import PrintedGroup, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
@@ -24,6 +24,9 @@ def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
             *(_broken(printed.names, printed.names.latex(n), x) for n, x in printed.intermediates),
         ]
     lines += [_broken(printed.names, latex(rate, printed.names), x) for rate, x in printed.states]
+    if printed.sampled:
+        lines.append(rf"\text{{{SAMPLED}}}")
+        lines += [_broken(printed.names, latex(state, printed.names), x) for state, x in printed.sampled]
     if told := printed.told_of_numbers:
         lines.append(rf"\text{{{told.replace('_', chr(92) + '_')}}}")
     values = r",\quad ".join(latex(x, printed.names) for x in printed.values)

@@ -14,7 +14,7 @@ from ..printing.formula_of import ROUNDED
 from ..printing.formula_text import TIGHT
 from ..printing.formula_tree import MatrixOf, times
 from ..texts import visible
-from .printed_equations import PrintedEntry, PrintedEquations, plain
+from .printed_equations import SAMPLED, PrintedEntry, PrintedEquations, plain
 from .printed_parts import SHORT, PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
@@ -64,6 +64,9 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
     if printed.states:
         found += ["", "first-order states"]
         found += [x for a, f in printed.states for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
+    if printed.sampled:
+        found += ["", SAMPLED]
+        found += [x for a, f in printed.sampled for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
     found += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
     return "\n".join(found)
 

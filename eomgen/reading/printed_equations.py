@@ -92,6 +92,9 @@ def _names(x: Expr) -> set[str]:
     return set(symbols_of([x]))
 
 
+SAMPLED = "sampled states, held until the next time t, where they become one after the other"
+
+
 class PrintedEquations:
     """Formulas of M(q) v' = f and what else a display says.
 
@@ -155,13 +158,24 @@ class PrintedEquations:
 
     @cached_property
     def states(self) -> list[tuple[Formula, Formula]]:
-        """First-order states: their rates, and what these are, after named parts of the latter."""
-        kinematics = self.equations.kinematics
-        if not kinematics.state_names:
+        """First-order states: their rates, and what these are, after named parts of the latter; no sampled ones."""
+        names, mechanism = self.equations.kinematics.state_names, self.equations.kinematics.mechanism
+        held = {name for clock in mechanism.clocks for name in (*clock.states, clock.counter)}
+        if held.issuperset(names):
             return []
-        rates = self.equations.symbols_put_in([acceleration_name(name) for name in kinematics.state_names])
+        rates = self.equations.symbols_put_in([acceleration_name(name) for name in names])
         named, column = self.equations.written("state_rates")
-        pairs = [*named, *zip(rates, column, strict=True)]
+        pairs = [(rate, x) for name, rate, x in zip(names, rates, column, strict=True) if name not in held]
+        return [(self.formula(left), self.formula(right)) for left, right in (*named, *pairs)]
+
+    @cached_property
+    def sampled(self) -> list[tuple[Formula, Formula]]:
+        """Sampled states and what they become, behind the time of the next sample, after named parts of these."""
+        names = [name for name, _ in self.equations.kinematics.sampled]
+        if not names:
+            return []
+        named, column = self.equations.written("sampled_values")
+        pairs = (*named, *zip(self.equations.symbols_put_in(names), column, strict=True))
         return [(self.formula(left), self.formula(right)) for left, right in pairs]
 
     @property
@@ -245,6 +259,7 @@ class PrintedEquations:
         loops: tuple[str, ...] = OF_LOOPS if self.equations.constraint_names else ()
         mechanism, there = self.equations.kinematics.mechanism, type(self.equations)
         loops = (*loops, "states", "state_rates") if mechanism.states else loops
+        loops = (*loops, "sampled", "sampled_values") if mechanism.clocks else loops
         lacking = {*(OF_BODIES if mechanism.bare else ()), *(OF_PARTS if mechanism.given is not None else ())}
         lacking |= {"linearize"} if mechanism.states else set()  # refused
         return tuple(name for name in (*ATTRIBUTES, *loops) if hasattr(there, name) and name not in lacking)

@@ -160,6 +160,16 @@ class Readable(QuantitiesOfMethods):
         """s' (n_s, 1) of the first-order states ``states``."""
         return self._column("state_rates", lambda s: s.kinematics.state_rates)
 
+    @property
+    def sampled(self) -> tuple[Any, ...]:
+        """Sampled states in the order of renewal, behind t for each of their clocks, SymPy symbols."""
+        return tuple(self._symbol(name) for name, _ in self.kinematics.sampled)
+
+    @cached_property
+    def sampled_values(self) -> Any:
+        """What ``sampled`` become (n, 1), one after the other; for t: the time of the next sample."""
+        return self._column("sampled_values", lambda s: [x for _, x in s.kinematics.sampled])
+
     # -- constraints --------------------------------------------------------------------------------------------------
     @cached_property
     def constraints(self) -> Any:

@@ -47,6 +47,7 @@ WHOLE = (
     *("constraints", "velocity_constraints", "constraint_jacobian", "gamma", "velocity_transformation"),
     *("velocity_offset", "acceleration_offset", "body_velocity_transformation", "body_mass_matrix"),
     *("gibbs_function", "hamiltonian", "momentum_rates", "block_system", "tree_system", "state_rates"),
+    "sampled_values",
 )
 SHOWN = 8  #: names that a message lists
 BY_NAME = ("poses", "velocities", "accelerations", "loop_coordinates", "free_bodies", "joint_forces")

@@ -40,6 +40,23 @@ def refuse_states(layout: Layout, what: str) -> None:
         )
 
 
+def refuse_sampled(layout: Layout, what: str) -> None:
+    """Refuse a model with sampled states where motions in continuous time are asked for.
+
+    Raises
+    ------
+    UnavailableError
+    """
+    clocks = layout.metadata.get("clocks", [])
+    if clocks:
+        names = ", ".join(name for clock in clocks for name in clock["states"])
+        raise UnavailableError(
+            f"{what} is not available for models with sampled states, and {layout.name!r} has {names}: between "
+            "samples these do not change, so they have no equations in continuous time; declare the quantity as an "
+            "input for the mechanism alone, or put the law itself in its place"
+        )
+
+
 def require_projection(layout: Layout) -> None:
     """Refuse a model whose right-hand side holds constraints by Baumgarte's stabilisation.
 

@@ -188,14 +188,17 @@ class Events:
         after = np.array(x, dtype=float)
         for i in fired:
             if self.model[i].action == RESET:
-                resets = self.layout.metadata["resets"]
-                own = [k for k, (event, _) in enumerate(resets) if event == i]
-                places = [resets[k][1] for k in own]
-                after[places] = module.kernels.rows("resets", own, t, after, forcing(t, after))
-                after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
+                after = np.asarray(module.project(self.renewed(module, forcing, t, after, i), t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
             after = self._strike(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
+        return after
+
+    def renewed(self, module: BoundModel, forcing: Forcing, t: float, x: Array, event: int) -> Array:
+        """The state x with the new values that the model gives at an event."""
+        after, resets = x.copy(), self.layout.metadata["resets"]
+        own = [k for k, (index, _) in enumerate(resets) if index == event]
+        after[[resets[k][1] for k in own]] = module.kernels.rows("resets", own, t, after, forcing(t, after))
         return after
 
     def crowded(self, t: float, count: int) -> ZenoError:

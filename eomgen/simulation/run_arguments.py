@@ -85,10 +85,19 @@ def find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | 
     AssemblyError
         The loops do not close, or the inputs on which they depend change with the state that they give.
     """
+    if module.metadata.get("clocks"):
+        from .clocks import at_next_samples
+
+        span = None if forcing is None else forcing.span
+        return at_next_samples(module, t, _find_state(module, initial, t, forcing), span)
+    return _find_state(module, initial, t, forcing)
+
+
+def _find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | None) -> Array:
     if forcing is not None and forcing.constrained:
         from .led_state import find_led_state
 
-        return find_led_state(module.layout, forcing, t, lambda u: find_state(module.bind(None, u), initial, t))
+        return find_led_state(module.layout, forcing, t, lambda u: _find_state(module.bind(None, u), initial, t, None))
     if initial is None:
         return module.x0(t=t) if t else module._declared_start.copy()
     if isinstance(initial, Mapping):

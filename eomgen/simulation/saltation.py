@@ -78,11 +78,12 @@ class Saltation:
     def reset(self, t: float, z: Array, fired: Sequence[int]) -> Array:
         """z = [x; S] right after events that happened at time t."""
         changed: list[str] = []
+        fixed = all(self._is_fixed(t, *self.run.split(z), self.listed[own][0], self.names[own]) for own in fired)
         for own in sorted(fired, key=lambda own: self.listed[own][1].action != GO_ON):
             after = self._pass(t, z, own)
             changed += [self.names[own]] if after is not z else []
             z = after
-        if len(changed) > 1:
+        if len(changed) > 1 and not fixed:
             raise self._at_once(t, changed)
         return z
 
@@ -93,10 +94,11 @@ class Saltation:
         x, S = self._consistent(t, raw, S)
         before, after = self._sides(t, x)
         changes = event.action != GO_ON or bool(np.abs(before - after).max() > 0.0)
-        if changes:
+        fixed = self._is_fixed(t, x, S, index, self.names[own])
+        if changes and not fixed:
             self._refuse_ends(t, own)
             self._refuse_others(t, x, own, before)
-        dt = self._time(t, x, S, index, before, self.names[own], changes)
+        dt = np.zeros(S.shape[1]) if fixed else self._time(t, x, S, index, before, self.names[own], changes)
         move = self.run.move(t, x, S + np.multiply.outer(before, dt), dt)
         if not changes:
             self.found.append(EventSlopes(self.names[own], t, x, x, dt, move.x, move.x))
@@ -146,6 +148,14 @@ class Saltation:
                 )
 
     # -- the time of an event -------------------------------------------------------------------------------------
+    def _is_fixed(self, t: float, x: Array, S: Array, index: int, name: str) -> bool:
+        """Whether an event is a sampling time that no change moves."""
+        clocks = [clock["event"] for clock in self.module.metadata.get("clocks", [])]
+        if index not in clocks:
+            return False
+        gradient = self._gradient(t, x, index)
+        return not self.run.move(t, x, S).along(gradient, f"event {name}", self.module.layout.u).any()
+
     def _gradient(self, t: float, x: Array, index: int) -> Array:
         """Derivatives (1, ...) of an event's value by [x, t, u, p]."""
         first = len(self.events.model)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 OPTIONS = (
     *("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step"),
-    *("checkpoint", "checkpoint_every", "resume"),
+    *("checkpoint", "checkpoint_every", "resume", "controllers"),
 )
 
 
@@ -49,6 +49,7 @@ def simulate(
     atol: Any = None,
     t_eval: ArrayLike | None = None,
     events: Any = None,
+    controllers: Mapping[str, Callable[[float, Any], Any]] | None = None,
     dense_output: bool = False,
     max_step: float | None = None,
     first_step: float | None = None,
@@ -90,6 +91,9 @@ def simulate(
         Names of the model's events (all by default; those that reset the state are watched in any case), expressions
         as text, or functions with SciPy's attributes ``terminal`` and ``direction``.  In a mapping also
         ``{"expression": text, "terminal": times, "direction": 1}``.
+    controllers : mapping of str to callable f(t, x), optional
+        Functions that give the new values of sampled states for which the model has no law; x is the state right
+        before, in which the sampled states with a law have their new values already.
     dense_output : bool
         Keep a continuous solution for ``Trajectory.at``.
     max_step, first_step : float, optional
@@ -148,6 +152,10 @@ def simulate(
     declared = declare(module)
     method = declared["method"] if method is None else method
     watched = Events(module.layout, events)
+    if controllers is not None:
+        from .controllers import ControlledEvents
+
+        watched = ControlledEvents(module.layout, events, controllers, kept is not None)
     forcing = Forcing(module.layout, inputs)
     compiled = can_run(module, method, forcing) and options.keys().isdisjoint(IMPLICIT)
     if method == "RK4" and not compiled:

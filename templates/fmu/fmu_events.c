@@ -87,20 +87,26 @@ int fmu_completed(fmu_instance *f, int *event)
 }
 
 #if FMU_N_RESETS
+/* New values of states, for one event after the other: each takes the values that those before have given. */
 static int reset(fmu_instance *f, const int *fired)
 {
     fmu_memory *const m = &f->m;
     double *const new_values = f->trial;
-    const int status = FMU_MODEL(resets)(m->t, m->x, m->u, m->c, new_values, f->w);
-    if (status != 0 && status != EOMGEN_NON_FINITE) {
-        return fmu_judge(f, status, "the new values of states at an event");
-    }
-    for (int k = 0; k < FMU_N_RESETS; k++) {
-        if (fired[FMU_RESET_OF[k]]) {
-            if (!isfinite(new_values[k])) {
-                return fmu_say(f, FMU_ERROR, "an event at t = %.9g s gives a state a value that is not finite", m->t);
+    for (int i = 0; i < FMU_N_EVENTS; i++) {
+        if (!fired[i] || !FMU_RESETS[i]) {
+            continue;
+        }
+        const int status = FMU_MODEL(resets)(m->t, m->x, m->u, m->c, new_values, f->w);
+        if (status != 0 && status != EOMGEN_NON_FINITE) {
+            return fmu_judge(f, status, "the new values of states at an event");
+        }
+        for (int k = 0; k < FMU_N_RESETS; k++) {
+            if (FMU_RESET_OF[k] == i) {
+                if (!isfinite(new_values[k])) {
+                    return fmu_say(f, FMU_ERROR, "an event at t = %.9g s gives a state a value that is not finite", m->t);
+                }
+                m->x[FMU_RESET_X[k]] = new_values[k];
             }
-            m->x[FMU_RESET_X[k]] = new_values[k];
         }
     }
     return FMU_OK;
@@ -191,5 +197,45 @@ int fmu_update(fmu_instance *f, int *ended, int *changed)
             return fmu_say(f, FMU_ERROR, "events follow each other ever faster at t = %.9g s (a ball that comes to rest)", m->t);
         }
     }
+    return status;
+}
+
+#if FMU_N_CLOCKS
+/* How long ago the next time of a clock was, if its counter is what `x` says. */
+static int lateness(fmu_instance *f, const double *x, int clock, double *late)
+{
+    fmu_memory *const m = &f->m;
+    const int status = FMU_MODEL(events)(m->t, x, m->u, m->c, f->values, f->w);
+    *late = f->values[FMU_CLOCK_EVENT[clock]];
+    return status == EOMGEN_NON_FINITE && isfinite(*late) ? FMU_OK : fmu_judge(f, status, "the sampling times");
+}
+#endif
+
+int fmu_set_clocks(fmu_instance *f)
+{
+    int status = fmu_constants(f);
+#if FMU_N_CLOCKS
+    fmu_memory *const m = &f->m;
+    for (int i = 0; i < FMU_N_CLOCKS && status == FMU_OK; i++) {
+        double *const counter = &m->x[FMU_CLOCK_COUNTER[i]];
+        double late = 0.0, ahead = 0.0;
+        memcpy(f->trial, m->x, FMU_N_X * sizeof(double));
+        f->trial[FMU_CLOCK_COUNTER[i]] += 1.0;
+        status = lateness(f, m->x, i, &late);
+        status = status == FMU_OK ? lateness(f, f->trial, i, &ahead) : status;
+        const double period = late - ahead;
+        if (status == FMU_OK && !(period > 0.0)) {
+            return fmu_say(f, FMU_ERROR, "a period is %.9g s; give a positive time between samples", period);
+        }
+        if (status == FMU_OK && late > 0.0) {
+            *counter += fmax(ceil((late - RUNS_INSTANT * fmax(fabs(m->t), RUNS_EARLIEST)) / period), 0.0);
+            status = lateness(f, m->x, i, &late);
+        }
+        while (status == FMU_OK && late > 0.0) { /* rounding: its time is this one */
+            *counter = fmax(nextafter(*counter, HUGE_VAL), *counter + late / period);
+            status = lateness(f, m->x, i, &late);
+        }
+    }
+#endif
     return status;
 }

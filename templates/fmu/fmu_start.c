@@ -145,7 +145,8 @@ int fmu_assemble(fmu_instance *f)
 {
     fmu_memory *const m = &f->m;
     m->rates_known = 0;
-    const int status = as_given(m) ? (int)FMU_OK : fmu_close(f);
+    int status = as_given(m) ? (int)FMU_OK : fmu_close(f);
+    status = status == FMU_OK ? fmu_set_clocks(f) : status;
     m->assembled = status == FMU_OK;
     return status == FMU_DISCARD ? (int)FMU_ERROR : status;
 }

@@ -64,6 +64,7 @@ def _switches(program: Program, free: Sequence[int]) -> list[tuple[str, int]]:
         ("HAS_KINEMATICS", int(follows)),
         ("N_EVENTS", sizes.n_events),
         ("N_RESETS", sizes.n_resets),
+        ("N_CLOCKS", len(program.metadata.get("clocks", []))),
         ("N_U", sizes.n_u),
         ("N_P", sizes.n_p),
     ]
@@ -93,7 +94,7 @@ def _numbers(program: Program, n_free: int) -> list[tuple[str, int | str]]:
 def _lists(program: Program, free: Sequence[int]) -> list[tuple[str, str]]:
     """Tables of whole numbers."""
     metadata = program.metadata
-    events, resets = metadata.get("events", []), metadata.get("resets", [])
+    events, resets, clocks = (metadata.get(key, []) for key in ("events", "resets", "clocks"))
     return [
         ("INDEPENDENT", _whole(map(int, find_exact(program)))),
         ("FREE_Q", _whole(coordinate_of(program, k) for k in free)),
@@ -103,6 +104,8 @@ def _lists(program: Program, free: Sequence[int]) -> list[tuple[str, str]]:
         ("RESETS", _whole(int(event["resets"]) for event in events)),
         ("RESET_OF", _whole(row[0] for row in resets)),
         ("RESET_X", _whole(row[1] for row in resets)),
+        ("CLOCK_EVENT", _whole(clock["event"] for clock in clocks)),
+        ("CLOCK_COUNTER", _whole(clock["counter"] for clock in clocks)),
     ]
 
 

@@ -1,0 +1,71 @@
+"""Simulation: the state where a run begins -> that state, with each clock of sampled states at its next time.
+
+A clock is an event, t - offset - k period, and the state that holds k, the number of its next time.
+"""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from .events import instant
+
+if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
+
+
+def at_next_samples(module: BoundModel, t: float, x: Array, span: tuple[float, float] | None = None) -> Array:
+    """The state x (n_x,) at time t with clocks whose next time is past set to their first one that is not.
+
+    A sampling time at t itself happens.  A clock that is ahead stays so.
+
+    Raises
+    ------
+    UsageError
+        A period is not positive, or the `span` of the run goes backwards.
+    """
+    clocks: list[dict[str, Any]] = module.metadata.get("clocks", [])
+    if not clocks:
+        return x
+    if span is not None:
+        require_forward(module, *span)
+    values = module.kernels.timed("events")
+    found = np.array(x, dtype=float)
+    for clock in clocks:
+        event, place = int(clock["event"]), int(clock["counter"])
+        late, period = _lateness(values, t, found, event, place)
+        if not period > 0.0:
+            raise UsageError(
+                f"the period of {', '.join(clock['states'])} is {period:.6g} s; give a positive time between samples"
+            )
+        if late > 0.0:
+            found[place] += max(ceil((late - instant(t)) / period), 0)
+        while (late := _lateness(values, t, found, event, place)[0]) > 0.0:  # rounding: its time is this one
+            found[place] = max(np.nextafter(found[place], np.inf), found[place] + late / period)
+    return found
+
+
+def _lateness(values: Any, t: float, x: Array, event: int, place: int) -> tuple[float, float]:
+    """How long ago the next time of a clock was (s), and its period (s)."""
+    late, ahead = float(values(t, x)[event]), np.array(x)
+    ahead[place] += 1.0
+    return late, late - float(values(t, ahead)[event])
+
+
+def require_forward(module: BoundModel, start: float, end: float) -> None:
+    """Refuse a run backwards in time of a model with sampled states: what they were before a sample is not known.
+
+    Raises
+    ------
+    UsageError
+    """
+    clocks: list[dict[str, Any]] = module.metadata.get("clocks", [])
+    if clocks and end < start:
+        raise UsageError(
+            f"a run of sampled states ({', '.join(clocks[0]['states'])}) goes forward in time, not from {start:.6g} s "
+            f"to {end:.6g} s"
+        )
