@@ -71,6 +71,19 @@ def test_as_all_pairs_to_the_bit(target: str, monkeypatch: pytest.MonkeyPatch) -
     assert touched > 20
 
 
+def test_times_of_meeting_as_of_all_pairs() -> None:
+    """Shapes that are too far to meet before others are left out in C; NumPy looks at all."""
+    mods = [spread(40, 40).compile(target=target) for target in ("numpy", "cython")]
+    rng, ended = np.random.default_rng(5), 0
+    for k in range(60):
+        q, v, a = rng.uniform(-1, 1, 3) * [3.0, 0.2, 1e-2], rng.uniform(-3, 3, 3), rng.uniform(-9, 9, 3)
+        v, a = v * (k % 4 > 0), a * (k % 8 > 3)
+        found = [mod.kernels.motion("meeting_time")(q, v, a) for mod in mods]
+        ended += found[0][0] < 1e200
+        assert np.allclose(*found, rtol=1e-11)
+    assert 30 < ended < 60
+
+
 def test_bodies_that_tilt_and_states_that_are_no_numbers() -> None:
     """Axes that are not across z of the first shapes are left out; what is not a number is not lost."""
     mods = [spread(20, 20, tilt=1.0).compile(target=target) for target in ("numpy", "cython")]
