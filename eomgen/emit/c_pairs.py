@@ -9,17 +9,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from ..graph.pair_calls import PairFunction, PairKind
-from ..numeric.pair_sums import PLACE, POSE, RESULT
+from ..graph.pair_calls import PairFunction, PairKind, PairPart
+from ..limits.runs import BEYOND, UP_TO, WITHIN
+from ..numeric.pair_sums import APART, MEETING, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
 from ..program import Program
 from .c_text import print_pieces, used_helpers
-from .pair_sums_used import used_sums
+from .pair_sums_used import UsedSum, used_sums
 from .sources import render
 from .straight import cut
 
 
 def _table(k: int, rows: Sequence[Sequence[int]], start: int) -> dict[str, Any]:
-    sizes = len(rows[0]) - PLACE - 1
+    sizes = len(rows[0]) - PLACE - REST
     length = POSE + sizes + 4
     return {"k": k, "rows": rows, "columns": len(rows[0]), "sizes": sizes, "length": length, "start": start}
 
@@ -28,31 +29,40 @@ def _tables(function: PairFunction) -> list[dict[str, Any]]:
     """The tables of shapes, and where the shapes stand in the work array."""
     found: list[dict[str, Any]] = []
     start = 0
+    number = 0
     for k, rows in enumerate(function.tables):
-        found.append(_table(k, rows, start))
+        found.append({**_table(k, rows, start), "number": number})
+        number += len(rows)
         start += len(rows) * found[-1]["length"]
     return found
 
 
 def pair_files(program: Program) -> dict[str, str]:
     """The C files of the sums that a program uses."""
-    return {f"{program.name}_pairs_{f.name}.c": _file(program, f, slopes) for f, slopes in used_sums(program)}
+    return {f"{program.name}_pairs_{used.function.name}.c": _file(program, used) for used in used_sums(program)}
 
 
-def _file(program: Program, function: PairFunction, slopes: bool) -> str:
+def _file(program: Program, used: UsedSum) -> str:
+    function = used.function
+    parts: list[tuple[PairPart, str]] = [("outputs", "")] if used.sums or used.slopes else []
+    parts += [("slopes", "_slope")] if used.slopes else []
+    parts += [("touch", "_touch")] if used.meets else []
     tables = _tables(function)
     functions: list[str] = []
     helpers: list[str] = []
-    kinds = []
+    kinds: list[dict[str, Any]] = []
     for kind in function.kinds:
         named = f"{function.name}_{kind.name}"
-        for sloped in (False, True) if slopes else (False,):
-            text, needed = _law(program, kind, f"{named}{'_slope' * sloped}", sloped, tables)
+        for part, ending in parts:
+            text, needed = _law(program, kind, f"{named}{ending}", part, tables)
             functions.append(text)
             helpers += [helper for helper in needed if helper not in helpers]
         kinds.append(
             {
+                "n": len(kinds),
                 "name": kind.name,
+                "sorted": _is_sorted(function, kind),
+                "turns": not kind.expressions("touch")[-1].is_zero,
                 "function": named,
                 "first": tables[kind.first],
                 "second": tables[kind.second],
@@ -74,17 +84,34 @@ def _file(program: Program, function: PairFunction, slopes: bool) -> str:
         "kinds": kinds,
         "functions": functions,
         "helpers": helpers,
-        "slopes": slopes,
+        "most": max((len(kind["second"]["rows"]) for kind in kinds if kind["sorted"]), default=0),
+        "longest": max(table["length"] for table in tables),
+        "apart": repr(APART),
+        "sums": used.sums,
+        "slopes": used.slopes,
+        "meets": used.meets,
+        "turns": any(kind["turns"] for kind in kinds),
+        "never": repr(NEVER),
+        "meeting": MEETING,
+        "beyond": repr(BEYOND),
+        "up_to": repr(UP_TO),
+        "within": repr(WITHIN),
         "scratch": sum(len(table["rows"]) * table["length"] for table in tables),
     }
     return render("c/pairs.c.j2", context)
 
 
+def _is_sorted(function: PairFunction, kind: PairKind) -> bool:
+    """Whether pairs are found along an axis: where they are many and every shape has bounds."""
+    rows = function.tables[kind.first], function.tables[kind.second]
+    return len(rows[0]) * len(rows[1]) >= SORTED and all(row[-REST] >= 0 for table in rows for row in table)
+
+
 def _law(
-    program: Program, kind: PairKind, name: str, slopes: bool, tables: Sequence[dict[str, Any]]
+    program: Program, kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[str, Any]]
 ) -> tuple[str, list[str]]:
     """The function of one pair and the helpers that it needs."""
-    outputs = kind.expressions(slopes)
+    outputs = kind.expressions(part)
     graph = outputs[0].graph
     places: dict[int, str] = {}
     count = len(kind.plain)
@@ -101,39 +128,48 @@ def _law(
 
 def pair_declarations(program: Program) -> list[str]:
     """Declarations of the sums, in every lane, for the files that call them."""
-    return [_declared(program.name, function, slopes) for function, slopes in used_sums(program)]
+    return [_declared(program.name, used) for used in used_sums(program)]
 
 
-def _declared(program: str, function: PairFunction, slopes: bool) -> str:
+def _declared(program: str, used: UsedSum) -> str:
+    function = used.function
     prefix, n, results = f"{program}_pairs_{function.name}", function.count, function.results
     text = f"#define pairs_{function.name}_numbers {prefix}_numbers\n"
     text += f"EOMGEN_PIECE extern const double {prefix}_numbers[{max(1, len(function.data))}];\n"
-    text += f"EOMGEN_PIECE void {prefix}_sum(const double *given, double *out, double *work);\n"
-    text += _each(f"pairs_{function.name}_sum", f"{prefix}_sum", n, results, False)
-    if slopes:
+    if used.sums:
+        text += f"EOMGEN_PIECE void {prefix}_sum(const double *given, double *out, double *work);\n"
+        text += _each(f"pairs_{function.name}_sum", f"{prefix}_sum", (n, 0, results))
+    if used.meets:
         text += (
-            f"EOMGEN_PIECE void {prefix}_slope(const double *given, const double *rates, double *out, double *work, "
-            "int low, int high);\n"
+            f"EOMGEN_PIECE void {prefix}_meeting(const double *given, const double *accelerations, double *out, "
+            "double *work);\n"
         )
-        text += _each(f"pairs_{function.name}_slope", f"{prefix}_slope", n, results, True)
+        text += _each(f"pairs_{function.name}_meeting", f"{prefix}_meeting", (n, MOTION * function.bodies, MEETING))
+    if used.slopes:
+        text += (
+            f"EOMGEN_PIECE void {prefix}_slope(const double *given, const double *rates, double *out, double *work);\n"
+        )
+        text += _each(f"pairs_{function.name}_slope", f"{prefix}_slope", (n, n, results))
     return text
 
 
-def _each(name: str, called: str, n: int, results: int, slope: bool) -> str:
-    """The function that calls a sum in every lane."""
-    rates, ends = (", const real *rates", ", int low, int high") if slope else ("", "")
-    passed, bounds = (", rates", ", low, high") if slope else ("", "")
-    taken = 2 * n if slope else n
-    also = f" plain[{n} + i] = EOMGEN_LANE(rates[i], k);" if slope else ""
-    lanes = f"plain, plain + {n}" if slope else "plain"
+def _each(name: str, called: str, sizes: tuple[int, int, int]) -> str:
+    """The function that calls a sum in every lane; sizes of what is given, of its rates and of the results."""
+    n, more, results = sizes
+    rates, passed = (", const real *rates", ", rates") if more else ("", "")
+    taken = n + more
+    also = (
+        f"        for (int i = 0; i < {more}; i++) {{ plain[{n} + i] = EOMGEN_LANE(rates[i], k); }}\n" if more else ""
+    )
+    lanes = f"plain, plain + {n}" if more else "plain"
     return (
-        f"EOMGEN_SHARED inline void {name}(const real *given{rates}, real *out, real *work{ends})\n{{\n"
-        f"#ifdef EOMGEN_PLAIN\n    {called}(given{passed}, out, work{bounds});\n#else\n"
+        f"EOMGEN_SHARED inline void {name}(const real *given{rates}, real *out, real *work)\n{{\n"
+        f"#ifdef EOMGEN_PLAIN\n    {called}(given{passed}, out, work);\n#else\n"
         "    typedef double __attribute__((may_alias)) number;\n"
         "    number *const plain = (number *)work;\n"
         "    for (int k = 0; k < EOMGEN_WIDTH; k++) {\n"
-        f"        for (int i = 0; i < {n}; i++) {{ plain[i] = EOMGEN_LANE(given[i], k);{also} }}\n"
-        f"        {called}({lanes}, plain + {taken}, plain + {taken + results}{bounds});\n"
+        f"        for (int i = 0; i < {n}; i++) {{ plain[i] = EOMGEN_LANE(given[i], k); }}\n{also}"
+        f"        {called}({lanes}, plain + {taken}, plain + {taken + results});\n"
         f"        for (int i = 0; i < {results}; i++) {{ EOMGEN_LANE(out[i], k) = plain[{taken} + i]; }}\n"
         "    }\n#endif\n}\n"
     )

@@ -40,7 +40,7 @@ def define_functions(program: Program, bundled: bool) -> tuple[list[str], list[s
     sums = used_sums(program)
     if sums:
         imports.append("from .numeric.pair_sums import PairSum")
-        definitions += [print_pair_sum(program, function) for function, _ in sums]
+        definitions += [print_pair_sum(program, function) for function, *_ in sums]
     return imports, definitions
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..graph.pair_calls import PairCall, PairFunction, pair_call
+from ..graph.pair_calls import PairCall, PairFunction, PairPart, pair_call
 from ..graph.substitute import symbols_of
 from ..operations import CONDITION, OPERATIONS
 from ..program import Block, Program
@@ -73,6 +73,8 @@ def _print_pair_node(call: PairCall, operands: Sequence[str]) -> str:
         return f"{name}({operands[0]})"
     if call.part == "slope":
         return f"{name}.slope_along({operands[0]}, {call.numbers}, [{', '.join(operands[1:])}])"
+    if call.part == "meeting":
+        return f"{name}.meeting({operands[0]}, [{', '.join(operands[1:])}])"
     return f"{operands[0]}[{call.numbers[0]}]"
 
 
@@ -81,9 +83,10 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
     texts, kinds = list[str](), list[str]()
     for kind in function.kinds:
         names = []
-        for slopes in (False, True):
-            name = f"_pairs_{function.name}_{kind.name}{'_slope' * slopes}"
-            outputs = kind.expressions(slopes)
+        parts: list[tuple[PairPart, str]] = [("outputs", ""), ("slopes", "_slope"), ("touch", "_touch")]
+        for part, ending in parts:
+            name = f"_pairs_{function.name}_{kind.name}{ending}"
+            outputs = kind.expressions(part)
             graph = outputs[0].graph
             places = {graph.symbol(symbol).id: f"x[{k}]" for k, symbol in enumerate(kind.symbols)}
             pieces = cut(graph, outputs, (), frozenset(), program.limits.statements)
@@ -93,7 +96,7 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
             texts.append(text.replace(f"def {name}(t, x, u, c):", f"def {name}(x):"))
             names.append(name)
         row = (kind.first, kind.second, kind.planar, kind.law)
-        kinds.append(f"        ({', '.join(map(repr, row))}, {names[0]}, {names[1]}),\n")
+        kinds.append(f"        ({', '.join([*map(repr, row), *names])}),\n")
     tables = "".join(f"        {table!r},\n" for table in function.tables)
     made = f"PairSum(\n    {function.bodies},\n    (\n{tables}    ),\n    (\n{''.join(kinds)}    ),\n)"
     return "\n\n".join([*texts, f"pairs_{function.name} = {made}"])

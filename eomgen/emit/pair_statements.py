@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 
 from ..graph.core import Graph
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
-from ..numeric.pair_sums import PLACE, POSE
+from ..numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST
 
 
 def work_of(function: PairFunction) -> int:
     """Numbers that a sum works with: its shapes and their rates, and in lanes copies of what is given and found."""
-    shapes = sum(len(rows) * (POSE + len(rows[0]) - PLACE + 3) for rows in function.tables)
+    shapes = sum(len(rows) * (POSE + len(rows[0]) - PLACE - REST + 4) for rows in function.tables)
     return 2 * shapes + 2 * function.count + function.results
 
 
@@ -44,7 +44,9 @@ class PairLists:
                 continue
             function = call.function
             self._places[i] = end
-            end += function.count if call.part == "given" else function.results
+            end += {"given": function.count, "meeting": MEETING + MOTION * function.bodies}.get(
+                call.part, function.results
+            )
             if call.part == "slope" and function.name not in self._rates:
                 self._rates[function.name] = end
                 end += function.count
@@ -82,16 +84,14 @@ class PairLists:
         given = self._places[operands[0]]
         if call.part == "sum":
             return [f"pairs_{function.name}_sum(w + {given}, w + {place}, w + {work});"]
+        if call.part == "meeting":
+            return [
+                *(f"w[{place + MEETING + k}] = {text(x)};" for k, x in enumerate(operands[1:])),
+                f"pairs_{function.name}_meeting(w + {given}, w + {place + MEETING}, w + {place}, w + {work});",
+            ]
         rates = self._rates[function.name]
-        low, high = _moved(function, call.numbers)
         return [
             f"for (int i = 0; i < {function.count}; i++) {{ w[{rates} + i] = same(0.0); }}",
             *(f"w[{rates + k}] = {text(x)};" for k, x in zip(call.numbers, operands[1:], strict=True)),
-            f"pairs_{function.name}_slope(w + {given}, w + {rates}, w + {place}, w + {work}, {low}, {high});",
+            f"pairs_{function.name}_slope(w + {given}, w + {rates}, w + {place}, w + {work});",
         ]
-
-
-def _moved(function: PairFunction, numbers: Sequence[int]) -> tuple[int, int]:
-    """The first and the last body that have rates; all where the data have some."""
-    bodies = [k // POSE for k in numbers]
-    return (0, function.bodies - 1) if max(bodies) >= function.bodies else (min(bodies), max(bodies))

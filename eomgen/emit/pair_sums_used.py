@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from ..errors import UsageError
 from ..graph.pair_calls import PairFunction, pair_call
 from ..graph.traverse import reachable
 from ..program import Program
 
 
-def used_sums(program: Program) -> list[tuple[PairFunction, bool]]:
-    """The sums, by name, and whether their derivatives are used."""
+class UsedSum(NamedTuple):
+    """A sum, and whether its value, its derivatives and the time in which shapes meet are used."""
+
+    function: PairFunction
+    sums: bool
+    slopes: bool
+    meets: bool
+
+
+def used_sums(program: Program) -> list[UsedSum]:
+    """The sums, by name."""
     graph = program.graph
     roots = [y.id for block in program.blocks for y in (*block.outputs, *block.checks)]
     operations = {graph.nodes[i][0] for i in reachable(graph, roots)} & set(graph.calls)
     calls = [call for operation in sorted(operations) if (call := pair_call(graph, operation)) is not None]
     functions = {call.function.name: call.function for call in calls}
-    sloped = {call.function.name for call in calls if call.part == "slope"}
-    return [(functions[name], name in sloped) for name in sorted(functions)]
+    parts = {(call.function.name, call.part) for call in calls}
+    return [
+        UsedSum(functions[name], *((name, part) in parts for part in ("sum", "slope", "meeting")))
+        for name in sorted(functions)
+    ]
 
 
 def refuse_sums(program: Program, target: str) -> None:
@@ -26,7 +40,7 @@ def refuse_sums(program: Program, target: str) -> None:
     ------
     UsageError
     """
-    names = sorted({function.element for function, _ in used_sums(program)})
+    names = sorted({function.element for function, *_ in used_sums(program)})
     if names:
         raise UsageError(
             f"{target} has no contacts between groups of shapes (here {', '.join(names)}); use target c, cython or "

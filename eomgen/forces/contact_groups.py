@@ -18,14 +18,25 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
-from ..graph.pair_calls import LOSSES, PairFunction, PairKind, pair_sum
+from ..graph.pair_calls import LOSSES, PairFunction, PairKind, pair_meeting, pair_sum
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..numeric.pair_sums import POSE
 from ..records import dataclass
+from .branches import where
 from .contact import CURVED, SpherePlane
-from .contact_shapes import GROUNDS, PLANAR, AtHeight, ContactShape, Feature, ShapeMotion, meet, touching
-from .force import Force, Load, MarkerLoad, View
+from .contact_shapes import (
+    GROUNDS,
+    PLANAR,
+    AtHeight,
+    ContactShape,
+    Feature,
+    ShapeMotion,
+    meet,
+    touching,
+    turning_radius,
+)
+from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction_laws import DryFriction, has_bristles, read_friction
 from .normal_laws import HertzBodies, NormalLaw, read_normal_law
 
@@ -108,8 +119,23 @@ class ContactGroups(Force):
             for k, marker in enumerate(markers)
         ]
 
+    def met_shapes(self) -> list[str]:
+        groups = [_features(self.first), *([_features(self.second)] if self.second else [])]
+        parts = [shape for group in groups for features in group.values() for shape, _ in features]
+        return [f"{shape.kind} on {shape.marker.label}" for shape in parts]
+
+    def meeting(self, view: MovingView) -> list[Expr]:
+        markers, function, operands = self._operands(view, "")
+        accelerations = [x for m in markers for x in (*view.acceleration(m), *view.angular_acceleration(m))]
+        return pair_meeting(view.graph, function, operands, accelerations)
+
     def _results(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], list[Expr]]:
         """The bodies as markers at their origins, force and torque on each, and the energy; at rest, if asked."""
+        markers, function, operands = self._operands(view, part, still)
+        return markers, pair_sum(view.graph, function, operands)
+
+    def _operands(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], PairFunction, list[Expr]]:
+        """The bodies as markers at their origins, the sum over pairs and what it is given."""
         graph = view.graph
         bodies = sorted({shape.marker.body for shape in (*self.first, *self.second)})
         labels = {shape.marker.body: shape.marker.label.partition(".")[0] for shape in (*self.first, *self.second)}
@@ -123,13 +149,13 @@ class ContactGroups(Force):
             operands += [graph.zero if still else x for v in moving for x in v]
         data = _SharedData(len(operands), graph)
         function = self._function(f"{part}{self.name}", bodies, data, bool(part))
-        return markers, pair_sum(graph, function, [*operands, *data.values])
+        return markers, function, [*operands, *data.values]
 
     def _function(self, name: str, bodies: Sequence[int], data: _SharedData, lost: bool) -> PairFunction:
         groups = [_features(self.first), _features(self.second)] if self.second else [_features(self.first)]
         place = {body: k for k, body in enumerate(bodies)}
         keys = [(g, kind) for g, group in enumerate(groups) for kind in group]
-        tables = [tuple(data.row(place[body], f) for body, f in groups[g][kind]) for g, kind in keys]
+        tables = [tuple(data.row(place[shape.marker.body], f) for shape, f in groups[g][kind]) for g, kind in keys]
         planar = any(shape.kind in PLANAR for shape in (*self.first, *self.second))
         kinds = []
         for i, (g, first) in enumerate(keys):
@@ -184,8 +210,12 @@ class ContactGroups(Force):
         names += [f"l{k}" for k in range(len(places))]
         seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
         slopes = jvp(results, seeds)
-        nodes, renamed = _kept(graph, [*results, *slopes])
-        ids = [renamed[x.id] for x in (*results, *slopes)]
+        across, depth, _, _ = contact.touch(view)
+        if (share := contact.share(view)) is not None:  # beside a piece of ground nothing is in it
+            depth = where(graph.apply("lt", 0.0, share), depth, graph.apply("min", depth, 0.0))
+        touch = [*across, depth, turning_radius(kinds[1], given[1][POSE:], graph)]
+        nodes, renamed = _kept(graph, [*results, *slopes, *touch])
+        ids, seen = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch))
         rates = [f"d_{name}" for name in names]
         return PairKind(
             f"{kinds[0]}_{kinds[1]}_{tables[0]}_{tables[1]}",
@@ -196,6 +226,7 @@ class ContactGroups(Force):
             (*names, *rates),
             tuple(ids[: len(results)]),
             tuple(ids[len(results) :]),
+            tuple(seen),
         )
 
 
@@ -217,15 +248,15 @@ class _SharedData:
         frame = feature.frame
         entries = [*frame.position, *(x for row in frame.rotation for x in row), *feature.sizes]
         bound = -1 if feature.bound is None else self.place(feature.bound)
-        return (body, *(self.place(x) for x in entries), bound)
+        return (body, *(self.place(x) for x in entries), bound, self.place(feature.thickness))
 
 
-def _features(shapes: Sequence[ContactShape]) -> dict[str, list[tuple[int, Feature]]]:
-    """Features of shapes with their bodies, by class."""
-    found: dict[str, list[tuple[int, Feature]]] = {}
+def _features(shapes: Sequence[ContactShape]) -> dict[str, list[tuple[ContactShape, Feature]]]:
+    """Features of shapes, by class."""
+    found: dict[str, list[tuple[ContactShape, Feature]]] = {}
     for shape in shapes:
         for feature in shape.features():
-            found.setdefault(feature.kind, []).append((shape.marker.body, feature))
+            found.setdefault(feature.kind, []).append((shape, feature))
     return found
 
 

@@ -7,6 +7,8 @@ shapes, which are round of radius 0 or of the shape's own.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import reduce
 from typing import NamedTuple
 
 from ..elements.dimensions import LENGTH
@@ -14,7 +16,7 @@ from ..elements.field import Field, Fields
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr, sqrt
+from ..graph.core import Expr, Graph, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .branches import where
@@ -81,18 +83,34 @@ SHAPE_FIELDS: dict[str, Fields] = {kind: {**_ON, **sizes} for kind, sizes in _SI
 PLANAR = ("circle", "segment", "box", "polygon", "half_plane", "profile", "smooth_profile")
 #: Shapes without an end, which do not meet each other.
 GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space")
+_SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
 _BOTH = (-1.0, 1.0)
 _STEPS = 24  #: lines of which the picture of an ellipse is made
 _EDGE = 5  #: numbers of an edge: its first corner, its outward normal, its length
 
 
 class Feature(NamedTuple):
-    """A part of a shape: its class, frame in the body, sizes, and the radius about it within which the part lies."""
+    """A part of a shape.
+
+    Attributes
+    ----------
+    kind : str
+        Its class.
+    frame : Frame
+        In the body.
+    sizes : tuple of Expr
+    bound : Expr or None
+        The radius about the frame's origin within which it lies.
+    thickness : Expr
+        How far another body goes from one side of the shape to the other at least; greater than 0 but for a half-plane,
+        which has no other side.
+    """
 
     kind: str
     frame: Frame
     sizes: tuple[Expr, ...]
     bound: Expr | None
+    thickness: Expr
 
 
 @dataclass(frozen=True)
@@ -116,17 +134,18 @@ class ContactShape:
         """Its parts."""
         frame, zero = self.marker.frame, self.marker.frame.position[0].graph.zero
         if self.kind in ("circle", "sphere"):
-            return [Feature("round", frame, self.sizes, self.sizes[0])]
+            return [Feature("round", frame, self.sizes, self.sizes[0], 2.0 * self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
-            return [Feature("half", self._facing(frame), (), None)]
+            return [Feature("half", self._facing(frame), (), None, zero)]
         if self.kind in ("profile", "smooth_profile"):
             return self._pieces(frame)
         if self.kind == "ellipsoid":
-            return [Feature("ellipsoid", frame, self.sizes, None)]
+            return [Feature("ellipsoid", frame, self.sizes, _most(self.sizes), 2.0 * _least(self.sizes))]
         if self.kind == "cuboid":
             x, y, z = (0.5 * size for size in self.sizes)
+            thick = _least(self.sizes)
             return [
-                Feature("end", _moved(frame, (i * x, j * y, k * z)), (zero,), zero)
+                Feature("end", _moved(frame, (i * x, j * y, k * z)), (zero,), zero, thick)
                 for i in _BOTH
                 for j in _BOTH
                 for k in _BOTH
@@ -135,8 +154,9 @@ class ContactShape:
             along = frame if self.kind == "segment" else _turned(frame, (2, 0, 1))
             half, radius = 0.5 * self.sizes[0], self.sizes[1]
             whole, end = ("segment", "corner") if self.kind == "segment" else ("rod", "end")
-            ends = [Feature(end, _moved(along, (x, zero, zero)), (radius,), radius) for x in (-half, half)]
-            return [Feature(whole, along, (half, radius), half + radius), *ends]
+            thick = zero.graph.apply("max", 2.0 * radius, _SLIM * half)
+            ends = [Feature(end, _moved(along, (x, zero, zero)), (radius,), radius, thick) for x in (-half, half)]
+            return [Feature(whole, along, (half, radius), half + radius, thick), *ends]
         corners = list(zip(self.sizes[::2], self.sizes[1::2], strict=True))
         edges: list[Expr] = []
         reach = zero
@@ -145,8 +165,9 @@ class ContactShape:
             length = sqrt(dx * dx + dy * dy)
             edges += [x, y, dy / length, -dx / length, length]
             reach = reach.graph.apply("max", reach, x * x + y * y)
-        points = [Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero) for x, y in corners]
-        return [Feature(f"polygon{len(corners)}", frame, tuple(edges), sqrt(reach)), *points]
+        thick = _width(edges, corners)
+        points = [Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, thick) for x, y in corners]
+        return [Feature(f"polygon{len(corners)}", frame, tuple(edges), sqrt(reach), thick), *points]
 
     def _points(self) -> list[tuple[Expr, Expr]]:
         """Points of a profile."""
@@ -157,11 +178,11 @@ class ContactShape:
         points, depth, zero = self._points(), self.sizes[0], self.sizes[0].graph.zero
         pieces = straight_pieces(points) if self.kind == "profile" else smooth_pieces(points)
         found = [
-            Feature(one.kind, one.frame(frame), (*one.sizes, depth), None if one.open else one.half + depth)
+            Feature(one.kind, one.frame(frame), (*one.sizes, depth), None if one.open else one.half + depth, depth)
             for one in pieces
         ]
         tops = peaks(points)
-        return [*found, *(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero) for x, y in tops)]
+        return [*found, *(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth) for x, y in tops)]
 
     def _facing(self, frame: Frame) -> Frame:
         """The frame whose z axis points out of the solid: y of a half-plane's marker, z of a half-space's."""
@@ -199,6 +220,31 @@ class ContactShape:
         return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in closed))]
 
 
+def _most(sizes: Sequence[Expr]) -> Expr:
+    return reduce(lambda a, b: a.graph.apply("max", a, b), sizes)
+
+
+def _least(sizes: Sequence[Expr]) -> Expr:
+    return reduce(lambda a, b: a.graph.apply("min", a, b), sizes)
+
+
+def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
+    """How far points of a feature are from its centre that its turning moves along a normal; 0 of what is round."""
+    if kind == "ellipsoid":
+        return _most(sizes)
+    return sizes[0] + sizes[1] if kind == "rod" else graph.zero
+
+
+def _width(edges: Sequence[Expr], corners: Sequence[tuple[Expr, Expr]]) -> Expr:
+    """The least distance of two parallel lines that hold a polygon between them: one lies along an edge."""
+    widths: list[Expr] = []
+    for k in range(0, len(edges), _EDGE):
+        px, py, nx, ny, _ = edges[k : k + _EDGE]
+        across = [nx * (px - x) + ny * (py - y) for x, y in corners]
+        widths.append(_most(across))
+    return _least(widths)
+
+
 def _moved(frame: Frame, by: Vec3) -> Frame:
     return Frame(frame.rotation, vec.add(frame.position, vec.times(frame.rotation, by)))
 
@@ -209,11 +255,32 @@ def _turned(frame: Frame, columns: tuple[int, int, int]) -> Frame:
     return Frame((rows[0], rows[1], rows[2]), frame.position)
 
 
+def direction(reach: Vec3, otherwise: Vec3) -> tuple[Vec3, Expr]:
+    """The unit vector along another and its length; ``otherwise`` where that is 0, so that coincident centres part."""
+    square = vec.dot(reach, reach)
+    apart = square.graph.apply("lt", 0.0, square)
+    length = sqrt(where(apart, square, 1.0))
+    x, y, z = (where(apart, a / length, b) for a, b in zip(reach, otherwise, strict=True))
+    return (x, y, z), where(apart, length, 0.0)
+
+
+@dataclass(frozen=True)
+class RoundRound(SphereSphere):
+    """Two circles or spheres; where their centres coincide the second is pushed along x of the first marker."""
+
+    def touch(self, view: View) -> Touch:
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        normal, distance = direction(reach, vec.transpose(view.rotation(self.first))[0])
+        depth = self.radii[0] + self.radii[1] - distance
+        first = vec.scale(self.radii[0] - 0.5 * depth, normal)
+        return normal, depth, first, vec.scale(0.5 * depth - self.radii[1], normal)
+
+
 @dataclass(frozen=True)
 class SegmentRound(Contact):
     """A circle or sphere about the second marker on a segment along x of the first, which has a radius of its own.
 
-    Undefined where the centre lies on the segment.
+    A centre on the segment is pushed along y of the first marker.
     """
 
     half: Expr
@@ -224,8 +291,7 @@ class SegmentRound(Contact):
         reach = vec.sub(view.position(self.second), view.position(self.first))
         place = graph.apply("max", -self.half, graph.apply("min", self.half, vec.dot(along, reach)))
         across = vec.sub(reach, vec.scale(place, along))
-        distance = sqrt(vec.dot(across, across))
-        normal: Vec3 = (across[0] / distance, across[1] / distance, across[2] / distance)
+        normal, distance = direction(across, vec.transpose(view.rotation(self.first))[1])
         depth = self.radii[0] + self.radii[1] - distance
         first = vec.add(vec.scale(place, along), vec.scale(self.radii[0] - 0.5 * depth, normal))
         return normal, depth, first, vec.scale(0.5 * depth - self.radii[1], normal)
@@ -326,7 +392,7 @@ def touching(
     normal = law.normal_law.at(lambda: joint_radius(first[0], radius) if kinds[0] == "round" else radius)
     laws = (law.name, *markers, normal, law.friction)
     if kinds[0] == "round":
-        return SphereSphere(*laws, (first[0], radius))
+        return RoundRound(*laws, (first[0], radius))
     if kinds[1] == "ellipsoid":
         x, y, z = sizes[1]
         return EllipsoidPlane(*laws, (x, y, z))

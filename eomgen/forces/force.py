@@ -34,6 +34,13 @@ class View(Protocol):
         ...
 
 
+class MovingView(View, Protocol):
+    """Motion of markers up to accelerations."""
+
+    def acceleration(self, marker: Marker) -> Vec3: ...
+    def angular_acceleration(self, marker: Marker) -> Vec3: ...
+
+
 class MarkerLoad(NamedTuple):
     """A wrench on the marker's body: force at the marker's origin and torque, in ground axes (N, N m)."""
 
@@ -135,6 +142,14 @@ class Force(ABC):
     def state_rates(self, view: View) -> tuple[Expr, ...]:
         """Rates of its states, in the order in which its type names them."""
         return ()
+
+    def met_shapes(self) -> list[str]:
+        """What may meet, of a force that acts between many shapes."""
+        return []
+
+    def meeting(self, view: MovingView) -> list[Expr]:
+        """Of a force that acts between shapes: when they may meet, and which two are deepest in each other."""
+        return []
 
     def remainder(self, view: View) -> list[Load]:
         """What the loads are beyond the slope of the potential, where there is one: friction, damping."""

@@ -3,20 +3,22 @@
 The law of one kind of pair is a small graph of its own (:class:`PairKind`), so that the nodes of a sum do not grow with
 the number of pairs.  ``pairs <name>(given)`` holds the operands, ``pairs <name>(sum)`` and ``pairs <name>(slope)`` are
 lists of results and of their directional derivatives, ``pairs <name>(k)`` is one entry of such a list.
+``pairs <name>(meeting)`` is a list of when shapes that are apart may meet, and of the deepest two.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 from ..errors import UsageError
-from ..numeric.pair_sums import POSE, PairSum
+from ..numeric.pair_sums import MEETING, MOTION, POSE, PairSum
 from ..records import dataclass
 from .core import Expr, Graph
 from .nodes import Node
 
+PairPart = Literal["outputs", "slopes", "touch"]
 LOSSES = "0"  #: begins the name of a sum of losses, as no name of a model does
 
 
@@ -40,6 +42,9 @@ class PairKind:
         Numbers of the first shape, of the second, of the law, and then their rates.
     outputs, slopes : tuple of int
         What a pair exerts (:data:`~eomgen.numeric.pair_sums.RESULT` nodes), and its directional derivative.
+    touch : tuple of int
+        Normal (3), from the first shape to the second, penetration, and the radius about the centre of the second shape
+        of what its turning moves (0 where it is round).
     """
 
     name: str
@@ -51,6 +56,7 @@ class PairKind:
     symbols: tuple[str, ...]
     outputs: tuple[int, ...]
     slopes: tuple[int, ...]
+    touch: tuple[int, ...]
 
     def graph(self) -> Graph:
         """Its nodes as a graph."""
@@ -59,10 +65,10 @@ class PairKind:
         graph._ids = {node: i for i, node in enumerate(self.nodes)}
         return graph
 
-    def expressions(self, slopes: bool = False) -> list[Expr]:
-        """Its results, or their derivatives."""
+    def expressions(self, what: PairPart = "outputs") -> list[Expr]:
+        """Its results, their derivatives, or its geometry."""
         graph = self.graph()
-        return [Expr(graph, i) for i in (self.slopes if slopes else self.outputs)]
+        return [Expr(graph, i) for i in getattr(self, what)]
 
     @property
     def plain(self) -> tuple[str, ...]:
@@ -123,7 +129,11 @@ class PairFunction:
     def evaluator(self, made: Callable[[list[Expr], Sequence[str]], Callable[[Any], Any]]) -> PairSum:
         """Its loops on numbers, with an evaluator of expressions for the laws."""
         kinds = [
-            (k.first, k.second, k.planar, k.law, made(k.expressions(), k.plain), made(k.expressions(True), k.symbols))
+            (
+                *(k.first, k.second, k.planar, k.law),
+                *(made(k.expressions(), k.plain), made(k.expressions("slopes"), k.symbols)),
+                made(k.expressions("touch"), k.plain),
+            )
             for k in self.kinds
         ]
         return PairSum(self.bodies, self.tables, kinds)
@@ -148,7 +158,7 @@ class PairCall:
     Attributes
     ----------
     function : PairFunction
-    part : {'given', 'sum', 'slope', 'item'}
+    part : {'given', 'sum', 'slope', 'meeting', 'item'}
     numbers : tuple of int
         Of a slope the operands that have rates; of an item its place.
     """
@@ -178,7 +188,11 @@ class PairCall:
             flat = operands if len(operands) == 1 + len(self.numbers) else tuple(_unpacked(operands))
             return loops.slope_along(flat[0], self.numbers, flat[1:])
 
-        made: dict[str, Callable[..., Any]] = {"given": given, "sum": loops, "slope": slope}
+        def meeting(*operands: Any) -> Any:
+            flat = operands if len(operands) > 1 else tuple(_unpacked(operands))
+            return loops.meeting(flat[0], flat[1:])
+
+        made: dict[str, Callable[..., Any]] = {"given": given, "sum": loops, "slope": slope, "meeting": meeting}
         return made[self.part] if self.part in made else lambda listed: listed[self.numbers[0]]
 
 
@@ -196,6 +210,12 @@ def pair_call(graph: Graph, operation: str) -> PairCall | None:
 def has_pair_sums(graph: Graph) -> bool:
     """Whether there are sums over pairs among the nodes."""
     return any(isinstance(function, PairCall) for function, _ in graph.calls.values())
+
+
+def pairs_of_bodies(graph: Graph) -> int:
+    """How many blocks of six by six the derivatives of all sums have by the motion of bodies."""
+    sums = {call.function.element: call.function for call, _ in graph.calls.values() if isinstance(call, PairCall)}
+    return sum(1 + len(others) for function in sums.values() for others in function.touching)
 
 
 def opaque_names(graph: Graph) -> list[str]:
@@ -227,6 +247,17 @@ def pair_sum(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -> 
     return [Expr(graph, _item(graph, function, total, k)) for k in range(function.results)]
 
 
+def pair_meeting(
+    graph: Graph, function: PairFunction, operands: Sequence[Expr], accelerations: Sequence[Expr]
+) -> list[Expr]:
+    """When shapes that are apart may meet, and more: see :meth:`~eomgen.numeric.pair_sums.PairSum.meeting`."""
+    assert len(accelerations) == MOTION * function.bodies
+    given = _node(graph, PairCall(function, "given"), f"pairs {function.name}(given)", [x.id for x in operands])
+    ids = [given, *(x.id for x in accelerations)]
+    listed = _node(graph, PairCall(function, "meeting"), f"pairs {function.name}(meeting)", ids)
+    return [Expr(graph, _item(graph, function, listed, k)) for k in range(MEETING)]
+
+
 def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
     """The tangent of a node of a sum over pairs from those of the nodes before it; None where there is none.
 
@@ -248,6 +279,8 @@ def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
         return _item(graph, function, slope, call.numbers[0]) if _acts(function, moving, call.numbers[0]) else None
     if call.part == "given":
         return None
+    if call.part == "meeting":
+        raise UsageError(f"contacts {function.element!r}: the time in which shapes meet has no derivatives")
     if call.part == "slope":
         raise UsageError(
             f"contacts {function.element!r}: second derivatives of contacts between groups are not made; use "

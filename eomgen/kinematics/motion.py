@@ -80,6 +80,10 @@ class MarkerMotion:
         x, y, z = jvp(list(self.velocity(marker)), self.state.along)
         return (x, y, z)
 
+    def angular_acceleration(self, marker: Marker) -> Vec3:
+        """Angular acceleration of the marker's body, ground axes (rad/s^2)."""
+        return self.turning_of(marker, own_axes=False, rate=True)
+
     def turning_of(self, marker: Marker, own_axes: bool, rate: bool) -> Vec3:
         """Angular velocity (rad/s) of the marker's body or, with ``rate``, its angular acceleration (rad/s^2).
 

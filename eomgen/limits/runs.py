@@ -17,6 +17,14 @@ UNKNOWN, FIRST, STRAIGHT, GROWTH = 1e-5, 1e-6, 1e-15, 1e-3
 FINE = 2.5e-15  #: a step above this part of the time is longer than the spacing of numbers: eleven of it
 SAME = 1e-9  #: part of a step by which two count as one
 SLOPE, SIZE = 1.5e-8, 1e-3  #: part of a variable over which its slope is differenced, the root of eps; its least size
+#: Steps of contacts between groups: part of the distance of two shapes that one step may go at their present motion,
+#: where its far side is near; the same where there is no far side; and part of their thicknesses that it may always go.
+#: In a body that is passed through there are then at least 1 / WITHIN steps, each with some ten stages.
+UP_TO, BEYOND, WITHIN = 0.75, 2.0, 0.0625
+UNHURRIED = 1e3  #: the least step, over which contacts shorten none further
+SUNK = (
+    0.1  #: penetration at the start of a run, relative to the thickness of the two shapes, that is no rest on a floor
+)
 SLOW = 1e-3  #: rate of Newton's iterations in a Radau step above which the Jacobian is renewed
 
 # -- runs that stall -------------------------------------------------------------------------------------------------

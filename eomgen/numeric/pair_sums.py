@@ -11,12 +11,25 @@ from typing import Any
 
 import numpy as np
 
+from ..limits.runs import BEYOND, UP_TO, WITHIN
+
 #: Numbers that say how a body or a shape stands and moves: position, rotation by rows, velocity, angular velocity.
 POSE = 18
 #: Numbers that a pair gives: force on the second shape, torques on both about their centres, the first first, energy.
 RESULT = 10
 #: Columns of a row of a table of shapes before the sizes: the body, and where its position and rotation stand.
 PLACE = 13
+#: Columns behind the sizes: where the radius of the sphere that bounds the shape and its thickness stand.
+REST = 2
+#: Numbers that say how the motion of a body changes: acceleration, angular acceleration.
+MOTION = 6
+#: Numbers that say how shapes meet: time, penetration and thickness of the deepest pair, and its two shapes.
+MEETING = 5
+SORTED = 256  #: pairs of tables from which on near ones are found along an axis: below, testing all is as quick
+#: Part of distances from the ground's origin by which shapes count as nearer while they are sorted out: rounding of
+#: their places moves none across it, and the distance itself is tested after.
+APART = 1e-12
+NEVER = 1e300  #: (s) where no shapes come towards each other
 
 Narrow = Callable[[Sequence[Any]], Sequence[Any]]
 
@@ -28,16 +41,19 @@ class PairSum:
     ----------
     bodies : int
         How many bodies are given, ground among them; ``POSE`` numbers each stand before the data.
-    tables : sequence of (n, PLACE + sizes + 1) integers
+    tables : sequence of (n, PLACE + sizes + REST) integers
         Shapes of one kind: body, then places in the data of the position (3) and rotation (9) in the body, of the
-        sizes, and of the radius of a sphere that bounds the shape (-1: none does).
-    kinds : sequence of (first, second, planar, law, value, slope)
+        sizes, of the radius of a sphere that bounds the shape (-1: none does), and of the thickness of the body.
+    kinds : sequence of (first, second, planar, law, value, slope, touch)
         Tables of the first and the second shape; whether distances count across z of the first only; places of the
         law's numbers; the function of one pair and its directional derivative, of the numbers of the first shape, of
-        the second, and of the law (and of their rates in the same order).
+        the second, and of the law (and of their rates in the same order); normal, penetration and turning radius of the
+        pair.
     """
 
-    def __init__(self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[int, int, bool, Any, Narrow, Narrow]]):
+    def __init__(
+        self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[int, int, bool, Any, Narrow, Narrow, Narrow]]
+    ):
         self.bodies = bodies
         self.tables = [np.array(table, dtype=int) for table in tables]
         self.kinds = [(*kind, *self._pairs(*kind[:2])) for kind in kinds]
@@ -68,13 +84,96 @@ class PairSum:
             every[k] = rate
         return self.slope(given, every)
 
+    def meeting(self, given: Sequence[Any], accelerations: Sequence[Any]) -> list[Any]:
+        """Time (s) within which no two shapes that are apart meet, or get deeper than a part of their thickness.
+
+        Distances and their rates are those of the shapes, as seen from the first one, or of the spheres about them
+        where those are apart; a convex shape is at least as far as the tangent to its distance says, so that only the
+        relative acceleration, here that of the present, can bring two closer.  Then how deep the deepest two are in
+        each other (0 where none are), the sum of their thicknesses, and which they are: numbers of rows, over all
+        tables.
+
+        Parameters
+        ----------
+        given : sequence
+        accelerations : sequence of ``MOTION`` numbers for each body
+            Of its origin and angular, ground axes.
+
+        Returns
+        -------
+        list of ``MEETING`` numbers or arrays
+        """
+        both = _stacked([*given, *accelerations])
+        data, own = both[: len(given)], both[len(given) :].reshape(self.bodies, MOTION, *both.shape[1:])
+        placed = [self._place(table, data, None)[:2] for table in self.tables]
+        least = np.full(data.shape[1:], NEVER, dtype=data.dtype)
+        deepest = np.zeros((MEETING - 1, *data.shape[1:]), dtype=data.dtype)
+        starts = np.cumsum([0, *map(len, self.tables)])
+        for first, second, planar, law, _, _, touch, i, j in self.kinds:
+            (a, arm_a), (b, arm_b) = placed[first], placed[second]
+            tables = self.tables[first], self.tables[second]
+            if not len(i):
+                continue
+            change_a, change_b = (
+                _changed(x, arm, own[t[:, 0]]) for x, arm, t in zip((a, b), (arm_a, arm_b), tables, strict=True)
+            )
+            a, b, change_a, spin = a[i], b[j], change_a[i], own[tables[0][i, 0]][:, 3:6]
+            reach, speed, change = b[:, 0:3] - a[:, 0:3], b[:, 12:15] - a[:, 12:15], change_b[j] - change_a
+            if planar:
+                across = a[:, [5, 8, 11]]  # z of the first shape
+                reach, speed, change = (x - _dot(across, x)[:, None] * across for x in (reach, speed, change))
+            distance = np.sqrt(_dot(reach, reach))
+            bound = tables[0][i, -REST], tables[1][j, -REST]
+            gap = distance - data[np.maximum(bound[0], 0)] - data[np.maximum(bound[1], 0)]
+            free = ((bound[0] < 0) | (bound[1] < 0)).reshape(-1, *([1] * (data.ndim - 1)))
+            near = free | ~(gap > 0.0)
+            closing, towards = (
+                -_dot(reach, speed) / np.where(distance > 0.0, distance, 1.0),
+                np.sqrt(_dot(change, change)),
+            )
+            if near.any():
+                numbers = [*np.moveaxis(a, 1, 0), *np.moveaxis(b, 1, 0), *data[list(law)][:, None]]
+                nx, ny, nz, depth, radius = _table(touch(numbers), len(i), data)
+                normal, turning = np.stack([nx, ny, nz], axis=1), a[:, 15:18]
+                seen = speed - _across(turning, reach)
+                felt = (
+                    change
+                    - _across(spin, reach)
+                    - _across(turning, _across(turning, reach))
+                    - 2.0 * _across(turning, seen)
+                )
+                turned, spun = b[:, 15:18] - turning, own[tables[1][j, 0]][:, 3:6] - spin
+                rate, own_rate, change_of_rate = (np.sqrt(_dot(x, x)) for x in (turned, turning, spun))
+                faster = radius * rate - _dot(normal, seen)  # of points of the second shape, which turns in the first
+                gap, closing = np.where(near, -depth, gap), np.where(near, faster, closing)
+                most = np.sqrt(_dot(felt, felt)) + radius * (change_of_rate + rate * (own_rate + rate))
+                towards = np.where(near, most, towards)
+            thick = np.broadcast_to(data[tables[0][i, -1]] + data[tables[1][j, -1]], gap.shape)
+            reached = np.maximum(gap * np.where(free, BEYOND, UP_TO), WITHIN * thick)
+            with np.errstate(all="ignore"):
+                root = np.sqrt(closing * closing + 2.0 * towards * reached)
+                time = np.where(closing > 0.0, 2.0 * reached / (closing + root), (root - closing) / towards)
+            time = np.where((gap > 0.0) & (time > 0.0), time, NEVER)
+            least = np.minimum(least, time.min(axis=0))
+            far = np.argmin(gap, axis=0)[None]
+            depth = np.maximum(-np.take_along_axis(gap, far, axis=0)[0], 0.0)
+            names = [np.broadcast_to(x.reshape(free.shape), gap.shape) for x in (starts[first] + i, starts[second] + j)]
+            mine = [
+                depth,
+                *(np.take_along_axis(np.broadcast_to(x, gap.shape), far, axis=0)[0] for x in (thick, *names)),
+            ]
+            deepest = np.where(depth > deepest[0], np.array(mine), deepest)
+        found = [least, *deepest]
+        return [x if np.ndim(x) else float(x) for x in found]
+
     def _sum(self, data: np.ndarray, rates: np.ndarray | None) -> list[Any]:
         placed = [self._place(table, data, rates) for table in self.tables]
         out = np.zeros((6 * self.bodies + 1, *data.shape[1:]), dtype=data.dtype)
         if data.dtype == object:
             out = out + data[0] * 0
-        for first, second, planar, law, value, slope, i, j in self.kinds:
+        for first, second, planar, law, value, slope, _, i, j in self.kinds:
             (a, arm_a, da, d_arm_a), (b, arm_b, db, d_arm_b) = placed[first], placed[second]
+            i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
             near = self._near(a, b, planar, i, j, (self.tables[first], self.tables[second]), data)
             i, j = i[near], j[near]
             if not len(i):
@@ -111,7 +210,7 @@ class PairSum:
         local, turn = data[table[:, 1:4]], data[table[:, 4:PLACE]].reshape(len(table), 3, 3, *data.shape[1:])
         p, R, v, w = _parts(poses)
         arm = _times(R, local)
-        numbers = [p + arm, _flat(_product(R, turn)), v + _across(w, arm), w, data[table[:, PLACE:-1]]]
+        numbers = [p + arm, _flat(_product(R, turn)), v + _across(w, arm), w, data[table[:, PLACE:-REST]]]
         if rates is None:
             return np.concatenate(numbers, axis=1), arm, None, None
         moving = rates[: POSE * self.bodies].reshape(self.bodies, POSE, *rates.shape[1:])[table[:, 0]]
@@ -124,9 +223,53 @@ class PairSum:
             _flat(_product(dR, turn) + _product(R, d_turn)),
             dv + _across(dw, arm) + _across(w, d_arm),
             dw,
-            rates[table[:, PLACE:-1]],
+            rates[table[:, PLACE:-REST]],
         ]
         return np.concatenate(numbers, axis=1), arm, np.concatenate(changes, axis=1), d_arm
+
+    def counts(self, given: Sequence[Any]) -> list[tuple[int, int]]:
+        """For each kind how many pairs are tested for their distance, and of how many the law is evaluated."""
+        data = _stacked(given)
+        placed = [self._place(table, data, None)[0] for table in self.tables]
+        found = []
+        for first, second, planar, _, _, _, _, i, j in self.kinds:
+            a, b, tables = placed[first], placed[second], (self.tables[first], self.tables[second])
+            i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
+            found.append((len(i), int(self._near(a, b, planar, i, j, tables, data).sum())))
+        return found
+
+    def _candidates(
+        self, a: np.ndarray, b: np.ndarray, planar: bool, which: tuple[int, int], data: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Pairs whose spheres may meet, from the order of their centres along an axis; None where all are to be tested.
+
+        They come in the order of all pairs, so that sums keep their bits.
+        """
+        first, second = (self.tables[k] for k in which)
+        if data.ndim > 1 or data.dtype != float or len(first) * len(second) < SORTED:
+            return None
+        if min(first[:, -REST].min(), second[:, -REST].min()) < 0:
+            return None
+        radii, others = data[first[:, -REST]], data[second[:, -REST]]
+        spread = np.ptp(b[:, 0:3], axis=0)
+        if planar:  # only axes across z of the first shapes keep distances
+            spread[(a[:, [5, 8, 11]] != 0.0).any(axis=0)] = -1.0
+        axis = int(np.argmax(spread))
+        if spread[axis] < 0.0 or not (np.isfinite(a[:, 0:3]).all() and np.isfinite(b[:, 0:3]).all()):
+            return None
+        order = np.argsort(b[:, axis], kind="stable")
+        places, middle = b[order, axis], a[:, axis]
+        wide = radii + max(others.max(), 0.0)
+        reach = wide + APART * (np.abs(middle) + np.abs(places).max() + wide)
+        low, high = places.searchsorted(middle - reach), places.searchsorted(middle + reach, "right")
+        i = np.repeat(np.arange(len(first)), high - low)
+        j = order[np.arange(len(i)) - np.repeat(np.cumsum(high - low) - high, high - low)]
+        keep = first[i, 0] != second[j, 0]
+        if which[0] == which[1]:
+            keep &= i < j
+        i, j = i[keep], j[keep]
+        sort = np.lexsort((j, i))
+        return i[sort], j[sort]
 
     def _near(
         self,
@@ -139,7 +282,7 @@ class PairSum:
         data: np.ndarray,
     ) -> np.ndarray:
         """Pairs whose bounding spheres meet, in any column."""
-        bounds = tables[0][i, -1], tables[1][j, -1]
+        bounds = tables[0][i, -REST], tables[1][j, -REST]
         reach = b[j, 0:3] - a[i, 0:3]
         square = (reach * reach).sum(axis=1)
         if planar:
@@ -149,6 +292,17 @@ class PairSum:
         apart = np.asarray(square > size * size, dtype=bool)
         every = np.asarray(apart.all(axis=tuple(range(1, apart.ndim))))
         return np.asarray(~every | (bounds[0] < 0) | (bounds[1] < 0))
+
+
+def _changed(shapes: np.ndarray, arm: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Accelerations of the centres of shapes (n, 3, ...) from those of their bodies."""
+    turning = shapes[:, 15:18]
+    return np.asarray(own[:, 0:3] + _across(own[:, 3:6], arm) + _across(turning, _across(turning, arm)))
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> Any:
+    """Products of vectors (n, 3, ...)."""
+    return (a * b).sum(axis=1)
 
 
 def _stacked(given: Sequence[Any]) -> np.ndarray:

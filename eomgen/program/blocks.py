@@ -8,6 +8,7 @@ from itertools import chain
 
 from ..graph.core import Expr
 from ..graph.differentiate import jvp
+from ..graph.pair_calls import pairs_of_bodies
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from ..kernel_table import DAE, NAMED, Sizes
@@ -93,11 +94,18 @@ class BlockMaker:
     @cached_property
     def by_direction(self) -> bool:
         """Whether the Jacobian of the residuals is too large to be written out."""
+        if self._touching:
+            return True
         if not self.has_loops and self.slopes.recursive and self.slopes.operations <= self.limits.jacobian_recursive:
             return False
         residuals = [*self._force_residual, *self._acceleration_residual, *self.terms.velocity_constraints]
         nodes = len(reachable(self.terms.graph, (r.id for r in residuals)))
         return self.sizes.n_x * nodes > self.limits.jacobian_nodes
+
+    @cached_property
+    def _touching(self) -> bool:
+        """Whether contacts between groups couple too many pairs of bodies for their derivatives to be written out."""
+        return pairs_of_bodies(self.terms.graph) > self.limits.jacobian_pairs
 
     @cached_property
     def slopes(self) -> ResidualSlopes:
@@ -210,6 +218,7 @@ class BlockMaker:
             "canonical": lambda: terms.canonical,
             "dae_residual": lambda: self._dae_residual,
             "finite_forces": lambda: terms.finite_forces,
+            "meeting_time": lambda: terms.meeting_times,
             "events": lambda: terms.events,
             "resets": lambda: terms.resets,
             "event_slopes": lambda: derivatives(terms, terms.events, (*terms.q, *terms.v)),
@@ -383,6 +392,8 @@ class BlockMaker:
 
     def _unrolled_derivative(self, name: str) -> tuple[list[Expr], list[Expr]] | None:
         """A derivative of the inverse dynamics, or of a small tree's right-hand side, and checks of its mass matrix."""
+        if self._touching and name not in SHIFTS:
+            return None
         if name == "inverse_dynamics_derivatives":
             found = inverse_slopes(self.terms, self.slopes)
             return None if found is None else (found, [])

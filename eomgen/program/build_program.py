@@ -69,7 +69,7 @@ def build_program(
     maker = BlockMaker(terms, sizes, limits)
     has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
     has["energy"] = bool(metadata.get("energy_known", True))
-    has |= {"events": bool(terms.events), "resets": bool(terms.resets)}
+    has |= {"events": bool(terms.events), "resets": bool(terms.resets), "meeting_time": bool(terms.meeting_times)}
     if terms.given_rates or not terms.projects:  # their derivatives by inputs and parameters are not derived
         has |= dict.fromkeys(SHIFTS, False)
     if terms.given_rates or metadata.get("no_inertia") or metadata.get("indefinite"):
@@ -78,6 +78,8 @@ def build_program(
         has |= dict.fromkeys(LONG, False)
     if terms.given_rates:
         has |= {"dae_residual": False, "dae_jacobian": False}
+    if kernels is not None and "rhs" in kernels and terms.meeting_times:  # no run goes without
+        kernels = [*kernels, "meeting_time"]
     wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]
     blocks: dict[str, Block] = {}
     drivers: list[KernelDriver] = []

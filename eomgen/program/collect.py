@@ -10,6 +10,7 @@ from ..describe.mechanism import FirstOrderState, Input, Output, Parameter
 from ..equations.tree_equations import TreeEquations
 from ..equations.tree_slopes import ForceSlopes, can_differentiate
 from ..errors import UsageError
+from ..forces.branches import where
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -83,6 +84,7 @@ def collect_terms(
         paired=kinematics.coordinate_of if kinematics.given_rates else (),
         coordinate_slopes=c.slopes,
         finite_forces=tuple(flag for _, flag in flag_forces(kinematics)),
+        meeting_times=tuple(_meeting_times(kinematics)),
         accelerations=equations.accelerations,
         pivots=equations.pivots,
         wrenches=find_wrenches(kinematics),
@@ -99,6 +101,30 @@ def collect_terms(
         slopes=partial(ForceSlopes, kinematics) if can_differentiate(kinematics) else None,
     )
     return with_states(terms, kinematics.state_names, kinematics.state_rates)
+
+
+def _contact_shapes(kinematics: Kinematics) -> list[list[str]]:
+    """Contact and description of each part of a shape, in the order of their numbers."""
+    return [[force.name, shape] for force in kinematics.mechanism.forces for shape in force.met_shapes()]
+
+
+def _meeting_times(kinematics: Kinematics) -> list[Expr]:
+    """How long a step may be that passes over no contact, and the deepest two shapes, if there are such contacts."""
+    total: list[Expr] = []
+    start = 0
+    for force in kinematics.mechanism.forces:
+        shapes = force.met_shapes()
+        if not shapes:
+            continue
+        time, depth, thickness, *pair = force.meeting(kinematics.motion)
+        mine = [time, depth, thickness, *(start + number for number in pair)]
+        start += len(shapes)
+        if total:
+            deeper = time.graph.apply("lt", total[1], depth)
+            rest = [where(deeper, new, old) for new, old in zip(mine[1:], total[1:], strict=True)]
+            mine = [time.graph.apply("min", total[0], time), *rest]
+        total = mine
+    return kinematics.resolve(total)
 
 
 def _independent(kinematics: Kinematics, mobility: Mobility) -> tuple[int, ...]:
@@ -292,6 +318,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         **_signals(kinematics, equations),
         **({"input_rates": rates} if (rates := _input_rates(kinematics)) else {}),
         **({"constraint_inputs": used} if (used := _constraint_inputs(kinematics)) else {}),
+        **({"contact_shapes": shapes} if (shapes := _contact_shapes(kinematics)) else {}),
         "picture": describe_picture(m),
         "simulation": {
             "end": m.simulation.end,

@@ -27,6 +27,9 @@ class Limits:
     unrolled_loops: int = 4_000  #: loops get a straight-line rhs where factors take at most so many multiplications
     jacobian_nodes: int = 10_000  #: above so many estimated operations the Jacobian is made direction by direction
     jacobian_recursive: int = 40_000  #: the same of one made by recursion over composite bodies
+    #: pairs of bodies in contacts between groups above which derivatives are made direction by direction: each pair has
+    #: up to 36 entries, which as text take some 10 kB, against 1 kB a body of one direction
+    jacobian_pairs: int = 64
     #: second derivatives of more operations are generated only where they are named
     second_order: int = 40_000
     statements: int = 1500  #: statements in one generated function at most

@@ -81,6 +81,8 @@ class SystemTerms:
     constrained: Callable[..., TreeMotion] | None = None  #: constraint rows -> a, by articulated bodies; else None
     events: Row = ()  #: of (q, v): their zeros are the events of the model
     resets: Row = ()  #: of (q, v): new values of states after events
+    meeting_times: Row = ()  #: (0 or 5,) of (q, v, a): how long a step may be that passes over no contact, and
+    #: penetration, thickness and numbers of the deepest two shapes
     input_rates: tuple[tuple[str, str], ...] = ()  #: inputs with the input that is their rate
     impacts: bool = False  #: whether an event is a gap with a restitution
     n_states: int = 0  #: first-order states, the last of the velocities: of unit inertia, no coordinate's rate

@@ -23,6 +23,7 @@ from ..runtime.near_names import check_names, read_names, unknown
 from ..runtime.refusals import require_projection, require_velocities
 from ..runtime.room import read_number, require_steps
 from ..runtime.signals import Forcing
+from .bound_run import Run
 from .events import Events, told_by_the_caller, warn_of_unknown
 from .input_slopes import SlopesNow
 from .integrate import Solution, choose_solver, integrate, require_end
@@ -136,8 +137,9 @@ def sensitivities(
     try:
         with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
             solution = integrate(
-                run, nodes, z0, solver, times, salts.watched, False, settings, stall_check, salts.reset, forcing.enter
-            )
+                run, nodes, z0, solver, times, salts.watched, False, settings, stall_check, salts.reset, forcing.enter,
+                longest=Run(bound, forcing).longest(stop >= start),
+            )  # fmt: skip
     except Crawling as crawl:
         _refuse_change_point(bound, forcing, crawl.t, crawl.x[: layout.n_x])
         trouble = "; ".join(fail.trouble(crawl.x[: layout.n_x], crawl.t) or ())

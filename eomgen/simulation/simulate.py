@@ -17,6 +17,7 @@ from ..runtime.room import read_flag, require_room, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run, watch_run
 from .compiled import can_run, integrate_compiled
+from .deep_starts import warn_of_depth
 from .events import UNWATCHED, Events, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .passed_limits import warn_of_limits
@@ -183,6 +184,7 @@ def simulate(
         bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
     else:
         bound.rhs(start, x0)
+    warn_of_depth(bound, start, x0, forcing(start, x0) if forcing else None)
     run = Run(bound, forcing)
     tolerances = {
         "rtol": declared["rtol"] if rtol is None else rtol,
@@ -221,7 +223,7 @@ def simulate(
                 listed = watched.listed(bound, forcing)
                 solution = integrate(
                     run.watched(watch), nodes, x0, solver, stored, listed, dense_output, settings, stall_check,
-                    partial(watched.reset, bound, forcing), forcing.enter, pause,
+                    partial(watched.reset, bound, forcing), forcing.enter, pause, run.longest(end >= start),
                 )  # fmt: skip
                 warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])
     except Interrupted as interrupt:

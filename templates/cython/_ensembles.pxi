@@ -5,7 +5,8 @@ cdef extern from "eomgen_ensembles.h" nogil:
         const eomgen_method *method
         const eomgen_model *model
         eomgen_function rhs
-        eomgen_function jacobian
+        eomgen_function jacobian, meeting
+        int n_q
         const eomgen_series *series
         void (*lane_rhs)() noexcept
         void (*lane_series)() noexcept
@@ -120,6 +121,8 @@ cdef class Ensemble:
         all.rhs, all.n, all.count = MODEL.kernels[index].call, n, count
         if all.method.squares > 0:
             all.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
+        if "meeting_time" in names:
+            all.meeting, all.n_q = MODEL.kernels[find("meeting_time", ValueError)].call, _FACTS["n_q"]
         if lanes != NULL:
             all.lane_rhs, all.lane_series, all.lane_width = lanes.contracted, lanes.expand, lanes.width
         all.x0, all.p, all.u = reading(x0), reading(p), reading(u)

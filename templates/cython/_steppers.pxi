@@ -40,7 +40,8 @@ cdef extern from "eomgen_steppers.h" nogil:
         long until_callback
         long (*callback)(void *, const double *) noexcept nogil
         void *callback_data
-        eomgen_function jacobian
+        eomgen_function jacobian, meeting
+        int n_q
         long differentiations, factorizations
         const eomgen_series *series
         int order, side, expanded, stopped
@@ -230,6 +231,8 @@ cdef class Stepper:
         cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
         if self.method.squares > 0:
             self.run.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
+        if "meeting_time" in names:
+            self.run.meeting, self.run.n_q = MODEL.kernels[find("meeting_time", ValueError)].call, _FACTS["n_q"]
         cdef const eomgen_series *series = seen_series(SERIES)
         self.run.series = series
         length += eomgen_further(self.method, n, series)

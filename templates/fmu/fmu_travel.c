@@ -60,6 +60,9 @@ static void prepare(fmu_instance *f, travel *j)
 #if FMU_HAS_JACOBIAN
     run->jacobian = FMU_MODEL(jacobian);
 #endif
+#if FMU_HAS_MEETING_TIME
+    run->meeting = FMU_MODEL(meeting_time), run->n_q = FMU_N_Q;
+#endif
     run->rtol = m->rtol, run->max_step = FMU_MAX_STEP, run->direction = 1.0, run->atol = j->atol;
     for (int i = 0; i < n; i++) {
         j->atol[i] = FMU_ATOL * (m->rtol / FMU_RTOL);

@@ -47,6 +47,53 @@ def test_text_does_not_grow_with_the_pairs(tmp_path: Path) -> None:
         assert Counter(re.findall(r"\w+|\S", text)) == Counter(re.findall(r"\w+|\S", texts[1][name])), name
 
 
+def many_bodies(count: int, bulk: bool = True) -> eg.Model:
+    """Circles, each a body, on a floor and beside each other."""
+    m, bodies = scenes.planar("many", count)
+    if bulk:
+        circles = {"shape": "circle", "on": bodies, "radius": 0.06}
+        m.contacts("floor", circles, {"shape": "half_plane", "on": m.ground}, LAW)
+        m.contacts("among", circles, law=LAW)
+        return m
+    for i, body in enumerate(bodies):
+        m.sphere_plane(f"f{i}", m.ground.at(0, 0, 0, rpy=(-np.pi / 2, 0, 0)), body, radius=0.06, **LAW)
+        for j in range(i):
+            m.sphere_sphere(f"s{i}_{j}", bodies[j], body, radii=(0.06, 0.06), **LAW)
+    return m
+
+
+def test_text_of_derivatives_grows_with_the_bodies_alone(tmp_path: Path) -> None:
+    """Not with their pairs: all kernels of 10, 20 and 40 circles that all may touch."""
+    sizes = []
+    for count in (10, 20, 40):
+        folder = generate(many_bodies(count), tmp_path / str(count), target="c")
+        sizes.append(sum(len(file.read_text()) for file in folder.rglob("many*.c")))
+    assert np.all(np.diff(sizes) < 1.15 * np.array([1, 2]) * (sizes[1] - sizes[0]))
+    assert sizes[-1] < 4e6
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_derivatives_by_direction_as_pair_by_pair(target: str) -> None:
+    """Beside contacts described one by one, whose derivatives are written out, and differences."""
+    bulk = many_bodies(12).compile(target=target, kernels=["rhs", "jacobian", "inverse_dynamics_derivatives"])
+    single = many_bodies(12, bulk=False).compile(target="numpy", kernels=["rhs", "jacobian"])
+    rng = np.random.default_rng(3)
+    q = np.column_stack([0.1 * (np.arange(12) % 4), 0.055 + 0.1 * (np.arange(12) // 4), rng.uniform(-3, 3, 12)])
+    x = np.concatenate([(q + rng.uniform(-1e-3, 1e-3, q.shape)).ravel(), rng.uniform(-1, 1, 36)])
+    found, wanted = bulk.jacobian(0.0, x), single.jacobian(0.0, x)
+    assert np.count_nonzero(np.abs(wanted[36:]) > 1.0) > 400
+    assert np.abs(found - wanted).max() <= 1e-12 * np.abs(wanted).max()
+    steps = 1e-7 * np.eye(72)
+    slopes = np.array([(bulk.rhs(0.0, x + h) - bulk.rhs(0.0, x - h)) / 2e-7 for h in steps]).T
+    assert np.abs(found - slopes).max() <= 1e-5 * np.abs(wanted).max()
+    a = bulk.rhs(0.0, x)[36:]
+    by_motion = bulk.kernels.motion("inverse_dynamics_derivatives")(x[:36], x[36:], a)
+    mass = by_motion[:, 72:]
+    assert np.allclose(
+        np.linalg.solve(mass, -by_motion[:, :72]), found[36:], rtol=1e-9, atol=1e-9 * np.abs(found).max()
+    )
+
+
 def test_many_shapes_as_in_the_graph() -> None:
     c, python = (rows(30).compile(target=target) for target in ("cython", "numpy"))
     x = c.x0(j1_y=0.11, j1_3=0.1, j0_3_dot=2.0)

@@ -348,3 +348,18 @@ def test_groups_that_cannot_be_are_told(first: Any, told: str) -> None:
     with pytest.raises(eg.EomgenError, match=told):
         m.contacts("c", given, {"shape": "half_plane", "on": m.ground}, LAW)
         m.check()
+
+
+def test_coincident_centres_part() -> None:
+    """Circles along x of the first, a centre on a segment along its y: forces are finite and opposite."""
+    for kind, axis, depth in (("circle", 0, 0.2), ("segment", 1, 0.13)):
+        m, (a, b) = scenes.planar("same", 2, (0, 0, 0))
+        m.contacts("touch", on(PLANAR[kind], a), on(PLANAR["circle"], b), ELASTIC)
+        for target in ("numpy", "cython"):
+            mod = m.compile(target=target)
+            force = -mod.bias(0.0, mod.x0())
+            wanted = np.zeros(2)
+            wanted[axis] = 2e4 * depth**1.5
+            assert np.allclose(force[3:5], wanted, rtol=1e-12)
+            assert np.allclose(force[:2], -wanted, rtol=1e-12)
+            assert np.isfinite(mod.jacobian(0.0, mod.x0())).all()

@@ -59,6 +59,7 @@ def _switches(program: Program, free: Sequence[int]) -> list[tuple[str, int]]:
         ("CO_SIMULATION", 1),
         ("HAS_OUTPUTS", int(sizes.n_y > 0)),
         ("HAS_JACOBIAN", int("jacobian" in kernels)),
+        ("HAS_MEETING_TIME", int("meeting_time" in kernels)),
         ("HAS_PROJECT", int("project" in kernels)),
         ("HAS_KINEMATICS", int(follows)),
         ("N_EVENTS", sizes.n_events),

@@ -23,6 +23,8 @@ typedef struct {
     const eomgen_model *model;
     eomgen_function rhs;
     eomgen_function jacobian;      /* of implicit methods */
+    eomgen_function meeting;       /* as in eomgen_run */
+    int n_q;
     const eomgen_series *series;   /* of Taylor's method */
     void (*lane_rhs)(void);        /* see eomgen_lanes; NULL: one trajectory at a time */
     void (*lane_series)(void);     /* likewise */

@@ -115,6 +115,29 @@ static void advance_nodes(eomgen_ensemble *e, lane_run *run, double direction, d
 }
 
 /* The step that each lane tries: its size with the sign of the run, 0 for those without a trajectory. */
+/* How long the next step of a lane may be, as eomgen_longest has it. */
+static EOMGEN_APART double longest_of(const eomgen_ensemble *e, const lane_run *run, int l, double direction, double least)
+{
+    const eomgen_model *const model = e->model;
+    double *const x = run->alone, *const u = x + 2 * run->n, *const c = u + run->n_u, *const w = c + model->n_const;
+    double found[5];
+    for (int i = 0; i < run->n; i++) {
+        x[i] = i < e->n_q ? run->y[i][l] : run->y[i][l] * direction;
+    }
+    for (int i = e->n_q; i < run->n; i++) {
+        x[run->n - e->n_q + i] = run->f[i][l];
+    }
+    for (int i = 0; i < run->n_u; i++) {
+        const int table = run->signals != NULL && run->signals[i].n > 0;
+        u[i] = table ? eomgen_table_value(run->signals + i, run->t[l], run->hold[l]) : run->u[i][l];
+    }
+    for (int i = 0; i < model->n_const; i++) {
+        c[i] = run->c[i][l];
+    }
+    const int status = e->meeting(run->t[l], x, u, c, found, w);
+    return status == 0 && found[0] < e->max_step ? fmin(e->max_step, fmax(found[0], RUNS_UNHURRIED * least)) : e->max_step;
+}
+
 static void choose_steps(eomgen_ensemble *e, lane_run *run, double direction, double *constants)
 {
     const real t = run->t, spacing = abs_of(t) * 0x1p-52; /* of numbers there, or more */
@@ -122,6 +145,11 @@ static void choose_steps(eomgen_ensemble *e, lane_run *run, double direction, do
     run->awake = run->active & ~run->begins;
     run->size_before = choose(run->again, run->size_before, run->size);
     real size = choose(run->size > e->max_step, same(e->max_step), choose(run->size < least, least, run->size));
+    for (int l = 0; e->meeting != NULL && l < W; l++) {
+        if (run->awake[l] && !run->again[l]) {
+            size[l] = fmin(size[l], longest_of(e, run, l, direction, least[l]));
+        }
+    }
     size = run->size = choose(run->again, run->size, size);
     const flag lost = ~(size >= least), late = ~run->again & (run->steps >= e->max_steps);
     if (any_of(run->awake & (lost | late))) {

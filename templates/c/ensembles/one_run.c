@@ -19,6 +19,7 @@ static double *lay_out_one(eomgen_run *run, const eomgen_ensemble *e, const eomg
     double *const constants = own->memory;
     memset(run, 0, sizeof *run);
     run->rhs = e->rhs, run->jacobian = e->jacobian, run->series = e->series;
+    run->meeting = e->meeting, run->n_q = e->n_q;
     run->c = constants, run->signals = own->signals, run->n_u = e->model->n_u, run->n = n;
     run->rtol = e->rtol, run->atol = e->atol, run->max_step = e->max_step, run->most_steps = e->max_steps;
     run->w = constants + e->model->n_const;

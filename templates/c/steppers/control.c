@@ -106,13 +106,37 @@ static int too_small(const eomgen_run *run, double h)
     return !(h >= RUNS_FINE * fabs(run->t) + ROUNDING_TINY) && !(h >= least_step(run)); /* nextafter takes its time */
 }
 
+double eomgen_longest(eomgen_run *run)
+{
+    double longest = run->max_step;
+#ifndef EOMGEN_ALONE
+    if (run->meeting != NULL) { /* backwards in time velocities are opposite, accelerations are not */
+        double *const motion = run->K;
+        memcpy(motion, run->y, (size_t)run->n * sizeof(double));
+        memcpy(motion + run->n, run->f + run->n_q, (size_t)(run->n - run->n_q) * sizeof(double));
+        for (int i = run->n_q; i < run->n; i++) {
+            motion[i] *= run->direction;
+        }
+        if (run->signals != NULL) {
+            eomgen_force(run, run->t, run->y);
+        }
+        double found[5];
+        if (run->meeting(run->t, motion, run->u, run->c, found, run->w) == 0 && found[0] < longest) {
+            longest = fmin(longest, fmax(found[0], RUNS_UNHURRIED * least_step(run)));
+        }
+    }
+#endif
+    return longest;
+}
+
 int eomgen_step(const eomgen_method *method, eomgen_run *run)
 {
     if (method->step != NULL) {
         return method->step(run);
     }
     const int n = run->n;
-    double h_abs = run->h_abs > run->max_step ? run->max_step : run->h_abs;
+    const double longest = method->fixed ? run->max_step : eomgen_longest(run);
+    double h_abs = run->h_abs > longest ? longest : run->h_abs;
     if (h_abs == run->h_abs && too_small(run, h_abs)) {
         h_abs = least_step(run);
     }

@@ -58,6 +58,8 @@ typedef struct {
     long (*callback)(void *callback_data, const double *t); /* the next until_callback, or 0 to stop the run */
     void *callback_data;
     eomgen_function jacobian;     /* of implicit methods */
+    eomgen_function meeting;      /* of (q, v, a): a time in which no shapes meet, and 4 numbers, or NULL; n_q: coordinates */
+    int n_q;
     long differentiations, factorizations;
     const eomgen_series *series;  /* of Taylor's method */
     int order;                    /* of its next step */
@@ -135,6 +137,9 @@ static inline void eomgen_evaluate(eomgen_run *run, double t, const double *y, d
 
 /* dx'/dx at (t, y), where x' is f, into J; spare: 2 n doubles. 0, or the status of a failure, which is remembered. */
 int eomgen_differentiate(eomgen_run *run, double t, const double *y, const double *f, double *J, double *spare);
+
+/* How long the next step may be: max_step, or less where shapes may meet; K changes. */
+double eomgen_longest(eomgen_run *run);
 
 /* First evaluation, and h_abs unless it is positive already. */
 void eomgen_start(const eomgen_method *method, eomgen_run *run);

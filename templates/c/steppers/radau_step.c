@@ -100,7 +100,7 @@ static int radau_step(eomgen_run *run)
     const int n = run->n;
     const newton_area area = newton_areas(run, RADAU_ROWS), *const a = &area;
     const double least = 10.0 * fabs(nextafter(run->t, run->direction * HUGE_VAL) - run->t), entered = run->h_abs;
-    double h_abs = fmin(fmax(entered, least), run->max_step), rate = -1.0, size;
+    double h_abs = fmin(fmax(entered, least), eomgen_longest(run)), rate = -1.0, size;
     double h_old = a->state[RADAU_H_OLD], error_old = a->state[RADAU_ERROR_OLD];
     if (run->most_steps > 0 && run->steps >= run->most_steps) {
         return EOMGEN_TOO_MANY_STEPS;
