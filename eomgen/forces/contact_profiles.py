@@ -23,7 +23,7 @@ from .force import View
 Point = tuple[Expr, Expr]
 
 
-class Piece(NamedTuple):
+class ProfilePart(NamedTuple):
     """A piece of a profile: origin and direction of its x axis, y out of the solid; sizes; half of its length.
 
     ``open`` tells whether it goes on without end.
@@ -44,7 +44,7 @@ class Piece(NamedTuple):
         return Frame(vec.product(base.rotation, turn), vec.add(base.position, vec.times(base.rotation, (x, y, zero))))
 
 
-def straight_pieces(points: Sequence[Point]) -> list[Piece]:
+def straight_pieces(points: Sequence[Point]) -> list[ProfilePart]:
     """Edges from point to point; the first and the last go on beyond their ends."""
     width = SHARED * _length(_minus(points[-1], points[0]))
     edges = [_minus(b, a) for a, b in itertools.pairwise(points)]
@@ -55,7 +55,7 @@ def straight_pieces(points: Sequence[Point]) -> list[Piece]:
     ]
 
 
-def _edge(start: Point, edge: Point, before: Point | None, after: Point | None, width: Expr) -> Piece:
+def _edge(start: Point, edge: Point, before: Point | None, after: Point | None, width: Expr) -> ProfilePart:
     """Sizes: half of its length; at the left and the right end x and y of the bisector and 1, or 0 without an end."""
     graph, way, half = width.graph, _unit(edge), 0.5 * _length(edge)
     ends: list[Expr] = []
@@ -66,10 +66,10 @@ def _edge(start: Point, edge: Point, before: Point | None, after: Point | None, 
         bisector = _unit((-way[1] - other[1], way[0] + other[0]))  # the sum of both normals
         ends += [inward * _dot(bisector, way), way[0] * bisector[1] - way[1] * bisector[0], graph.one]
     middle = (start[0] + 0.5 * edge[0], start[1] + 0.5 * edge[1])
-    return Piece("edge", middle, way, (half, *ends, width), half, before is None or after is None)
+    return ProfilePart("edge", middle, way, (half, *ends, width), half, before is None or after is None)
 
 
-def smooth_pieces(points: Sequence[Point]) -> list[Piece]:
+def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
     """Two circular arcs of one tangent from point to point (biarcs), and straight lines beyond the ends.
 
     The tangent at a point is that of the circle through it and its neighbours, so that points of a circle give the
@@ -106,7 +106,7 @@ def _mirrored(way: Point, chord: Point) -> Point:
     return along * c[0] - way[0], along * c[1] - way[1]
 
 
-def _arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: Point | None = None) -> Piece:
+def _arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: Point | None = None) -> ProfilePart:
     """Sizes: curvature; half of the chord; height of the ends over the middle; cos and sin of the half angle."""
     chord = _minus(end, start)
     c, half = _unit(chord), 0.5 * _length(chord)
@@ -117,7 +117,7 @@ def _arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: 
         cosine, sine = _dot(at_end, c), c[0] * at_end[1] - c[1] * at_end[0]
     rise = half * sine / (1.0 + cosine)
     middle = (start[0] + half * c[0] + rise * c[1], start[1] + half * c[1] - rise * c[0])
-    return Piece(
+    return ProfilePart(
         "arc", middle, c, (sine / half, half, rise, cosine, sine, width), sqrt(half * half + rise * rise), False
     )
 
