@@ -167,8 +167,7 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("canonical", ("q", "v"), lambda s: (2, s.n_momenta), "momenta dT/dv, and their rates -dH/dq + Q", late=True),
     Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
     Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
-    Kernel("meeting_time", ("q", "v", "a"), lambda s: (5,),
-           "s in which shapes of contacts may meet, depth and thickness (m) of the deepest pair, its two shapes"),
+    Kernel("meeting_time", ("q", "v", "a"), lambda s: (5,), "s until shapes may meet; depth, thickness, deepest pair"),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )  # fmt: skip
 

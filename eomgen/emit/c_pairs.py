@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 from ..graph.pair_calls import PairFunction, PairKind, PairPart
-from ..limits.runs import BEYOND, UP_TO, WITHIN
-from ..numeric.pair_sums import APART, MEETING, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
+from ..limits.runs import APART, BEYOND, UP_TO, WITHIN
+from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
 from ..program import Program
 from .c_text import print_pieces, used_helpers
 from .pair_sums_used import UsedSum, used_sums

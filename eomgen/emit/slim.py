@@ -47,7 +47,9 @@ PUBLIC = (
 CALLS = ("simulate",)
 
 
-def carry_slim(package: Mapping[str, str], signals: bool, states: bool, clocks: bool) -> dict[str, str]:
+def carry_slim(
+    package: Mapping[str, str], signals: bool, states: bool, clocks: bool, contact_shapes: bool
+) -> dict[str, str]:
     """Files of eomgen for a slim package, by name: what is reached of each, and refusals in place of others.
 
     Parameters
@@ -60,9 +62,12 @@ def carry_slim(package: Mapping[str, str], signals: bool, states: bool, clocks: 
         Whether the model has first-order states.
     clocks : bool
         Whether some of these are sampled.
+    contact_shapes : bool
+        Whether groups of shapes are in contact.
     """
     left_out = LEFT_OUT if signals else LEFT_OUT | {"runtime/tapes": "inputs that a model declares"}
     left_out = left_out if states else left_out | {"runtime/mechanical": "first-order states"}
+    left_out = left_out if contact_shapes else left_out | {"simulation/meetings": "contacts between groups of shapes"}
     left_out = left_out if clocks else left_out | dict.fromkeys(OF_CLOCKS, "sampled states")
     own = {name: text for name, text in package.items() if name.endswith(".py")}
     typed = [SourceText("", text) for name, text in package.items() if name.endswith(".pyi")]

@@ -25,10 +25,10 @@ from ..numeric.pair_sums import POSE
 from ..records import dataclass
 from .branches import where
 from .contact import CURVED, SpherePlane
+from .contact_rounds import AtHeight
 from .contact_shapes import (
     GROUNDS,
     PLANAR,
-    AtHeight,
     ContactShape,
     Feature,
     ShapeMotion,
@@ -213,7 +213,7 @@ class ContactGroups(Force):
         across, depth, _, _ = contact.touch(view)
         if (share := contact.share(view)) is not None:  # beside a piece of ground nothing is in it
             depth = where(graph.apply("lt", 0.0, share), depth, graph.apply("min", depth, 0.0))
-        touch = [*across, depth, turning_radius(kinds[1], given[1][POSE:], graph)]
+        touch = [*across, depth, turning_radius(kinds[1], given[1], graph)]
         nodes, renamed = _kept(graph, [*results, *slopes, *touch])
         ids, seen = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch))
         rates = [f"d_{name}" for name in names]

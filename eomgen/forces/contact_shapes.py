@@ -19,11 +19,10 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .branches import where
-from .contact import Contact, SpherePlane, SphereSphere, Touch, joint_radius
+from .contact import Contact, SpherePlane, joint_radius
 from .contact_profiles import ArcRound, EdgeRound, peaks, smooth_pieces, straight_pieces
+from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_solids import EllipsoidPlane, RodRod
-from .force import View
 
 CORNERS = 64  #: most corners of a polygon
 
@@ -86,7 +85,6 @@ GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space")
 _SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
 _BOTH = (-1.0, 1.0)
 _STEPS = 24  #: lines of which the picture of an ellipse is made
-_EDGE = 5  #: numbers of an edge: its first corner, its outward normal, its length
 
 
 class Feature(NamedTuple):
@@ -238,8 +236,8 @@ def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
 def _width(edges: Sequence[Expr], corners: Sequence[tuple[Expr, Expr]]) -> Expr:
     """The least distance of two parallel lines that hold a polygon between them: one lies along an edge."""
     widths: list[Expr] = []
-    for k in range(0, len(edges), _EDGE):
-        px, py, nx, ny, _ = edges[k : k + _EDGE]
+    for k in range(0, len(edges), EDGE):
+        px, py, nx, ny, _ = edges[k : k + EDGE]
         across = [nx * (px - x) + ny * (py - y) for x, y in corners]
         widths.append(_most(across))
     return _least(widths)
@@ -253,106 +251,6 @@ def _turned(frame: Frame, columns: tuple[int, int, int]) -> Frame:
     """A frame whose axes are x, y and z of another in another order."""
     rows = tuple((row[columns[0]], row[columns[1]], row[columns[2]]) for row in frame.rotation)
     return Frame((rows[0], rows[1], rows[2]), frame.position)
-
-
-def direction(reach: Vec3, otherwise: Vec3) -> tuple[Vec3, Expr]:
-    """The unit vector along another and its length; ``otherwise`` where that is 0, so that coincident centres part."""
-    square = vec.dot(reach, reach)
-    apart = square.graph.apply("lt", 0.0, square)
-    length = sqrt(where(apart, square, 1.0))
-    x, y, z = (where(apart, a / length, b) for a, b in zip(reach, otherwise, strict=True))
-    return (x, y, z), where(apart, length, 0.0)
-
-
-@dataclass(frozen=True)
-class RoundRound(SphereSphere):
-    """Two circles or spheres; where their centres coincide the second is pushed along x of the first marker."""
-
-    def touch(self, view: View) -> Touch:
-        reach = vec.sub(view.position(self.second), view.position(self.first))
-        normal, distance = direction(reach, vec.transpose(view.rotation(self.first))[0])
-        depth = self.radii[0] + self.radii[1] - distance
-        first = vec.scale(self.radii[0] - 0.5 * depth, normal)
-        return normal, depth, first, vec.scale(0.5 * depth - self.radii[1], normal)
-
-
-@dataclass(frozen=True)
-class SegmentRound(Contact):
-    """A circle or sphere about the second marker on a segment along x of the first, which has a radius of its own.
-
-    A centre on the segment is pushed along y of the first marker.
-    """
-
-    half: Expr
-    radii: tuple[Expr, Expr]
-
-    def touch(self, view: View) -> Touch:
-        graph, along = view.graph, vec.transpose(view.rotation(self.first))[0]
-        reach = vec.sub(view.position(self.second), view.position(self.first))
-        place = graph.apply("max", -self.half, graph.apply("min", self.half, vec.dot(along, reach)))
-        across = vec.sub(reach, vec.scale(place, along))
-        normal, distance = direction(across, vec.transpose(view.rotation(self.first))[1])
-        depth = self.radii[0] + self.radii[1] - distance
-        first = vec.add(vec.scale(place, along), vec.scale(self.radii[0] - 0.5 * depth, normal))
-        return normal, depth, first, vec.scale(0.5 * depth - self.radii[1], normal)
-
-
-@dataclass(frozen=True)
-class PolygonRound(Contact):
-    """A circle about the second marker on a convex polygon in the x-y plane of the first.
-
-    Of a centre outside the nearest point of the outline counts, of one inside the edge that is nearest; the edge in
-    whose direction the centre is farthest holds both (Ericson, Real-Time Collision Detection, 2005, section 5.1).
-    """
-
-    edges: tuple[Expr, ...]
-    radius: Expr
-
-    def touch(self, view: View) -> Touch:
-        graph, R = view.graph, view.rotation(self.first)
-        reach = vec.sub(view.position(self.second), view.position(self.first))
-        x, y, _ = vec.transpose_times(R, reach)
-        best: tuple[Expr, ...] | None = None
-        for k in range(0, len(self.edges), _EDGE):
-            px, py, nx, ny, length = self.edges[k : k + _EDGE]
-            rise = nx * (x - px) + ny * (y - py)
-            mine = (rise, px, py, nx, ny, length)
-            if best is None:
-                best = mine
-            else:
-                higher = graph.apply("lt", best[0], rise)
-                best = tuple(where(higher, new, old) for new, old in zip(mine, best, strict=True))
-        assert best is not None
-        rise, px, py, nx, ny, length = best
-        run = ny * (px - x) + nx * (y - py)  # along the edge (-ny, nx)
-        run = graph.apply("max", 0.0, graph.apply("min", length, run))
-        ax, ay = x - px + run * ny, y - py - run * nx
-        outside = graph.apply("lt", 0.0, rise)
-        distance = sqrt(where(outside, ax * ax + ay * ay, 1.0))
-        gap = where(outside, distance, rise)
-        nx, ny = where(outside, ax / distance, nx), where(outside, ay / distance, ny)
-        normal = vec.times(R, (nx, ny, graph.zero))
-        depth = self.radius - gap
-        second = vec.scale(0.5 * depth - self.radius, normal)
-        return normal, depth, vec.add(reach, second), second
-
-
-@dataclass(frozen=True)
-class AtHeight(Contact):
-    """Shapes of the plane that touch in the plane of the first: the point of contact lies at the height of the second.
-
-    So both bodies feel the force at one place, and its power is that of the depth, whichever way the bodies tilt.
-    """
-
-    flat: Contact
-    height: Vec3
-
-    def touch(self, view: View) -> Touch:
-        normal, depth, first, second = self.flat.touch(view)
-        return normal, depth, vec.add(first, self.height), second
-
-    def share(self, view: View) -> Expr | None:
-        return self.flat.share(view)
 
 
 _FLAT = ("segment", "polygon", "edge", "arc")

@@ -21,10 +21,11 @@ SLOPE, SIZE = 1.5e-8, 1e-3  #: part of a variable over which its slope is differ
 #: where its far side is near; the same where there is no far side; and part of their thicknesses that it may always go.
 #: In a body that is passed through there are then at least 1 / WITHIN steps, each with some ten stages.
 UP_TO, BEYOND, WITHIN = 0.75, 2.0, 0.0625
+#: Part of distances from the ground's origin by which shapes count as nearer while they are sorted out: rounding of
+#: their places moves none across it, and the distance itself is tested after.
+APART = 1e-12
 UNHURRIED = 1e3  #: the least step, over which contacts shorten none further
-SUNK = (
-    0.1  #: penetration at the start of a run, relative to the thickness of the two shapes, that is no rest on a floor
-)
+SUNK = 0.1  #: penetration at the start, relative to the thickness of both shapes, that is no rest on a floor
 SLOW = 1e-3  #: rate of Newton's iterations in a Radau step above which the Jacobian is renewed
 
 # -- runs that stall -------------------------------------------------------------------------------------------------

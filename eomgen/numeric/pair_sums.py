@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.runs import BEYOND, UP_TO, WITHIN
+from ..limits.runs import APART, BEYOND, UP_TO, WITHIN
 
 #: Numbers that say how a body or a shape stands and moves: position, rotation by rows, velocity, angular velocity.
 POSE = 18
@@ -26,9 +26,6 @@ MOTION = 6
 #: Numbers that say how shapes meet: time, penetration and thickness of the deepest pair, and its two shapes.
 MEETING = 5
 SORTED = 256  #: pairs of tables from which on near ones are found along an axis: below, testing all is as quick
-#: Part of distances from the ground's origin by which shapes count as nearer while they are sorted out: rounding of
-#: their places moves none across it, and the distance itself is tested after.
-APART = 1e-12
 NEVER = 1e300  #: (s) where no shapes come towards each other
 
 Narrow = Callable[[Sequence[Any]], Sequence[Any]]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import EvaluationError, SimulationError, UnavailableError
-from ..limits.runs import SCIPY_ATOL, UNHURRIED
+from ..limits.runs import SCIPY_ATOL
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
 from .stalled import Crawling
@@ -34,28 +34,6 @@ class Run:
     def kernel(self) -> Timed:
         """The right-hand side."""
         return self.module.kernels.timed("rhs", nan=True)
-
-    def longest(self, forward: bool) -> Callable[[float, Array, Array | None], float] | None:
-        """How long a step from (t, x) may be that passes over no contact of groups; None without such contacts.
-
-        More numbers may follow the state.  Backwards in time velocities are opposite, accelerations are not.
-        """
-        kernels, n_q = self.module.kernels, self.module.n_q
-        if "meeting_time" not in kernels.core.names:
-            return None
-        time, way, n_x = kernels.motion("meeting_time"), 1.0 if forward else -1.0, self.module.n_x
-
-        def call(t: float, x: Array, rates: Array | None) -> float:
-            state = np.array(x[:n_x])
-            u = self.forcing(t, state) if self.forcing else None
-            change = self.kernel(t, state, u=u) if rates is None else np.array(rates[:n_x])
-            try:
-                found = float(time(state[:n_q], way * state[n_q:], change[n_q:], u=u, t=t)[0])
-            except EvaluationError:
-                return np.inf
-            return max(found, UNHURRIED * 10.0 * float(np.spacing(abs(t))))
-
-        return call
 
     def watched(self, watch: Progress | None) -> Callable[[float, Array], Array]:
         """f(t, x) for the solver."""

@@ -135,11 +135,8 @@ def integrate(
     reset: Callable[[float, Array, list[int]], Array] | None = None,
     enter: Callable[[float, float], None] | None = None,
     pause: Pause | None = None,
-    longest: Callable[[float, Array, Array | None], float] | None = None,
 ) -> Solution:
     """Integrate over the parts between `nodes` (start, corners, end), and from each event that resets the state.
-
-    ``longest(t, x, x')`` says how long the next step may be.
 
     Raises
     ------
@@ -150,7 +147,7 @@ def integrate(
     Interrupted
         Ctrl-C.
     """
-    journey = _Journey(rhs, nodes, x0, solver, t_eval, events, dense, options, stall_check, longest)
+    journey = _Journey(rhs, nodes, x0, solver, t_eval, events, dense, options, stall_check)
     try:
         journey.travel(reset, enter, pause)
     except KeyboardInterrupt as interrupt:
@@ -172,9 +169,7 @@ class _Journey:
     def __init__(
         self, rhs: Any, nodes: Sequence[float], x0: Array, solver: Any, t_eval: Array | None,
         events: Sequence[RunEvent], dense: bool, options: dict[str, Any], stall_check: StallCheck | None,
-        longest: Callable[[float, Array, Array | None], float] | None = None,
     ) -> None:  # fmt: skip
-        self.longest = longest
         self.rhs, self.nodes, self.solver, self.t_eval = rhs, nodes, solver, t_eval
         self.options, self.stall_check = options, stall_check
         self.t, self.x, self.forward = nodes[0], np.array(x0), nodes[-1] >= nodes[0]
@@ -225,7 +220,7 @@ class _Journey:
             stop: tuple[float, bool] | None = None
             try:
                 while stop is None and solver.status == "running":
-                    message = self._advance(solver, self.nodes[k + 1])
+                    message = solver.step()
                     if solver.status == "failed":
                         self.status, self.message = -1, str(message)
                         return
@@ -260,19 +255,6 @@ class _Journey:
         if options.get("first_step") is not None:
             options["first_step"] = min(options["first_step"], abs(end - self.t))
         return self.solver(self.rhs, self.t, self.x, end, **options)
-
-    def _advance(self, solver: Any, end: float) -> str | None:
-        """One step; its bound is what every method keeps to, as some read the longest step only where they begin."""
-        if self.longest is not None:
-            size = self.longest(self.t, self.x, getattr(solver, "f", None))
-            if size < abs(end - self.t):
-                _set_bound(solver, self.t + size if self.forward else self.t - size)
-        message = solver.step()
-        if solver.t_bound != end:
-            _set_bound(solver, end)
-        if solver.status == "finished" and solver.t != end:
-            solver.status = "running"
-        return None if message is None else str(message)
 
     def _length(self, solver: Any) -> float:
         size = getattr(solver, "h_abs", None)
@@ -327,14 +309,6 @@ class _Journey:
             t, x, *found, Joined(self.pieces, self.forward) if self.pieces else None, self.status, self.message,
             self.counts, (self.nodes[0], self.t), None if self.t_eval is None else steps,
         )  # fmt: skip
-
-
-def _set_bound(solver: Any, bound: float) -> None:
-    """Where a solver must not go beyond; LSODA keeps a copy."""
-    solver.t_bound = bound
-    inner = getattr(getattr(solver, "_lsoda_solver", None), "_integrator", None)
-    if inner is not None:
-        inner.rwork[0] = bound
 
 
 def require_end(solution: Solution, end: float) -> None:

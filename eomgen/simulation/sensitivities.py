@@ -28,6 +28,7 @@ from .events import Events, told_by_the_caller, warn_of_unknown
 from .input_slopes import SlopesNow
 from .integrate import Solution, choose_solver, integrate, require_end
 from .lost_branch import refuse_lost_branches
+from .meetings import limited
 from .recording import record
 from .run_arguments import DEFAULTS, find_span, find_state, ordered_times
 from .saltation import Saltation
@@ -122,7 +123,7 @@ def sensitivities(
             alone = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **settings)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     S0 = start_sensitivity(here, start, x0, held, columns, _inputs(run, start, x0))
-    solver = choose_solver(method)
+    solver = limited(Run(bound, forcing), choose_solver(method), stop >= start)
     width = layout.n_x * (1 + len(columns.names))
     if np.ndim(settings["atol"]):  # of each state, and of its derivatives alike
         settings["atol"] = np.concatenate([settings["atol"], np.repeat(settings["atol"], len(columns.names))])
@@ -137,9 +138,8 @@ def sensitivities(
     try:
         with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
             solution = integrate(
-                run, nodes, z0, solver, times, salts.watched, False, settings, stall_check, salts.reset, forcing.enter,
-                longest=Run(bound, forcing).longest(stop >= start),
-            )  # fmt: skip
+                run, nodes, z0, solver, times, salts.watched, False, settings, stall_check, salts.reset, forcing.enter
+            )
     except Crawling as crawl:
         _refuse_change_point(bound, forcing, crawl.t, crawl.x[: layout.n_x])
         trouble = "; ".join(fail.trouble(crawl.x[: layout.n_x], crawl.t) or ())

@@ -17,7 +17,6 @@ from ..runtime.room import read_flag, require_room, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run, watch_run
 from .compiled import can_run, integrate_compiled
-from .deep_starts import warn_of_depth
 from .events import UNWATCHED, Events, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .passed_limits import warn_of_limits
@@ -184,14 +183,14 @@ def simulate(
         bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
     else:
         bound.rhs(start, x0)
-    warn_of_depth(bound, start, x0, forcing(start, x0) if forcing else None)
     run = Run(bound, forcing)
-    tolerances = {
-        "rtol": declared["rtol"] if rtol is None else rtol,
-        "atol": declared["atol"] if atol is None else atol,
-    }
+    if "contact_shapes" in bound.metadata:
+        from .meetings import begin
+
+        solver = begin(run, solver, (start, end), x0)
+    given = (("rtol", rtol), ("atol", atol))
     steps = {key: value for key, value in (("max_step", max_step), ("first_step", first_step)) if value is not None}
-    settings = {**tolerances, **steps, **settings}
+    settings = {name: declared[name] if value is None else value for name, value in given} | steps | settings
     if compiled or solver.__module__.startswith("scipy."):  # another's solver may take anything
         settings = check_tolerances(module.n_x, abs(end - start), settings)
         require_steps("max_step", float(settings.get("max_step", np.inf)), start, end)
@@ -223,7 +222,7 @@ def simulate(
                 listed = watched.listed(bound, forcing)
                 solution = integrate(
                     run.watched(watch), nodes, x0, solver, stored, listed, dense_output, settings, stall_check,
-                    partial(watched.reset, bound, forcing), forcing.enter, pause, run.longest(end >= start),
+                    partial(watched.reset, bound, forcing), forcing.enter, pause,
                 )  # fmt: skip
                 warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])
     except Interrupted as interrupt:
@@ -259,7 +258,6 @@ def _check(run: Run, solution: Solution, start: float, end: float, method: str) 
         first = int(np.flatnonzero(~finite)[0])
         raise run.ended(float(solution.t[first]), end, method, "the state is not finite.") from run.cause()
     if solution.status < 0:
-        reached = float(solution.t[-1]) if solution.t.size else start
-        last = solution.x[:, -1] if solution.t.size else None
+        reached, last = (float(solution.t[-1]), solution.x[:, -1]) if solution.t.size else (start, None)
         raise run.ended(reached, end, method, solution.message, last) from run.cause()
     require_end(solution, end)

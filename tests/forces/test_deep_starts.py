@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from contact_scenes import ELASTIC, LAW, PLANAR, on
 
-from eomgen.simulation.deep_starts import PenetrationWarning
+from eomgen.simulation.meetings import PenetrationWarning
 
 
 def pair(target: str) -> Any:
