@@ -14,14 +14,14 @@ from .units import UnitError, read_unit
 KEYS = ("value", "unit")
 
 
-class Given(NamedTuple):
+class InstanceValue(NamedTuple):
     """What an instance gives for a parameter or an input."""
 
     value: Any
     unit: str | None = None  #: None for that of the component
 
 
-def read_given(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> Given | None:
+def read_given(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> InstanceValue | None:
     """A number or expression as it stands, or the value and unit of a mapping; None if that is at fault.
 
     Parameters
@@ -35,7 +35,7 @@ def read_given(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> Gi
     fault : callable
     """
     if not isinstance(given, Mapping):
-        return Given(given)
+        return InstanceValue(given)
     for key in given:
         if key not in KEYS:
             fault(f"{path}.{key}", f"no key {key!r}", nearest(str(key), KEYS, "keys"))
@@ -45,7 +45,7 @@ def read_given(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> Gi
         return None
     unit, own = given.get("unit"), entry.values.get("unit")
     if unit is None:
-        return Given(given["value"])
+        return InstanceValue(given["value"])
     try:
         if not isinstance(unit, str):
             raise UnitError(f"{unit!r} is not a unit", "write a unit as text, as in mm")
@@ -60,4 +60,4 @@ def read_given(entry: DescribedEntry, given: Any, path: str, fault: Fault) -> Gi
         remedy = "leave the unit out: parameters are in SI units, so the expression is too"
         fault(f"{path}.unit", f"{str(given['value'])!r} is an expression, and {unit} is not an SI unit", remedy)
         return None
-    return Given(given["value"], unit)
+    return InstanceValue(given["value"], unit)
