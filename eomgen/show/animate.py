@@ -11,12 +11,12 @@ from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..notation.notation import Notation
 from ..texts import shown
-from .curves import ShownColumn
 from .film_frames import DPI, MOST_DOTS, Frames
 from .force_arrows import with_arrows
 from .player import InlineFilm, InlinePage
 from .scene import Scene
 from .shown_motion import ShownMotion, States, moving_scene, sample, with_fine_traces
+from .unit_panels import ShownColumn
 from .writers import FILMS, WRITERS, kind_of, require_target
 
 

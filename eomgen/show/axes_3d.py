@@ -11,15 +11,15 @@ from .colors import color_of
 from .data import Array
 from .flat import joined_limits
 from .label_places import NAME_STYLE, NAMES, name_offsets
-from .pieces import Pieces, eye_of
 from .plane import page_axes
 from .scene import Scene
+from .scene_pieces import ScenePieces, eye_of
 
 ZOOM = 0.88  #: leaves room for the names of the axes
 IN_FRONT = 1e6  #: place of names over solids, of which each has a place of its own
 
 
-def piece_collection(pieces: Pieces, ax: Any) -> Any:
+def piece_collection(pieces: ScenePieces, ax: Any) -> Any:
     """A collection of matplotlib that draws pieces as the eye of axes sees them; ``move`` gives it their corners.
 
     The class stands here because its base is an optional library's.
@@ -66,7 +66,7 @@ class Axes3DPicture:
             for k in (vertical, depth):
                 limits[k] = limits[k][::-1]
         limits = joined_limits(ax, "xyz", limits)
-        self.pieces = Pieces(scene)
+        self.pieces = ScenePieces(scene)
         self.drawn = piece_collection(self.pieces, ax)
         ax.add_collection(self.drawn, autolim=False)
         elevation, azimuth = view or usual_view(scene)

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from .curves import ShownColumn, by_unit, draw_curves
 from .draw import new_artist
 from .flat import figure_size
 from .optional import matplotlib
 from .scene import Scene
 from .shown_motion import ShownMotion
+from .unit_panels import ShownColumn, by_unit, draw_curves
 
 DPI = 80  #: of the frames
 LETTER = 0.0836  #: width of a letter of a title (inch)

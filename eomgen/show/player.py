@@ -8,9 +8,9 @@ from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
 
-from .curves import ShownColumn, by_unit, draw_curves
 from .optional import matplotlib
 from .shown_motion import ShownMotion
+from .unit_panels import ShownColumn, by_unit, draw_curves
 
 WIDE = 0.55  #: height over width of the window for which the camera is set
 BAR = 40  #: height of the bar (dots)

@@ -67,7 +67,7 @@ WRONG = {
     "mod.simulate(1.0).qq": '"Trajectory" has no attribute "qq"',
     "m.revolute('hinge', m.ground)": 'Missing positional argument "successor"',
     "mod.x0(theta=object())": "incompatible type",
-    "mod.simulat(1.0)": '"Module" has no attribute "simulat"; maybe "simulate"?',
+    "mod.simulat(1.0)": 'Module has no attribute "simulat"; maybe "simulate"?',
     "mod.simulate(foo=1)": 'Unexpected keyword argument "foo"',
     "mod.simulate(1.0, rtol=object())": "incompatible type",
     "mod.simulate_many(1.0, foo=1)": 'Unexpected keyword argument "foo"',
@@ -78,7 +78,7 @@ WRONG = {
     "eg.load('robot.urdf', limit='off')": 'Unexpected keyword argument "limit"',
     "mod.draw(theta=[1])": "incompatible type",
     "mod.simulate(1.0).plot('theta').plott()": '"Axes" has no attribute "plott"',
-    "mod.simulate(1.0).animate('run.gif', fsp=10)": "No overload variant",
+    "mod.simulate(1.0).animate('run.gif', fsp=10)": 'Unexpected keyword argument "fsp"',
     "mod.simulate(1.0).animate(format='gfi')": "No overload variant",
 }
 

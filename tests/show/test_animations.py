@@ -27,11 +27,11 @@ from eomgen.show import animate as eomgen_animate
 from eomgen.show import writers
 from eomgen.show.browser import _looks_round, scene_plot
 from eomgen.show.build_scene import build_scene
-from eomgen.show.curves import ShownColumn, draw_curves
 from eomgen.show.film_frames import Frames
 from eomgen.show.palettes import indices_in, palette_of
 from eomgen.show.shown_motion import moving_scene, sample
 from eomgen.show.solids import box, cylinder, sphere
+from eomgen.show.unit_panels import ShownColumn, draw_curves
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

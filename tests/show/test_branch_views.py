@@ -12,8 +12,8 @@ import pytest
 import eomgen as eg
 from eomgen.show.branch_views import telling_values, telling_view, toward_eye, usual_view
 from eomgen.show.build_scene import build_scene
-from eomgen.show.pieces import eye_of
 from eomgen.show.scene import Scene
+from eomgen.show.scene_pieces import eye_of
 
 matplotlib.use("agg")
 EXAMPLES = Path(__file__).parents[2] / "examples"

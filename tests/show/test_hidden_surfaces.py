@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 import eomgen as eg
 from eomgen.show.build_scene import build_scene
-from eomgen.show.pieces import Pieces, eye_of
+from eomgen.show.scene_pieces import ScenePieces, eye_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 VIEWS = [(22.0, -58.0), (-35.0, 20.0), (80.0, 130.0), (5.0, 200.0)]
@@ -62,7 +62,7 @@ def test_what_a_ray_meets_first_is_drawn_last(elevation: float, azimuth: float) 
     assert len(scene.items) == 5
     eye = eye_of(ax.M)
     assert proj_transform(*eye[:3], ax.M)[2] != 0.0  # no place on the page, but a depth
-    pieces = Pieces(scene)
+    pieces = ScenePieces(scene)
     shown = pieces.seen(pieces.at(0), eye)
     flat = np.column_stack(proj_transform(*shown.corners.reshape(-1, 3).T, ax.M)[:2]).reshape(-1, 3, 2)
     meshes = [(k, item.at(scene.frames[0])[item.faces]) for k, item in enumerate(scene.items)]
@@ -127,7 +127,7 @@ def test_pieces_of_a_run_follow_its_bodies() -> None:
     module = eg.load(EXAMPLES / "furuta_pendulum.yaml").compile(target="numpy")
     run = module.simulate(0.5, t_eval=np.linspace(0, 0.5, 6))
     scene = build_scene(module, run.q, run.t, trace=[module.body_names[-1]])
-    pieces = Pieces(scene)
+    pieces = ScenePieces(scene)
     counts = []
     for k in range(6):
         corners = pieces.at(k)
@@ -147,5 +147,5 @@ def test_scenes_of_more_triangles_than_pieces_are_drawn_undivided(monkeypatch: p
     module = blocks()
     scene = build_scene(module, module.x0()[: module.n_q, None])
     raw = sum(len(item.points) - 1 if item.faces is None else len(item.faces) for item in scene.items)
-    monkeypatch.setattr("eomgen.show.pieces.MOST", 10)
-    assert len(Pieces(scene).at(0)) == raw
+    monkeypatch.setattr("eomgen.show.scene_pieces.MOST", 10)
+    assert len(ScenePieces(scene).at(0)) == raw

@@ -1,4 +1,4 @@
-"""Stage show, curves: columns of a run -> panels beside an animation, one for each unit."""
+"""Stage show, panels: columns of a run -> panels beside an animation, one for each unit."""
 
 from __future__ import annotations
 

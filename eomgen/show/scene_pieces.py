@@ -29,7 +29,7 @@ AMBIENT, DIFFUSE = 0.64, 0.40  #: light on a face: everywhere, and by the angle 
 LIGHT = (-0.45, 0.6, 1.0)  #: to the right, upwards and towards the eye: where the light comes from
 
 
-class Shown(NamedTuple):
+class SeenPieces(NamedTuple):
     """The pieces that are seen, the hindmost first.
 
     Attributes
@@ -46,7 +46,7 @@ class Shown(NamedTuple):
     widths: Array
 
 
-class Pieces:
+class ScenePieces:
     """Pieces of all items of a scene.
 
     Parameters
@@ -98,7 +98,7 @@ class Pieces:
             found.append(parts @ points[corners[of]])
         return np.concatenate(found)
 
-    def seen(self, corners: Array, eye: Array) -> Shown:
+    def seen(self, corners: Array, eye: Array) -> SeenPieces:
         """What an eye sees of the pieces.
 
         Parameters
@@ -121,7 +121,7 @@ class Pieces:
         bright = AMBIENT + DIFFUSE * np.clip(normals @ self._light(eye), 0.0, None)
         bright = np.where(self._lines, 1.0, bright)
         colors = np.clip(self._colors * bright[:, None], 0.0, 1.0)
-        return Shown(corners[order], colors[order], self._widths[order])
+        return SeenPieces(corners[order], colors[order], self._widths[order])
 
     def _light(self, eye: Array) -> Array:
         """Unit vector towards the light, which moves with the eye."""
