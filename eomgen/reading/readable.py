@@ -106,6 +106,7 @@ class Readable(QuantitiesOfMethods):
         n = self.mobility.n_dof
         written = self._write("mass_matrix", lambda s: s.motion[0], "z", lambda s: s.motion[1])
         named = self._named["force"] = self._named["mass_matrix"]
+        self._all["force"] = self._all["mass_matrix"]  # they are written together
         return named, sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, 1, written[n * n :])
 
     @property

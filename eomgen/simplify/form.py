@@ -25,8 +25,8 @@ from .good_names import GoodNames
 from .inline import EACH, NAME, Named, inlined, is_plain
 from .literal import Literal
 from .mixed import Mixed
+from .quotient_signs import with_signs
 from .shared_sums import SharedSums
-from .signs import with_signs
 
 WHOLE = (10**9,)
 SIZES = (1, 6, 16, 40, 120, *WHOLE)

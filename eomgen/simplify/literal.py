@@ -7,7 +7,7 @@ from fractions import Fraction
 from ..graph.traverse import reachable
 from .atoms import ONE, Poly, add, constant, freeze, inverse, multiply, number, scaled
 from .expansion import Expansion
-from .signs import factors_with_signs
+from .quotient_signs import factors_with_signs
 
 
 class Literal:

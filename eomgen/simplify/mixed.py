@@ -15,7 +15,7 @@ from ..graph.traverse import reachable
 from .atoms import ONE, SUMS, TURNS, Atoms, Poly, add, multiply, scaled
 from .expansion import Expansion
 from .factoring import Factoring
-from .signs import factors_with_signs
+from .quotient_signs import factors_with_signs
 
 PLAIN = ("sym", "pi", "name", *TURNS, *SUMS)  #: kinds of atoms of which inertia is made
 

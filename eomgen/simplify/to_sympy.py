@@ -13,7 +13,7 @@ from ..graph.core import Graph
 from ..graph.sympy_raise import as_number, raise_operation
 from .atoms import SMALL, TURNS, Atoms, Monomial, Number, Poly
 from .factoring import Factoring
-from .signs import MADE
+from .quotient_signs import MADE
 
 
 class Raising:

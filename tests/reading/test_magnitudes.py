@@ -39,3 +39,13 @@ def test_it_prints_as_a_magnitude() -> None:
     equations = sprung()
     shown = text(Formulas(order_of(equations))(equations.V), equations.notation)
     assert "|a - s|" in shown.replace("\u00a0", " ")
+    assert "sgn(s - a)" in str(equations)
+    assert "no value at x = 0" in str(equations)
+    assert "no value at x = 0" in equations._repr_html_()
+
+
+def test_mass_matrix_and_force_are_formed_together() -> None:
+    equations = sprung()
+    formed, _ = equations.as_formed("force").formed()
+    assert len(formed) == 2
+    assert equations.as_formed("force").flat == [*equations.mass_matrix, *equations.force]
