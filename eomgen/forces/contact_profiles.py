@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from functools import reduce
 from typing import NamedTuple
 
 from ..frames import Frame
@@ -87,6 +88,16 @@ def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
         joint = (0.5 * (a[0] + b[0] + d * (s[0] - t[0])), 0.5 * (a[1] + b[1] + d * (s[1] - t[1])))
         found += [_arc(a, joint, s, width), _arc(joint, b, None, width, t)]
     return [*found, _edge(points[-1], _times(ways[-1], _length(last)), ways[-1], None, width)]
+
+
+def solid_depth(pieces: Sequence[ProfilePart], depth: Expr) -> Expr:
+    """How far a solid reaches below its pieces: as deep as given, but not beyond the centre of its sharpest hill.
+
+    There its sides meet: a deeper solid would be felt through the other side of a hill.
+    """
+    graph = depth.graph
+    bends = [-one.sizes[0] for one in pieces if one.kind == "arc"]  # 1 / radius, of hills
+    return reduce(lambda least, bend: least / graph.apply("max", 1.0, least * bend), bends, depth)
 
 
 def _tangents(points: Sequence[Point]) -> list[Point]:

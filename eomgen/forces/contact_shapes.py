@@ -20,7 +20,7 @@ from ..graph.core import Expr, Graph, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .contact import Contact, SpherePlane, joint_radius
-from .contact_profiles import ArcRound, EdgeRound, peaks, smooth_pieces, straight_pieces
+from .contact_profiles import ArcRound, EdgeRound, peaks, smooth_pieces, solid_depth, straight_pieces
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_solids import EllipsoidPlane, RodRod
 
@@ -175,6 +175,7 @@ class ContactShape:
         """Pieces of a profile, and its peaks, which meet what is flat."""
         points, depth, zero = self._points(), self.sizes[0], self.sizes[0].graph.zero
         pieces = straight_pieces(points) if self.kind == "profile" else smooth_pieces(points)
+        depth = solid_depth(pieces, depth)
         found = [
             Feature(one.kind, one.frame(frame), (*one.sizes, depth), None if one.open else one.half + depth, depth)
             for one in pieces

@@ -23,7 +23,7 @@ class JointFriction(Force):
     """Friction on a joint's coordinate of rate v (N or N m), such as -[c(v) tanh(v / smoothing) + viscous v].
 
     The tanh is the regularisation of Andersson, Soderberg and Bjorklund (2007), Tribol. Int. 40, 580-587.  It does not
-    depend on the joint's reactions; :class:`ReactionFriction` does.
+    depend on the joint's reactions; :class:`~.reaction_friction.ReactionFriction` does.
     """
 
     sentence: ClassVar[str] = "Friction in a joint: it opposes the rate $v$ of the coordinate."
