@@ -39,7 +39,7 @@ _GREEK = re.compile(r"[\u0370-\u03ffµ]")
 _SUPERSCRIPT = re.compile(r"[⁰¹⁴⁵⁶⁷⁸⁹⁻⁺]")
 
 
-class TypingSlip(NamedTuple):
+class Typed(NamedTuple):
     """What is wrong with a text, its column from 1, and what to write."""
 
     message: str
@@ -47,12 +47,12 @@ class TypingSlip(NamedTuple):
     remedy: str
 
 
-def find_slip(text: str) -> TypingSlip | None:
+def find_slip(text: str) -> Typed | None:
     """The first slip of the table that the text has; None if it looks like none of them."""
     return next((slip for slip in (look(text) for look in _LOOKS) if slip is not None), None)
 
 
-def _unit(text: str) -> TypingSlip | None:
+def _unit(text: str) -> Typed | None:
     found = _WITH_UNIT.fullmatch(text)
     if found is None:
         return None
@@ -69,7 +69,7 @@ def _unit(text: str) -> TypingSlip | None:
         if re.fullmatch(_WORD, unit):
             remedy += f", or {number}*{unit} if {unit} is a name of the model"
         remedy += "; the value of a parameter may have a unit beside it: {value: ..., unit: ...}"
-    return TypingSlip("a number with a unit is not an expression", found.start(2) + 1, remedy)
+    return Typed("a number with a unit is not an expression", found.start(2) + 1, remedy)
 
 
 def _in_si(number: str, unit: str) -> str:
@@ -80,89 +80,89 @@ def _in_si(number: str, unit: str) -> str:
     return f"{float(number) * read.size:.12g}, the number in {read.si or 'SI units'}"
 
 
-def _degrees(text: str) -> TypingSlip | None:
+def _degrees(text: str) -> Typed | None:
     found = _DEGREE_SIGN.search(text)
-    return found and TypingSlip("'°' is not allowed in an expression", found.end(), f"write deg({found[1]})")
+    return found and Typed("'°' is not allowed in an expression", found.end(), f"write deg({found[1]})")
 
 
-def _exponent(text: str) -> TypingSlip | None:
+def _exponent(text: str) -> Typed | None:
     found = _HALF_EXPONENT.search(text)
     remedy = "" if found is None else f"write {found[1]}*10**{found[2].removeprefix('+')}"
-    return found and TypingSlip("the power of ten behind e must be a whole number", found.start() + 1, remedy)
+    return found and Typed("the power of ten behind e must be a whole number", found.start() + 1, remedy)
 
 
-def _comma(text: str) -> TypingSlip | None:
+def _comma(text: str) -> Typed | None:
     found = _COMMA.search(text)
     if found is None:
         return None
     before = text[: found.start()]
     if before.count("(") > before.count(")") or "[" in before:
         return None  # arguments of a function, or a list
-    return TypingSlip("a comma is not a decimal point", found.start(2), f"write {found[1]}.{found[2]}")
+    return Typed("a comma is not a decimal point", found.start(2), f"write {found[1]}.{found[2]}")
 
 
-def _grouped(text: str) -> TypingSlip | None:
+def _grouped(text: str) -> Typed | None:
     found = _GROUPED.search(text)
     remedy = "" if found is None else f"write {found[0].replace(' ', '')}"
-    return found and TypingSlip("a number has no spaces", found.start() + 1, remedy)
+    return found and Typed("a number has no spaces", found.start() + 1, remedy)
 
 
-def _points(text: str) -> TypingSlip | None:
+def _points(text: str) -> Typed | None:
     found = _POINTS.search(text)
-    return found and TypingSlip("a number has one decimal point", found.start() + 1, f"{found[0]!r} has several; leave one")
+    return found and Typed("a number has one decimal point", found.start() + 1, f"{found[0]!r} has several; leave one")
 
 
-def _applied(text: str) -> TypingSlip | None:
+def _applied(text: str) -> Typed | None:
     """A function without brackets: ``sin 30``."""
     for found in _CALL.finditer(text):
         if found[1] in function_words() and found[2] not in _KEYWORDS:
-            return TypingSlip(f"{found[1]!r} is a function", found.start() + 1, f"write {found[1]}({found[2]})")
+            return Typed(f"{found[1]!r} is a function", found.start() + 1, f"write {found[1]}({found[2]})")
     return None
 
 
-def _times(text: str) -> TypingSlip | None:
+def _times(text: str) -> Typed | None:
     """A product without its sign: ``2pi``, ``2(a + b)``, ``(a)(b)``, ``a b``."""
     for found in _TIMES.finditer(text):
         first, second = found[1] or found[3], found[2] or found[4]
         power = second in ("e", "E") and text[found.end() : found.end() + 1] in ("+", "-")
         if second not in _KEYWORDS and not power:
             remedy = f"write * between ) and {second}" if found[3] else f"write {first}*{second}"
-            return TypingSlip("a multiplication sign is missing", found.end() - len(second) + 1, remedy)
+            return Typed("a multiplication sign is missing", found.end() - len(second) + 1, remedy)
     for found in _BESIDE.finditer(text):
         if not {found[1], found[2]} & _KEYWORDS:
             remedy = f"write {found[1]}*{found[2]} if a product is meant; allowed are + - * / ** and comparisons"
             message = f"not a valid expression: an operator is missing between {found[1]!r} and {found[2]!r}"
-            return TypingSlip(message, found.start(2) + 1, remedy)
+            return Typed(message, found.start(2) + 1, remedy)
     return None
 
 
-def _ends(text: str) -> TypingSlip | None:
+def _ends(text: str) -> Typed | None:
     found = _LACKS.search(text)
-    return found and TypingSlip(
+    return found and Typed(
         f"not a valid expression: nothing follows {found[1]!r}", len(text.rstrip()) + 1, "write what comes after it"
     )
 
 
-def _bars(text: str) -> TypingSlip | None:
+def _bars(text: str) -> Typed | None:
     found = _BARS.search(text)
-    return found and TypingSlip("'|' is not allowed in an expression", found.start() + 1, f"write abs({found[1].strip()})")
+    return found and Typed("'|' is not allowed in an expression", found.start() + 1, f"write abs({found[1].strip()})")
 
 
-def _assigned(text: str) -> TypingSlip | None:
+def _assigned(text: str) -> Typed | None:
     found = _ASSIGNED.search(text)
     remedy = "write only what stands on the right; == compares"
-    return found and TypingSlip("this is a statement, not an expression", found.start() + 2, remedy)
+    return found and Typed("this is a statement, not an expression", found.start() + 2, remedy)
 
 
-def _sign(text: str) -> TypingSlip | None:
+def _sign(text: str) -> Typed | None:
     for k, sign in enumerate(text, 1):
         message = f"{sign!r} is not allowed in an expression"
         if sign in SIGNS:
-            return TypingSlip(message, k, f"write {SIGNS[sign]}")
+            return Typed(message, k, f"write {SIGNS[sign]}")
         if _SUPERSCRIPT.match(sign):
-            return TypingSlip(message, k, "write ** for powers; the inverse of tan is atan")
+            return Typed(message, k, "write ** for powers; the inverse of tan is atan")
         if _GREEK.match(sign):
-            return TypingSlip(message, k, "names have the letters a to z and A to Z, digits and _: mu, omega")
+            return Typed(message, k, "names have the letters a to z and A to Z, digits and _: mu, omega")
     return None
 
 
