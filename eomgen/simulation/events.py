@@ -188,7 +188,8 @@ class Events:
         after = np.array(x, dtype=float)
         for i in fired:
             if self.model[i].action == RESET:
-                after = np.asarray(module.project(self.renewed(module, forcing, t, after, i), t=t, u=forcing(t, after)))
+                after = self.renewed(module, forcing, t, after, i)
+                after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
             after = self._strike(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)

@@ -17,9 +17,11 @@ def test_modes_take_outputs_as_x0_does() -> None:
 
 
 def test_settings_take_the_names_of_instances() -> None:
+    leg = eg.Model("leg")
+    leg.revolute("hip", leg.ground, leg.body("thigh", mass=1.0, inertia={"zz": 0.1}), coordinate="hip")
+    leg.parameter("l", 1.0)
     m = eg.Model("walker")
-    m.revolute("leg1_hip", m.ground, m.body("leg1_thigh", mass=1.0, inertia={"zz": 0.1}), coordinate="leg1_hip")
-    m.parameter("leg1_l", 1.0)
+    m.add(leg, "leg1_")
     module = m.compile(target="numpy")
     initial, parameters, inputs = sort_settings(module, {"leg1.hip": 0.2, "leg1.l": 3.0})
     assert (initial, parameters, inputs) == ({"leg1_hip": 0.2}, {"leg1_l": 3.0}, {})
