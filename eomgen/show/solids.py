@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..limits.pictures import SAME
+from ..numeric import algebra
 from .data import Array
 
 Triangles = NDArray[np.int64]
@@ -121,7 +122,7 @@ def hull(points: Array) -> Mesh | None:
 def rounded(points: Array, radius: float) -> Mesh | None:
     """The hull of balls about points (n, 3): a bar between two, a plate with round corners over three."""
     middle = points.mean(axis=0)
-    _, sizes, axes = np.linalg.svd(points - middle)
+    _, sizes, axes = algebra.svd(points - middle)
     if len(sizes) == 3 and sizes[2] > SAME * sizes[0]:
         ball = sphere(radius)[0]
         return hull((points[:, None] + ball[None]).reshape(-1, 3))
