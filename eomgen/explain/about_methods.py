@@ -257,8 +257,7 @@ def final(author: Author) -> Section:
     if not eqs.acceleration_names:
         return Section("Equations of motion", tuple(_prescribed(author)))
     try:
-        named, mass = eqs.written("mass_matrix")
-        force = eqs.force
+        named, mass, force = eqs.intermediates, eqs.mass_matrix, eqs.force
     except UnavailableError as error:
         return Section("Equations of motion", (Sentence(str(error).partition("\n")[0]),))
     pieces: list[Piece] = [
@@ -268,8 +267,9 @@ def final(author: Author) -> Section:
     left, right = map(author.letter, "Mf") if one else (r"\mathbf{M}", r"\mathbf{f}")
     if one:
         pieces = [Sentence(f"${left} {author.symbol(eqs.acceleration_names[0])} = {right}$ with")]
-    pieces += author.formulas(left, mass[0] if one else mass, named, ("mass_matrix", None), True)
-    known = {symbol for symbol, _ in needed(named, mass)}
+    shown = author.formulas(left, mass[0] if one else mass, named, ("mass_matrix", None), True)
+    pieces += shown
+    known = set() if isinstance(shown[0], Sentence) else {symbol for symbol, _ in needed(named, mass)}
     pieces += author.formulas(right, force[0] if one else force, named, ("force", None), told=known)
     return Section("Equations of motion", tuple(pieces))
 
