@@ -13,7 +13,7 @@ from textwrap import fill
 from textwrap import indent as indented
 
 from ..texts import WIDTH
-from .selection import NOT_REACHED, Selection
+from .selection import Selection
 from .uses import Import, SourceText, assigned, is_text, is_typing
 
 
@@ -33,10 +33,10 @@ class _AbridgedText:
             self._visit(node)
 
     def written(self) -> str:
-        """The text; one empty line between definitions."""
+        """The text; one empty line between definitions and none within functions."""
         kept = [line for line in self.lines if line is not None]
         text = re.sub(r"\n{3,}", "\n\n", "\n".join(kept))
-        return re.sub(rf"\n\n(?= +(?:(?:elif|else|except|finally)\b|{NOT_REACHED}))", "\n", text).strip() + "\n"
+        return re.sub(r"\n\n(?= +(?!def |@|class |#:))", "\n", text).strip() + "\n"
 
     def _visit(self, node: ast.stmt) -> None:
         selection, source = self.selection, self.source

@@ -14,6 +14,7 @@ LEFT_OUT = {
     "analysis/impact": "events with impacts",
     "numeric/assembly_failure": "the reason why loops do not close",
     "numeric/leaps": "motions through change points",
+    "numeric/nearest_branch": "positions near a guess",
     "numeric/splines": "cubic tables",
     "runtime/culprit": "the cause of a failure",
     "runtime/origin": "the origin of a result",

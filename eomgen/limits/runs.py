@@ -53,6 +53,7 @@ RESTING = 1000.0  #: times that, at both ends of a step, of a value that stays a
 SAMPLED, HALVED = 16, 50  #: parts of a step in which a touch is looked for; times that it is halved after a reset
 TOUCHING = 1e-9  #: part of its size at which the value of an event counts as zero, and its rate as none
 INSTANT = 1e-14  #: part of the time within which two are one: 50 roundings of a step's end
+WHOLE = 1e-6  #: a counter of samples this near to a whole number is one: rounding of times moves it by less
 EARLIEST = 1e-3  #: (s) stands for the time where that is less
 AHEAD = 1e-8  #: part of the run over which the rate of an event's value is taken: the root of its rounding
 

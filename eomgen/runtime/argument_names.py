@@ -61,7 +61,8 @@ def _plain(layout: Layout, value: Any) -> Any:
         found = layout.plain(value)
         return found if found in layout.names or found.partition(".")[0] in layout.bodies else value
     if isinstance(value, dict):
-        return {_plain(layout, name): _plain(layout, x) for name, x in value.items()}
+        found = {_plain(layout, name): _plain(layout, x) for name, x in value.items()}
+        return found if len(found) == len(value) else value  # a name given twice is told where it is read
     if type(value) in (list, tuple) and any(isinstance(x, str | dict | tuple) for x in value):
         return type(value)(_plain(layout, x) for x in value)
     return value

@@ -22,7 +22,6 @@ from ..numeric.assembly_velocity import VelocityEquations, assemble_velocity
 from ..numeric.closure import close, closed
 from ..numeric.constraint_system import RESTARTS
 from ..numeric.held_path import follow
-from ..numeric.nearest_branch import close_nearest
 from ..numeric.projection import largest
 from ..numeric.ranks import rank
 from ..numeric.scales import Array
@@ -169,6 +168,8 @@ class Initial:
         if set(guess) <= set(favoured):
             with suppress(AssemblyError):
                 return self.assembled(guess, rough=True)
+        from ..numeric.nearest_branch import close_nearest  # not in a slim package
+
         declared = {**self.sort(layout.guess).positions, **self.sort(layout.initial).positions}
         start = self.system.with_values(self.system.with_values(layout.q_reference, declared), guess)
         soft = self.compatible(start, {}, {**ordered, **{k: v for k, v in declared.items() if k not in guess}})

@@ -22,8 +22,12 @@ class UnknownNameError(UsageError, KeyError):
 
 
 def without_dots(given: Mapping[Any, Any], instances: Mapping[str, str]) -> dict[Any, Any]:
-    """Values by name; ``leg1.hip`` of an instance of a component is ``leg1_hip``."""
-    return {plain_name(name, instances): value for name, value in given.items()}
+    """Values by name; ``leg1.hip`` of an instance of a component is ``leg1_hip``, which must not be given beside it."""
+    found = {plain_name(name, instances): value for name, value in given.items()}
+    if len(found) < len(given):
+        twice = [name for name in given if plain_name(name, instances) != name and plain_name(name, instances) in given]
+        raise UsageError(f"{', '.join(map(repr, twice))} is given under both of its names; give it once")
+    return found
 
 
 def plain_name(name: object, instances: Mapping[str, str]) -> Any:

@@ -20,7 +20,7 @@ class Named(list[Array]):
     def __getitem__(self, key: str | SupportsIndex) -> Array: ...
     @overload
     def __getitem__(self, key: slice) -> list[Array]: ...
-    def __getitem__(self, key: str | SupportsIndex | slice) -> Array | list[Array]:
+    def __getitem__(self, key: Any) -> Any:
         if isinstance(key, str):
             if key not in self.names:
                 raise unknown("event", key, self.names)

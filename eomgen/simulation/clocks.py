@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.runs import WHOLE
 from ..numeric.scales import Array
 from .events import instant
 
@@ -21,12 +22,13 @@ if TYPE_CHECKING:
 def at_next_samples(module: BoundModel, t: float, x: Array, span: tuple[float, float] | None = None) -> Array:
     """The state x (n_x,) at time t with clocks whose next time is past set to their first one that is not.
 
-    A sampling time at t itself happens.  A clock that is ahead stays so.
+    A sampling time at t itself happens.  A clock that is ahead by more than its period, as that of a state from the end
+    of another run, is set back; one that has not begun stays so.
 
     Raises
     ------
     UsageError
-        A period is not positive, or the `span` of the run goes backwards.
+        A period is not positive, a counter not whole, or the `span` of the run goes backwards.
     """
     clocks: list[dict[str, Any]] = module.metadata.get("clocks", [])
     if not clocks:
@@ -42,11 +44,20 @@ def at_next_samples(module: BoundModel, t: float, x: Array, span: tuple[float, f
             raise UsageError(
                 f"the period of {', '.join(clock['states'])} is {period:.6g} s; give a positive time between samples"
             )
-        if late > 0.0:
-            found[place] += max(ceil((late - instant(t)) / period), 0)
+        if not abs(found[place] - round(found[place])) < WHOLE:
+            name = module.x_names[place]
+            raise UsageError(f"{name} counts samples, so it must be a whole number, not {found[place]:.9g}")
+        if late > 0.0 or (found[place] >= 1.0 and late < -period - instant(t)):
+            found[place] = max(found[place] + ceil((late - instant(t)) / period), 0.0)
+            while found[place] >= 1.0 and _lateness(values, t, _less_one(found, place), event, place)[0] <= instant(t):
+                found[place] -= 1.0  # the period has been rounded
         while (late := _lateness(values, t, found, event, place)[0]) > 0.0:  # rounding: its time is this one
             found[place] = max(np.nextafter(found[place], np.inf), found[place] + late / period)
     return found
+
+
+def _less_one(x: Array, place: int) -> Array:
+    return np.where(np.arange(len(x)) == place, x - 1.0, x)
 
 
 def _lateness(values: Any, t: float, x: Array, event: int, place: int) -> tuple[float, float]:

@@ -6,6 +6,7 @@ with consistent values.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,7 @@ from ..runtime.near_names import require
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
 from .event_values import EventValues
-from .events import GO_ON, UNWATCHED, Events, warn_of_unknown
+from .events import GO_ON, UNWATCHED, Events, calls_within, instant, warn_of_unknown
 from .integrate import Solution, require_end
 from .recording import record
 from .resets import Resets
@@ -117,6 +118,12 @@ def integrate_dae(
     times = None if t_eval is None else ordered_times(t_eval, start, end, DaeForm(module).n_y)
     if options.get("max_step"):
         require_steps("max_step", check_step("max_step", options["max_step"]), start, end)
+    elif "contact_shapes" in bound.metadata:
+        warnings.warn(
+            "IDA steps over contacts that are shorter than its steps; give max_step, less than the thickness of the "
+            "thinner shape divided by the speed, or use simulate",
+            stacklevel=calls_within() + 1,
+        )
     run = _DaeRun(bound, forcing, watched, (start, end), times, partial(ida.IDA, **tolerances), options)
     run.travel(x0)
     warn_of_unknown([event.name for event in run.listed if not event.known])
@@ -273,6 +280,12 @@ class _DaeRun:
 
     def _happen(self, t: float, x: Array, fired: list[int]) -> Array | None:
         """The state after events; None where it stays."""
+        clocks = {clock["event"] for clock in self.module.metadata.get("clocks", [])}
+        if clocks.intersection(
+            self.index[e] for e in fired
+        ):  # others of this instant, which IDA finds a rounding later
+            due = np.flatnonzero(np.abs(self.values(t, x)) <= instant(t)).tolist()
+            fired = sorted({*fired, *(e for e in due if self.index[e] in clocks)})
         self._note(t, x, fired)
         for e in fired:
             if self.left[e]:

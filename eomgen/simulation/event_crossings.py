@@ -113,6 +113,8 @@ class Crossings:
                 stop = stop or (zero, False)
                 self.fired.append(i)
                 self.ways.append(way)
+        order = sorted(range(len(self.fired)), key=self.fired.__getitem__)  # of one instant: as they are declared
+        self.fired, self.ways = [self.fired[k] for k in order], [self.ways[k] for k in order]
         self.g, self.slope, self.slope_new = new, self.slope_new, self.slope
         self.slope = self._slopes(step.t, step.x, f, new, step.length, -1.0)
         return stop

@@ -187,7 +187,7 @@ int fmu_update(fmu_instance *f, int *ended, int *changed)
         status = look(f, g, slope);
         for (int i = 0; i < FMU_N_EVENTS && status == FMU_OK; i++) { /* one that is still beyond zero may leave at once */
             const int sent = m->leaving[i] || fired[i] == 1;
-            m->leaving[i] = sent && fabs(g[i]) <= 2.0 * fabs(before[i]) && slope[i] != 0.0;
+            m->leaving[i] = sent && g[i] * before[i] >= 0.0 && fabs(g[i]) <= 2.0 * fabs(before[i]) && slope[i] != 0.0;
             m->side[i] = m->leaving[i] ? slope[i] > 0.0 : g[i] > 0.0;
             m->g[0][i] = g[i];
         }
@@ -227,9 +227,19 @@ int fmu_set_clocks(fmu_instance *f)
         if (status == FMU_OK && !(period > 0.0)) {
             return fmu_say(f, FMU_ERROR, "a period is %.9g s; give a positive time between samples", period);
         }
-        if (status == FMU_OK && late > 0.0) {
-            *counter += fmax(ceil((late - RUNS_INSTANT * fmax(fabs(m->t), RUNS_EARLIEST)) / period), 0.0);
-            status = lateness(f, m->x, i, &late);
+        const double moment = RUNS_INSTANT * fmax(fabs(m->t), RUNS_EARLIEST);
+        if (status == FMU_OK && !(fabs(*counter - round(*counter)) < RUNS_WHOLE)) {
+            return fmu_say(f, FMU_ERROR, "a state that counts samples must be a whole number, not %.9g", *counter);
+        }
+        if (status == FMU_OK && (late > 0.0 || (*counter >= 1.0 && late < -period - moment))) {
+            *counter = fmax(*counter + ceil((late - moment) / period), 0.0);
+            for (late = 0.0; status == FMU_OK && late <= moment && *counter >= 1.0;) { /* the period has been rounded */
+                memcpy(f->trial, m->x, FMU_N_X * sizeof(double));
+                f->trial[FMU_CLOCK_COUNTER[i]] -= 1.0;
+                status = lateness(f, f->trial, i, &late);
+                *counter -= late <= moment ? 1.0 : 0.0;
+            }
+            status = status == FMU_OK ? lateness(f, m->x, i, &late) : status;
         }
         while (status == FMU_OK && late > 0.0) { /* rounding: its time is this one */
             *counter = fmax(nextafter(*counter, HUGE_VAL), *counter + late / period);

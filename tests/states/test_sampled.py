@@ -212,6 +212,68 @@ def test_units_of_values_and_periods(unit: str, period: str, fault: str | None, 
         loads(text, tmp_path).derive()
 
 
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "Radau", "LSODA", "many", "dae"])
+def test_clocks_whose_times_differ_by_rounding_keep_their_order(method: str, target: str) -> None:
+    """0.3 and 3 * 0.1 are neighbouring numbers: b, declared later, takes the new a at each of its times."""
+    m = eg.Model("cascade")
+    m.prismatic("slide", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    m.sampled("a", "1 - s - 2*s_dot", 0.1)
+    m.sampled("b", "a", 0.3)
+    m.actuator("motor", "s", value="b")
+    module = m.compile(target=target)
+    s = v = force = 0.0
+    for k in range(41):
+        force = 1 - s - 2 * v if k % 3 == 0 else force
+        h = 0.1 if k < 40 else 0.05
+        s, v = s + h * v + 0.5 * h * h * force, v + h * force
+    if method == "many":
+        found = module.simulate_many(4.05, count=2).x[0, 1]
+    elif method == "dae":
+        pytest.importorskip("sksundae")
+        found = module.dae.solve((0.0, 4.05), rtol=1e-9, atol=1e-11)["s"][-1]
+    else:
+        found = module.simulate(4.05, method=method)["s"][-1]
+    assert abs(found - s) < (1e-5 if method in ("LSODA", "dae") else 1e-11)
+
+
+def test_a_state_from_the_end_of_a_run_begins_anew_where_the_run_begins_earlier(module: Any) -> None:
+    first = module.simulate(1.0)
+    for span, wanted in ((0.32, [0.0, 0.1, 0.2, 0.3]), ((0.45, 0.62), [0.5, 0.6]), ((1.0, 1.15), [1.1])):
+        found = module.simulate(span, first.x[:, -1]).t_events["z_sampled"]
+        assert found == pytest.approx(wanted, abs=1e-13)
+    again = module.simulate((1.0, 1.5), first.x[:, -1], parameters={"T": 0.2})
+    assert again.t_events["z_sampled"][-2:] == pytest.approx([1.2, 1.4])
+    with pytest.raises(eg.UsageError, match="z_samples counts samples, so it must be a whole number, not 2.5"):
+        module.simulate(1.0, {"z_samples": 2.5})
+
+
+def test_verification_holds_sampled_states(module: Any) -> None:
+    assert not module.verify(states=2).breaches
+
+
+@pytest.mark.parametrize("step", [1e-3, 4e-3, 5e-3, 7e-3])
+def test_importers_of_fixed_steps_miss_no_sample(step: float, tmp_path: Path) -> None:
+    """Euler's method handles an event where its step ends, up to a step late."""
+    fmpy = pytest.importorskip("fmpy")
+    m = eg.Model("held")
+    m.prismatic("slide", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    m.sampled("u", "1 - s", 0.01)
+    m.actuator("motor", "s", value="u")
+    m.output("count", "u_samples")
+    path = m.derive().write_fmu(tmp_path / "held.fmu")
+    found = fmpy.simulate_fmu(
+        str(path),
+        fmi_type="ModelExchange",
+        solver="Euler",
+        step_size=step,
+        output_interval=step,
+        stop_time=1.0,
+        output=["count"],
+    )
+    assert found["count"][-1] >= 99
+
+
 @pytest.mark.parametrize("kind", ["ModelExchange", "CoSimulation"])
 @pytest.mark.parametrize("start", [0.0, 0.35])
 def test_units_sample_at_the_same_times(kind: str, start: float, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...describe.build_clocks import COUNTER, EVENT
 from ...describe.description import GROUND_NAME, Description
 from ...describe.element_states import states_of
 from ...describe.marker_quantities import MarkerQuantity
@@ -83,6 +84,9 @@ class _Renamed(Visitor):
         for entry in description.sections["forces"]:
             for name in states_of(entry):
                 self.words[name] = self.words[entry.name] + name[len(entry.name) :]
+        for entry in description.sections["states"]:
+            for ending in (COUNTER, EVENT) if "period" in entry.values else ():
+                self.words[entry.name + ending] = self.words[entry.name] + ending
         for name in velocities_of(description):
             if not name.endswith("_dot"):  # <joint>_wx
                 joint, _, suffix = name.rpartition("_")
