@@ -35,6 +35,8 @@ LEFT_OUT = {
     "simulation/solver_state": "checkpoint=",
     "simulation/steppers": "step and classes of solvers",
 }
+#: Types of the options that these take, which their signatures unpack.
+OPTIONS = ("SolverOptions",)
 OF_CLOCKS = ("simulation/clocks", "simulation/controllers")
 #: Classes whose methods users call.
 PUBLIC = (
@@ -79,6 +81,8 @@ def carry_slim(
         selection.reach(one.home or "", one.name)
     for name in CALLS:
         selection.reach(f"simulation/{name}", name)
+    for name in OPTIONS:
+        selection.reach("runtime/option_types", name)
     selection.follow(PUBLIC)
     called = {file for file, _ in PUBLIC}
     kept = [file for file in sorted(selection.files) if f"{file}.py" not in own]

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
 from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names
+from ..runtime.option_types import Number, SolverOptions
 from ..runtime.room import read_flag, require_room, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run, watch_run
@@ -27,7 +28,6 @@ from .tolerances import IMPLICIT, check_tolerances
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.option_types import Number, SolverOptions
     from ..runtime.trajectory import Trajectory
 
 OPTIONS = (
