@@ -71,7 +71,7 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
     if kind in ("profile", "smooth_profile"):
         return _profile(reader, path, given, 2 if kind == "profile" else 3)
     if kind in ("ellipsoid", "cuboid"):
-        key = "axes" if kind == "ellipsoid" else "size"
+        key = "semi_axes" if kind == "ellipsoid" else "size"
         lengths = _several(reader, f"{path}.{key}", given[key], 3)
         for k, x in enumerate(lengths or ()):
             _positive(reader, f"{path}.{key}[{k}]", x)

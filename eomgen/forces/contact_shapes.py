@@ -68,7 +68,7 @@ _SIZES: dict[str, Fields] = {
     },
     "half_space": {},
     "ellipsoid": {
-        "axes": Field("vector", "half axes along x, y and z (m)", required=True, dimension=LENGTH),
+        "semi_axes": Field("vector", "semi-axes along x, y and z (m)", required=True, dimension=LENGTH),
     },
     "cuboid": {"size": Field("vector", "lengths along x, y and z (m)", required=True, dimension=LENGTH)},
 }

@@ -17,7 +17,7 @@ ELASTIC = {"stiffness": STIFF}
 TURNED = Rotation.from_euler("xyz", (0.4, -0.8, 1.1))
 ROD = {"shape": "capsule", "length": 0.4, "radius": 0.05}
 SHAPES: dict[str, dict[str, Any]] = {
-    "ellipsoid": {"shape": "ellipsoid", "axes": (0.2, 0.1, 0.05)},
+    "ellipsoid": {"shape": "ellipsoid", "semi_axes": (0.2, 0.1, 0.05)},
     "cuboid": {"shape": "cuboid", "size": (0.4, 0.2, 0.1)},
     "capsule": ROD,
 }
@@ -131,7 +131,7 @@ def test_depth_on_a_half_space(kind: str) -> None:
             return float(n @ (centre + (turn * own).apply(local) - [0.1, -0.2, 0.3]))
 
         if kind == "ellipsoid":
-            axes = np.array(SHAPES[kind]["axes"])
+            axes = np.array(SHAPES[kind]["semi_axes"])
 
             def of_angles(s: np.ndarray, axes: Any = axes, height: Any = height) -> float:
                 round_ = np.array([np.cos(s[0]) * np.sin(s[1]), np.sin(s[0]) * np.sin(s[1]), np.cos(s[1])])
@@ -176,8 +176,8 @@ def test_lossless_runs_keep_their_energy(kind: str) -> None:
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        ({"shape": "ellipsoid", "axes": (1, 2)}, "three numbers"),
-        ({"shape": "ellipsoid", "axes": (1, 2, -1)}, r"axes\[2\]: is -1; must be greater than 0"),
+        ({"shape": "ellipsoid", "semi_axes": (1, 2)}, "three numbers"),
+        ({"shape": "ellipsoid", "semi_axes": (1, 2, -1)}, r"semi_axes\[2\]: is -1; must be greater than 0"),
         ({"shape": "cuboid", "size": (1, 0, 1)}, r"size\[1\]: is 0; must be greater than 0"),
         ({"shape": "cuboid"}, "size: is missing"),
     ],

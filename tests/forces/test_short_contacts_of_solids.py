@@ -21,7 +21,7 @@ def thrown(shape: dict[str, Any], other: dict[str, Any], target: str) -> Any:
 
 
 SOLIDS = {
-    "ellipsoid": ({"shape": "ellipsoid", "axes": [0.02, 0.3, 0.02]}, {"shape": "half_space"}),
+    "ellipsoid": ({"shape": "ellipsoid", "semi_axes": [0.02, 0.3, 0.02]}, {"shape": "half_space"}),
     "capsules": (
         {"shape": "capsule", "length": 0.8, "radius": 0.01},
         {"shape": "capsule", "length": 0.6, "radius": 0.01},

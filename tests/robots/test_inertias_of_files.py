@@ -271,7 +271,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
 def test_negative_masses_and_locks_that_are_no_numbers(tmp_path: Path) -> None:
     path = write(tmp_path, {})
     for value in (float("nan"), "x"):
-        with pytest.raises(eg.UsageError, match="lock=.*finite number"):
+        with pytest.raises(eg.UsageError, match="lock.*number"):
             eg.load(path, lock={"j": value})
     text = path.read_text()
     path.write_text(re.sub(r'<mass value="[^"]*"', '<mass value="-0.7"', text))

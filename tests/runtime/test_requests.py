@@ -43,7 +43,7 @@ def ending(times: Any) -> Any:
         ({"method": "RK4", "step": "fine"}, "step must be a number, not 'fine'"),
         ({"method": "RK4", "step": -0.1}, "step must be greater than 0 s, not -0.1"),
         ({"t_eval": "all"}, "t_eval must be a list of times in seconds, not 'all'"),
-        ({"t_eval": [0, "end"]}, "t_eval must be a list of times"),
+        ({"t_eval": [0, "end"]}, "t_eval must be a number, not 'end'"),
         ({"t_eval": {0: 1}}, "t_eval must be a list of times"),
         ({"method": ["RK45"]}, r"method must be a name or a subclass of OdeSolver, not \['RK45'\]"),
         ({"method": 3}, "method must be a name"),

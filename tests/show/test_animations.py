@@ -298,7 +298,7 @@ def test_a_range_at_one_time_moves_in_a_page_too(module: Any, tmp_path: Path) ->
 
 @pytest.mark.parametrize("dpi", ["x", 0, True, 1e6, float("nan")])
 def test_dots_are_a_sensible_number(run: Any, tmp_path: Path, dpi: Any) -> None:
-    with pytest.raises(UsageError, match="dpi must be a number from 1 to 1200"):
+    with pytest.raises(UsageError, match="dpi must be a number(?: from 1 to 1200)?, not"):
         run.animate(tmp_path / "a.gif", dpi=dpi)
 
 

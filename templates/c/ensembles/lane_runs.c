@@ -115,7 +115,7 @@ static void advance_nodes(eomgen_ensemble *e, lane_run *run, double direction, d
 }
 
 /* The step that each lane tries: its size with the sign of the run, 0 for those without a trajectory. */
-/* How long the next step of a lane may be, as eomgen_longest has it. */
+/* The longest step that a lane may take next, as eomgen_longest has it. */
 static EOMGEN_APART double longest_of(const eomgen_ensemble *e, const lane_run *run, int l, double direction, double least)
 {
     const eomgen_model *const model = e->model;
