@@ -258,9 +258,9 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
 
 def _check_place(reader: Reader, path: str, what: str, label: str) -> None:
     """Note what is wrong with a marker whose place or velocity is an initial value."""
-    marker = reader.markers.get(label) if "." in label else None
+    marker = reader.markers.get(label)
     if marker is None:
-        named = [known for known, marker in reader.markers.items() if "." in known and marker.body != GROUND]
+        named = [known for known, marker in reader.markers.items() if marker.body != GROUND]
         reader.faults.add(path, f"no marker {quoted(label)}", nearest(label, named, "markers"))
     elif marker.body == GROUND:
         kind = "velocity" if what.startswith("v") else "position"

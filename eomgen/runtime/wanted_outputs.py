@@ -162,20 +162,22 @@ def _scale(layout: Layout, unit: str, slopes: Array) -> float:
 
 
 def _marker(kernels: Kernels, name: str, what: str, marker: str) -> WantedPosition | WantedRate:
-    """A coordinate of a marker's place, or of its velocity."""
+    """A coordinate of the place of a marker or of a body's origin, or of its velocity."""
     layout, poses, axis = kernels.layout, kernels.state("poses"), "xyz".index(what[-1])
     data = load_show("data").read_picture(layout.metadata, kernels.context.p)
     marker = layout.plain(marker)  # leg.thigh.knee of an instance leg
-    if marker not in data.markers:
-        raise unknown("marker", marker, data.markers)
-    frame = data.markers[marker]
-    if frame.body < 0:
+    if marker not in data.markers and marker not in layout.bodies:
+        raise unknown("marker or body", marker, (*data.markers, *layout.bodies))
+    own = marker in data.markers
+    body = data.markers[marker].body if own else layout.bodies.index(marker)
+    place = data.markers[marker].position if own else np.zeros(3)
+    if body < 0:
         kind = "velocity" if what.startswith("v") else "position"
         raise UnknownNameError(f"{name!r} is a {kind} on the ground, which does not move")
 
     def value(q: Array, t: float) -> float:
-        pose = poses(q, t=t)[frame.body]
-        return float(pose[axis, :3] @ frame.position + pose[axis, 3])
+        pose = poses(q, t=t)[body]
+        return float(pose[axis, :3] @ place + pose[axis, 3])
 
     sizes = np.where([kind == "length" for kind in layout.coordinate_kinds], layout.length, 1.0)
 

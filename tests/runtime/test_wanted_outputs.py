@@ -55,7 +55,7 @@ def test_what_cannot_be_held_is_refused(crank: Any) -> None:
         crank.x0(pin_x=0.9)
     with pytest.raises(AssemblyError, match="2 values for 1 degree of freedom"):
         crank.x0(pin_x=0.42, theta=0.1)
-    with pytest.raises(UsageError, match=r"no marker 'rod\.tp'; did you mean rod\.tip"):
+    with pytest.raises(UsageError, match=r"no marker or body 'rod\.tp'; did you mean rod\.tip"):
         crank.x0({"x(rod.tp)": 0.4})
     with pytest.raises(UsageError, match="did you mean pin_x"):
         crank.x0(pinx=0.4)
@@ -213,7 +213,7 @@ def test_a_file_declares_places_of_markers_among_its_initial_values(target: str,
     ("name", "told"),
     [
         ("x(shank.toe)", r"initial.x\(shank.toe\): no marker 'shank.toe'; did you mean 'shank.foot'"),
-        ("x(shank)", "no marker 'shank'"),
+        ("x(shin)", "no marker 'shin'"),
         ("y(ground.wall)", "is a position on the ground, which does not move; name a marker of another body"),
         ("w(shank.foot)", "no coordinate, velocity or output"),
     ],
@@ -250,3 +250,18 @@ outputs: {height: -cos(phi)}
 guess: {phi: 0.5}
 initial: {INITIAL}
 """
+
+
+def test_a_body_stands_for_its_origin() -> None:
+    """The place and velocity of a body's origin as initial values, against the angles in closed form."""
+    m = eg.Model("arm")
+    first, second = (m.body(name, mass=1.0, inertia={"zz": 0.1}) for name in ("first", "second"))
+    m.revolute("A", m.ground, first, coordinate="a")
+    m.revolute("B", first.at(1.0, 0, 0), second.at(-0.5, 0, 0), coordinate="b")
+    m.initial(**{"x(second)": 0.9, "y(second)": 0.7, "vx(second)": 0.3, "vy(second)": -0.2})
+    x = m.compile(target="numpy").x0()
+    s, c, both = np.sin(x[0]), np.cos(x[0]), x[0] + x[1]
+    place = [c + 0.5 * np.cos(both), s + 0.5 * np.sin(both)]
+    rate = x[2] + x[3]
+    speed = [-s * x[2] - 0.5 * np.sin(both) * rate, c * x[2] + 0.5 * np.cos(both) * rate]
+    np.testing.assert_allclose([*place, *speed], [0.9, 0.7, 0.3, -0.2], atol=1e-10)
