@@ -27,7 +27,6 @@ LIBRARIES = {"NVRTC": ("cuda.bindings.nvrtc", "pip install '.[cuda]'")}
 
 def pytest_configure(config: pytest.Config) -> None:
     """Compiled modules go to a cache of this run: every test shares it, and the user's own stays as it is."""
-    os.environ.pop("COLUMNS", None)  # which some terminals set: texts have the width that they have in a file
     # a busy machine is slow, not wrong
     settings.register_profile("eomgen", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
     settings.load_profile("eomgen")

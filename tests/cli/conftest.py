@@ -35,6 +35,7 @@ Call = Callable[..., Result]
 def call(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Call:
     """Call the command as ``call("check", file)`` in an empty folder."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("COLUMNS", raising=False)  # readline, which pytest imports, sets it
 
     def run(*words: object) -> Result:
         with pytest.raises(SystemExit) as left:
