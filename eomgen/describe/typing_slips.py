@@ -28,6 +28,7 @@ _BESIDE = re.compile(rf"({_WORD}|{_NUMBER})\s+({_WORD}|{_NUMBER})")
 _LACKS = re.compile(r"(\*\*|//|[-+*/<>=.,])\s*$")
 _BARS = re.compile(r"\|([^|]+)\|")
 _ASSIGNED = re.compile(r"[^=<>!:]=(?!=)")
+LONGEST = 400  #: characters of a text that people type
 _KEYWORDS = frozenset(("and", "or", "not", "if", "else", "is", "in"))
 #: Signs of a keyboard or a formula -> what to write.
 SIGNS = {
@@ -48,7 +49,12 @@ class Typed(NamedTuple):
 
 
 def find_slip(text: str) -> Typed | None:
-    """The first slip of the table that the text has; None if it looks like none of them."""
+    """The first slip of the table that the text has; None if it looks like none of them, or is longer than people type.
+
+    Searches take the square of the length.
+    """
+    if len(text) > LONGEST:
+        return None
     return next((slip for slip in (look(text) for look in _LOOKS) if slip is not None), None)
 
 

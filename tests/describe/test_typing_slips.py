@@ -99,3 +99,8 @@ def test_units_of_the_message_are_those_of_a_parameter() -> None:
         m.revolute("A", m.ground, m.body("b", mass=1, inertia=(1, 1, 1)))
         value = m.compile(target="numpy").p[0]
         assert float(refused(text).remedy.split()[1].rstrip(",")) == pytest.approx(value, rel=1e-10)
+
+
+def test_long_texts_are_not_searched() -> None:
+    """A search of so many digits would take minutes."""
+    assert find_slip("1" * 100_000) is None
