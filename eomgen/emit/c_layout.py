@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..program import Program
-from ..program.blocks import ALONG, SHIFTS
+from ..program.block_groups import ALONG, SHIFTS
 from ..program.loop_slopes import BY_BODIES
 
 CLOSE = ("scaled", "cholesky", "residual_sizes", "correct", "project", "close")

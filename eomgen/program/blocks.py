@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from itertools import chain
 
 from ..graph.core import Expr
 from ..graph.differentiate import jvp
@@ -12,6 +11,7 @@ from ..graph.pair_calls import pairs_of_bodies
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from ..kernel_table import DAE, NAMED, Sizes
+from .block_groups import ALONG, COMPOSED, RATES, SHIFTS, flat
 from .body_loops import BodyLoops
 from .dae_rows import dae_kinematics
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
@@ -25,22 +25,7 @@ from .port_symbols import port_symbols
 from .program import Block, Limits, Port
 from .residuals import acceleration_residual, force_residual
 from .second_order import TreeHessian, hessian_product
-from .terms import Row, SystemTerms
-
-COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h, C_q and gamma are put together from
-RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
-
-#: Kernels that are derivatives by something other than the state -> what.
-SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}
-
-
-#: Kernels whose columns are derivatives along directions where they are not written out -> the block of one.
-ALONG = {"dae_jacobian": "dae_tangent", "inverse_dynamics_derivatives": "inverse_tangent"}
-
-
-def flat(rows: Sequence[Row]) -> Row:
-    """Rows one after the other."""
-    return tuple(chain.from_iterable(rows))
+from .terms import SystemTerms
 
 
 class BlockMaker:

@@ -16,7 +16,8 @@ from ..graph.pair_calls import has_pair_sums
 from ..graph.substitute import symbols_of
 from ..kernel_table import KERNELS, Kernel, Sizes
 from ..suggestions import hint, joined
-from .blocks import SHIFTS, BlockMaker
+from .block_groups import SHIFTS
+from .blocks import BlockMaker
 from .hoist import count_apart, hoist
 from .jacobian_blocks import sparsity
 from .program import Block, KernelDriver, Limits, Program

@@ -9,7 +9,6 @@ from ..describe.input_names import rate_of, split_rate
 from ..describe.mechanism import FirstOrderState, Input, Output, Parameter
 from ..equations.tree_equations import TreeEquations
 from ..equations.tree_slopes import ForceSlopes, can_differentiate
-from ..errors import UsageError
 from ..forces.branches import where
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -26,6 +25,7 @@ from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
 from .drawn import describe_picture
+from .event_terms import describe_events, resets
 from .factor import has_long_paths
 from .given_multipliers import multiplier_values
 from .rolling_discs import describe_discs
@@ -93,7 +93,7 @@ def collect_terms(
         turned=equations.turned,
         constrained=equations.constrained if c.labels else None,
         events=tuple(resolved([e.expression for e in kinematics.mechanism.events], kinematics, equations)),
-        resets=tuple(resolved([x for _, _, x in _resets(kinematics)], kinematics, equations)),
+        resets=tuple(resolved([x for _, _, x in resets(kinematics)], kinematics, equations)),
         input_rates=tuple(_rate_pairs(kinematics)),
         impacts=any(e.restitution is not None for e in kinematics.mechanism.events),
         projects=c.stabilised is None,
@@ -171,38 +171,6 @@ def _poses(kinematics: Kinematics) -> list[Expr]:
 def resolved_outputs(kinematics: Kinematics, equations: TreeEquations) -> list[Expr]:
     """Outputs in terms of the tree's q, v, a."""
     return resolved([o.expression for o in kinematics.mechanism.outputs], kinematics, equations)
-
-
-def _clocks(kinematics: Kinematics) -> list[dict[str, Any]]:
-    """Of each clock its event, the place of its counter in x, and the states that it renews."""
-    events = [event.name for event in kinematics.mechanism.events]
-    states = (*kinematics.names, *kinematics.velocity_names, *kinematics.state_names)
-    lawless = {s.name for s in kinematics.mechanism.states if s.sampled == kinematics.graph.symbol(s.name)}
-    return [
-        {
-            "event": events.index(c.event),
-            "counter": states.index(c.counter),
-            "states": list(c.states),
-            "open": [name for name in c.states if name in lawless],
-        }
-        for c in kinematics.mechanism.clocks
-    ]
-
-
-def _resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:
-    """Event, state and its new value, of all resets."""
-    names = (*kinematics.names, *kinematics.velocity_names, *kinematics.state_names)
-    places = {name: k for k, name in enumerate(names)}
-    found: list[tuple[int, int, Expr]] = []
-    for i, event in enumerate(kinematics.mechanism.events):
-        for name, value in event.reset:
-            if name not in places:
-                raise UsageError(
-                    f"events.{event.name}.reset: {name!r} belongs to a joint that is cut and follows from the others; "
-                    f"reset {', '.join(places)}"
-                )
-            found.append((i, places[name], value))
-    return found
 
 
 def resolved(given: list[Expr], kinematics: Kinematics, equations: TreeEquations) -> list[Expr]:
@@ -296,25 +264,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "system": _system(equations),
         "baumgarte": None if c.stabilised is None else list(c.stabilised),
         "dry_friction": {j.coordinates[0]: j.dry_friction for j in m.joints if j.dry_friction},
-        **(
-            {
-                "events": [
-                    {
-                        "name": e.name,
-                        "terminal": e.terminal,
-                        "direction": e.direction,
-                        "resets": bool(e.reset),
-                        "restitution": e.restitution,
-                        "doc": e.doc,
-                    }
-                    for e in m.events
-                ],
-                "resets": [[i, k] for i, k, _ in _resets(kinematics)],
-            }
-            if m.events
-            else {}
-        ),
-        **({"clocks": _clocks(kinematics)} if m.clocks else {}),
+        **describe_events(kinematics),
         **_signals(kinematics, equations),
         **({"input_rates": rates} if (rates := _input_rates(kinematics)) else {}),
         **({"constraint_inputs": used} if (used := _constraint_inputs(kinematics)) else {}),

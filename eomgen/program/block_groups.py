@@ -1,0 +1,23 @@
+"""Stage program, groups of blocks: what is composed, what belongs to given rates, and kernels made along directions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import chain
+
+from .terms import Row
+
+COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h, C_q and gamma are put together from
+RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
+
+#: Kernels that are derivatives by something other than the state -> what.
+SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}
+
+
+#: Kernels whose columns are derivatives along directions where they are not written out -> the block of one.
+ALONG = {"dae_jacobian": "dae_tangent", "inverse_dynamics_derivatives": "inverse_tangent"}
+
+
+def flat(rows: Sequence[Row]) -> Row:
+    """Rows one after the other."""
+    return tuple(chain.from_iterable(rows))
