@@ -14,7 +14,7 @@ from ..graph.core import Expr, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..limits.contacts import AT_REST
 from ..records import dataclass
-from .branches import where
+from .branches import beyond_zero, where
 
 BRISTLES = "lugre"  #: the law that has states
 #: Laws of dry friction.
@@ -206,8 +206,7 @@ class LuGre(DryFriction):
 
     def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
         squared = vec.dot(slip.velocity, slip.velocity)
-        moves = squared.graph.apply("lt", 0.0, squared)
-        speed = where(moves, sqrt(where(moves, squared, 1.0)), 0.0)  # the root has no slope at rest
+        speed = beyond_zero(squared, sqrt)  # the root has no slope at rest
         decay = self.stiffness * speed / _level(squared, self.dynamic, self.static, self.stribeck)
         relaxed = self.stiffness / self.damping
         touches = squared.graph.apply("lt", 0.0, slip.depth)

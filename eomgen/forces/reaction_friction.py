@@ -10,6 +10,7 @@ from ..elements.entry import Entry
 from ..elements.field import LAW, Field, Fields
 from ..graph.core import Expr, sqrt
 from ..records import dataclass
+from .branches import beyond_zero
 from .force import Force, Load, View
 from .friction_laws import Friction
 from .joint_reactions import reaction_symbol
@@ -40,7 +41,7 @@ class ReactionFriction(Force):
     def along(self, value: Expr, rate: Expr) -> Expr:
         graph = rate.graph
         x, y, z = (reaction_symbol(graph, self.joint, k) for k in range(3))
-        normal = size_across(x, y)
+        normal = beyond_zero(x * x + y * y, sqrt)  # whose slopes are 0 where no force acts
         if self.radius is not None:
             normal = self.radius * normal
         if self.thrust_radius is not None:
@@ -50,13 +51,6 @@ class ReactionFriction(Force):
 
     def loads(self, view: View) -> list[Load]:
         return self.path.loads(view, self.along(*self.path.measure(view)))
-
-
-def size_across(x: Expr, y: Expr) -> Expr:
-    """sqrt(x^2 + y^2), whose slopes are 0 where both are."""
-    squared = x * x + y * y
-    some = x.graph.apply("lt", 0.0, squared)
-    return x.graph.apply("select", some, sqrt(x.graph.apply("select", some, squared, 1.0)), 0.0)
 
 
 #: Keys of friction by the joint's reaction.
