@@ -192,8 +192,12 @@ def test_a_wheel_of_teeth_drives_a_pinned_bar() -> None:
     m.contacts("mesh", pin, {"shape": "sprocket", "on": wheel, **SPROCKET}, {"stiffness": 1e6, "dissipation": 0.5})
     mod = m.compile()
     traj = mod.simulate(1.0, rtol=1e-8, atol=1e-10)
-    lag = 0.002 / math.sin(math.radians(65))  # 2 mm between pin and seat, along the normal of the flank
-    assert traj["guide"][-1] == pytest.approx(reach * math.sin(0.05) - lag, abs=2e-5)
+    y, turn = traj["guide"][-1], 0.05
+    to_flank = turn + math.pi + math.radians(65)  # the direction from the middle of the seat to the flank below the pin
+    d = np.array([math.cos(to_flank), math.sin(to_flank)])
+    pushed = (np.array([reach, y]) - reach * np.array([math.cos(turn), math.sin(turn)])) @ d - 0.002
+    force = 100.0 * y + 20.0 * traj["guide_dot"][-1]
+    assert force / -d[1] == pytest.approx(1e6 * pushed**1.5, rel=1e-2)  # 2 mm between pin and seat
 
 
 def test_what_is_wrong_with_an_outline_is_told() -> None:
