@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ..errors import UsageError
+from ..graph.shown import shown
 from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
 from .described import Described
@@ -366,12 +367,16 @@ class ForceHandle:
 
 
 class Settings(dict[str, Any]):
-    """A mapping that can also be called with keywords to add to it: ``model.initial(theta=0.3)``."""
+    """A mapping that is also called to add to it: ``model.initial(theta=0.3)``, ``initial({"arm.theta": 0.3})``."""
 
-    def __call__(self, *unnamed: Any, **values: Any) -> None:
-        """Set the given entries and keep the others."""
-        if unnamed:
-            raise UsageError(f"values are given by name, as in initial(theta=0.3), not as {unnamed[0]!r} alone")
+    def __call__(self, *mappings: Mapping[str, Any], **values: Any) -> None:
+        """Set the given entries, those of mappings first, and keep the others."""
+        for given in mappings:
+            if not isinstance(given, Mapping):
+                told = f"values are given by name, as in initial(theta=0.3) or a mapping, not as {shown(given)} alone"
+                raise UsageError(told)
+        for given in mappings:
+            self.update(given)
         self.update(values)
 
 

@@ -185,6 +185,18 @@ def test_settings_are_set_and_read() -> None:
     assert (mechanism.simulation.rtol, mechanism.simulation.end) == (1e-6, 10.0)
 
 
+def test_initial_values_are_given_as_a_mapping_too() -> None:
+    """As names of instances have points, which keywords have not."""
+    leg = Model("leg")
+    leg.revolute("hinge", leg.ground, leg.body("shank", mass=1, inertia={"zz": 0.1}))
+    m = Model("walker")
+    m.add(leg, "left_")
+    m.initial({"left.hinge": 0.3}, left_hinge_dot=2)
+    assert m.compile(target="numpy").x0().tolist() == [0.3, 2.0]
+    with pytest.raises(UsageError, match=r"as in initial\(theta=0.3\) or a mapping, not as 3 alone"):
+        m.initial(3)
+
+
 def test_an_output_may_repeat_its_coordinate() -> None:
     def add(m: Model) -> None:
         theta = m.revolute("theta", m.ground, "b").coordinate
