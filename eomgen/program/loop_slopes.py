@@ -17,6 +17,7 @@ from functools import cached_property
 from ..equations.articulated import ConstraintRow
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
+from ..graph.pair_calls import list_operands
 from ..graph.substitute import substitute
 from ..graph.traverse import reachable
 from ..limits.constraints import TIKHONOV
@@ -156,7 +157,8 @@ class LoopSlopes:
             elif kind != "sym":
                 if not turning.isdisjoint(args):
                     turning.add(i)
-                    found.update(dict.fromkeys(k for k in args if k not in turning and k not in fixed))
+                    needed = [j for k in args if k not in turning for j in list_operands(graph, k)]
+                    found.update(dict.fromkeys(k for k in needed if k not in fixed))
                 elif fixed.issuperset(args):
                     fixed.add(i)
         found.update(dict.fromkeys(i for i in both if i not in turning and i not in fixed))
