@@ -110,7 +110,8 @@ def undercarriage(m: eg.Model, track: Track, mass: float, inertia: float, ground
     m.parameter("slip", 0.02, unit="m/s", doc="sliding from which friction is full")
     m.parameter("pretension", 40e3, unit="N", doc="of the spring behind the idlers")
     m.parameter("recoil", 1e6, unit="N/m", doc="its stiffness")
-    m.parameter("gain", 4e5, doc="torque of the motors for a lack of speed (N m s)")
+    m.parameter("gain", 1e5, doc="torque of the motors for a lack of speed (N m s)")
+    m.parameter("rotors", 100.0, doc="inertia of the motors behind their gears (kg m^2)")
     m.parameter("relief", 66e3, unit="N*m", doc="most that the motors give")
     m.input("speed", 0.0)
     one = dict(zip(("link", "roller", "carrier", "idler", "sprocket"), track.masses, strict=True))
@@ -119,12 +120,12 @@ def undercarriage(m: eg.Model, track: Track, mass: float, inertia: float, ground
     frame = m.body("frame", mass=mass, inertia={"zz": inertia})
     m.planar("frame", m.ground, frame, coordinates=["x", "y", "pitch"])
 
-    def wheel(name: str, at: Any, kind: str, radius: float, axis: Any = None) -> Any:
+    def wheel(name: str, at: Any, kind: str, radius: float, **keys: Any) -> Any:
         body = m.body(name, mass=one[kind], inertia={"zz": 0.5 * one[kind] * radius**2})
-        m.revolute(name, at, body, axis=axis)
+        m.revolute(name, at, body, **keys)
         return body
 
-    sprocket = wheel("sprocket", frame.at(-track.half, 0, 0), "sprocket", track.sprocket, axis=(0, 0, -1))
+    sprocket = wheel("sprocket", frame.at(-track.half, 0, 0), "sprocket", track.sprocket, axis=(0, 0, -1), armature="rotors")
     slide = m.body("slide", mass=0.2 * one["idler"])
     m.prismatic("tensioner", frame.at(idler, 0, 0), slide, axis="x")
     m.element("recoil_spring", joint="tensioner", law="pretension - recoil*length - 2e4*rate")

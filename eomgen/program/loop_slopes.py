@@ -24,7 +24,7 @@ from ..limits.constraints import TIKHONOV
 from .body_loops import BodyLoops
 from .program import Block, Port
 from .residuals import acceleration_residual, force_residual
-from .sparse import SparseFactor, times, transpose
+from .sparse import SparseFactor, in_parts, times, transpose
 
 Outputs = list[Expr]
 
@@ -59,7 +59,8 @@ class LoopSlopes:
         columns = transpose(J, self.terms.n_v)
         for _ in range(passes):
             e = [a + b for a, b in zip(r, times(self.loops.rows[:rows], x), strict=True)]
-            x = [a - k * b for a, k, b in zip(x, s, times(columns, factor.solve(e)), strict=True)]
+            dz = times(columns, factor.solve(e))
+            x = [a - k * b for a, k, b in in_parts(list(zip(x, s, dz, strict=True)), x)]
         return x
 
     def _at_rest(self, rows: int) -> list[Expr]:
