@@ -7,8 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..graph.core import Expr
-from ..graph.pair_calls import pair_call
-from ..graph.traverse import reachable
 from ..program import Block, Program
 from .c_text import ARGUMENTS, SIGNATURE, BlockPrinter, Printed, direct_results, function_text
 from .rolled import Place, SegmentKind, Segments, find_segments
@@ -41,8 +39,6 @@ def _print(
     texts: dict[int, str],
 ) -> Printed | None:
     graph = program.graph
-    if any(pair_call(graph, graph.nodes[i][0]) for i in reachable(graph, [y.id for y in (*outputs, *checks)])):
-        return None  # the lists of sums over pairs have places of their own in the work
     given = {i: _place(text) for i, text in texts.items()}
     longest = max(1, program.limits.statements // 2)
     found = find_segments(graph, outputs, checks, skipped, given, longest)
@@ -96,8 +92,35 @@ def _place(text: str) -> Place:
     return (text, 0) if text == "t" else (text[0], int(text[2:-1]))
 
 
+def _print_list(found: Segments, i: int, name: str) -> str:
+    """A function that makes a list of a sum over pairs."""
+    by_array: dict[str, list[tuple[int, float]]] = {}
+    for place, operand in found.lists.fills(i):
+        array, at = found.places[operand]
+        by_array.setdefault(array, []).append((place, at))
+    tables, filled = "", []
+    for array, pairs in by_array.items():
+        to = f"{name}_to_{array}"
+        tables += f"EOMGEN_SHARED const int {to}[{len(pairs)}] = {{\n{_lines([place for place, _ in pairs])}\n}};\n"
+        value = "t"
+        if array != "t":
+            kind, form = ("double", "same({})") if array == "const" else ("int", f"{array}[{{}}]")
+            source = f"{name}_from_{array}"
+            tables += (
+                f"EOMGEN_SHARED const {kind} {source}[{len(pairs)}] = {{\n{_lines([at for _, at in pairs])}\n}};\n"
+            )
+            value = form.format(f"{source}[i]")
+        filled.append(f"for (int i = 0; i < {len(pairs)}; i++) {{ w[{to}[i]] = {value}; }}")
+    unused = " ".join(f"(void){a};" for a in ("out", *({"t", "x", "u", "c"} - set(by_array)), "first", "last"))
+    lines = "\n".join(f"    {line}" for line in (unused, *found.lists.lines(i, filled)))
+    head = f"static EOMGEN_APART flag {name}({SIGNATURE}, int first, int last)"
+    return f"{tables}{head}\n{{\n    EOMGEN_BEGIN\n{lines}\n    EOMGEN_RETURN\n}}\n"
+
+
 def _print_kind(program: Program, found: Segments, kind: SegmentKind, name: str) -> str:
     """A function that evaluates members ``first`` to ``last`` of a kind."""
+    if found.lists.is_list(kind.members[0][0]):
+        return _print_list(found, kind.members[0][0], name)
     n = len(kind.members)
     table = PlaceTable("i", n)
     numbers: dict[tuple[float, ...], int] = {}
@@ -131,6 +154,7 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, name: str)
     checks = found.checks.intersection(statements)
     inlined = conditions(program.graph, statements, kept, checks)
     printer = BlockPrinter(program, fixed, Pieces((), (), (), 0))
+    printer.lists = found.lists
     lines = printer.lines(PrintedFunction(statements, loads, stores, results, checks, inlined))
     head = [f"const int *restrict const i = {name}_places[m];"] if table.rows else []
     head += [f"const double *restrict const k = {name}_numbers[m];"] if numbers else []
@@ -201,5 +225,5 @@ def _print_runs(runs: Sequence[tuple[int, int]], name: str, kinds: int) -> tuple
     ]
 
 
-def _lines(numbers: Sequence[int]) -> str:
+def _lines(numbers: Sequence[float]) -> str:
     return ",\n".join("    " + ", ".join(map(str, numbers[k : k + ROW])) for k in range(0, len(numbers), ROW))

@@ -89,7 +89,7 @@ class BlockPrinter:
         kind = node[0]
         if self.lists.call(i) is not None:
             self.used.add("w")
-            return self.lists.item(i)
+            return f"w[{self.lists.place(i)}]"
         if kind in self._calls:
             function, orders = self._calls[kind]
             return f"{each_name(function.name, orders)}({', '.join(map(self.real, node[1:]))})"
@@ -123,7 +123,7 @@ class BlockPrinter:
         if self.lists.is_list(i):
             self._load(i, piece, loaded, result)
             self.used.add("w")
-            result += self.lists.lines(i, self.real)
+            result += self.lists.lines(i, [f"w[{place}] = {self.real(x)};" for place, x in self.lists.fills(i)])
             return
         if i not in piece.inlined:
             self._load(i, piece, loaded, result)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Sequence
 
 from ..graph.core import Graph
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
@@ -62,36 +62,51 @@ class PairLists:
         """Whether a node is a list, which has no variable."""
         return i in self._places
 
-    def item(self, i: int) -> str:
-        """An entry of a list."""
+    @property
+    def every(self) -> Sequence[int]:
+        """All lists."""
+        return list(self._places)
+
+    def place(self, i: int) -> int:
+        """Where in the work an entry of a list stands."""
         call = self.call(i)
         assert call is not None
-        return f"w[{self._places[self._graph.nodes[i][1]] + call.numbers[0]}]"
+        return self._places[self._graph.nodes[i][1]] + call.numbers[0]
 
-    def lines(self, i: int, text: Callable[[int], str]) -> list[str]:
-        """The statements that make a list; ``text`` writes an operand."""
+    def fills(self, i: int) -> list[tuple[int, int]]:
+        """Which operands go where in the work before a list is made."""
+        call, operands = self.call(i), self._graph.nodes[i][1:]
+        assert call is not None
+        function, place = call.function, self._places[i]
+        if call.part == "given":
+            start = POSE * function.bodies
+            return [(place + k, x) for k, x in enumerate(operands) if k < start or function.data[k - start] is None]
+        if call.part == "meeting":
+            return [(place + MEETING + k, x) for k, x in enumerate(operands[1:])]
+        if call.part == "slope":
+            rates = self._rates[function.name]
+            return [(rates + k, x) for k, x in zip(call.numbers, operands[1:], strict=True)]
+        return []
+
+    def lines(self, i: int, filled: Sequence[str]) -> list[str]:
+        """The statements that make a list; ``filled`` are those that copy its operands (:meth:`fills`)."""
         call, operands = self.call(i), self._graph.nodes[i][1:]
         assert call is not None
         function, place, work = call.function, self._places[i], self._work
         if call.part == "given":
             start = POSE * function.bodies
-            moving = [(k, x) for k, x in enumerate(operands) if k < start or function.data[k - start] is None]
             numbers = f"pairs_{function.name}_numbers[i]"
-            return [
-                f"for (int i = 0; i < {len(function.data)}; i++) {{ w[{place + start} + i] = same({numbers}); }}",
-                *(f"w[{place + k}] = {text(x)};" for k, x in moving),
-            ]
+            head = f"for (int i = 0; i < {len(function.data)}; i++) {{ w[{place + start} + i] = same({numbers}); }}"
+            return [head, *filled]
         given = self._places[operands[0]]
         if call.part == "sum":
             return [f"pairs_{function.name}_sum(w + {given}, w + {place}, w + {work});"]
         if call.part == "meeting":
-            return [
-                *(f"w[{place + MEETING + k}] = {text(x)};" for k, x in enumerate(operands[1:])),
-                f"pairs_{function.name}_meeting(w + {given}, w + {place + MEETING}, w + {place}, w + {work});",
-            ]
+            after = f"w + {place + MEETING}, w + {place}, w + {work}"
+            return [*filled, f"pairs_{function.name}_meeting(w + {given}, {after});"]
         rates = self._rates[function.name]
         return [
             f"for (int i = 0; i < {function.count}; i++) {{ w[{rates} + i] = same(0.0); }}",
-            *(f"w[{rates + k}] = {text(x)};" for k, x in zip(call.numbers, operands[1:], strict=True)),
+            *filled,
             f"pairs_{function.name}_slope(w + {given}, w + {rates}, w + {place}, w + {work});",
         ]

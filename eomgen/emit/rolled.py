@@ -16,6 +16,7 @@ from ..graph.core import Expr, Graph
 from ..graph.traverse import LEAVES, parts, reachable
 from ..records import dataclass
 from .angles import CIRCULAR
+from .pair_statements import PairLists
 
 FEW = 3  #: segments of fewer members are not worth a loop
 
@@ -63,6 +64,8 @@ class Segments:
     results : mapping of int to tuple of int
         Node id -> places in the result.
     checks : frozenset of int
+    lists : PairLists
+        Of sums over pairs; each is a segment of its own.
     work : int
     """
 
@@ -72,6 +75,7 @@ class Segments:
     places: Mapping[int, Place]
     results: Mapping[int, tuple[int, ...]]
     checks: frozenset[int]
+    lists: PairLists
     work: int
 
     @property
@@ -119,32 +123,52 @@ def find_segments(
     known.update((i, ("const", nodes[i][1])) for i in every if nodes[i][0] == "const")
     slot = {a: k for k, a in enumerate(angles)}
     known.update((i, ("w", slot[nodes[i][1]] + (len(angles) if nodes[i][0] == "cos" else 0))) for i in turning)
-    early = set(turning)
+    lists = PairLists(graph, statements, 2 * len(angles))
+    items = {i for i in statements if lists.call(i) is not None and not lists.is_list(i)}
+    known.update((i, ("w", lists.place(i))) for i in items)
+    alone = {*lists.every, *(items & kept)}
+    early = {*turning, *(items - kept)}
     left = [i for i in statements if i not in early]
     results = {i: tuple(at) for i, at in places.items()}
-    reader = SegmentReader(graph, known, results, checked)
-    groups = _grouped(graph, [(number, tuple(part)) for number, part in parts(graph, left)])
+    reader = SegmentReader(graph, known, results, checked, alone)
+    groups = _grouped(graph, _apart(parts(graph, left), alone), items, alone)
     common = _common(reader, [tuple(chain.from_iterable(group)) for group in groups])
     segments: list[tuple[int, ...]] = []
     for group, alike in zip(groups, common, strict=True):
         segments += [tuple(chain.from_iterable(group))] if alike else group
-    segments = _merged(segments, _common(reader, segments), longest)
+    segments = _merged(
+        segments, [s[0] in alone or c for s, c in zip(segments, _common(reader, segments), strict=True)], longest
+    )
     read = [reader.read(segment) for segment in segments]
-    return _laid_out(segments, read, tuple(angles), known, results, checked)
+    return _laid_out(segments, read, tuple(angles), known, results, checked, lists)
 
 
-def _grouped(graph: Graph, every: Sequence[tuple[int, tuple[int, ...]]]) -> list[list[tuple[int, ...]]]:
+def _apart(every: Sequence[tuple[int, Sequence[int]]], alone: Collection[int]) -> list[tuple[int, tuple[int, ...]]]:
+    """Segments cut so that some statements are segments of their own."""
+    found: list[tuple[int, tuple[int, ...]]] = []
+    for number, part in every:
+        for by_itself, grouped in groupby(part, key=alone.__contains__):
+            run = tuple(grouped)
+            found += [(0, (i,)) for i in run] if by_itself else [(number, run)]
+    return found
+
+
+def _grouped(
+    graph: Graph, every: Sequence[tuple[int, tuple[int, ...]]], items: Collection[int], alone: Collection[int]
+) -> list[list[tuple[int, ...]]]:
     """Segments of several passes over one body together, as far as what they read allows.
 
-    A segment goes to the last group that it reads from, unless that holds one of the same pass.
+    A segment goes to the last group that it reads from, unless that holds one of the same pass, or a list.  Entries of
+    lists (``items``) are there when their list is.
     """
     nodes = graph.nodes
     groups: list[list[tuple[int, ...]]] = []
     passes: list[set[int]] = []
     home: dict[int, int] = {}
     for number, segment in every:
-        last = max((home.get(j, -1) for i in segment for j in nodes[i][1:]), default=-1)
-        if last < 0 or not number or number in passes[last]:
+        read = (nodes[j][1] if j in items else j for i in segment for j in nodes[i][1:])
+        last = max((home.get(j, -1) for j in read), default=-1)
+        if last < 0 or not number or number in passes[last] or groups[last][0][0] in alone:
             last = len(groups)
             groups.append([])
             passes.append(set())
@@ -182,8 +206,10 @@ class SegmentReader:
         known: Mapping[int, Place],
         results: Mapping[int, tuple[int, ...]],
         checked: Collection[int],
+        alone: Collection[int],
     ) -> None:
         self.nodes, self.known, self.results, self.checked = graph.nodes, known, results, checked
+        self.alone = alone
         self.found: dict[tuple[int, ...], tuple[Signature, tuple[int, ...]]] = {}
 
     def read(self, segment: tuple[int, ...]) -> tuple[Signature, tuple[int, ...]]:
@@ -199,8 +225,10 @@ class SegmentReader:
         signature: list[object] = []
         for i in segment:
             node = nodes[i]
-            signature.append(node[0])
+            signature.append((node[0], i) if i in self.alone else node[0])
             for j in node[1:]:
+                if j in self.alone and j not in self.known:
+                    continue  # a list
                 at = local.get(j)
                 if at is None:
                     at = numbers.get(j)
@@ -223,6 +251,7 @@ def _laid_out(
     known: dict[int, Place],
     results: Mapping[int, tuple[int, ...]],
     checked: frozenset[int],
+    lists: PairLists,
 ) -> Segments:
     """Where every value goes that a later segment reads."""
     number: dict[Signature, int] = {}
@@ -241,7 +270,7 @@ def _laid_out(
                 use = (kind_of[s], at)
                 if use < first[k].get(index, (len(number), 0)):
                     first[k][index] = use
-    work = 2 * len(angles)
+    work = lists.end
     kinds = []
     for k, of in enumerate(members):
         exports = tuple(sorted(first[k], key=first[k].__getitem__))
@@ -251,4 +280,4 @@ def _laid_out(
         kinds.append(SegmentKind(tuple(segments[s] for s in of), tuple(read[s][1] for s in of), exports, work))
         work += len(of) * len(exports)
     runs = tuple((k, len(list(run))) for k, run in groupby(kind_of))
-    return Segments(tuple(kinds), runs, angles, known, results, checked, work)
+    return Segments(tuple(kinds), runs, angles, known, results, checked, lists, work)

@@ -143,7 +143,7 @@ class ContactGroups(Force):
         frame = Frame(vec.identity(graph), vec.zero(graph))
         markers = [Marker(body, frame, labels[body]) for body in bodies]
         operands: list[Expr] = []
-        for marker in markers:
+        for marker in graph.marked(markers):
             rotation = [x for row in view.rotation(marker) for x in row]
             moving = (view.velocity(marker), view.angular_velocity(marker))
             operands += [*view.position(marker), *rotation]

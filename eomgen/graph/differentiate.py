@@ -13,7 +13,7 @@ from ..operations import OPERATIONS, operations_with
 from .core import Expr, Graph
 from .pair_calls import is_pair_item, pair_call, push_pairs
 from .slopes import half_power_slope, partials
-from .traverse import LEAVES, common_graph, parts, reachable
+from .traverse import LEAVES, common_graph, marked_again, reachable
 
 
 def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict[int, int]) -> None:
@@ -218,13 +218,8 @@ def jvp(outputs: Sequence[Expr], seeds: Mapping[Expr, Expr]) -> list[Expr]:
     order = reachable(g, (y.id for y in outputs))
     tangents = {x.id: dx.id for x, dx in seeds.items() if not dx.is_zero}
     slopes: dict[int, int] = {}
-    passes: dict[int, int] = {0: 0}
-    for number, part in parts(g, order):
-        if number not in passes:
-            passes[number] = g.begin_pass()
-        g.mark(passes[number])
+    for part in marked_again(g, order):
         _push(g, part, tangents, slopes)
-    g.mark()
     return [Expr(g, tangents.get(y.id, g.zero.id)) for y in outputs]
 
 
@@ -356,7 +351,9 @@ def _reverse_jacobian(g: Graph, roots: Sequence[int], wrt: Sequence[Expr]) -> di
         if root not in active:
             continue
         adjoints = {root: g.one.id}
-        _pull(g, [i for i in reachable(g, [root]) if i in active], active, adjoints, [])
+        order = [i for i in reachable(g, [root]) if i in active]
+        for part in marked_again(g, order, backwards=True):
+            _pull(g, part, active, adjoints, [])
         for column, x in enumerate(wrt):
             d = adjoints.get(x.id, g.zero.id)
             if d != g.zero.id:

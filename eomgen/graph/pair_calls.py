@@ -230,6 +230,12 @@ def is_pair_item(graph: Graph, operation: str) -> bool:
     return call is not None and call.part == "item"
 
 
+def list_operands(graph: Graph, i: int) -> tuple[int, ...]:
+    """A node itself, or what the list of operands that it is holds: a list is no number that a block can hand on."""
+    call = pair_call(graph, graph.nodes[i][0])
+    return graph.nodes[i][1:] if call is not None and call.part == "given" else (i,)
+
+
 def _node(graph: Graph, call: PairCall, operation: str, ids: Sequence[int]) -> int:
     graph.calls[operation] = (call, ())  # type: ignore[assignment]
     return graph._node((operation, *ids))

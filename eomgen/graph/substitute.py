@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from .core import Expr
-from .traverse import common_graph, reachable
+from .traverse import common_graph, marked_again, reachable
+
+FEW = 256  #: nodes that are not worth parts of their own
 
 
 def substitute(outputs: Sequence[Expr], mapping: Mapping[Expr, Expr]) -> list[Expr]:
@@ -29,15 +31,17 @@ def substitute(outputs: Sequence[Expr], mapping: Mapping[Expr, Expr]) -> list[Ex
     nodes, make = graph.nodes, graph.make
     new = {old.id: replacement.id for old, replacement in mapping.items()}
     replaced = frozenset(new)
-    for i in reachable(graph, (y.id for y in outputs), stop=replaced):
-        node = nodes[i]
-        if i in replaced or node[0] in ("const", "sym"):
-            continue
-        old: tuple[int, ...] = node[1:]
-        for k in old:
-            if k in new:
-                new[i] = make(node[0], *[new.get(j, j) for j in old])
-                break
+    order = reachable(graph, (y.id for y in outputs), stop=replaced)
+    for part in [order] if len(order) < FEW else marked_again(graph, order):
+        for i in part:
+            node = nodes[i]
+            if i in replaced or node[0] in ("const", "sym"):
+                continue
+            old: tuple[int, ...] = node[1:]
+            for k in old:
+                if k in new:
+                    new[i] = make(node[0], *[new.get(j, j) for j in old])
+                    break
     return [Expr(graph, new.get(y.id, y.id)) for y in outputs]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 
 from .core import Expr, Graph
 from .nodes import Node
@@ -59,13 +59,29 @@ def reachable(graph: Graph, roots: Iterable[int], stop: Container[int] = ()) -> 
 def parts(graph: Graph, ids: Sequence[int]) -> list[tuple[int, Sequence[int]]]:
     """Ids in ascending order, cut where the graph has marks, each with the number of its pass; none is empty."""
     found: list[tuple[int, Sequence[int]]] = []
-    start = number = 0
-    for mark, following in [*graph.marks, (len(graph.nodes), 0)]:
+    if not ids:
+        return found
+    first = bisect_left(graph.marks, (ids[0] + 1,))
+    last = bisect_left(graph.marks, (ids[-1] + 1,))
+    start, number = 0, graph.marks[first - 1][1] if first else 0
+    for mark, following in [*graph.marks[first:last], (len(graph.nodes), 0)]:
         end = bisect_left(ids, mark, start)
         if end > start:
             found.append((number, ids[start:end]))
         start, number = end, following
     return found
+
+
+def marked_again(graph: Graph, ids: Sequence[int], backwards: bool = False) -> Iterator[Sequence[int]]:
+    """Ids in ascending order by parts, the last first if asked; what is made of each is a part of its own."""
+    passes: dict[int, int] = {0: 0}
+    found = parts(graph, ids)
+    for number, part in reversed(found) if backwards else found:
+        if number not in passes:
+            passes[number] = graph.begin_pass()
+        graph.mark(passes[number])
+        yield part
+    graph.mark()
 
 
 def common_graph(*groups: Sequence[Expr]) -> Graph | None:

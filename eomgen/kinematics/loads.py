@@ -14,7 +14,7 @@ def applied_wrenches(kinematics: Kinematics) -> list[Wrench]:
     graph, poses = kinematics.graph, kinematics.poses
     total: list[Wrench] = [(vec.zero(graph), vec.zero(graph)) for _ in kinematics.links]
     for terms in graph.marked(kinematics.forces):
-        for load in terms.marker_loads:
+        for load in graph.marked(terms.marker_loads):
             if load.marker.body == GROUND:
                 continue
             k = poses.link_of[load.marker.body]

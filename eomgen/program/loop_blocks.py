@@ -16,7 +16,7 @@ from ..graph.core import Expr
 from ..limits.constraints import GENTLE, LEFT, TIKHONOV, UNMOVED
 from ..limits.crossings import NEAR_SQUARE
 from ..limits.rounding import ROW
-from .sparse import Row, SparseFactor, dot, factorize, fill, gram, rows_of, times, transpose
+from .sparse import Row, SparseFactor, dot, factorize, fill, gram, in_parts, rows_of, times, transpose
 from .terms import SystemTerms
 
 NOTHING = 1e-100  #: what is this small need not be told from 0
@@ -156,7 +156,7 @@ class LoopBlocks(ABC):
         for _ in range(passes[order - 1]):
             e = [a + b for a, b in zip(r, times(self.rows, x), strict=True)]
             dz = times(columns, factor.solve(e))
-            x = [a - s * b for a, s, b in zip(x, self.s, dz, strict=True)]
+            x = [a - s * b for a, s, b in in_parts(list(zip(x, self.s, dz, strict=True)), x)]
         if self.gentle:
             graph = self.terms.graph
             left = total_magnitude([a + b for a, b in zip(r, times(self.rows, x), strict=True)]) * self.unit

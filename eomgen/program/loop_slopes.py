@@ -17,13 +17,14 @@ from functools import cached_property
 from ..equations.articulated import ConstraintRow
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
+from ..graph.pair_calls import list_operands
 from ..graph.substitute import substitute
 from ..graph.traverse import reachable
 from ..limits.constraints import TIKHONOV
 from .body_loops import BodyLoops
 from .program import Block, Port
 from .residuals import acceleration_residual, force_residual
-from .sparse import SparseFactor, times, transpose
+from .sparse import SparseFactor, in_parts, times, transpose
 
 Outputs = list[Expr]
 
@@ -58,7 +59,8 @@ class LoopSlopes:
         columns = transpose(J, self.terms.n_v)
         for _ in range(passes):
             e = [a + b for a, b in zip(r, times(self.loops.rows[:rows], x), strict=True)]
-            x = [a - k * b for a, k, b in zip(x, s, times(columns, factor.solve(e)), strict=True)]
+            dz = times(columns, factor.solve(e))
+            x = [a - k * b for a, k, b in in_parts(list(zip(x, s, dz, strict=True)), x)]
         return x
 
     def _at_rest(self, rows: int) -> list[Expr]:
@@ -156,7 +158,8 @@ class LoopSlopes:
             elif kind != "sym":
                 if not turning.isdisjoint(args):
                     turning.add(i)
-                    found.update(dict.fromkeys(k for k in args if k not in turning and k not in fixed))
+                    needed = [j for k in args if k not in turning for j in list_operands(graph, k)]
+                    found.update(dict.fromkeys(k for k in needed if k not in fixed))
                 elif fixed.issuperset(args):
                     fixed.add(i)
         found.update(dict.fromkeys(i for i in both if i not in turning and i not in fixed))

@@ -37,6 +37,10 @@ class Limits:
     #: spatial chains, microseconds of loops and of text without: 3.2 and 3.0 at 12,000 operations, 6.1 and 6.5 at
     #: 25,000, 23 and 32 at 103,000, where text without loops takes 10 times as long to compile.
     rolled: int = 16_000
+    #: The same where all functions together are longer than ``long``, so that they take long to compile.  Measured
+    #: (benchmarks/tracks.py) on a chain of 49 links round wheels: 13 s of work to compile it instead of 36 s.
+    rolled_of_long: int = 2_500
+    long: int = 100_000
 
 
 @dataclass(frozen=True)
@@ -162,7 +166,8 @@ class Program:
 
     def is_rolled(self, name: str) -> bool:
         """Whether a block, or ``precompute``, is so long that what is alike in it is written once."""
-        return self.counts[name].total > self.limits.rolled
+        long = sum(counted.total for counted in self.counts.values()) > self.limits.long
+        return self.counts[name].total > (self.limits.rolled_of_long if long else self.limits.rolled)
 
     @property
     def twins(self) -> dict[str, str]:

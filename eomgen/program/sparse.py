@@ -6,12 +6,15 @@ cost the same each, however many there are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
 
 from ..graph.core import Expr
 from ..records import dataclass
 
 Row = dict[int, Expr]  #: column -> entry; zeros left out
+Alike = TypeVar("Alike")
+FEW = 6  #: rows or terms that are not worth parts of their own
 
 
 def rows_of(matrix: Sequence[Sequence[Expr]]) -> list[Row]:
@@ -37,12 +40,17 @@ def dot(a: Mapping[int, Expr], b: Mapping[int, Expr]) -> Expr | None:
     return None if total is None or total.is_zero else total
 
 
+def in_parts(alike: Sequence[Alike], x: Sequence[Expr]) -> Iterable[Alike]:
+    """Rows or terms that are treated alike; many of them as parts of the graph of x, whose code is written once."""
+    return x[0].graph.marked(alike) if len(alike) > FEW else alike
+
+
 def times(rows: Sequence[Mapping[int, Expr]], x: Sequence[Expr]) -> list[Expr]:
     """The product of a matrix and a dense vector."""
     result = []
-    for row in rows:
+    for row in in_parts(rows, x):
         total = x[0].graph.zero if x else None
-        for k, entry in row.items():
+        for k, entry in in_parts(list(row.items()), x):
             total = entry * x[k] if total is None or total.is_zero else total + entry * x[k]
         assert total is not None
         result.append(total)

@@ -94,11 +94,22 @@ def afloat(n: int) -> eg.Model:
     return m
 
 
+def touching(n: int) -> eg.Model:
+    """A hanging chain whose links are discs that meet each other and the floor."""
+    m = planar_chain(n)
+    discs = {"shape": "circle", "on": [m.bodies[f"b{k}"] for k in range(n)], "radius": 0.2}
+    law = {"stiffness": 300.0, "dissipation": "0.2*m", "friction": 0.3, "smoothing": 0.1}
+    m.contacts("floor", discs, {"shape": "half_plane", "on": m.ground.at(0, -0.4, 0)}, law)
+    m.contacts("among", discs, law=law)
+    return m
+
+
 MODELS: dict[str, Callable[[int], eg.Model]] = {
     "planar": planar_chain,
     "numbers": numbers_chain,
     "slides": slides,
     "afloat": afloat,
+    "touching": touching,
 }
 
 

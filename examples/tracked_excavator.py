@@ -1,0 +1,191 @@
+"""Tracked excavator of the 22 t class in the plane of its tracks: python tracked_excavator.py [seconds]."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+import eomgen as eg
+
+
+@dataclass(frozen=True)
+class Track:
+    """Sizes (m) of a track seen from the side, and masses (kg) of both tracks together.
+
+    Links, rollers, carrier rollers and the distance from sprocket to idler are those of a Cat 320 (Caterpillar, 320
+    Hydraulic Excavator, Technical Specifications: 49 shoes, 8 and 2 rollers, 3.65 m).  A chain of 190 mm pitch on a
+    sprocket of 21 teeth, of which every second one pulls, fits them.  The rest is chosen to be plausible.
+    """
+
+    links: int = 49
+    pitch: float = 0.19
+    rail: float = 0.055  # from the line of the pins to the rails, on which rollers run
+    shoe: float = 0.075  # from the line of the pins to the ground
+    bushing: float = 0.0295
+    teeth: int = 21
+    tip: float = 0.015  # of the teeth above the circle of the pins
+    rollers: int = 8
+    roller: float = 0.085
+    carriers: int = 2
+    carrier: float = 0.07
+    raised: float = 0.03  # of the chain under sprocket and idler above that under the rollers
+    masses: tuple[float, ...] = (58.0, 60.0, 40.0, 200.0, 200.0)  # of link, roller, carrier roller, idler, sprocket
+
+    @property
+    def sprocket(self) -> float:
+        """Radius on which pins go round the sprocket."""
+        return self.pitch / (2.0 * math.sin(2.0 * math.pi / self.teeth))
+
+    @property
+    def per_turn(self) -> float:
+        """Length of chain that a turn of the sprocket moves."""
+        return 0.5 * self.teeth * self.pitch
+
+    @property
+    def idler(self) -> float:
+        """Radius of the idler, on which the rails lie while pins go round as on the sprocket."""
+        return math.sqrt(self.sprocket**2 - (0.5 * self.pitch) ** 2) - self.rail
+
+    @property
+    def half(self) -> float:
+        """Half the distance from sprocket to idler."""
+        return 0.5 * (0.5 * self.links * self.pitch - math.pi * self.sprocket)
+
+    @property
+    def low(self) -> float:
+        """Height of the pins under the rollers, from the axis of the sprocket."""
+        return -self.sprocket - self.raised
+
+    @property
+    def height(self) -> float:
+        """Height of the axis of the sprocket above the ground."""
+        return self.shoe - self.low
+
+    def wheels(self) -> dict[str, tuple[float, float, float]]:
+        """Place and radius of rollers and carrier rollers in the frame."""
+        found = {}
+        for kind, count, reach, pins, way in (
+            ("roller", self.rollers, 0.82, self.low, 1.0),
+            ("carrier", self.carriers, 0.3, self.sprocket, -1.0),
+        ):
+            radius = getattr(self, kind)
+            for k, x in enumerate(self.half * np.linspace(-reach, reach, count)):
+                found[f"{kind}{k}"] = (float(x), pins + way * (self.rail + radius), radius)
+        return found
+
+    def laid(self) -> tuple[float, np.ndarray]:
+        """Where the idler is when the chain lies taut around the wheels, and the places of the pins, closed."""
+        under = [(x, y, r + self.rail) for name, (x, y, r) in self.wheels().items() if name.startswith("roller")]
+
+        def walk(idler: float) -> np.ndarray:
+            circles = [(-self.half, 0.0, self.sprocket), (idler, 0.0, self.sprocket), *under]
+            return _walk(_belt(circles), self.pitch, self.links)
+
+        def gap(idler: float) -> float:
+            pins = walk(idler)
+            return float((pins[-1] - pins[0])[1])
+
+        idler = float(brentq(gap, self.half - 0.4 * self.pitch, self.half + 0.4 * self.pitch))
+        return idler, walk(idler)
+
+
+def _belt(circles: list[tuple[float, float, float]], parts: int = 8000) -> np.ndarray:
+    """A taut belt around circles (x, y, radius) as points, counterclockwise from the leftmost one."""
+    angles = math.pi + 2.0 * math.pi * np.arange(parts + 1) / parts
+    along = np.array([np.cos(angles), np.sin(angles)])
+    x, y, r = np.array(circles)[np.argmax([np.array([x, y]) @ along + r for x, y, r in circles], axis=0)].T
+    return np.array([x + r * along[0], y + r * along[1]]).T
+
+
+def _walk(belt: np.ndarray, pitch: float, count: int) -> np.ndarray:
+    """So many steps of equal straight lengths along a belt, more than once round if need be."""
+    line = np.concatenate([belt, belt[1:]])
+    places, k = [line[0]], 0
+    for _ in range(count):
+        here = places[-1]
+        while np.hypot(*(line[k + 1] - here)) < pitch:
+            k += 1
+        along, back = line[k + 1] - line[k], line[k] - here
+        a, b, c = along @ along, along @ back, back @ back - pitch**2
+        places.append(line[k] + along * (math.sqrt(b * b - a * c) - b) / a)
+    return np.array(places)
+
+
+SOIL = {"stiffness": "k_ground", "dissipation": 0.5, "friction": "mu_ground", "smoothing": "slip"}
+STEEL = {"stiffness": "k_wheels", "dissipation": 0.5, "friction": "mu_wheels", "smoothing": "slip"}
+
+
+def undercarriage(m: eg.Model, track: Track, mass: float, inertia: Any, ground: Any = None, law: Any = None) -> Any:
+    """Add frame, wheels and chain to a model, and the contacts between them; the frame is returned."""
+    m.parameter("k_ground", 1e8, doc="of a corner of a shoe on the ground (N/m^1.5)")
+    m.parameter("mu_ground", 0.7)
+    m.parameter("k_wheels", 8e8, doc="of rails on rollers, bushings on the sprocket (N/m^1.5)")
+    m.parameter("mu_wheels", 0.15)
+    m.parameter("slip", 0.02, unit="m/s", doc="sliding from which friction is full")
+    m.parameter("pretension", 40e3, unit="N", doc="of the springs behind the idlers")
+    m.parameter("recoil", 1e6, unit="N/m", doc="their stiffness")
+    m.parameter("gain", 1e5, doc="torque of the motors for a lack of speed (N m s)")
+    m.parameter("relief", 66e3, unit="N*m", doc="most that the motors give: 205 kN of pull")
+    m.parameter("rotors", 100.0, doc="inertia of the motors behind their gears (kg m^2)")
+    m.input("speed", 0.0)
+    one = dict(zip(("link", "roller", "carrier", "idler", "sprocket"), track.masses, strict=True))
+    idler, pins = track.laid()
+    frame = m.body("frame", mass=mass, inertia=inertia)
+    m.planar("frame", m.ground, frame, coordinates=["x", "y", "pitch"])
+
+    def wheel(name: str, at: Any, radius: float, **keys: Any) -> Any:
+        of = one[name.rstrip("0123456789")]
+        body = m.body(name, mass=of, inertia={"zz": 0.5 * of * radius**2})
+        m.revolute(name, at, body, **keys)
+        return body
+
+    forward = {"axis": (0, 0, -1), "armature": "rotors"}
+    sprocket = wheel("sprocket", frame.at(-track.half, 0, 0), track.sprocket, **forward)
+    slide = m.body("slide", mass=0.2 * one["idler"])
+    m.prismatic("tensioner", frame.at(idler, 0, 0), slide, axis="x")
+    m.element("recoil_spring", joint="tensioner", law="pretension - recoil*length - 2e4*rate")
+    wheels = [{"shape": "circle", "on": wheel("idler", slide, track.idler), "radius": track.idler}]
+    for name, (x, y, radius) in track.wheels().items():
+        wheels.append({"shape": "circle", "on": wheel(name, frame.at(x, y, 0), radius), "radius": radius})
+    turning = one["link"] * (track.pitch**2 + (track.rail + track.shoe) ** 2) / 12
+    com = (track.pitch / 2, -0.01, 0)
+    links = [m.body(f"link{k}", mass=one["link"], com=com, inertia={"zz": turning}) for k in range(track.links)]
+    m.planar("chain", m.ground, links[0], coordinates=["chain_x", "chain_y", "turn0"])
+    for k in range(1, track.links):
+        m.revolute(f"turn{k}", links[k - 1].at(track.pitch, 0, 0), links[k])
+    m.revolute("closure", links[-1].at(track.pitch, 0, 0), links[0])
+    turns = np.unwrap([math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(pins)])
+    m.initial(x=0.0, y=track.height, pitch=0.0)
+    m.initial(chain_x=float(pins[0][0]), chain_y=float(pins[0][1]) + track.height, turn0=float(turns[0]))
+    for k in range(1, track.links):  # two of them follow from the closure
+        (m.initial if k < track.links - 2 else m.guess)(**{f"turn{k}": float(turns[k] - turns[k - 1])})
+
+    def line(radius: float, y: float, length: float) -> dict[str, Any]:
+        on = [link.at(track.pitch / 2, y, 0) for link in links]
+        return {"shape": "segment", "on": on, "length": length, "radius": radius}
+
+    rails = line(0.01, track.rail - 0.01, track.pitch - 0.01)
+    shoes = line(0.015, 0.015 - track.shoe, track.pitch - 0.04)
+    teeth = {
+        "shape": "sprocket",
+        "on": sprocket.at(0, 0, 0, rpy=(0, 0, math.pi)),
+        "teeth": track.teeth,
+        "pitch": 2.0 * track.sprocket * math.sin(math.pi / track.teeth),
+        "seat": track.bushing + 0.0005,
+        "tip_radius": track.sprocket + track.tip,
+    }
+    m.contacts("ground", shoes, ground or {"shape": "half_plane", "on": m.ground}, law or SOIL)
+    m.contacts("wheels", rails, wheels, STEEL)
+    m.contacts("mesh", {"shape": "circle", "on": links, "radius": track.bushing}, teeth, STEEL)
+    m.torque("motor", "sprocket", "max(-relief, min(relief, gain*(speed - sprocket_dot)))")
+    m.output("chain_speed", f"sprocket_dot*{track.per_turn / (2.0 * math.pi)!r}", unit="m/s")
+    m.output("drive", "power(motor)", unit="W")
+    return frame
