@@ -1,9 +1,10 @@
 """Constraint elements: equations between coordinates or markers; :data:`CONSTRAINTS` is the table of their types."""
 
 from ..elements.element_type import Types
-from . import cams, couplings, drivers, gears, planetary, rolling
+from . import cams, couplings, drivers, gears, planetary, rolling_types
 from .cams import CamLift, FlatContact, FlatSupport, KnifeContact, RollerContact
 from .constraint import Condition, Constraint, ConstraintView
+from .convex_rolling import RollingConvex
 from .couplings import Equation, Linear
 from .drivers import AngleDriver, CoordinateDriver, DistanceDriver, Driver, PlaceDriver
 from .gears import Belt, Gear, Rack
@@ -11,7 +12,7 @@ from .planetary import Planetary
 from .rolling import KnifeEdge, RollingDisc, RollingSphere
 
 CONSTRAINTS: Types = {}
-for _home in (couplings, gears, planetary, cams, rolling, drivers):
+for _home in (couplings, gears, planetary, cams, rolling_types, drivers):
     CONSTRAINTS |= _home.TYPES
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "Planetary",
     "Rack",
     "RollerContact",
+    "RollingConvex",
     "RollingDisc",
     "RollingSphere",
 ]

@@ -9,34 +9,26 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import ClassVar
 
-from ..elements.dimensions import LENGTH
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
-from ..elements.field import Field
 from ..elements.looks import Seen, Wheel
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .constraint import VELOCITY, Condition, Constraint, ConstraintView, on_two_bodies
+from .constraint import VELOCITY, Condition, Constraint, ConstraintView
 
 #: What is wrong where the lowest point of a disc is not defined.
 LYING = "the disc lies flat (axle along the plane's normal)"
 
 
 @dataclass(frozen=True)
-class _Rolling(Constraint):
+class Rolling(Constraint):
     """A body that rolls on the x-y plane of marker ``plane``, on the side to which its z axis points."""
 
     sentence: ClassVar[str] = "The body touches the plane, and the point of contact does not slide."
     formula: ClassVar[str] = r"\mathbf{v} + \boldsymbol{\omega} \times \mathbf{d} = \mathbf{0}"
-    wheel: Marker  #: centre; its z axis is that of the wheel
+    wheel: Marker  #: centre; its z axis is that of a disc
     plane: Marker
-    radius: Expr
-
-    def drawn(self) -> list[Seen]:
-        return [Wheel(self.wheel, self.radius)]
 
     @abstractmethod
     def height(self, view: ConstraintView) -> Expr:
@@ -60,12 +52,22 @@ class _Rolling(Constraint):
         ]
 
 
+@dataclass(frozen=True)
+class Wheeled(Rolling):
+    """A body of one radius."""
+
+    radius: Expr
+
+    def drawn(self) -> list[Seen]:
+        return [Wheel(self.wheel, self.radius)]
+
+
 def _normal(view: ConstraintView, plane: Marker) -> Vec3:
     return vec.transpose(view.rotation(plane))[2]
 
 
 @dataclass(frozen=True)
-class RollingDisc(_Rolling):
+class RollingDisc(Wheeled):
     """A disc or wheel: a circle about the wheel's z axis, rounded by a tube of radius ``tube`` (0 for a sharp edge).
 
     With n the normal, a the axle and s = |n - (n.a) a| the sine of the angle between them, the centre is
@@ -98,7 +100,7 @@ class RollingDisc(_Rolling):
 
 
 @dataclass(frozen=True)
-class RollingSphere(_Rolling):
+class RollingSphere(Wheeled):
     """A ball about the marker's origin; with ``no_spin`` it does not turn about the normal either."""
 
     type_name: ClassVar[str] = "rolling_sphere"
@@ -138,59 +140,3 @@ class KnifeEdge(Constraint):
         under = vec.add(view.velocity(self.on), vec.cross(view.angular_velocity(self.on), apart))
         slip = vec.dot(sideways, vec.sub(view.velocity(self.marker), under))
         return [Condition("slip", slip, "length", VELOCITY)]
-
-
-def _rolling(e: Entry) -> Constraint | None:
-    shape, wheel, plane, radius = e.choice("shape"), e.marker("wheel"), e.marker("plane"), e.positive("radius")
-    if shape == "sphere":
-        e.refuse("tube", "only a disc has an edge with a tube radius")
-    else:
-        e.refuse("no_spin", "only a sphere takes no_spin")
-    if wheel is None or plane is None or not on_two_bodies(e, "plane", wheel, plane):
-        return None
-    if shape == "sphere":
-        return RollingSphere(e.name, wheel, plane, radius, e.flag("no_spin"))
-    return RollingDisc(e.name, wheel, plane, radius, e.law("tube"))
-
-
-def _knife_edge(e: Entry) -> Constraint | None:
-    marker, on, axis = e.marker("marker"), e.marker("on"), e.axis("axis")
-    if marker is None or on is None or not on_two_bodies(e, "on", marker, on):
-        return None
-    return KnifeEdge(e.name, marker, axis, on)
-
-
-TYPES = table(
-    ElementType(
-        "rolling",
-        "a wheel or ball that rolls on a plane without slip.",
-        {
-            "wheel": Field("marker", "marker at the centre of the wheel; z is the axle of a disc", required=True),
-            "plane": Field(
-                "marker", "marker in the plane; z is its normal and points to the wheel's side", default="ground"
-            ),
-            "radius": Field("expression", "radius (m)", required=True, dimension=LENGTH),
-            "shape": Field("choice", "shape of the wheel", default="disc", choices=("disc", "sphere")),
-            "tube": Field(
-                "expression",
-                "radius of the rounded edge of a disc (m), 0 for a sharp edge",
-                default=0,
-                dimension=LENGTH,
-            ),
-            "no_spin": Field(
-                "flag", "whether the sphere is kept from spinning about the plane's normal", default=False
-            ),
-        },
-        _rolling,
-    ),
-    ElementType(
-        "knife_edge",
-        "a blade: a marker that cannot move sideways, along one of its own axes.",
-        {
-            "marker": Field("marker", "marker at the point where the blade touches", required=True),
-            "axis": Field("axis", "direction in which the marker cannot move, in its own axes", default="y"),
-            "on": Field("marker", "the body on which the blade moves", default="ground"),
-        },
-        _knife_edge,
-    ),
-)

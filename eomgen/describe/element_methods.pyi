@@ -218,8 +218,9 @@ class ElementMethods(Described):
         radius: Value = None, coordinate: Any = None, latex: str | None = None, periodic: bool | None = None) -> None:
         """Add a follower that stays in contact with the contour of a plane cam."""
     def rolling(self, name: str, wheel: Any, plane: Any = None, radius: Value = None, shape: str | None = None,
-        tube: Value = 0, no_spin: bool | None = None) -> None:
-        """Add a wheel or ball that rolls on a plane without slip."""
+        tube: Value = 0, no_spin: bool | None = None, semi_axes: Sequence[Value] | None = None,
+        support: Value = None) -> None:
+        """Add a wheel, ball or smooth convex body that rolls on a plane without slip."""
     def knife_edge(self, name: str, marker: Any, axis: str | Sequence[float] | None = None, on: Any = None) -> None:
         """Add a blade: a marker that cannot move sideways, along one of its own axes."""
     def driver(self, name: str, coordinate: Any = None, value: Value = None, between: Sequence[Any] | None = None,
