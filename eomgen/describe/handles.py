@@ -369,7 +369,7 @@ class ForceHandle:
 class Settings(dict[str, Any]):
     """A mapping that is also called to add to it: ``model.initial(theta=0.3)``, ``initial({"arm.theta": 0.3})``."""
 
-    def __call__(self, *mappings: Mapping[str, Any], **values: Any) -> None:
+    def __call__(self, *mappings: Any, **values: Any) -> None:
         """Set the given entries, those of mappings first, and keep the others."""
         for given in mappings:
             if not isinstance(given, Mapping):

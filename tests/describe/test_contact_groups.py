@@ -101,7 +101,7 @@ FAULTS = [
     (
         FLOOR,
         "{shape: half_space, on: ground}",
-        "circle and half_space do not meet; circle, segment, box, polygon, outline",
+        "circle and half_space do not meet; circle, segment, box",
     ),
     (FLOOR, "{shape: circle, on: a, radius: r}", "the shape on a is in both groups; give second only what is not in"),
     (BOXES, BOXES.replace("[a, b]", "a"), "forces.among: has shapes on one body only"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -27,7 +28,7 @@ def belt(mu: float) -> eg.Model:
     right = [(over[-1][0], over[-1][1] - PITCH * k) for k in range(1, LINKS + 1 - side - around)]
     pins = [*left, *over, *right]
     links, before = [], 0.0
-    for k, ((x, y), (x2, y2)) in enumerate(zip(pins, pins[1:], strict=False)):
+    for k, ((x, y), (x2, y2)) in enumerate(itertools.pairwise(pins)):
         link = m.body(f"link{k}", mass=0.02, com=(PITCH / 2, 0, 0), inertia={"zz": 1e-5})
         turn = math.atan2(y2 - y, x2 - x)
         if not links:
