@@ -35,7 +35,7 @@ from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
 from .joint_data import check_display
 from .mass_properties import read_body
-from .mechanism import SUMS, Body, Mechanism, Simulation
+from .mechanism import SUMS, Body, CarriedQuantity, Mechanism, Simulation
 from .names import fault_of_model_name, nearest
 from .physical import check_bodies
 from .scope import Namespace
@@ -145,7 +145,8 @@ def build(description: Description) -> Mechanism:
         clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
-        element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked} | state_rates,
+        element_quantities={str(a): (a.name, a.element) for a in reader.asked if not a.carried} | state_rates,
+        reaction_quantities=_carried(reader),
         initial=begun | {name: value for name, value in starts.items() if name in moving},
         initial_outputs={name: value for name, value in starts.items() if name not in moving},
         guess=guess,
@@ -225,10 +226,20 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
         reader.faults.add("outputs", message, "a centre of mass and a momentum need mass")
 
 
+def _carried(reader: Reader) -> dict[str, CarriedQuantity]:
+    """The parts of reactions and the multipliers that expressions speak of."""
+    found = {}
+    for asked, path in reader.asked.items():
+        if asked.carried:
+            axes = reader.moving(asked.axes) if asked.axes else None
+            found[str(asked)] = CarriedQuantity(asked.element, asked.part, axes, path)
+    return found
+
+
 def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
     """Report faults: quantities such as ``length(k1)`` of force elements that do not act along a path."""
     known = {force.name: force for force in forces}
-    for (quantity, name), path in reader.asked.items():
+    for (quantity, name, *_), path in reader.asked.items():
         if quantity != "power" and name in known and not known[name].acts_along:
             remedy = f"power({name}) is known of every element; force, length and rate of elements along a path "
             reader.faults.add(

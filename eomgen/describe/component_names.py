@@ -118,7 +118,7 @@ class Renaming(Visitor):
             return str(quantity.renamed(place))
 
         def element(quantity: ElementQuantity) -> str:
-            return str(quantity.renamed(lambda name: self.prefix + name))
+            return str(quantity.renamed(lambda name: self.prefix + name, place))
 
         def place(marker: str) -> str:
             if marker == COM and COM not in self.own.bodies:

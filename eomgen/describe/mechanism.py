@@ -162,6 +162,18 @@ def dimension_of(level: int, axis: int) -> dimensions.Dimension:
     return LEVEL_DIMENSIONS[level]
 
 
+class CarriedQuantity(NamedTuple):
+    """A part of the reaction of a joint, along the axes of a marker (None: ground), or the multiplier of an equation.
+
+    ``part`` is empty for a multiplier.
+    """
+
+    of: str
+    part: str
+    axes: Marker | None
+    path: str  #: where an expression speaks of it first
+
+
 @dataclass(frozen=True)
 class Output:
     """A named result: an expression in t, coordinates, their rates, parameters, inputs and marker quantities."""
@@ -278,6 +290,7 @@ class Mechanism:
     events: tuple[Event, ...] = ()
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
     element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element
+    reaction_quantities: Mapping[str, CarriedQuantity] = field(default_factory=dict)  #: by symbol
     initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate, ``<coordinate>_dot`` or state
     initial_outputs: Mapping[str, Expr] = field(default_factory=dict)  #: by output, in its unit
     guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts

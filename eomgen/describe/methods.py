@@ -15,6 +15,7 @@ from ..elements.field import Field
 from ..errors import UsageError
 from .described import Described
 from .description import items
+from .carried_handles import ConstraintHandle
 from .handles import ForceHandle, JointHandle, MarkerHandle
 from .keywords import check_keywords
 from .references import joint_reference, marker_reference
@@ -50,7 +51,7 @@ ARGUMENTS = {
 }
 _SCALAR = ("scalar", "Value")
 #: Section -> what its methods return.
-_HANDLES: dict[str, Any] = {"joints": JointHandle, "forces": ForceHandle}
+_HANDLES: dict[str, Any] = {"joints": JointHandle, "forces": ForceHandle, "constraints": ConstraintHandle}
 _WIDTH = 108  #: of the text of a method's documentation
 
 

@@ -89,6 +89,7 @@ class Kinematics:
     forces: tuple[ForceTerms, ...]
     length_scale: Expr
     coupled: tuple[str, ...] = ()  #: labels of the equations of constraint elements
+    reaction_laws: tuple[str, ...] = ()  #: force elements whose laws speak of reactions, which are solved for
     hints: tuple[tuple[str, Expr], ...] = ()  #: where assembly looks for coordinates of contact points
 
     @property
