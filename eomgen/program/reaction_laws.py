@@ -61,12 +61,12 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     symbols = [graph.symbol(name) for name in names]
     if laws or kinematics.constraints.labels or _before_accelerations(mechanism):
         still, gain = _linear_parts(linear, mobility, names, forces, users)
-        values = solve_laws(list(laws), symbols, still, gain)
+        values, known = solve_laws(list(laws), symbols, still, gain)
     else:  # outputs of a tree: they may speak of accelerations
-        values = _reactions(kinematics, mobility, names, users)[0]
+        values, known = _reactions(kinematics, mobility, names, users)[0], {}
     motion = copy(motion)
     motion.carried = dict(zip(names, values, strict=True))
-    solved = _replaced(kinematics, dict(zip(symbols, values, strict=True)))
+    solved = _replaced(kinematics, known | dict(zip(symbols, values, strict=True)))
     return replace(solved, motion=motion, reaction_laws=tuple(speaking))
 
 

@@ -4,7 +4,8 @@ A law is what an entry of a load depends on reactions by: the smallest parts of 
 reactions themselves.  Laws that are reactions themselves are eliminated first, as a linear system.  The others are met
 by Newton's method, a fixed number of steps, with the exact slopes of g.
 
-A law is taken to have slopes of any sign up to their size, as that of |N| has.  It has one solution for every N0 if
+A law is taken to have slopes of any sign up to their size, as that of |N| has, in each of its pieces, as max(0, N) has
+two.  It has one solution for every N0 if
 I - B is an M-matrix, B[i, j] = |dg_i/dN| |K[., j]|: then g is a contraction in a weighted maximum norm (A. Berman,
 R. J. Plemmons, Nonnegative Matrices in the Mathematical Sciences (1994), ch. 6).  For one law this is |mu K| < 1, the
 limit beyond which Painleve's examples have two solutions or none (P. Painleve, Sur les lois du frottement de
@@ -68,11 +69,16 @@ def _parts(x: Expr, dependent: set[int], found: dict[Expr, None]) -> None:
 
 
 def _is_symbol(x: Expr) -> bool:
-    return x.node[0] == "sym"
+    return bool(x.node[0] == "sym")
 
 
-def solve_laws(laws: Sequence[Expr], symbols: Sequence[Expr], still: Sequence[Expr], gain: Matrix) -> list[Expr]:
-    """N with f = g(N), N = N0 + K f; no numbers where that is not certain to have one solution."""
+def solve_laws(
+    laws: Sequence[Expr], symbols: Sequence[Expr], still: Sequence[Expr], gain: Matrix
+) -> tuple[list[Expr], dict[Expr, Expr]]:
+    """N with f = g(N), N = N0 + K f, and g(N) by the law; no numbers where one solution is not certain.
+
+    Laws are given by themselves because a law such as max(0, N) is a number where N is none.
+    """
     one = symbols[0].graph.one
     linear = [j for j, law in enumerate(laws) if _is_symbol(law)]
     curved = [j for j in range(len(laws)) if j not in linear]
@@ -83,7 +89,7 @@ def solve_laws(laws: Sequence[Expr], symbols: Sequence[Expr], still: Sequence[Ex
     else:
         gain = [list(row) for row in gain]
     if not curved:
-        return [N / certain for N in still] if linear else list(still)
+        return [N / certain for N in still] if linear else list(still), {}
     return _newton([laws[j] for j in curved], symbols, still, gain, certain)
 
 
@@ -107,7 +113,7 @@ def _eliminated(
 
 def _newton(
     laws: Sequence[Expr], symbols: Sequence[Expr], still: Sequence[Expr], gain: Matrix, certain: Expr
-) -> list[Expr]:
+) -> tuple[list[Expr], dict[Expr, Expr]]:
     graph, n = symbols[0].graph, len(laws)
     slopes = jacobian(list(laws), list(symbols))
     places = list(slopes)
@@ -121,13 +127,15 @@ def _newton(
         left = [g - f for g, f in zip(values[:n], force, strict=True)]
         force = [f + x for f, x in zip(force, eliminate(matrix, left), strict=True)]
     here = _at(still, gain, force)
-    values = substitute([*laws, *(slopes[p] for p in places)], dict(zip(symbols, here, strict=True)))
-    D = dict(zip(places, values[n:], strict=True))
-    certain = certain * _certain(D, gain, n, graph.one)
+    pieces = [(i, piece) for i, law in enumerate(laws) for piece in _pieces(law)]
+    bounds = jacobian([piece for _, piece in pieces], list(symbols))
+    values = substitute([*laws, *bounds.values()], dict(zip(symbols, here, strict=True)))
+    certain = certain * _certain([i for i, _ in pieces], dict(zip(bounds, values[n:], strict=True)), gain, n, graph.one)
     apart = total([graph.apply("abs", g - f) for g, f in zip(values[:n], force, strict=True)])
     size = total([graph.apply("abs", g) for g in values[:n]])
     certain = certain * graph.apply("le", apart, size * FIXED)
-    return _at(still, gain, [f / certain for f in force])
+    found = {law: g / certain for law, g in zip(laws, values[:n], strict=True)}
+    return _at(still, gain, [f / certain for f in force]), found
 
 
 def _at(still: Sequence[Expr], gain: Matrix, force: Sequence[Expr]) -> list[Expr]:
@@ -140,17 +148,35 @@ def _slope(D: Mapping[tuple[int, int], Expr], gain: Matrix, i: int, j: int) -> E
     return total([graph.one if i == j else graph.zero, *(-(d * gain[m][j]) for (k, m), d in D.items() if k == i)])
 
 
-def _certain(D: Mapping[tuple[int, int], Expr], gain: Matrix, n: int, one: Expr) -> Expr:
-    """1 where I - B is an M-matrix, all pivots of its elimination being positive, else 0."""
+def _pieces(law: Expr) -> list[Expr]:
+    """The smooth pieces of a law such as |N| or max(0, N), whose slopes it may have at another N."""
+    graph, found, waiting = law.graph, [], [law.id]
+    while waiting:
+        operation, *operands = graph.nodes[waiting[-1]]
+        i = waiting.pop()
+        if operation in ("abs", "max", "min"):
+            waiting += operands
+        elif operation == "select":
+            waiting += operands[1:]
+        elif operation != "const":
+            found.append(Expr(graph, i))
+    return found
+
+
+def _certain(of: Sequence[int], D: Mapping[tuple[int, int], Expr], gain: Matrix, n: int, one: Expr) -> Expr:
+    """1 where I - B is an M-matrix, all pivots of its elimination being positive, else 0.
+
+    ``of`` tells the law of each piece, whose slopes are D.
+    """
     graph = one.graph
-    matrix: Matrix = []
-    for i in range(n):
-        used = [(m, d) for (k, m), d in D.items() if k == i]
-        size = _length([d for _, d in used], graph.zero)
-        row = [-(size * _length([gain[m][j] for m, _ in used], graph.zero)) for j in range(n)]
-        row[i] = one + row[i]
-        matrix.append(row)
-    return _positive_pivots(matrix, one)
+    sizes = [[graph.zero] * n for _ in range(n)]
+    for k, i in enumerate(of):
+        used = [(m, d) for (piece, m), d in D.items() if piece == k]
+        steep = _length([d for _, d in used], graph.zero)
+        for j in range(n):
+            size = steep * _length([gain[m][j] for m, _ in used], graph.zero)
+            sizes[i][j] = size if sizes[i][j].is_zero else graph.apply("max", sizes[i][j], size)
+    return _positive_pivots([[(one if i == j else graph.zero) - sizes[i][j] for j in range(n)] for i in range(n)], one)
 
 
 def _positive_pivots(given: Matrix, one: Expr) -> Expr:

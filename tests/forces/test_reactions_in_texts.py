@@ -1,4 +1,4 @@
-"""Reactions of joints and multipliers of equations in laws, outputs and events, against closed forms and free bodies."""
+"""Reactions of joints and multipliers of equations in laws, outputs and events, against closed forms."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def engine(text: bool) -> eg.Model:
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_loop_with_friction_as_texts(target: str) -> None:
-    """The same as the element, which tests of its own hold against free bodies; multipliers are those of the module."""
+    """The same as the element, which is held against free bodies elsewhere; multipliers are those of the module."""
     m = with_all_reactions(engine(text=True), "ABCS")
     for row in ("C.r_x", "C.r_y"):
         m.output(row.replace(".", "_"), f"multiplier({row})")
@@ -282,3 +282,18 @@ def test_a_mass_cannot_be_a_reaction() -> None:
     m.revolute("A", m.ground, m.body("rod", mass="reaction(A).x", inertia={"zz": 0.3}))
     with pytest.raises(ModelError, match=r"bodies.rod.mass: reaction\(...\) cannot be used here"):
         m.compile(target="numpy")
+
+
+def test_a_force_that_can_let_go_is_judged_while_it_has_let_go() -> None:
+    """Painleve's rod: a law max(0, N) has a second solution where m dN/df exceeds 1, also at a state without force."""
+    m = eg.Model("second", gravity=(0, 0, 0))
+    cart, mass = m.body("cart", mass=1.0), m.body("mass", mass=1.0)
+    m.prismatic("x", m.ground, cart, axis="x")
+    m.prismatic("y", cart, mass, axis="y")
+    m.parameter("c", 1.0)
+    m.torque("back", "x", "c*(1 + x)*max(0, reaction(y).x)")  # 2 a = f - 1, N = a
+    m.torque("pull", "x", m.input("pull", -1.0))
+    mod = m.compile(target="numpy")
+    assert mod.rhs(0.0, np.zeros(4))[2] == pytest.approx(-0.5, rel=1e-14)
+    with pytest.raises(NonFiniteError, match="Painleve"):
+        mod.rhs(0.0, np.array([1.5, 0.0, 0.0, 0.0]))
