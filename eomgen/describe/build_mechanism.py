@@ -23,6 +23,7 @@ from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .build_quantities import Outputs, read_input, read_parameter, with_signal
 from .build_states import build_states, declare_states
+from .build_switches import begun_switches, build_switches, declare_switches, events_of_switches, states_of_switches
 from .cam_turns import check_turns
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
@@ -91,6 +92,7 @@ def build(description: Description) -> Mechanism:
 
     declared = declare_states(reader, sections["states"], given_values is not None or lagrangian_values is not None)
     held, state_rates = own_states(reader, sections["forces"])
+    switching = declare_switches(reader, sections["constraints"])
     read_outputs = Outputs(reader, sections["outputs"]).all
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     bodies = _bodies(reader, sections["bodies"])
@@ -103,9 +105,13 @@ def build(description: Description) -> Mechanism:
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     states, begun, clocks, samplings = build_states(reader, declared)
     outputs = read_outputs()
-    events = (*build_events(reader, sections["events"]), *samplings)
+    switched = build_switches(reader, switching, constraints)
+    constraints = tuple(c for c in constraints if all(c is not s.constraint for s in switched))
+    events = (
+        *build_events(reader, sections["events"]), *samplings, *events_of_switches(reader, switching, switched)
+    )  # fmt: skip
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
-    kinds = ("coordinate", "velocity", *(("state",) if declared or held else ()))
+    kinds = ("coordinate", "velocity", *(("state",) if declared or held or switching else ()))
     starts = _initial(reader, "initial", values.get("initial", {}), (*kinds, "output"))
     moving = set(reader.names.of(*kinds))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
@@ -141,13 +147,15 @@ def build(description: Description) -> Mechanism:
         joints=joints,
         forces=forces,
         outputs=outputs,
-        states=(*states, *held),
+        states=(*states, *held, *states_of_switches(reader, switched)),
         clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
         element_quantities={str(a): (a.name, a.element) for a in reader.asked if not a.carried} | state_rates,
         reaction_quantities=_carried(reader),
-        initial=begun | {name: value for name, value in starts.items() if name in moving},
+        initial=begun
+        | begun_switches(graph, switched)
+        | {name: value for name, value in starts.items() if name in moving},
         initial_outputs={name: value for name, value in starts.items() if name not in moving},
         guess=guess,
         independent=independent,
@@ -155,6 +163,7 @@ def build(description: Description) -> Mechanism:
         lagrangian=lagrangian,
         given=given,
         constraints=constraints,
+        switched=switched,
         lines=dict(description.lines),
         doc=doc,
         latex=dict(reader.latex),

@@ -261,6 +261,19 @@ class Event:
     doc: str = ""
 
 
+class Switched(NamedTuple):
+    """A constraint that closes and opens in a run: the state that is 1 while it holds, and whether it does at first.
+
+    ``stabilisation`` is the rate at which its error dies away; ``releases`` are states that become 0 as it closes.
+    """
+
+    constraint: Constraint | None  #: None where its entry has faults
+    state: str
+    closed: bool
+    stabilisation: Expr
+    releases: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class Simulation:
     """Defaults of ``simulate`` and ``eomgen run``."""
@@ -299,6 +312,7 @@ class Mechanism:
     lagrangian: Lagrangian | None = None
     given: GivenEquations | None = None
     constraints: tuple[Constraint, ...] = ()
+    switched: tuple[Switched, ...] = ()  #: constraints that close and open, which are not among those
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
     doc: str = ""
     latex: Mapping[str, str] = field(default_factory=dict)  #: how names are printed, where it is given

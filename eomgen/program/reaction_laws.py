@@ -28,9 +28,11 @@ from ..kinematics.eliminate import Matrix, dot, eliminate, total
 from ..kinematics.kinematics import ForceTerms
 from ..kinematics.mobility import Mobility
 from ..kinematics.resolved_loads import AnyLoad, entries_of, with_entries
+from ..kinematics.switched import SwitchedRow, switched_rows
 from ..kinematics.wrenches import JointWrenches
 from ..limits.systems import UNTOUCHED
 from .factor import factorize, solve
+from .held_constraints import Linear, hold, plastic_impacts
 from .reaction_users import Users, refuse_joints, refuse_redundant, require_inertia_of_tree
 from .solve_laws import laws_in, solve_laws
 
@@ -57,17 +59,30 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     names = sorted(name for name in symbols_of([*laws, *seen]) if is_carried(name))
     forces = [graph.symbol(f"law[{k}]") for k in range(len(laws))]
     users = Users(mechanism, tuple(speaking))
+    rows, held = switched_rows(kinematics)
     linear = _replaced(kinematics, dict(zip(laws, forces, strict=True)))
+    linear = replace(linear, forces=(*linear.forces, *held))
     symbols = [graph.symbol(name) for name in names]
-    if laws or kinematics.constraints.labels or _before_accelerations(mechanism):
-        still, gain = _linear_parts(linear, mobility, names, forces, users)
+    if laws or rows or kinematics.constraints.labels or _before_accelerations(mechanism):
+        reactions, multipliers = _reactions(
+            linear, mobility, [*names, *(r.multiplier.node[1] for r in rows)], rows, users
+        )
+        measured = [*reactions, *(dot([*r.jacobian, r.rest], [*kinematics.a, graph.one]) for r in rows)]
+        unknown = [*forces, *(row.multiplier for row in rows)]
+        a, columns = _motion(linear, mobility, unknown, users)
+        found = _linear_parts([*kinematics.a, *multipliers], measured, unknown, a, columns)
+        inner = [row[len(laws) :] for row in found.gain[len(reactions) :]]
+        plastic = plastic_impacts(kinematics, rows, inner, columns[len(laws) :])
+        still, gain = hold(found, rows, len(laws))
+        symbols += [row.multiplier for row in rows]
         values, known = solve_laws(list(laws), symbols, still, gain)
     else:  # outputs of a tree: they may speak of accelerations
-        values, known = _reactions(kinematics, mobility, names, users)[0], {}
+        values, known, plastic = _reactions(linear, mobility, names, (), users)[0], {}, {}
     motion = copy(motion)
-    motion.carried = dict(zip(names, values, strict=True))
-    solved = _replaced(kinematics, known | dict(zip(symbols, values, strict=True)))
-    return replace(solved, motion=motion, reaction_laws=tuple(speaking))
+    motion.carried = dict(zip(names, values, strict=False))
+    whole = replace(kinematics, forces=(*kinematics.forces, *held))
+    solved = _replaced(whole, known | dict(zip(symbols, values, strict=True)))
+    return replace(solved, motion=motion, reaction_laws=tuple(speaking), plastic=plastic)
 
 
 def _before_accelerations(mechanism: Mechanism) -> bool:
@@ -100,26 +115,21 @@ def _replaced(kinematics: Kinematics, mapping: Mapping[Expr, Expr]) -> Kinematic
 
 # -- linear parts ---------------------------------------------------------------------------------------------------
 def _linear_parts(
-    kinematics: Kinematics, mobility: Mobility, names: Sequence[str], forces: Sequence[Expr], users: Users
-) -> tuple[list[Expr], Matrix]:
-    """N0 and K of the components ``names``, with symbols in place of the laws."""
-    graph = kinematics.graph
-    reactions, multipliers = _reactions(kinematics, mobility, names, users)
-    unknown = [*kinematics.a, *multipliers]
-    a, columns = _motion(kinematics, mobility, forces, users)
-    slopes = jacobian(reactions, [*unknown, *forces])
-    base = substitute(reactions, dict.fromkeys([*unknown, *forces], graph.zero))
+    solved: Sequence[Expr], measured: Sequence[Expr], forces: Sequence[Expr], a: Sequence[Expr], columns: Matrix
+) -> Linear:
+    """Expressions of accelerations and multipliers, ``solved``, in terms of the forces alone."""
+    graph = solved[0].graph
+    slopes = jacobian(list(measured), [*solved, *forces])
+    base = substitute(list(measured), dict.fromkeys([*solved, *forces], graph.zero))
     still, gain = [], []
     for i, N in enumerate(base):
-        row = [slopes.get((i, j), graph.zero) for j in range(len(unknown) + len(forces))]
+        row = [slopes.get((i, j), graph.zero) for j in range(len(solved) + len(forces))]
         still.append(total([N, *(d * x for d, x in zip(row, a, strict=False))]))
+        own = row[len(solved) :]
         gain.append(
-            [
-                total([row[len(unknown) + j], *(d * x for d, x in zip(row, column, strict=False))])
-                for j, column in enumerate(columns)
-            ]
+            [total([f, *(d * x for d, x in zip(row, c, strict=False))]) for f, c in zip(own, columns, strict=True)]
         )
-    return still, gain
+    return Linear(still, gain)
 
 
 def _motion(
@@ -151,7 +161,11 @@ def _motion(
 
 
 def _reactions(
-    kinematics: Kinematics, mobility: Mobility, names: Sequence[str], users: Users
+    kinematics: Kinematics,
+    mobility: Mobility,
+    names: Sequence[str],
+    held: Sequence[SwitchedRow],
+    users: Users,
 ) -> tuple[list[Expr], list[Expr]]:
     """The components in terms of accelerations, multipliers and forces, and the multipliers of ``labels``.
 
@@ -166,15 +180,15 @@ def _reactions(
     own = {label: graph.symbol(f"multiplier[{label}]") for label in labels}
     idle = {label: graph.symbol(f"multiplier[{label}]") for label in wrenches.on_bodies if label not in own}
     every = carried_reactions(wrenches, own | idle)
+    known = own | idle | {row.label: row.multiplier for row in held}
     where = [reaction_of(name) for name in names]
-    rows = [
-        None if place else _row(kinematics, multiplier_of(name) or "", users)
-        for name, place in zip(names, where, strict=True)
-    ]
-    known = own | idle
-    reactions = [
-        every[place[0]][place[1]] if place else known[str(row)] for place, row in zip(where, rows, strict=True)
-    ]
+    reactions = []
+    for name, place in zip(names, where, strict=True):
+        row = multiplier_of(name)
+        if place is not None:
+            reactions.append(every[place[0]][place[1]])
+        else:
+            reactions.append(graph.symbol(name) if row is None else known[_row(kinematics, row, list(known), users)])
     slopes = jacobian(reactions, list(idle.values())) if idle else {}
     reactions = substitute(reactions, dict.fromkeys(idle.values(), graph.zero)) if idle else reactions
     for i, place in enumerate(where):
@@ -190,14 +204,13 @@ def _reactions(
     return reactions, [own[label] for label in labels]
 
 
-def _row(kinematics: Kinematics, name: str, users: Users) -> str:
+def _row(kinematics: Kinematics, name: str, labels: Sequence[str], users: Users) -> str:
     """The label of an equation, which may be named by its element where that has no other.
 
     Raises
     ------
     ModelError
     """
-    labels = kinematics.constraints.labels
     own = [label for label in labels if label.partition(".")[0] == name.partition(".")[0]]
     if name in own:
         return name
