@@ -322,7 +322,7 @@ class JointHandle:
 
     @property
     def reaction(self) -> JointReaction:
-        """What the joint carries, in ground axes; as in :meth:`Module.reactions`."""
+        """What the joint carries, in ground axes; as ``reactions`` of a module gives it."""
         return JointReaction(self.name)
 
     def reaction_in(self, axes: MarkerHandle) -> JointReaction:

@@ -17,14 +17,14 @@ from ..kinematics.eliminate import Matrix, eliminate, total
 from ..kinematics.switched import SwitchedRow
 
 
-class Linear(NamedTuple):
+class LinearValues(NamedTuple):
     """Values that are linear in forces: at no force, and what a unit of each force adds."""
 
     still: list[Expr]
     gain: Matrix
 
 
-def hold(found: Linear, rows: Sequence[SwitchedRow], count: int) -> Linear:
+def hold(found: LinearValues, rows: Sequence[SwitchedRow], count: int) -> LinearValues:
     """Values in terms of the forces of laws alone, the multipliers of the rows being solved for.
 
     The values end with the w of the rows, the forces with their multipliers; ``count`` is that of the laws.
@@ -40,7 +40,7 @@ def hold(found: Linear, rows: Sequence[SwitchedRow], count: int) -> Linear:
     first, *columns = [eliminate(A, column) for column in right]
     still = [_with(N, row[count:], first) for N, row in zip(found.still[:n], found.gain, strict=False)]
     gain = [[_with(row[j], row[count:], columns[j]) for j in range(count)] for row in found.gain[:n]]
-    return Linear(still, gain)
+    return LinearValues(still, gain)
 
 
 def plastic_impacts(

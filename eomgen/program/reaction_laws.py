@@ -32,7 +32,7 @@ from ..kinematics.switched import SwitchedRow, switched_rows
 from ..kinematics.wrenches import JointWrenches
 from ..limits.systems import UNTOUCHED
 from .factor import factorize, solve
-from .held_constraints import Linear, hold, plastic_impacts
+from .held_constraints import LinearValues, hold, plastic_impacts
 from .reaction_users import Users, refuse_joints, refuse_redundant, require_inertia_of_tree
 from .solve_laws import laws_in, solve_laws
 
@@ -116,7 +116,7 @@ def _replaced(kinematics: Kinematics, mapping: Mapping[Expr, Expr]) -> Kinematic
 # -- linear parts ---------------------------------------------------------------------------------------------------
 def _linear_parts(
     solved: Sequence[Expr], measured: Sequence[Expr], forces: Sequence[Expr], a: Sequence[Expr], columns: Matrix
-) -> Linear:
+) -> LinearValues:
     """Expressions of accelerations and multipliers, ``solved``, in terms of the forces alone."""
     graph = solved[0].graph
     slopes = jacobian(list(measured), [*solved, *forces])
@@ -129,7 +129,7 @@ def _linear_parts(
         gain.append(
             [total([f, *(d * x for d, x in zip(row, c, strict=False))]) for f, c in zip(own, columns, strict=True)]
         )
-    return Linear(still, gain)
+    return LinearValues(still, gain)
 
 
 def _motion(

@@ -47,7 +47,7 @@ def spatial_tree(kind: str, late: bool = True) -> eg.Model:
 @pytest.mark.parametrize("late", [True, False])
 @pytest.mark.parametrize("kind", KINDS)
 def test_outputs_are_the_reactions_of_every_kind_of_joint(kind: str, late: bool) -> None:
-    """Those of ``Module.reactions`` are summed up from numbers, and without what acts along coordinates."""
+    """Those of ``reactions`` of the module are summed up from numbers, and without what acts along coordinates."""
     if kind == "free" and not late:
         pytest.skip("it carries nothing")
     mod = spatial_tree(kind, late).compile(target="numpy")
