@@ -1,4 +1,4 @@
-"""Constraint elements: wheels and balls that roll on a plane without slip, and blades that do not slip sideways.
+"""Constraint elements: wheels and convex shapes that roll on a plane without slip, blades that do not slip sideways.
 
 The material point in contact has no velocity along the plane (Neimark and Fufaev, Dynamics of Nonholonomic Systems,
 ch. I; Goldstein, Classical Mechanics, sec. 1.3): two equations that cannot be integrated, beside the height.
@@ -7,9 +7,10 @@ ch. I; Goldstein, Classical Mechanics, sec. 1.3): two equations that cannot be i
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import ClassVar
 
-from ..elements.dimensions import LENGTH
+from ..elements.dimensions import LENGTH, NONE
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
@@ -17,6 +18,8 @@ from ..elements.looks import Seen, Wheel
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
+from ..graph.differentiate import gradient
+from ..graph.substitute import substitute
 from ..graph.vectors import Vec3
 from ..records import dataclass
 from .constraint import VELOCITY, Condition, Constraint, ConstraintView, on_two_bodies
@@ -119,6 +122,34 @@ class RollingSphere(_Rolling):
 
 
 @dataclass(frozen=True)
+class RollingConvex(_Rolling):
+    """A smooth convex shape by its support function H(d), the distance of the tangent plane of outward normal d.
+
+    H holds for vectors of any length, in proportion to it, so that the point of contact is grad H (R. Schneider, Convex
+    Bodies (2014), sec. 1.7).  ``radius`` is that of the picture.
+    """
+
+    type_name: ClassVar[str] = "rolling_convex"
+    direction: Vec3  #: symbols of d, in the axes of the wheel
+    support: Expr
+
+    def _at(self, view: ConstraintView, parts: Sequence[Expr]) -> list[Expr]:
+        """Expressions of d where the normal points down to the plane."""
+        down = [-x for x in view.relative(self.plane, self.wheel).rotation[2]]
+        return substitute(parts, dict(zip(self.direction, down, strict=True)))
+
+    def height(self, view: ConstraintView) -> Expr:
+        return view.relative(self.plane, self.wheel).position[2] - self._at(view, [self.support])[0]
+
+    def contact(self, view: ConstraintView) -> Vec3:
+        x, y, z = self._at(view, gradient(self.support, self.direction))
+        return vec.times(view.rotation(self.wheel), (x, y, z))
+
+    def drawn(self) -> list[Seen]:
+        return []
+
+
+@dataclass(frozen=True)
 class KnifeEdge(Constraint):
     """A blade, or a small wheel upright on its plane: the marker does not move along ``axis`` of its own axes.
 
@@ -141,7 +172,15 @@ class KnifeEdge(Constraint):
 
 
 def _rolling(e: Entry) -> Constraint | None:
-    shape, wheel, plane, radius = e.choice("shape"), e.marker("wheel"), e.marker("plane"), e.positive("radius")
+    shape, wheel, plane = e.choice("shape"), e.marker("wheel"), e.marker("plane")
+    if shape in ("ellipsoid", "convex"):
+        return _convex(e, shape, wheel, plane)
+    for key in ("semi_axes", "support"):
+        e.refuse(key, f"a {shape} has a radius")
+    if "radius" not in e.values:
+        e.fault("radius", "is missing", f"give the radius of the {shape} (m)")
+        return None
+    radius = e.positive("radius")
     if shape == "sphere":
         e.refuse("tube", "only a disc has an edge with a tube radius")
     else:
@@ -151,6 +190,29 @@ def _rolling(e: Entry) -> Constraint | None:
     if shape == "sphere":
         return RollingSphere(e.name, wheel, plane, radius, e.flag("no_spin"))
     return RollingDisc(e.name, wheel, plane, radius, e.law("tube"))
+
+
+def _convex(e: Entry, shape: str, wheel: Marker | None, plane: Marker | None) -> Constraint | None:
+    key = {"ellipsoid": "semi_axes", "convex": "support"}[shape]
+    for other in ("radius", "tube", "no_spin", "semi_axes", "support"):
+        if other != key:
+            e.refuse(other, f"a shape that is {'an ellipsoid' if shape == 'ellipsoid' else shape} has no {other}")
+    if key not in e.values:
+        e.fault(key, "is missing", f"shape: {shape} needs it")
+        return None
+    d: Vec3 = tuple(e.graph.symbol(f"normal {axis} of {e.name}") for axis in "xyz")  # type: ignore[assignment]
+    if shape == "ellipsoid":
+        semi_axes = e.vector(key)
+        for k, size in enumerate(semi_axes):
+            e.require(f"{key}[{k}]", size, lambda x: x > 0, "must be greater than 0")
+        support = sqrt(sum((a * a * x * x for a, x in zip(semi_axes, d, strict=True)), start=e.graph.zero))
+    else:
+        length = sqrt(vec.dot(d, d))
+        unit = {f"n{axis}": x / length for axis, x in zip("xyz", d, strict=True)}
+        support = length * e.law(key, unit)
+    if wheel is None or plane is None or not on_two_bodies(e, "plane", wheel, plane):
+        return None
+    return RollingConvex(e.name, wheel, plane, e.graph.zero, d, support)
 
 
 def _knife_edge(e: Entry) -> Constraint | None:
@@ -163,19 +225,30 @@ def _knife_edge(e: Entry) -> Constraint | None:
 TYPES = table(
     ElementType(
         "rolling",
-        "a wheel or ball that rolls on a plane without slip.",
+        "a wheel, a ball or another convex shape that rolls on a plane without slip.",
         {
             "wheel": Field("marker", "marker at the centre of the wheel; z is the axle of a disc", required=True),
             "plane": Field(
                 "marker", "marker in the plane; z is its normal and points to the wheel's side", default="ground"
             ),
-            "radius": Field("expression", "radius (m)", required=True, dimension=LENGTH),
-            "shape": Field("choice", "shape of the wheel", default="disc", choices=("disc", "sphere")),
+            "radius": Field("expression", "radius of a disc or sphere (m)", dimension=LENGTH),
+            "shape": Field(
+                "choice", "shape of the wheel", default="disc", choices=("disc", "sphere", "ellipsoid", "convex")
+            ),
             "tube": Field(
                 "expression",
                 "radius of the rounded edge of a disc (m), 0 for a sharp edge",
                 default=0,
                 dimension=LENGTH,
+            ),
+            "semi_axes": Field("vector", "of an ellipsoid: its half axes along x, y and z (m)", dimension=LENGTH),
+            "support": Field(
+                "expression",
+                "of a convex shape: distance from the marker to the tangent plane of outward normal nx, ny, nz (m)",
+                dimension=LENGTH,
+                local={
+                    f"n{axis}": Field("expression", f"{axis} of the outward normal", dimension=NONE) for axis in "xyz"
+                },
             ),
             "no_spin": Field(
                 "flag", "whether the sphere is kept from spinning about the plane's normal", default=False

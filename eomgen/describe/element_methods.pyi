@@ -193,9 +193,10 @@ class ElementMethods(Described):
         bristle_stiffness: Value = None, bristle_damping: Value = None, moduli: Sequence[Value] | None = None,
         poisson: Sequence[Value] | None = None) -> ForceHandle:
         """Add contact of every shape of a group with every shape of another, by one law."""
-    def muscle(self, name: str, a: Any, b: Any, activation: Value, force_max: Value, fiber_length: Value,
-        slack_length: Value, velocity_max: Value = None, pennation: Value = 0, damping: Value = 0.1,
-        via: Sequence[Any] | None = None) -> ForceHandle:
+    def muscle(self, name: str, a: Any, b: Any, activation: Value = None, force_max: Value = None,
+        fiber_length: Value = None, slack_length: Value = None, velocity_max: Value = None, pennation: Value = 0,
+        damping: Value = 0.1, via: Sequence[Any] | None = None, excitation: Value = None,
+        activation_time: Value = 0.015, deactivation_time: Value = 0.06) -> ForceHandle:
         """Add a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion."""
     def coupling(self, name: str, coordinates: Mapping[Any, Value] | None = None, offset: Value = 0,
         equation: Value = None, closes: Value = None, opens: Value = None, closed: bool | None = None,
@@ -228,10 +229,10 @@ class ElementMethods(Described):
         periodic: bool | None = None) -> ConstraintHandle:
         """Add a follower that stays in contact with the contour of a plane cam."""
     def rolling(self, name: str, wheel: Any, plane: Any = None, radius: Value = None, shape: str | None = None,
-        tube: Value = 0, no_spin: bool | None = None, closes: Value = None, opens: Value = None,
-        closed: bool | None = None, releases: Sequence[Any] | None = None,
+        tube: Value = 0, semi_axes: Sequence[Value] | None = None, support: Value = None, no_spin: bool | None = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
         stabilisation: Value = 10) -> ConstraintHandle:
-        """Add a wheel or ball that rolls on a plane without slip."""
+        """Add a wheel, a ball or another convex shape that rolls on a plane without slip."""
     def knife_edge(self, name: str, marker: Any, axis: str | Sequence[float] | None = None, on: Any = None,
         closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
         stabilisation: Value = 10) -> ConstraintHandle:
