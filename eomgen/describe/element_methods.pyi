@@ -198,6 +198,10 @@ class ElementMethods(Described):
         damping: Value = 0.1, via: Sequence[Any] | None = None, excitation: Value = None,
         activation_time: Value = 0.015, deactivation_time: Value = 0.06) -> ForceHandle:
         """Add a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion."""
+    def creep(self, name: str, track: Any, wheel: Any, radius: Value, longitudinal: Value, lateral: Value,
+        lateral_spin: Value = 0, spin: Value = 0, speed: Value = None, creep_law: str | None = None,
+        normal: Value = None, friction: Value = None) -> ForceHandle:
+        """Add creep forces of a rolling wheel on its track (Kalker; Vermeulen and Johnson; Polach)."""
     def coupling(self, name: str, coordinates: Mapping[Any, Value] | None = None, offset: Value = 0,
         equation: Value = None, closes: Value = None, opens: Value = None, closed: bool | None = None,
         releases: Sequence[Any] | None = None, stabilisation: Value = 10) -> ConstraintHandle:
