@@ -25,9 +25,9 @@ class Creep(Force):
     """Forces by which a rolling wheel creeps on its track, from the velocity of the wheel where it touches.
 
     With the creepages x = v_x / V, y = v_y / V and the spin p = w_z / V they are -f11 x, -f22 y - f23 p and a moment
-    f23 y - f33 p (J. J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), sec. 2.2).  Where the normal
-    force N and the coefficient m are given, forces and moment are reduced in one proportion, so that the size of the
-    force, F without it, is at most m N:
+    f23 y - f33 p (J. J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), sec. 2.2).  Where the
+    normal force N and the coefficient m are given, forces and moment are reduced in one proportion, so that the size
+    of the force, F without it, is at most m N:
 
     - m N [1 - (1 - F / (3 m N))^3] (P. J. Vermeulen, K. L. Johnson, J. Appl. Mech. 31 (1964), 338-340);
     - (2 m N / pi) [e / (1 + e^2) + arctan e], e = pi F / (4 m N) (O. Polach, Vehicle System Dynamics, Supplement 33
