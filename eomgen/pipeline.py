@@ -142,7 +142,7 @@ def derive_as(
     if baumgarte is not None:
         kinematics = _stabilised(kinematics, chosen, baumgarte)
     with _alone(), _timed(seconds, "equations"):
-        if any(force.by_reaction for force in mechanism.forces):
+        if mechanism.reaction_quantities or mechanism.switched or any(force.by_reaction for force in mechanism.forces):
             kinematics = _with_reactions(kinematics, mobility)
         choice: Choice | None = None
         if chosen == GIVEN:

@@ -1,19 +1,21 @@
 """Constraint elements: equations between coordinates or markers; :data:`CONSTRAINTS` is the table of their types."""
 
 from ..elements.element_type import Types
-from . import cams, couplings, drivers, gears, planetary, rolling_types
+from . import cams, couplings, drivers, gears, holding, planetary, rolling_types
 from .cams import CamLift, FlatContact, FlatSupport, KnifeContact, RollerContact
 from .constraint import Condition, Constraint, ConstraintView
 from .convex_rolling import RollingConvex
 from .couplings import Equation, Linear
 from .drivers import AngleDriver, CoordinateDriver, DistanceDriver, Driver, PlaceDriver
 from .gears import Belt, Gear, Rack
+from .holding import Hold
 from .planetary import Planetary
 from .rolling import KnifeEdge, RollingDisc, RollingSphere
+from .switching import switchable
 
 CONSTRAINTS: Types = {}
-for _home in (couplings, gears, planetary, cams, rolling_types, drivers):
-    CONSTRAINTS |= _home.TYPES
+for _home in (couplings, gears, planetary, cams, rolling_types, drivers, holding):
+    CONSTRAINTS |= _home.TYPES if _home in (cams, drivers) else switchable(_home.TYPES)
 
 __all__ = [
     "CONSTRAINTS",
@@ -30,6 +32,7 @@ __all__ = [
     "FlatContact",
     "FlatSupport",
     "Gear",
+    "Hold",
     "KnifeContact",
     "KnifeEdge",
     "Linear",

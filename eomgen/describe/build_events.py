@@ -29,7 +29,7 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
     check_keys(path, values, EVENT, reader.faults)
     expression = reader.stand_in
     if "expression" in values:
-        expression = _instant(reader, f"{path}.expression", values["expression"])
+        expression = instant(reader, f"{path}.expression", values["expression"])
     direction = values.get("direction", 0)
     if not is_number(direction) or direction not in (-1, 0, 1):
         reader.faults.add(
@@ -64,7 +64,7 @@ def _times(reader: Reader, path: str, value: Any) -> int:
     return 0
 
 
-def _instant(reader: Reader, path: str, value: Any) -> Expr:
+def instant(reader: Reader, path: str, value: Any) -> Expr:
     """An expression of what is known of a state without solving for accelerations."""
     expression = reader.expression(path, value, OUTPUT)
     for name, what in late_names(reader.names, symbols_of([expression])):
@@ -83,7 +83,7 @@ def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...
     result = []
     for name, value in in_order(given, known):
         if name in known:
-            result.append((str(name), _instant(reader, f"{path}.{name}", value)))
+            result.append((str(name), instant(reader, f"{path}.{name}", value)))
         else:
             states = bool(reader.description.sections["states"])
             remedy = nearest(shown(name), known, f"coordinates and velocities{' and states' * states}")

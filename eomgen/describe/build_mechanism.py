@@ -23,6 +23,7 @@ from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .build_quantities import Outputs, read_input, read_parameter, with_signal
 from .build_states import build_states, declare_states
+from .build_switches import begun_switches, build_switches, declare_switches, events_of_switches, states_of_switches
 from .cam_turns import check_turns
 from .check_dimensions import check_dimensions, with_units
 from .checks import check_connected, check_keys, check_names
@@ -35,7 +36,7 @@ from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
 from .joint_data import check_display
 from .mass_properties import read_body
-from .mechanism import SUMS, Body, Mechanism, Simulation
+from .mechanism import SUMS, Body, CarriedQuantity, Mechanism, Simulation
 from .names import fault_of_model_name, nearest
 from .physical import check_bodies
 from .scope import Namespace
@@ -91,6 +92,7 @@ def build(description: Description) -> Mechanism:
 
     declared = declare_states(reader, sections["states"], given_values is not None or lagrangian_values is not None)
     held, state_rates = own_states(reader, sections["forces"])
+    switching = declare_switches(reader, sections["constraints"])
     read_outputs = Outputs(reader, sections["outputs"]).all
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     bodies = _bodies(reader, sections["bodies"])
@@ -103,9 +105,13 @@ def build(description: Description) -> Mechanism:
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     states, begun, clocks, samplings = build_states(reader, declared)
     outputs = read_outputs()
-    events = (*build_events(reader, sections["events"]), *samplings)
+    switched = build_switches(reader, switching, constraints)
+    constraints = tuple(c for c in constraints if all(c is not s.constraint for s in switched))
+    events = (
+        *build_events(reader, sections["events"]), *samplings, *events_of_switches(reader, switching, switched)
+    )  # fmt: skip
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
-    kinds = ("coordinate", "velocity", *(("state",) if declared or held else ()))
+    kinds = ("coordinate", "velocity", *(("state",) if declared or held or switching else ()))
     starts = _initial(reader, "initial", values.get("initial", {}), (*kinds, "output"))
     moving = set(reader.names.of(*kinds))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
@@ -141,12 +147,15 @@ def build(description: Description) -> Mechanism:
         joints=joints,
         forces=forces,
         outputs=outputs,
-        states=(*states, *held),
+        states=(*states, *held, *states_of_switches(reader, switched)),
         clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
-        element_quantities={str(asked): (asked.name, asked.element) for asked in reader.asked} | state_rates,
-        initial=begun | {name: value for name, value in starts.items() if name in moving},
+        element_quantities={str(a): (a.name, a.element) for a in reader.asked if not a.carried} | state_rates,
+        reaction_quantities=_carried(reader),
+        initial=begun
+        | begun_switches(graph, switched)
+        | {name: value for name, value in starts.items() if name in moving},
         initial_outputs={name: value for name, value in starts.items() if name not in moving},
         guess=guess,
         independent=independent,
@@ -154,6 +163,7 @@ def build(description: Description) -> Mechanism:
         lagrangian=lagrangian,
         given=given,
         constraints=constraints,
+        switched=switched,
         lines=dict(description.lines),
         doc=doc,
         latex=dict(reader.latex),
@@ -225,10 +235,20 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
         reader.faults.add("outputs", message, "a centre of mass and a momentum need mass")
 
 
+def _carried(reader: Reader) -> dict[str, CarriedQuantity]:
+    """The parts of reactions and the multipliers that expressions speak of."""
+    found = {}
+    for asked, path in reader.asked.items():
+        if asked.carried:
+            axes = reader.moving(asked.axes) if asked.axes else None
+            found[str(asked)] = CarriedQuantity(asked.element, asked.part, axes, path)
+    return found
+
+
 def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
     """Report faults: quantities such as ``length(k1)`` of force elements that do not act along a path."""
     known = {force.name: force for force in forces}
-    for (quantity, name), path in reader.asked.items():
+    for (quantity, name, *_), path in reader.asked.items():
         if quantity != "power" and name in known and not known[name].acts_along:
             remedy = f"power({name}) is known of every element; force, length and rate of elements along a path "
             reader.faults.add(

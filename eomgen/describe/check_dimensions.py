@@ -154,6 +154,8 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
     for name, quantity in reader.quantities.items():
         found[name] = Known(quantity.dimension)
     found |= {str(asked): Known(ENERGY.times(TIME, -1)) for asked in reader.asked if asked.name == "power"}
+    parts = {str(asked): asked.part for asked in reader.asked if asked.part}
+    found |= {name: Known(ENERGY if part.startswith("m") else FORCE) for name, part in parts.items()}
     return found | {f"{name}()": Known(ENERGY) for name in ENERGIES}
 
 

@@ -11,6 +11,7 @@ from ..notation import with_instance
 from .build_cam_points import needs_point
 from .build_clocks import COUNTER, EVENT
 from .build_joints import coordinate_names, sketch
+from .build_switches import CLOSED, is_switched
 from .description import GROUND_NAME, Description
 from .element_states import states_of
 from .marker_quantities import ElementQuantity, MarkerQuantity
@@ -47,6 +48,7 @@ class OwnNames:
             self.symbols |= {str(name) for name in coordinate_names(kind, entry.name, entry.values, joint)[0]}
             self.symbols |= {entry.name + velocity.suffix for velocity in joint.velocities if velocity.of is None}
         self.symbols |= {name for entry in sections["forces"] for name in states_of(entry)}
+        self.symbols |= {f"{entry.name}{CLOSED}" for entry in sections["constraints"] if is_switched(entry)}
         for entry in sections["states"]:
             if "period" in entry.values and isinstance(entry.name, str):
                 self.symbols |= {entry.name + COUNTER, entry.name + EVENT}
@@ -118,7 +120,7 @@ class Renaming(Visitor):
             return str(quantity.renamed(place))
 
         def element(quantity: ElementQuantity) -> str:
-            return str(quantity.renamed(lambda name: self.prefix + name))
+            return str(quantity.renamed(lambda name: self.prefix + name, place))
 
         def place(marker: str) -> str:
             if marker == COM and COM not in self.own.bodies:

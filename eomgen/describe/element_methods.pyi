@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..elements.element_type import ElementType
+from .carried_handles import ConstraintHandle
 from .described import Described
 from .handles import ForceHandle, JointHandle
 
@@ -192,38 +193,59 @@ class ElementMethods(Described):
         bristle_stiffness: Value = None, bristle_damping: Value = None, moduli: Sequence[Value] | None = None,
         poisson: Sequence[Value] | None = None) -> ForceHandle:
         """Add contact of every shape of a group with every shape of another, by one law."""
-    def muscle(self, name: str, a: Any, b: Any, activation: Value, force_max: Value, fiber_length: Value,
-        slack_length: Value, velocity_max: Value = None, pennation: Value = 0, damping: Value = 0.1,
-        via: Sequence[Any] | None = None) -> ForceHandle:
+    def muscle(self, name: str, a: Any, b: Any, activation: Value = None, force_max: Value = None,
+        fiber_length: Value = None, slack_length: Value = None, velocity_max: Value = None, pennation: Value = 0,
+        damping: Value = 0.1, via: Sequence[Any] | None = None, excitation: Value = None,
+        activation_time: Value = 0.015, deactivation_time: Value = 0.06) -> ForceHandle:
         """Add a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion."""
+    def creep(self, name: str, track: Any, wheel: Any, radius: Value, longitudinal: Value, lateral: Value,
+        lateral_spin: Value = 0, spin: Value = 0, speed: Value = None, creep_law: str | None = None,
+        normal: Value = None, friction: Value = None) -> ForceHandle:
+        """Add creep forces of a rolling wheel on its track (Kalker; Vermeulen and Johnson; Polach)."""
     def coupling(self, name: str, coordinates: Mapping[Any, Value] | None = None, offset: Value = 0,
-        equation: Value = None) -> None:
+        equation: Value = None, closes: Value = None, opens: Value = None, closed: bool | None = None,
+        releases: Sequence[Any] | None = None, stabilisation: Value = 10) -> ConstraintHandle:
         """Add a relation between coordinates: a linear one, or any equation."""
     def gear(self, name: str, a: Any, b: Any, radii: Sequence[Value] | None = None,
         teeth: Sequence[Value] | None = None, cones: Sequence[Value] | None = None, internal: bool | None = None,
-        phase: Value = 0) -> None:
+        phase: Value = 0, closes: Value = None, opens: Value = None, closed: bool | None = None,
+        releases: Sequence[Any] | None = None, stabilisation: Value = 10) -> ConstraintHandle:
         """Add two gears that mesh: r_a a + r_b b = r_a phase, or r_a a - r_b b = r_a phase if one is internal."""
-    def rack(self, name: str, pinion: Any, rack: Any, radius: Value, offset: Value = 0) -> None:
+    def rack(self, name: str, pinion: Any, rack: Any, radius: Value, offset: Value = 0, closes: Value = None,
+        opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        stabilisation: Value = 10) -> ConstraintHandle:
         """Add a pinion that rolls on a rack: s = radius angle + offset (m)."""
     def belt(self, name: str, a: Any, b: Any, radii: Sequence[Value] | None = None,
-        teeth: Sequence[Value] | None = None, crossed: bool | None = None, phase: Value = 0) -> None:
+        teeth: Sequence[Value] | None = None, crossed: bool | None = None, phase: Value = 0, closes: Value = None,
+        opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        stabilisation: Value = 10) -> ConstraintHandle:
         """Add a belt without slip on two pulleys: r_a (a - phase) = r_b b, or -r_b b if the belt crosses."""
     def planetary(self, name: str, sun: Any = None, ring: Any = None, carrier: Any = None, planet: Any = None,
-        radii: Mapping[str, Value] | None = None, teeth: Mapping[str, Value] | None = None, phase: Value = 0) -> None:
+        radii: Mapping[str, Value] | None = None, teeth: Mapping[str, Value] | None = None, phase: Value = 0,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        stabilisation: Value = 10) -> ConstraintHandle:
         """Add a planetary gear set: its meshing wheels follow Willis' equation."""
     def cam(self, name: str, cam: Any, follower: Any, lift: Value, phase: Value = 0,
-        periodic: bool | None = None) -> None:
+        periodic: bool | None = None) -> ConstraintHandle:
         """Add a cam with a given lift: the follower's coordinate is a function of the cam's angle."""
     def cam_contact(self, name: str, cam: Any, follower: Any, shape: str, contour: Value = None, support: Value = None,
-        radius: Value = None, coordinate: Any = None, latex: str | None = None, periodic: bool | None = None) -> None:
+        radius: Value = None, coordinate: Any = None, latex: str | None = None,
+        periodic: bool | None = None) -> ConstraintHandle:
         """Add a follower that stays in contact with the contour of a plane cam."""
     def rolling(self, name: str, wheel: Any, plane: Any = None, radius: Value = None, shape: str | None = None,
-        tube: Value = 0, no_spin: bool | None = None, semi_axes: Sequence[Value] | None = None,
-        support: Value = None) -> None:
+        tube: Value = 0, no_spin: bool | None = None, semi_axes: Sequence[Value] | None = None, support: Value = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        stabilisation: Value = 10) -> ConstraintHandle:
         """Add a wheel, ball or smooth convex body that rolls on a plane without slip."""
-    def knife_edge(self, name: str, marker: Any, axis: str | Sequence[float] | None = None, on: Any = None) -> None:
+    def knife_edge(self, name: str, marker: Any, axis: str | Sequence[float] | None = None, on: Any = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        stabilisation: Value = 10) -> ConstraintHandle:
         """Add a blade: a marker that cannot move sideways, along one of its own axes."""
     def driver(self, name: str, coordinate: Any = None, value: Value = None, between: Sequence[Any] | None = None,
         angle: Sequence[Any] | None = None, marker: Any = None, axis: str | Sequence[float] | None = None,
-        on: Any = None) -> None:
+        on: Any = None) -> ConstraintHandle:
         """Add a motion prescribed over time: of a coordinate, a distance, an angle or the place of a marker."""
+    def hold(self, name: str, a: Any, b: Any, axes: str | None = None, turning: str | None = None, closes: Value = None,
+        opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        stabilisation: Value = 10) -> ConstraintHandle:
+        """Add a marker held where it is on another body while it is closed: a foot on the ground, a grasp, a clutch."""

@@ -18,7 +18,8 @@ from ..graph.core import Expr, Graph
 from ..operations import OPERATIONS
 from ..syntax_trees import parse_statement
 from .marker_quantities import ElementQuantity, MarkerQuantity
-from .names import OF_ELEMENTS, QUANTITIES, function_words, nearest
+from .names import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, function_words, nearest
+from .reaction_texts import multiplier_in, reaction_in
 from .typing_slips import find_slip
 
 LENGTH = 4000  #: characters of one expression
@@ -33,7 +34,7 @@ Locate = Callable[[MarkerQuantity | ElementQuantity], Expr]
 
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/()<>=! \t\r\n]")
 #: A number that runs into a word: Python reads it as two, with a warning of its own.
-_JOINED = re.compile(r"(?<![A-Za-z0-9_])[0-9.][0-9A-Za-z_.]*?(and|or|not|if|is|in|else)")
+_JOINED = re.compile(r"(?<![A-Za-z0-9_])\.?[0-9][0-9A-Za-z_.]*?(and|or|not|if|is|in|else)")
 #: Keywords of motions that Python does not allow as such, and what stands for them in its tree.
 _KEYWORDS = {"in": "_n", "from": "_rom"}
 _KEYWORD = re.compile(r"\b(in|from)(?=\s*=(?!=))")
@@ -199,6 +200,8 @@ class _Walker:
         if isinstance(node, ast.IfExp):
             parts = [self.walk(part, depth + 1) for part in (node.test, node.body, node.orelse)]
             return self.apply(node, "select", *parts)
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Call):
+            return self.carried(node, node.value)
         raise self.fault(node, _REFUSED.get(type(node), f"{type(node).__name__} is not allowed in an expression"))
 
     def number(self, node: ast.Constant) -> Expr:
@@ -265,6 +268,8 @@ class _Walker:
             return self.quantity(node, name)
         if name in OF_ELEMENTS and name not in self.graph.functions and not node.keywords:
             return self.element(node, name)
+        if name in (REACTION, MULTIPLIER) and name not in self.graph.functions:
+            return self.carried(node, node)
         if node.keywords:
             raise self.fault(node, f"{name}() takes no keywords")
         declared = self.graph.functions.get(name)
@@ -339,6 +344,18 @@ class _Walker:
             return self.locate(ElementQuantity(name, argument.id))
         except ExpressionError as error:
             raise self.fault(argument, error.message, error.remedy) from None
+
+    def carried(self, node: ast.expr, call: ast.Call) -> Expr:
+        """What a joint or an equation carries: ``reaction(A).x``, ``multiplier(mesh.ratio)``."""
+        if not isinstance(call.func, ast.Name) or call.func.id not in (REACTION, MULTIPLIER):
+            raise self.fault(node, _REFUSED[ast.Attribute])
+        if self.locate is None:
+            remedy = "use it in outputs, events and the laws of force elements"
+            raise self.fault(node, f"{call.func.id}(...) cannot be used here", remedy)
+        try:
+            return self.locate(multiplier_in(node) if call.func.id == MULTIPLIER else reaction_in(node))
+        except ExpressionError as error:
+            raise self.fault(node, error.message, error.remedy) from None
 
     def marker(self, argument: ast.expr, quantity: str) -> str:
         """The label of a marker, ``rod`` or ``rod.tip``."""

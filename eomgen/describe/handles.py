@@ -9,6 +9,7 @@ from ..errors import UsageError
 from ..graph.shown import shown
 from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
+from .carried_handles import JointReaction
 from .described import Described
 from .description import GROUND_NAME, DescribedEntry, is_zero, items, label_of
 from .marker_quantities import MarkerQuantity
@@ -319,6 +320,16 @@ class JointHandle:
     def acceleration(self) -> Any:
         """The second derivative of the coordinate of a joint of one degree, as a SymPy symbol (for outputs)."""
         return symbol(self._only() + RATES[2])
+
+    @property
+    def reaction(self) -> JointReaction:
+        """What the joint carries, in ground axes; as ``reactions`` of a module gives it."""
+        return JointReaction(self.name)
+
+    def reaction_in(self, axes: MarkerHandle) -> JointReaction:
+        """What the joint carries, along the axes of a marker."""
+        axes.note()
+        return JointReaction(self.name, axes.label)
 
     def _only(self) -> str:
         names = self.coordinate_names

@@ -7,10 +7,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ..errors import ExpressionError
-from .names import OF_ELEMENTS, PAIRS, QUANTITIES, RESOLVED
+from .names import MULTIPLIER, OF_ELEMENTS, PAIRS, QUANTITIES, REACTION, REACTION_PARTS, RESOLVED
 
 _KEYWORD = re.compile(r"(from|in)\s*=\s*", re.ASCII)
 _OF_ELEMENT = re.compile(rf"({'|'.join(OF_ELEMENTS)})\((\w+)\)\Z", re.ASCII)
+_MULTIPLIER = re.compile(rf"{MULTIPLIER}\((\w+(?:\.\w+)?)\)\Z", re.ASCII)
+_REACTION = re.compile(rf"{REACTION}\((\w+)(?:, in=(.+))?\)\.({'|'.join(REACTION_PARTS)})\Z", re.ASCII)
 _CALL = re.compile(rf"({'|'.join(QUANTITIES)})\((.+)\)\Z", re.DOTALL)
 
 
@@ -78,17 +80,35 @@ class MarkerQuantity(NamedTuple):
 
 
 class ElementQuantity(NamedTuple):
-    """What a force element does, as ``force(k1)``; see :class:`~eomgen.forces.force.Measured`."""
+    """What a force element does, as ``force(k1)``; see :class:`~eomgen.forces.force.Measured`.
+
+    Also a part of what a joint carries, ``reaction(A, in=rod).x``, along the axes of a marker (none: ground), and the
+    multiplier of an equation, ``multiplier(mesh.ratio)``.
+    """
 
     name: str
     element: str
+    part: str = ""
+    axes: str = ""
 
     def __str__(self) -> str:
-        return f"{self.name}({self.element})"
+        axes = f", in={self.axes}" if self.axes else ""
+        return f"{self.name}({self.element}{axes}){f'.{self.part}' if self.part else ''}"
 
-    def renamed(self, rename: Callable[[str], str]) -> ElementQuantity:
-        """The same of another element."""
-        return ElementQuantity(self.name, rename(self.element))
+    @property
+    def carried(self) -> bool:
+        """Whether it is the reaction of a joint or the multiplier of an equation."""
+        return self.name in (REACTION, MULTIPLIER)
+
+    @property
+    def owner(self) -> str:
+        """The element, the joint, or the element or joint of an equation."""
+        return self.element.partition(".")[0] if self.name == MULTIPLIER else self.element
+
+    def renamed(self, rename: Callable[[str], str], marker: Callable[[str], str] | None = None) -> ElementQuantity:
+        """The same of another element, and of axes that ``marker`` renames."""
+        axes = (marker or rename)(self.axes) if self.axes else ""
+        return ElementQuantity(self.name, rename(self.element), self.part, axes)
 
 
 #: Quantities of two markers, of which the first may be left out: it is the ground then.
@@ -103,8 +123,12 @@ def marker_quantity(symbol: str) -> MarkerQuantity | None:
 
 def element_quantity(symbol: str) -> ElementQuantity | None:
     """What a symbol's name such as ``force(k1)`` speaks of; None for other names."""
-    found = _OF_ELEMENT.match(symbol)
-    return ElementQuantity(found[1], found[2]) if found else None
+    if found := _OF_ELEMENT.match(symbol):
+        return ElementQuantity(found[1], found[2])
+    if found := _MULTIPLIER.match(symbol):
+        return ElementQuantity(MULTIPLIER, found[1])
+    found = _REACTION.match(symbol)
+    return ElementQuantity(REACTION, found[1], found[3], found[2] or "") if found else None
 
 
 def _split(arguments: str) -> list[str]:

@@ -162,6 +162,18 @@ def dimension_of(level: int, axis: int) -> dimensions.Dimension:
     return LEVEL_DIMENSIONS[level]
 
 
+class CarriedQuantity(NamedTuple):
+    """A part of the reaction of a joint, along the axes of a marker (None: ground), or the multiplier of an equation.
+
+    ``part`` is empty for a multiplier.
+    """
+
+    of: str
+    part: str
+    axes: Marker | None
+    path: str  #: where an expression speaks of it first
+
+
 @dataclass(frozen=True)
 class Output:
     """A named result: an expression in t, coordinates, their rates, parameters, inputs and marker quantities."""
@@ -249,6 +261,19 @@ class Event:
     doc: str = ""
 
 
+class Switched(NamedTuple):
+    """A constraint that closes and opens in a run: the state that is 1 while it holds, and whether it does at first.
+
+    ``stabilisation`` is the rate at which its error dies away; ``releases`` are states that become 0 as it closes.
+    """
+
+    constraint: Constraint | None  #: None where its entry has faults
+    state: str
+    closed: bool
+    stabilisation: Expr
+    releases: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class Simulation:
     """Defaults of ``simulate`` and ``eomgen run``."""
@@ -278,6 +303,7 @@ class Mechanism:
     events: tuple[Event, ...] = ()
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
     element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element
+    reaction_quantities: Mapping[str, CarriedQuantity] = field(default_factory=dict)  #: by symbol
     initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate, ``<coordinate>_dot`` or state
     initial_outputs: Mapping[str, Expr] = field(default_factory=dict)  #: by output, in its unit
     guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts
@@ -286,6 +312,7 @@ class Mechanism:
     lagrangian: Lagrangian | None = None
     given: GivenEquations | None = None
     constraints: tuple[Constraint, ...] = ()
+    switched: tuple[Switched, ...] = ()  #: constraints that close and open, which are not among those
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
     doc: str = ""
     latex: Mapping[str, str] = field(default_factory=dict)  #: how names are printed, where it is given

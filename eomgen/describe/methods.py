@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from ..elements.element_type import ElementType
 from ..elements.field import Field
 from ..errors import UsageError
+from .carried_handles import ConstraintHandle
 from .described import Described
 from .description import items
 from .handles import ForceHandle, JointHandle, MarkerHandle
@@ -50,7 +51,7 @@ ARGUMENTS = {
 }
 _SCALAR = ("scalar", "Value")
 #: Section -> what its methods return.
-_HANDLES: dict[str, Any] = {"joints": JointHandle, "forces": ForceHandle}
+_HANDLES: dict[str, Any] = {"joints": JointHandle, "forces": ForceHandle, "constraints": ConstraintHandle}
 _WIDTH = 108  #: of the text of a method's documentation
 
 

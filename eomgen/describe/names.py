@@ -43,6 +43,10 @@ PAIRS = ("angle", "angle_rate", "distance", "distance_rate")
 RESOLVED = tuple(name for name, (level, axis) in QUANTITIES.items() if axis < 3 and level in (0, 1, 2, 7, 9))
 #: Quantities of a force element: generalized force along its path, the path's length or angle and its rate, power.
 OF_ELEMENTS = ("force", "length", "rate", "power")
+#: Quantities of a joint and of an equation of a constraint: what it carries.
+REACTION, MULTIPLIER = "reaction", "multiplier"
+#: Parts of a reaction: force and moment, size of the force, size of its part across the axis of the joint.
+REACTION_PARTS = ("x", "y", "z", "mx", "my", "mz", "size", "normal")
 #: Levels of what only the accelerations tell.
 ACCELERATIONS = (2, 9, 10)
 #: Sums over all bodies that need no marker, in outputs; a name of the model's own comes first.

@@ -14,14 +14,16 @@ from ..graph.core import Graph
 from ..graph.evaluate import evaluate
 from .expressions import parse
 from .marker_quantities import ElementQuantity, MarkerQuantity
-from .names import OF_ELEMENTS, QUANTITIES
+from .names import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, REACTION_PARTS
 
 _MARKER = r"[A-Za-z]\w*(?:\.\w+)*"
 _TOKEN = re.compile(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
     rf"|\b(?P<quantity>{'|'.join(sorted(QUANTITIES, key=len, reverse=True))})"
     rf"\(\s*(?P<arguments>{_MARKER}(?:\s*,\s*(?:(?:in|from)\s*=\s*)?{_MARKER})*)\s*\)"
-    rf"|\b(?P<what>{'|'.join(OF_ELEMENTS)})\(\s*(?P<element>[A-Za-z]\w*(?:\.\w+)*)\s*\)"
+    rf"|\b(?P<what>{'|'.join((*OF_ELEMENTS, MULTIPLIER))})\(\s*(?P<element>{_MARKER})\s*\)"
+    rf"|\b{REACTION}\(\s*(?P<joint>{_MARKER})\s*(?:,\s*in\s*=\s*(?P<axes>{_MARKER})\s*)?\)"
+    rf"\.(?P<part>{'|'.join(REACTION_PARTS)})\b"
     r"|(?P<name>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)"
 )
 
@@ -49,6 +51,9 @@ def rewritten(value: Any, name: Rename, locate: Locate, element: Callable[[Eleme
                 return found[0]
         if found["what"] is not None:
             return found[0] if element is None else element(ElementQuantity(found["what"], found["element"]))
+        if found["joint"] is not None:
+            quantity = ElementQuantity(REACTION, found["joint"], found["part"], found["axes"] or "")
+            return found[0] if element is None else element(quantity)
         return name(found[0])
 
     return _TOKEN.sub(one, value)

@@ -194,7 +194,8 @@ class Scope:
         """The symbol of ``vx(rod.tip)`` or ``force(k1)``; raises ExpressionError for an unknown marker or element."""
         if isinstance(found, ElementQuantity):
             if self.level < LAW:
-                self._refuse(str(found), "quantity of a force element")
+                carried = "reaction" if found.carried else "quantity of a force element"
+                self._refuse(str(found), carried)
             else:
                 self.ask(found, self.path)
             return self.graph.symbol(str(found))

@@ -21,6 +21,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..elements.element_type import ElementType
+from .carried_handles import ConstraintHandle
 from .described import Described
 from .handles import ForceHandle, JointHandle
 
@@ -57,7 +58,7 @@ def _method(section: str, found: ElementType) -> str:
             default = f" = {plain!r}"
             annotation += " | None" if plain is None and annotation not in ("Any", "Value") else ""
         listed.append(f"{one.name}: {annotation}{default}")
-    result = {"joints": "JointHandle", "forces": "ForceHandle"}.get(section, "None")
+    result = {"joints": "JointHandle", "forces": "ForceHandle", "constraints": "ConstraintHandle"}.get(section, "None")
     parts = [f"{part},".replace(" ", "\0") for part in listed]  # no line ends within an argument
     parts[-1] = parts[-1].removesuffix(",") + f")\0->\0{result}:"
     text = f"def\0{found.name}({' '.join(parts)}"

@@ -74,12 +74,26 @@ class Reader:
 
     def ask(self, quantity: ElementQuantity, path: str) -> None:
         """Note that an expression uses what a force element does; ExpressionError if there is none of that name."""
+        if quantity.carried:
+            self._ask_reaction(quantity)
+            self.asked.setdefault(quantity, path)
+            return
         names = [str(entry.name) for entry in self.description.sections["forces"]]
         if quantity.element not in names:
             raise ExpressionError(
                 f"no force element {quantity.element!r}", 0, nearest(quantity.element, names, "elements")
             )
         self.asked.setdefault(quantity, path)
+
+    def _ask_reaction(self, quantity: ElementQuantity) -> None:
+        """Refuse the reaction of an unknown joint, or the multiplier of an unknown element."""
+        places = ("joints",) if quantity.part else ("constraints", "joints")
+        names = [str(entry.name) for place in places for entry in self.description.sections[place]]
+        if quantity.owner not in names:
+            message = f"no {'joint' if quantity.part else 'constraint or joint'} {quantity.owner!r}"
+            raise ExpressionError(message, 0, nearest(quantity.owner, names, "known"))
+        if quantity.axes:
+            self.moving(quantity.axes)
 
     def known(self, expression: Expr) -> float | None:
         """The value of an expression at the declared values of parameters, None if they do not tell."""

@@ -1,13 +1,14 @@
 """Force elements: geometry (a path or a marker) times a law; :data:`FORCES` is the table of their types."""
 
 from ..elements.element_type import ElementType, Types
-from . import actuators, attraction, bushing, contact, contact_groups, friction, laws, muscle, springs, stops
+from . import actuators, attraction, bushing, contact, contact_groups, creep, friction, laws, muscle, springs, stops
 from .actuators import Actuator, BodyTorque, PointForce
 from .attraction import PointGravity
 from .bushing import Bushing
 from .contact import Contact, SpherePlane, SphereSphere
 from .contact_groups import ContactGroups
 from .contact_shapes import ContactShape
+from .creep import Creep
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
 from .friction import JointFriction
 from .friction_laws import BrownMcPhee, Friction, LuGre
@@ -21,7 +22,7 @@ from .springs import Damper, Spring
 from .stops import JointStop
 
 FORCES: Types = {}
-for _home in (actuators, springs, laws, bushing, attraction, friction, stops, contact, contact_groups, muscle):
+for _home in (actuators, springs, laws, bushing, attraction, friction, stops, contact, contact_groups, muscle, creep):
     FORCES |= _home.TYPES
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "ContactGroups",
     "ContactShape",
     "CoordinateLoad",
+    "Creep",
     "DampedLinear",
     "Damper",
     "ElementType",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
-from ..elements.dimensions import FORCE, LENGTH, NONE, SPEED
+from ..elements.dimensions import FORCE, LENGTH, NONE, SPEED, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field
@@ -24,6 +25,7 @@ _ACTIVE = (
 )
 _VELOCITY = (-0.318, -8.149, -0.374, 0.886)
 _STRAIN, _SHAPE = 0.6, 4.0
+SHARPNESS = 10.0  #: with which activation changes to deactivation
 
 
 def active_force_length(length: Expr) -> Expr:
@@ -46,6 +48,24 @@ def force_velocity(velocity: Expr) -> Expr:
     d1, d2, d3, d4 = _VELOCITY
     y = d2 * velocity + d3
     return d1 * velocity.graph.apply("log", y + sqrt(y * y + 1.0)) + d4
+
+
+@dataclass(frozen=True)
+class Activation:
+    """How the activation a follows the excitation e (De Groote and others, 2016, eq. 1 and 2).
+
+    a' = [(h + 1/2) / (t_a (1/2 + 3 a / 2)) + (1/2 - h) (1/2 + 3 a / 2) / t_d] (e - a),  h = tanh(10 (e - a)) / 2
+    """
+
+    excitation: Expr
+    activation_time: Expr
+    deactivation_time: Expr
+
+    def rate(self, activation: Expr) -> Expr:
+        """The rate of the activation (1/s)."""
+        apart = self.excitation - activation
+        h, slow = 0.5 * activation.graph.apply("tanh", SHARPNESS * apart), 0.5 + 1.5 * activation
+        return ((0.5 + h) / (self.activation_time * slow) + slow * (0.5 - h) / self.deactivation_time) * apart
 
 
 @dataclass(frozen=True)
@@ -73,6 +93,10 @@ class Muscle(Force):
     velocity_max: Expr
     pennation: Expr
     damping: Expr
+    drive: Activation | None = None  #: of a muscle whose activation is a state of its own
+
+    def state_rates(self, view: View) -> tuple[Expr, ...]:
+        return () if self.drive is None else (self.drive.rate(self.activation),)
 
     def tension(self, length: Expr, rate: Expr) -> Expr:
         """Pull of the tendon (N) from the length and the lengthening rate of the path."""
@@ -102,15 +126,28 @@ SHORTENING = 10.0
 
 
 def _muscle(e: Entry) -> Muscle | None:
-    path, activation = read_path(e), e.law("activation")
-    e.require("activation", activation, lambda a: 0 <= a <= 1, "an activation is 0 to 1")
+    path, drive = read_path(e), None
+    if "excitation" in e.values:
+        activation = e.states()[0]
+        drive = Activation(e.law("excitation"), e.positive("activation_time"), e.positive("deactivation_time"))
+        e.require("excitation", drive.excitation, lambda a: 0 <= a <= 1, "an excitation is 0 to 1")
+    else:
+        activation = e.law("activation")
+        e.require("activation", activation, lambda a: 0 <= a <= 1, "an activation is 0 to 1")
+        for key in ("activation_time", "deactivation_time"):
+            e.refuse(key, "has a meaning beside excitation only")
     force_max, fiber_length, slack_length = (e.positive(k) for k in ("force_max", "fiber_length", "slack_length"))
     velocity_max = e.positive("velocity_max") if "velocity_max" in e.values else SHORTENING * fiber_length
     pennation, damping = e.law("pennation"), e.law("damping")
     e.require("pennation", pennation, lambda x: abs(x) < 1.5707, "must be less than pi/2")
     if path is None:
         return None
-    return Muscle(e.name, path, activation, force_max, fiber_length, slack_length, velocity_max, pennation, damping)
+    sizes = (force_max, fiber_length, slack_length, velocity_max, pennation, damping)
+    return Muscle(e.name, path, activation, *sizes, drive)
+
+
+def _states(values: Mapping[str, Any]) -> dict[str, str]:
+    return {"activation": ""} if "excitation" in values else {}
 
 
 TYPES = table(
@@ -119,9 +156,7 @@ TYPES = table(
         "a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion.",
         {
             "between": BETWEEN._replace(required=True),
-            "activation": Field(
-                "expression", "activation of the muscle, 0 to 1", required=True, level=LAW, dimension=NONE
-            ),
+            "activation": Field("expression", "activation of the muscle, 0 to 1", level=LAW, dimension=NONE),
             "force_max": Field("expression", "largest active force (N)", required=True, dimension=FORCE),
             "fiber_length": Field("expression", "optimal length of the fibres (m)", required=True, dimension=LENGTH),
             "slack_length": Field("expression", "length of the tendon (m)", required=True, dimension=LENGTH),
@@ -140,7 +175,17 @@ TYPES = table(
                 "expression", "damping force at velocity_max, divided by force_max", default=0.1, dimension=NONE
             ),
             "via": VIA,
+            "excitation": Field(
+                "expression",
+                "instead of activation: what a state of the muscle, <name>_activation, follows, 0 to 1",
+                level=LAW,
+                dimension=NONE,
+            ),
+            "activation_time": Field("expression", "time in which it grows (s)", default=0.015, dimension=TIME),
+            "deactivation_time": Field("expression", "time in which it dies away (s)", default=0.06, dimension=TIME),
         },
         _muscle,
+        one_of=("activation", "excitation"),
+        states=_states,
     )
 )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import field, fields, is_dataclass
 from functools import cached_property
 
 from ..describe.input_rates import clock
@@ -89,6 +89,8 @@ class Kinematics:
     forces: tuple[ForceTerms, ...]
     length_scale: Expr
     coupled: tuple[str, ...] = ()  #: labels of the equations of constraint elements
+    plastic: Mapping[str, tuple[tuple[str, Expr], ...]] = field(default_factory=dict)  #: event -> velocities after it
+    reaction_laws: tuple[str, ...] = ()  #: force elements whose laws speak of reactions, which are solved for
     hints: tuple[tuple[str, Expr], ...] = ()  #: where assembly looks for coordinates of contact points
 
     @property

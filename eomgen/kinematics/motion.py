@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
-from ..describe.mechanism import ANGULAR_MOMENTUM, INERTIA, MASS, MOMENTUM, STATE_RATE, TURNING, Mechanism, Quantity
+from ..describe.mechanism import (
+    ANGULAR_MOMENTUM,
+    INERTIA,
+    MASS,
+    MOMENTUM,
+    STATE_RATE,
+    TURNING,
+    CarriedQuantity,
+    Mechanism,
+    Quantity,
+)
 from ..errors import ModelError
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
@@ -16,6 +26,7 @@ from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Mat3, Vec3
 from .angle_sums import sum_of_turns
 from .momentum import Momentum
+from .reaction_parts import part_of_reaction
 from .state import MotionSymbols
 from .tree import Poses
 
@@ -164,11 +175,26 @@ class MarkerMotion:
         for name, quantity in mechanism.quantities.items():
             if name in used:
                 mapping[self.graph.symbol(name)] = self._quantity(quantity)
+        for name in mechanism.reaction_quantities.keys() & used:
+            found = self._carried(mechanism, mechanism.reaction_quantities[name])
+            if found != self.graph.symbol(name):
+                mapping[self.graph.symbol(name)] = found
         for name in self.carried.keys() & used:
             mapping[self.graph.symbol(name)] = self.carried[name]
         for name in mechanism.element_quantities.keys() & used:
             mapping[self.graph.symbol(name)] = self._of_element(mechanism, name)
         return mapping
+
+    def _carried(self, mechanism: Mechanism, quantity: CarriedQuantity) -> Expr:
+        """A part of a reaction in symbols of the joint's wrench, or a multiplier; their values once they are known."""
+        if quantity.part:
+            spec = next(spec for spec in mechanism.joints if spec.name == quantity.of)
+            found = part_of_reaction(self, spec, quantity)
+            mapping = self.derived_symbols(mechanism, symbols_of([found]))
+        else:
+            found, mapping = self.graph.symbol(f"multiplier({quantity.of})"), {}
+        known = mapping | {self.graph.symbol(name): value for name, value in self.carried.items()}
+        return substitute([found], known)[0]
 
     def _of_element(self, mechanism: Mechanism, name: str) -> Expr:
         """What a force element does, in terms of the tree.

@@ -210,7 +210,7 @@ class JointWrenches:
     @cached_property
     def on_bodies(self) -> dict[str, dict[int, Row6]]:
         """D of each constraint row, body by body; rows that vanish identically are there too."""
-        return self._element_rows() | {
+        return self.element_rows() | {
             label: self._on_ends(joint.spec, gradient) for joint in self.cut for label, gradient in joint.rows
         }
 
@@ -249,7 +249,7 @@ class JointWrenches:
             flat += [*vec.times(axes, linear), *vec.times(axes, angular)]
         return flat
 
-    def _element_rows(self) -> dict[str, dict[int, Row6]]:
+    def element_rows(self) -> dict[str, dict[int, Row6]]:
         """D of the equations of constraint elements, body by body; what acts along coordinates of the tree is not in
         it."""
         kinematics, graph = self.kinematics, self.kinematics.graph

@@ -239,7 +239,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "constraint_scales": list(mobility.row_scales),
         "alignment_labels": list(c.aligned_joints),
         "fragile_forces": [name for name, _ in flag_forces(kinematics)],
-        **({"reaction_laws": laws} if (laws := [f.name for f in m.forces if f.by_reaction]) else {}),
+        **({"reaction_laws": list(kinematics.reaction_laws)} if kinematics.reaction_laws else {}),
         "p_values": [p.value for p in m.parameters],
         "u_values": [u.value for u in m.inputs],
         "units": units,

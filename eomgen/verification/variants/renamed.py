@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.build_clocks import COUNTER, EVENT
+from ...describe.build_switches import CLOSED, CLOSES, OPENS, is_switched
 from ...describe.description import GROUND_NAME, Description
 from ...describe.element_states import states_of
 from ...describe.marker_quantities import MarkerQuantity
@@ -81,6 +82,8 @@ class _Renamed(Visitor):
         for entry in description.sections["constraints"]:
             if entry.values["type"] == "cam_contact" and "coordinate" not in entry.values:
                 self.words[f"{entry.name}_contact"] = self.words[entry.name] + "_contact"
+            for ending in (CLOSED, CLOSES, OPENS) if is_switched(entry) else ():
+                self.words[entry.name + ending] = self.words[entry.name] + ending
         for entry in description.sections["forces"]:
             for name in states_of(entry):
                 self.words[name] = self.words[entry.name] + name[len(entry.name) :]
@@ -130,4 +133,8 @@ class _Renamed(Visitor):
         def place(marker: str) -> str:
             return marker if marker == COM and COM not in self.bodies else str(self.marker(marker, slot))
 
-        return rewritten(value, name, locate, lambda quantity: str(quantity.renamed(self.word)))
+        def element(word: str) -> str:
+            owner, dot, row = word.partition(".")
+            return self.word(owner) + dot + row
+
+        return rewritten(value, name, locate, lambda quantity: str(quantity.renamed(element, place)))

@@ -1,0 +1,34 @@
+"""Constraint elements that close and open: the keys by which a constraint holds for a time only."""
+
+from __future__ import annotations
+
+from ..elements.dimensions import SPIN
+from ..elements.element_type import ElementType, Types
+from ..elements.field import LAW, Field, Fields
+
+#: Of any constraint that may close and open in a run.
+SWITCHING: Fields = {
+    "closes": Field(
+        "expression",
+        "where it falls to 0 the constraint closes: a plastic impact, after which it holds",
+        level=LAW,
+    ),
+    "opens": Field("expression", "where it falls to 0 while the constraint holds, it lets go", level=LAW),
+    "closed": Field("flag", "whether it holds at the start of a run; false if closes is given, else true"),
+    "releases": Field("names", "other constraints that let go as it closes, before the impact"),
+    "stabilisation": Field(
+        "expression",
+        "rate (1/s) at which an error of the equation dies away while it holds",
+        default=10,
+        dimension=SPIN,
+    ),
+}
+
+
+def switchable(types: Types) -> Types:
+    """The types with these keys too."""
+    return {name: _with_keys(found) for name, found in types.items()}
+
+
+def _with_keys(found: ElementType) -> ElementType:
+    return found._replace(keys=found.keys | SWITCHING)

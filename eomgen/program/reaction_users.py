@@ -1,0 +1,110 @@
+"""Stage program, who speaks of reactions: laws, outputs and events -> what is wrong with what they ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..describe.mechanism import Mechanism
+from ..errors import ModelError, Problem
+from ..forces import JointCoordinate, ReactionFriction
+from ..graph.core import Expr
+from ..graph.evaluate import compile_evaluator
+from ..graph.substitute import symbols_of
+from ..kinematics import Kinematics
+from ..kinematics.mobility import Mobility
+from ..limits.inertia import SINGULAR
+from ..numeric import algebra
+from ..numeric.definite import correlated
+
+
+class Users(NamedTuple):
+    """The force elements whose laws speak of reactions; and, through the mechanism, all other expressions that do."""
+
+    mechanism: Mechanism
+    forces: tuple[str, ...]
+
+    @property
+    def paths(self) -> list[str]:
+        """Places in the description, forces first."""
+        asked = [q.path for q in self.mechanism.reaction_quantities.values() if not q.path.startswith("forces.")]
+        return [*(f"forces.{name}" for name in self.forces), *dict.fromkeys(asked)]
+
+    def verb(self, plural: str) -> str:
+        """The verb as it stands behind :meth:`together`."""
+        return plural if self.forces else f"{plural}s"
+
+    def together(self, message: str, remedy: str) -> Problem:
+        """A problem of all laws, or of the first expression that speaks of reactions."""
+        place = f"forces.{' and '.join(self.forces)}" if self.forces else self.paths[0]
+        return self.mechanism.problem(place, message, remedy)
+
+    def problem(self, message: str, remedy: str, joint: str) -> Problem:
+        """A problem of what speaks of a joint's reaction."""
+        laws = [f.name for f in self.mechanism.forces if getattr(f, "joint", None) == joint and f.by_reaction]
+        asked = [q.path for q in self.mechanism.reaction_quantities.values() if q.of == joint]
+        place = f"forces.{laws[0]}" if laws else asked[0] if asked else f"joints.{joint}"
+        return self.mechanism.problem(place, message, remedy)
+
+
+def refuse_joints(kinematics: Kinematics) -> None:
+    """Refuse friction in joints whose reaction has no force across, or along, the z axis of S."""
+    graph, mechanism = kinematics.graph, kinematics.mechanism
+    specs, problems = {spec.name: spec for spec in mechanism.joints}, []
+    for force in mechanism.forces:
+        if not isinstance(force, ReactionFriction) or not isinstance(force.path, JointCoordinate):
+            continue
+        spec = specs[force.joint]
+        columns = spec.joint.subspace(graph, [kinematics.motion.coordinates[n][0] for n in spec.coordinates])
+        of = [velocity.of for velocity in spec.joint.velocities]
+        place = spec.coordinates.index(force.path.name)
+        own = columns[of.index(place)] if place in of else ()
+        turns = spec.joint.coordinates[place].kind == "angle"
+        straight = [[not part[2].is_zero and part[0].is_zero and part[1].is_zero for part in own]]
+        free = [any(not linear[k].is_zero for _, linear in columns) for k in range(3)]
+        if straight != [[turns, not turns]] or free[0] or free[1]:
+            message = f"joint {spec.name!r} is {spec.joint.type_name}, which has no force across one fixed axis"
+            remedy = "coefficient is known of revolute, prismatic and cylindrical joints; give coulomb instead"
+            problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
+        elif force.thrust_radius is not None and free[2]:
+            message = f"thrust_radius is given, and joint {spec.name!r} slides along its axis, so it carries no thrust"
+            problems.append(mechanism.problem(f"forces.{force.name}", message, "leave thrust_radius out"))
+    if problems:
+        raise ModelError(problems)
+
+
+def require_inertia_of_tree(
+    kinematics: Kinematics, mobility: Mobility, mass_matrix: Sequence[Sequence[Expr]], users: Users
+) -> None:
+    """Refuse a tree that does not have inertia behind every coordinate, with which its reactions are found."""
+    values = {p.name: p.value for p in kinematics.mechanism.parameters}
+    if mobility.assumed or any(value is None for value in values.values()):
+        return
+    known = dict(zip(kinematics.names, mobility.q_reference, strict=True)) | values
+    flat, n = [x for row in mass_matrix for x in row], len(kinematics.v)
+    names = sorted(symbols_of(flat))
+    with np.errstate(all="ignore"):
+        M = np.reshape(compile_evaluator(flat, names)([float(known.get(name) or 0.0) for name in names]), (n, n))
+    M = np.where(np.triu(np.ones((n, n), dtype=bool)), M, M.T)  # M may be given by one of its triangles
+    sizes, directions = algebra.eigh(correlated(M))
+    if n and not sizes[0] > SINGULAR:
+        weights = np.abs(directions[:, 0])
+        moved = [x for x, w in zip(kinematics.velocity_labels, weights, strict=True) if w > 0.1 * weights.max()]
+        message = (
+            f"{users.verb('depend')} on reactions, and moving {', '.join(moved)} without its loops meets no inertia"
+        )
+        remedy = "give every body mass, or inertia about its joint"
+        raise ModelError([users.together(message, remedy)])
+
+
+def refuse_redundant(mobility: Mobility, users: Users) -> None:
+    """Refuse mechanisms whose reactions are not unique."""
+    if not mobility.redundant:
+        return
+    owners = dict.fromkeys(label.partition(".")[0] for label in mobility.redundant)
+    message = "depends on the reaction of a joint, and reactions are not unique: constraints of "
+    message += f"{', '.join(owners)} follow from the others"
+    remedy = "give the joints there more freedom (cylindrical, spherical), or take a law without reactions"
+    raise ModelError([users.mechanism.problem(path, message, remedy) for path in users.paths])

@@ -1,0 +1,156 @@
+"""Creep of wheel and rail: the linear wheelset beside textbook matrices, saturation beside published formulas."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import eomgen as eg
+from eomgen.errors import ModelError
+
+G = 9.81
+#: Of a wheelset: mass, yaw inertia, half the gauge, rolling radius, conicity, creep coefficients, suspension.
+P = {"m": 1250.0, "I": 700.0, "b": 0.75, "r": 0.45, "cone": 0.1, "f11": 6.6e6, "f22": 6.0e6, "f23": 1.0e4, "f33": 50.0}
+P |= {"ky": 2.5e5, "kpsi": 1.5e6}
+
+
+def wheelset(law: str = "linear") -> eg.Model:
+    """It runs along the track at the speed V; y is its lateral place, psi its yaw, phi its rolling."""
+    m = eg.Model("wheelset", gravity=(0, 0, -G))
+    for name, value in {**P, "V": 20.0, "mu": 0.3}.items():
+        m.parameter(name, value)
+    frames = [m.body(name, mass=0) for name in ("along", "across", "yawing")]
+    axle = m.body("axle", mass="m", inertia=("I", 80.0, "I"))
+    run = m.prismatic("x", m.ground, frames[0], axis="x")
+    m.driver("forward", "x", "V*t")
+    m.prismatic("y", frames[0], frames[1], axis="y")
+    m.revolute("psi", frames[1], frames[2])
+    m.revolute("phi", frames[2], axle, axis="y")
+    m.joint_spring("side", "y", stiffness="ky")
+    m.joint_spring("yaw", "psi", stiffness="kpsi")
+    more = {} if law == "linear" else {"normal": run.reaction.force[2] / 2, "friction": "mu"}
+    for side, sign in (("left", 1), ("right", -1)):
+        m.creep(side, m.ground.at(0, 0, "-r"), axle.at(0, sign * P["b"], 0), radius=f"r + ({sign})*cone*y",
+                longitudinal="f11", lateral="f22", lateral_spin="f23", spin="f33", creep_law=law, **more)  # fmt: skip
+    m.initial(phi_dot="V/r")
+    return m
+
+
+def matrices(V: float, p: dict[str, float]) -> np.ndarray:
+    """x = (y, psi, y', psi'): A. H. Wickens, Fundamentals of Rail Vehicle Dynamics (2003), ch. 3."""
+    M = np.diag([p["m"], p["I"]])
+    lateral, turning = 2 * p["f22"], 2 * p["f11"] * p["b"]
+    D = np.array([[lateral, 2 * p["f23"]], [-2 * p["f23"], turning * p["b"] + 2 * p["f33"]]]) / V
+    K = np.array([[p["ky"], -lateral], [turning * p["cone"] / p["r"], p["kpsi"] + 2 * p["f23"]]])
+    zero, one = np.zeros((2, 2)), np.eye(2)
+    return np.block([[zero, one], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+
+
+def reduced(mod: eg.Module, V: float) -> np.ndarray:
+    """d(y', psi', y'', psi'') by (y, psi, y', psi') at straight running, the rolling beside it."""
+    mod = mod.bind(p={"V": V})
+    x = mod.x0(phi_dot=V / P["r"])
+    J = mod.jacobian(0.0, x)
+    places = [mod.x_names.index(name) for name in ("y", "psi", "y_dot", "psi_dot")]
+    return J[np.ix_(places, places)]
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_linear_wheelset_and_its_critical_speed(target: str) -> None:
+    mod = wheelset().compile(target=target)
+    for V in (5.0, 20.0, 60.0):
+        assert reduced(mod, V) == pytest.approx(matrices(V, P), rel=1e-9, abs=1e-6)
+
+    def growth(V: float) -> float:
+        return float(np.linalg.eigvals(reduced(mod, V)).real.max())
+
+    found = brentq(growth, 10.0, 200.0, xtol=1e-8)
+    truth = brentq(lambda V: np.linalg.eigvals(matrices(V, P)).real.max(), 10.0, 200.0, xtol=1e-8)
+    assert found == pytest.approx(truth, rel=1e-6)
+    assert growth(0.9 * found) < 0.0 < growth(1.1 * found)
+
+
+def test_klingel_wave() -> None:
+    """Slow and without springs a wheelset follows a wave of the length 2 pi sqrt(r b / cone) (Klingel 1883)."""
+    mod = wheelset().compile(target="numpy")
+    V = 0.5
+    free = mod.bind(p={"ky": 0.0, "kpsi": 0.0, "f23": 0.0, "f33": 0.0, "V": V})
+    J = free.jacobian(0.0, free.x0(phi_dot=V / P["r"]))
+    places = [free.x_names.index(name) for name in ("y", "psi", "y_dot", "psi_dot")]
+    values = np.linalg.eigvals(J[np.ix_(places, places)])
+    slow = values[np.abs(values.imag) > 1e-6]
+    assert 2 * np.pi * V / np.abs(slow.imag).max() == pytest.approx(
+        2 * np.pi * np.sqrt(P["r"] * P["b"] / P["cone"]), rel=1e-5
+    )
+
+
+def vermeulen_johnson(F: float, most: float) -> float:
+    return most * (1 - (1 - F / (3 * most)) ** 3) if 3 * most > F else most
+
+
+def polach(F: float, most: float) -> float:
+    e = np.pi * F / (4 * most)
+    return 2 * most / np.pi * (e / (1 + e**2) + np.arctan(e))
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("law", [vermeulen_johnson, polach])
+@pytest.mark.parametrize("creepage", [1e-7, 1e-4, 3e-4, 2e-3, 0.2])
+def test_a_braked_wheel_saturates(law, creepage: float, target: str) -> None:
+    """By the friction of the weight that the axle carries, with both creepages at once."""
+    mass, r, f, V, mu = 400.0, 0.4, 4e6, 10.0, 0.25
+    m = eg.Model("wheel", gravity=(0, 0, -G))
+    frame, wheel = m.body("frame", mass=100.0), m.body("wheel", mass=mass, inertia=(12.0, 20.0, 12.0))
+    slide = m.joint("planar", "j", m.ground, frame)
+    m.revolute("phi", frame, wheel, axis="y")
+    m.creep("rail", m.ground.at(0, 0, -r), wheel, radius=r, longitudinal=f, lateral=0.8 * f,
+            creep_law=law.__name__, normal="reaction(j).z", friction=mu)  # fmt: skip
+    m.output("N", slide.reaction.force[2])
+    mod = m.compile(target=target)
+    x = mod.x0(j_x_dot=V, j_y_dot=0.5 * creepage * V, phi_dot=V * (1 - creepage) / r)
+    a = dict(zip(mod.v_names, mod.rhs(0.0, x)[mod.n_q :], strict=True))
+    assert mod.outputs(0.0, x)[0] == pytest.approx(500.0 * G, rel=1e-12)
+    linear = -f * creepage * np.array([1.0, 0.4])
+    size = float(np.hypot(*linear))
+    push = linear * law(size, mu * 500.0 * G) / size
+    assert [500.0 * a["j_x_dot"], 500.0 * a["j_y_dot"]] == pytest.approx(push, rel=1e-7)
+    assert 20.0 * a["phi_dot"] == pytest.approx(-r * push[0], rel=1e-7)
+    steps = [(mod.rhs(0, x + 1e-7 * e) - mod.rhs(0, x - 1e-7 * e)) / 2e-7 for e in np.eye(8)]
+    J = mod.jacobian(0.0, x)
+    assert pytest.approx(np.array(steps).T, rel=1e-4, abs=1e-4 * np.abs(J).max()) == J
+
+
+def test_a_track_that_moves_takes_the_opposite() -> None:
+    m = eg.Model("roller")
+    track, wheel = m.body("track", mass=30.0, inertia=(3.0, 3.0, 3.0)), m.body("wheel", mass=5.0, inertia=(0.2,) * 3)
+    m.free("a", m.ground, track)
+    m.free("b", m.ground, wheel)
+    m.creep("rail", track.at(0.1, 0, 0), wheel.at(0, 0.02, 0), radius=0.3, longitudinal=900.0, lateral=700.0,
+            lateral_spin=5.0, spin=2.0, speed=3.0)  # fmt: skip
+    for axis in "xyz":
+        m.output(f"p{axis}", f"momentum_{axis}")
+        m.output(f"L{axis}", f"angular_momentum_{axis}(ground)")
+    m.initial(b_z=0.3, b_x_dot=2.0, b_y_dot=0.3, b_1_dot=0.2, b_2_dot=4.0, b_3_dot=-0.5, a_3_dot=0.4)
+    mod = m.compile(target="numpy")
+    run = mod.simulate(0.3, rtol=1e-10, atol=1e-12)
+    y = mod.outputs(run.t, run.x)
+    assert np.abs(y - y[:, :1]).max() < 1e-7
+    assert np.ptp(run["b_x_dot"]) > 0.05
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"creep_law": "polach"}, "forces.rail.normal: is missing; the law polach needs the normal force"),
+        ({"friction": 0.3}, "forces.rail.friction: .*the linear law does not saturate"),
+        ({"longitudinal": -1.0}, "forces.rail.longitudinal: is -1; must be 0 or greater"),
+    ],
+)
+def test_what_is_wrong_is_told(keys: dict[str, object], told: str) -> None:
+    m = eg.Model("wheel")
+    wheel = m.body("wheel", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    m.free("f", m.ground, wheel)
+    m.creep("rail", m.ground, wheel, radius=0.3, **{"longitudinal": 1.0, "lateral": 1.0, **keys})
+    with pytest.raises(ModelError, match=told):
+        m.check()
