@@ -6,13 +6,16 @@ shapes, which are round of radius 0 or of the shape's own.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from functools import reduce
 from typing import NamedTuple
 
-from ..elements.dimensions import LENGTH
-from ..elements.field import Field, Fields
+import numpy as np
+
+from ..elements.dimensions import LENGTH, NONE
+from ..elements.field import NUMBER, Field, Fields
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -23,6 +26,7 @@ from .contact import Contact, SpherePlane, joint_radius
 from .contact_profiles import ArcRound, EdgeRound, peaks, smooth_pieces, solid_depth, straight_pieces
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_solids import EllipsoidPlane, RodRod
+from .contact_states import PLATE, POINTS, ShapeParts, parts_of
 
 CORNERS = 64  #: most corners of a polygon
 
@@ -58,6 +62,13 @@ _SIZES: dict[str, Fields] = {
             "corners", f"3 to {CORNERS} corners [x, y] of a convex outline (m)", required=True, dimension=LENGTH
         ),
     },
+    "plate": {
+        "length": Field("expression", "length along x of the marker (m)", required=True, dimension=LENGTH),
+        "width": Field("expression", "width across the plane (m)", required=True, dimension=LENGTH),
+        "points": Field(
+            "expression", f"at how many points it is felt, 1 to {POINTS}", default=PLATE, level=NUMBER, dimension=NONE
+        ),
+    },
     "half_plane": {},
     "profile": _profile("", 2),
     "smooth_profile": _profile(", by a smooth curve of circular arcs", 3),
@@ -79,7 +90,7 @@ _ON = {
 #: Kind of shape -> its keys; a shape in the plane lies in the x-y plane of its marker.
 SHAPE_FIELDS: dict[str, Fields] = {kind: {**_ON, **sizes} for kind, sizes in _SIZES.items()}
 #: Shapes of mechanisms in the plane; the others are shapes in space.
-PLANAR = ("circle", "segment", "box", "polygon", "half_plane", "profile", "smooth_profile")
+PLANAR = ("circle", "segment", "box", "polygon", "plate", "half_plane", "profile", "smooth_profile")
 #: Shapes without an end, which do not meet each other.
 GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space")
 _SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
@@ -102,6 +113,8 @@ class Feature(NamedTuple):
     thickness : Expr
         How far another body goes from one side of the shape to the other at least; greater than 0 but for a half-plane,
         which has no other side.
+    slot : int
+        Its number among those of its class on the shape.
     """
 
     kind: str
@@ -109,6 +122,7 @@ class Feature(NamedTuple):
     sizes: tuple[Expr, ...]
     bound: Expr | None
     thickness: Expr
+    slot: int = 0
 
 
 @dataclass(frozen=True)
@@ -121,7 +135,7 @@ class ContactShape:
         One of :data:`SHAPE_FIELDS`.
     sizes : tuple of Expr
         radius; length, radius; of a box or polygon x and y of its corners, counterclockwise; of a profile its depth
-        and x and y of its points; half axes; lengths.
+        and x and y of its points; half axes; lengths; of a plate length, width and number of points.
     """
 
     kind: str
@@ -142,18 +156,19 @@ class ContactShape:
         if self.kind == "cuboid":
             x, y, z = (0.5 * size for size in self.sizes)
             thick = _least(self.sizes)
+            ways = enumerate(itertools.product(_BOTH, repeat=3))
             return [
-                Feature("end", _moved(frame, (i * x, j * y, k * z)), (zero,), zero, thick)
-                for i in _BOTH
-                for j in _BOTH
-                for k in _BOTH
+                Feature("end", _moved(frame, (i * x, j * y, k * z)), (zero,), zero, thick, n) for n, (i, j, k) in ways
             ]
+        if self.kind == "plate":
+            return self._pads(frame)
         if self.kind in ("segment", "capsule"):
             along = frame if self.kind == "segment" else _turned(frame, (2, 0, 1))
             half, radius = 0.5 * self.sizes[0], self.sizes[1]
             whole, end = ("segment", "corner") if self.kind == "segment" else ("rod", "end")
             thick = zero.graph.apply("max", 2.0 * radius, _SLIM * half)
-            ends = [Feature(end, _moved(along, (x, zero, zero)), (radius,), radius, thick) for x in (-half, half)]
+            sides = enumerate((-half, half))
+            ends = [Feature(end, _moved(along, (x, zero, zero)), (radius,), radius, thick, k) for k, x in sides]
             return [Feature(whole, along, (half, radius), half + radius, thick), *ends]
         corners = list(zip(self.sizes[::2], self.sizes[1::2], strict=True))
         edges: list[Expr] = []
@@ -164,8 +179,36 @@ class ContactShape:
             edges += [x, y, dy / length, -dx / length, length]
             reach = reach.graph.apply("max", reach, x * x + y * y)
         thick = _width(edges, corners)
-        points = [Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, thick) for x, y in corners]
+        points = [
+            Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, thick, k) for k, (x, y) in enumerate(corners)
+        ]
         return [Feature(f"polygon{len(corners)}", frame, tuple(edges), sqrt(reach), thick), *points]
+
+    def parts(self) -> ShapeParts:
+        """How many parts of each class it has."""
+        points = {"polygon": len(self.sizes) // 2, "plate": len(self.features()) if self.kind == "plate" else 0}
+        return parts_of(self.kind, points.get(self.kind, (len(self.sizes) - 1) // 2))
+
+    def _pads(self, frame: Frame) -> list[Feature]:
+        """Points of a plate: those of Gauss's rule along x, with parts of the area.
+
+        Where the pressure of n points is a polynomial of degree 2 n - 2 or less along the plate, force and moment are
+        exact.
+        """
+        length, width, count = self.sizes
+        zero = length.graph.zero
+        places, weights = np.polynomial.legendre.leggauss(int(count.value or 0))
+        return [
+            Feature(
+                "pad",
+                _moved(frame, (0.5 * float(x) * length, zero, zero)),
+                (0.5 * float(w) * length * width, width),
+                zero,
+                length,
+                k,
+            )
+            for k, (x, w) in enumerate(zip(places, weights, strict=True))
+        ]
 
     def _points(self) -> list[tuple[Expr, Expr]]:
         """Points of a profile."""
@@ -181,7 +224,10 @@ class ContactShape:
             for one in pieces
         ]
         tops = peaks(points)
-        return [*found, *(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth) for x, y in tops)]
+        return [
+            *found,
+            *(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth, k) for k, (x, y) in tops),
+        ]
 
     def _facing(self, frame: Frame) -> Frame:
         """The frame whose z axis points out of the solid: y of a half-plane's marker, z of a half-space's."""
@@ -214,6 +260,10 @@ class ContactShape:
             found = [feature.frame for feature in self.features()]
             ways = ((0, 1, 3, 2, 0, 4, 5, 7, 6, 4), (1, 5), (2, 6), (3, 7))
             return [Drawn(tuple(Marker(marker.body, found[k], marker.label) for k in way)) for way in ways]
+        if self.kind == "plate":
+            half, zero = 0.5 * self.sizes[0], self.sizes[0].graph.zero
+            places = [_moved(marker.frame, (x, zero, zero)) for x in (-half, half)]
+            return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
         frames = [feature.frame for feature in self.features()[1:]]
         closed = frames if self.kind in ("segment", "capsule") else [*frames, frames[0]]
         return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in closed))]
@@ -259,6 +309,7 @@ _FLAT = ("segment", "polygon", "edge", "arc")
 MEETINGS = (
     ("round", "round"),
     *((surface, soft) for surface in ("half", *_FLAT) for soft in ("round", "corner")),
+    *((surface, "pad") for surface in ("half", "edge", "arc")),
     ("half", "end"),
     ("half", "ellipsoid"),
     ("rod", "round"),
@@ -289,7 +340,12 @@ def touching(
     """The contact of one feature with another; ``law`` has the laws."""
     first, radius = sizes[0], sizes[1][0]
     normal = law.normal_law.at(lambda: joint_radius(first[0], radius) if kinds[0] == "round" else radius)
-    laws = (law.name, *markers, normal, law.friction)
+    friction = law.friction
+    if kinds[1] == "pad":
+        area, width = sizes[1]
+        normal, radius = normal.on_pad(area, width), radius.graph.zero
+        friction = None if friction is None else friction.on_pad(area)
+    laws = (law.name, *markers, normal, friction)
     if kinds[0] == "round":
         return RoundRound(*laws, (first[0], radius))
     if kinds[1] == "ellipsoid":
