@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-
 RECOVERY = 0.05  #: (s) in which a plate above the ground forgets its sinkage and shear: far less than it is lifted
 
 

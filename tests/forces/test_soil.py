@@ -285,6 +285,6 @@ def test_shapes_that_do_not_lie_on_soil() -> None:
     assert "width: is 0; must be greater than 0" in told
     assert "is 99; give a whole number from 1 to 8" in told
     bare = plate(EXAMPLE)
-    bare.contacts("s", thin, ground, EXAMPLE)
+    bare.contacts("s", thin, {**ground, "on": bare.ground}, EXAMPLE)
     with pytest.raises(ModelError, match=r"s\.first\[0\]\.width: is missing"):
         bare.mechanism()
