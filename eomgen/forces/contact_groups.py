@@ -23,8 +23,8 @@ from ..records import dataclass
 from .branches import where
 from .contact import SpherePlane
 from .contact_rounds import AtHeight
+from .contact_shape_fields import PLANAR
 from .contact_shapes import (
-    PLANAR,
     ContactShape,
     Feature,
     ShapeMotion,

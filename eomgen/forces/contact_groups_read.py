@@ -11,7 +11,8 @@ from ..elements.entry import Entry
 from ..elements.field import Field
 from .contact import CURVED
 from .contact_groups import ContactGroups
-from .contact_shapes import GROUNDS, PLANAR, ContactShape
+from .contact_shape_fields import GROUNDS, PLANAR, SHAPE_FIELDS
+from .contact_shapes import ContactShape
 from .contact_states import ShapeParts, given_groups, pair_states
 from .friction_laws import DryFriction, has_bristles, read_friction
 from .normal_laws import HertzBodies, NormalLaw, read_normal_law
@@ -97,6 +98,10 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
             ) and (second or a != b or _differ(first, a)):
                 told = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
                 e.fault("second" if second else "first", told, _ALLOWED)
+    for key, own, met in (("second", kinds[0], kinds[1]), ("first", kinds[1], kinds[0])):
+        if "plate" in own and (wrong := [kind for kind in met if kind not in _UNDER_PLATES]):
+            e.fault(key, f"{wrong[0]} and plate do not meet", f"plates meet {', '.join(_UNDER_PLATES)}")
+            break
     thin = [shape for shape in first if _is_thin(shape)], [shape for shape in second or first if _is_thin(shape)]
     for k, others in enumerate((second or first, first)):
         cornered = sorted({shape.kind for shape in others if shape.kind in _CORNERED or _is_thin(shape)})
@@ -135,12 +140,21 @@ def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
     return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
 
 
-_CORNERED = ("box", "polygon", "profile", "smooth_profile")  #: shapes whose corners meet segments
+_UNDER_PLATES = ("half_plane", "profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
+_CORNERED = (
+    "box",
+    "polygon",
+    "profile",
+    "smooth_profile",
+    "outline",
+    "smooth_outline",
+    "sprocket",
+)  #: shapes whose corners meet segments
 _ON_GROUND = ("ellipsoid", "cuboid")  #: shapes that meet a half-space alone
 _IN_SPACE = ("sphere", "capsule", *_ON_GROUND)
 _ALLOWED = (
-    "circle, segment, box, polygon meet each other, half_plane, profile and smooth_profile; sphere and capsule meet "
-    "each other and half_space; ellipsoid and cuboid meet half_space"
+    "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
+    "smooth_profile; sphere and capsule meet each other and half_space; ellipsoid and cuboid meet half_space"
 )
 
 _SHAPES = "shapes {shape, on, ...} of the "
@@ -149,9 +163,8 @@ TYPES = table(
     ElementType(
         "contacts",
         "contact of every shape of a group with every shape of another, by one law.  Shapes are mappings of shape "
-        "(circle, segment, box, polygon, half_plane, profile, smooth_profile; sphere, capsule, half_space, ellipsoid, "
-        "cuboid), on (a marker or a list of markers) "
-        "and sizes.  Shapes of one body do not meet.",
+        f"({', '.join(PLANAR)}; {', '.join(kind for kind in SHAPE_FIELDS if kind not in PLANAR)}), "
+        "on (a marker or a list of markers) and sizes.  Shapes of one body do not meet.",
         {
             "first": Field("shapes", _SHAPES + "first group", required=True, dimension=LENGTH),
             "second": Field(

@@ -14,8 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.dimensions import LENGTH, NONE
-from ..elements.field import NUMBER, Field, Fields
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -23,76 +21,24 @@ from ..graph.core import Expr, Graph, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .contact import Contact, SpherePlane, joint_radius
-from .contact_profiles import ArcRound, EdgeRound, peaks, smooth_pieces, solid_depth, straight_pieces
+from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
+from .contact_profiles import (
+    ArcRound,
+    EdgeRound,
+    Point,
+    ProfilePart,
+    peaks,
+    smooth_pieces,
+    solid_depth,
+    straight_pieces,
+)
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
+from .contact_shape_fields import GROUNDS
 from .contact_solids import EllipsoidPlane, RodRod
-from .contact_states import PLATE, POINTS, ShapeParts, parts_of
+from .contact_states import ShapeParts, parts_of
 
-CORNERS = 64  #: most corners of a polygon
-
-_RADIUS = Field("expression", "radius (m)", required=True, dimension=LENGTH)
-_ALONG = "length between the centres of its ends (m), along {} of the marker"
-
-
-def _profile(how: str, least: int) -> Fields:
-    return {
-        "points": Field(
-            "places",
-            f"{least} or more points [x, y] from left to right that the ground runs through{how} (m)",
-            required=True,
-            dimension=LENGTH,
-        ),
-        "depth": Field(
-            "expression",
-            "how far the solid reaches below it (m); a tenth of its length unless given",
-            dimension=LENGTH,
-        ),
-    }
-
-
-_SIZES: dict[str, Fields] = {
-    "circle": {"radius": _RADIUS},
-    "segment": {
-        "length": Field("expression", _ALONG.format("x"), required=True, dimension=LENGTH),
-        "radius": _RADIUS._replace(required=False, default=0),
-    },
-    "box": {"size": Field("two", "lengths along x and y (m)", required=True, dimension=LENGTH)},
-    "polygon": {
-        "points": Field(
-            "corners", f"3 to {CORNERS} corners [x, y] of a convex outline (m)", required=True, dimension=LENGTH
-        ),
-    },
-    "plate": {
-        "length": Field("expression", "length along x of the marker (m)", required=True, dimension=LENGTH),
-        "width": Field("expression", "width across the plane (m)", required=True, dimension=LENGTH),
-        "points": Field(
-            "expression", f"at how many points it is felt, 1 to {POINTS}", default=PLATE, level=NUMBER, dimension=NONE
-        ),
-    },
-    "half_plane": {},
-    "profile": _profile("", 2),
-    "smooth_profile": _profile(", by a smooth curve of circular arcs", 3),
-    "sphere": {"radius": _RADIUS},
-    "capsule": {
-        "length": Field("expression", _ALONG.format("z"), required=True, dimension=LENGTH),
-        "radius": _RADIUS,
-    },
-    "half_space": {},
-    "ellipsoid": {
-        "semi_axes": Field("vector", "semi-axes along x, y and z (m)", required=True, dimension=LENGTH),
-    },
-    "cuboid": {"size": Field("vector", "lengths along x, y and z (m)", required=True, dimension=LENGTH)},
-}
-_ON = {
-    "shape": Field("choice", "kind of shape", required=True, choices=tuple(_SIZES)),
-    "on": Field("on", "the marker to which it is fixed, or a list of markers that have one each", required=True),
-}
-#: Kind of shape -> its keys; a shape in the plane lies in the x-y plane of its marker.
-SHAPE_FIELDS: dict[str, Fields] = {kind: {**_ON, **sizes} for kind, sizes in _SIZES.items()}
-#: Shapes of mechanisms in the plane; the others are shapes in space.
-PLANAR = ("circle", "segment", "box", "polygon", "plate", "half_plane", "profile", "smooth_profile")
-#: Shapes without an end, which do not meet each other.
-GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space")
+#: Shapes whose pieces are edges and arcs.
+_PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
 _SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
 _BOTH = (-1.0, 1.0)
 _STEPS = 24  #: lines of which the picture of an ellipse is made
@@ -134,8 +80,9 @@ class ContactShape:
     kind : str
         One of :data:`SHAPE_FIELDS`.
     sizes : tuple of Expr
-        radius; length, radius; of a box or polygon x and y of its corners, counterclockwise; of a profile its depth
-        and x and y of its points; half axes; lengths; of a plate length, width and number of points.
+        radius; length, radius; of a box or polygon x and y of its corners, counterclockwise; of a profile or an outline
+        its depth and x and y of its points, of outlines clockwise; of a sprocket its depth, teeth, pitch, seat, tip
+        radius and angle of a seat; half axes; lengths; of a plate length, width and number of points.
     """
 
     kind: str
@@ -149,7 +96,7 @@ class ContactShape:
             return [Feature("round", frame, self.sizes, self.sizes[0], 2.0 * self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
             return [Feature("half", self._facing(frame), (), None, zero)]
-        if self.kind in ("profile", "smooth_profile"):
+        if self.kind in _PIECED:
             return self._pieces(frame)
         if self.kind == "ellipsoid":
             return [Feature("ellipsoid", frame, self.sizes, _most(self.sizes), 2.0 * _least(self.sizes))]
@@ -186,8 +133,12 @@ class ContactShape:
 
     def parts(self) -> ShapeParts:
         """How many parts of each class it has."""
-        points = {"polygon": len(self.sizes) // 2, "plate": len(self.features()) if self.kind == "plate" else 0}
-        return parts_of(self.kind, points.get(self.kind, (len(self.sizes) - 1) // 2))
+        counts = {"polygon": len(self.sizes) // 2, "sprocket": self._whole(1), "plate": self._whole(2)}
+        return parts_of(self.kind, counts.get(self.kind, (len(self.sizes) - 1) // 2))
+
+    def _whole(self, k: int) -> int:
+        """A size that is a whole number."""
+        return int(self.sizes[k].value or 0) if k < len(self.sizes) else 0
 
     def _pads(self, frame: Frame) -> list[Feature]:
         """Points of a plate: those of Gauss's rule along x, with parts of the area.
@@ -195,39 +146,47 @@ class ContactShape:
         Where the pressure of n points is a polynomial of degree 2 n - 2 or less along the plate, force and moment are
         exact.
         """
-        length, width, count = self.sizes
-        zero = length.graph.zero
-        places, weights = np.polynomial.legendre.leggauss(int(count.value or 0))
-        return [
-            Feature(
-                "pad",
-                _moved(frame, (0.5 * float(x) * length, zero, zero)),
-                (0.5 * float(w) * length * width, width),
-                zero,
-                length,
-                k,
-            )
-            for k, (x, w) in enumerate(zip(places, weights, strict=True))
-        ]
+        length, width, _ = self.sizes
+        zero, found = length.graph.zero, list[Feature]()
+        for x, weight in zip(*np.polynomial.legendre.leggauss(self._whole(2)), strict=True):
+            area = 0.5 * float(weight) * length * width
+            place = _moved(frame, (0.5 * float(x) * length, zero, zero))
+            found.append(Feature("pad", place, (area, width), zero, length, len(found)))
+        return found
 
-    def _points(self) -> list[tuple[Expr, Expr]]:
-        """Points of a profile."""
+    def _points(self) -> list[Point]:
+        """Points of a profile or an outline."""
+        if self.kind == "sprocket":
+            return self._sprocket()[2]
         return list(zip(self.sizes[1::2], self.sizes[2::2], strict=True))
 
+    def _sprocket(self) -> tuple[list[ProfilePart], list[Point], list[Point]]:
+        _, teeth, *sizes = self.sizes
+        assert teeth.value is not None
+        return sprocket_ring(int(teeth.value), *sizes)
+
+    def _parts(self) -> tuple[list[ProfilePart], list[tuple[int, Point]]]:
+        """Pieces of a profile or an outline, and its corners, numbered, which meet what is flat."""
+        if self.kind == "sprocket":
+            pieces, tops, _ = self._sprocket()
+            return pieces, list(enumerate(tops))
+        points = self._points()
+        if self.kind in ("profile", "smooth_profile"):
+            return (straight_pieces if self.kind == "profile" else smooth_pieces)(points), peaks(points)
+        pieces = (straight_ring if self.kind == "outline" else smooth_ring)(points)
+        return pieces, peaks([points[-1], *points, points[0]])
+
     def _pieces(self, frame: Frame) -> list[Feature]:
-        """Pieces of a profile, and its peaks, which meet what is flat."""
-        points, depth, zero = self._points(), self.sizes[0], self.sizes[0].graph.zero
-        pieces = straight_pieces(points) if self.kind == "profile" else smooth_pieces(points)
+        depth, zero = self.sizes[0], self.sizes[0].graph.zero
+        pieces, tops = self._parts()
         depth = solid_depth(pieces, depth)
         found = [
             Feature(one.kind, one.frame(frame), (*one.sizes, depth), None if one.open else one.half + depth, depth)
             for one in pieces
         ]
-        tops = peaks(points)
-        return [
-            *found,
-            *(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth, k) for k, (x, y) in tops),
-        ]
+        for k, (x, y) in tops:
+            found.append(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth, k))
+        return found
 
     def _facing(self, frame: Frame) -> Frame:
         """The frame whose z axis points out of the solid: y of a half-plane's marker, z of a half-space's."""
@@ -250,9 +209,10 @@ class ContactShape:
             return [Wheel(marker, self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
             return [Drawn((Marker(marker.body, self._facing(marker.frame), marker.label),), about=PLANE)]
-        if self.kind in ("profile", "smooth_profile"):
-            zero = self.sizes[0].graph.zero
-            places = [_moved(marker.frame, (x, y, zero)) for x, y in self._points()]
+        if self.kind in _PIECED:
+            zero, points = self.sizes[0].graph.zero, self._points()
+            line = points if self.kind in GROUNDS else [*points, points[0]]
+            places = [_moved(marker.frame, (x, y, zero)) for x, y in line]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
         if self.kind == "ellipsoid":
             return [self._ellipse(i, j) for i, j in ((0, 1), (1, 2), (2, 0))]

@@ -17,7 +17,8 @@ _ROUND = ("round", "rod")
 #: Kind of shape -> what it is where it is the first of a pair.
 _FIRST = {
     "circle": "round", "sphere": "round", "capsule": "rod", "segment": "flat", "box": "flat", "polygon": "flat",
-    "profile": "ground", "smooth_profile": "ground", "half_plane": "half", "half_space": "half",
+    "profile": "ground", "smooth_profile": "ground", "outline": "ground", "smooth_outline": "ground",
+    "sprocket": "ground", "half_plane": "half", "half_space": "half",
 }  # fmt: skip
 #: What is met by each of these.
 _MET = {
@@ -52,11 +53,12 @@ class PairStates(NamedTuple):
 
 
 def parts_of(kind: str, points: int = 0) -> ShapeParts:
-    """The parts of a shape; ``points`` counts the points of an outline, profile or plate."""
+    """The parts of a shape; ``points`` counts the points of an outline, profile or plate, or the teeth of a wheel."""
     found = {
         "circle": {"round": 1}, "sphere": {"round": 1}, "segment": {"corner": 2}, "box": {"corner": 4},
         "capsule": {"rod": 1, "end": 2}, "ellipsoid": {"ellipsoid": 1}, "cuboid": {"end": 8},
-        "polygon": {"corner": points}, "plate": {"pad": points},
+        "polygon": {"corner": points}, "outline": {"corner": points}, "smooth_outline": {"corner": points},
+        "sprocket": {"corner": 2 * points}, "plate": {"pad": points},
         "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2},
     }  # fmt: skip
     return ShapeParts(kind, found.get(kind, {}))
@@ -117,7 +119,12 @@ def _given_shapes(value: Any) -> list[ShapeParts]:
     for shape in _listed(value):
         if not isinstance(shape, Mapping):
             continue
-        kind, points = str(shape.get("shape")), shape.get("points")
-        count = points_of_plate(shape) or 0 if kind == "plate" else len(_listed(points)) if points is not None else 0
+        kind = str(shape.get("shape"))
+        if kind == "plate":
+            count = points_of_plate(shape) or 0
+        elif kind == "sprocket":
+            count = shape["teeth"] if isinstance(shape.get("teeth"), int) else 0
+        else:
+            count = len(_listed(shape.get("points", ())))
         found += [parts_of(kind, count)] * len(_listed(shape.get("on")))
     return found

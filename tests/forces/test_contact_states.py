@@ -13,6 +13,7 @@ from contact_scenes import PLANAR, on
 
 import eomgen as eg
 from eomgen.errors import ModelError
+from eomgen.forces.contact_groups import _SharedData
 from eomgen.generation import generate
 
 LUGRE = {
@@ -184,3 +185,33 @@ def test_lateral_belongs_to_states() -> None:
     m.contacts("touch", {"shape": "circle", "on": a, "radius": 0.1}, ground, law)
     with pytest.raises(ModelError, match=r"touch\.lateral: belongs to contacts that have soil, or friction_law: lugre"):
         m.mechanism()
+
+
+def test_numbers_of_states_are_those_of_the_parts() -> None:
+    """Every kind of pair in the plane: as many states as its name says, each of one pair or of none."""
+    points = [[-0.1, -0.1], [-0.1, 0.1], [0.1, 0.1], [0.02, 0.0], [0.1, -0.1]]
+    shapes = {
+        **PLANAR,
+        "outline": {"shape": "outline", "points": points},
+        "sprocket": {"shape": "sprocket", "teeth": 7, "pitch": 0.05, "seat": 0.01, "tip_radius": 0.06},
+        "profile": {"shape": "profile", "points": [[-1, 0], [-0.3, 0.2], [0, 0.1], [0.4, 0.2], [1, 0]]},
+    }
+    m, bodies = scenes.planar("all", len(shapes))
+    ground = shapes.pop("profile")
+    first = [on(shape, body) for shape, body in zip(shapes.values(), bodies, strict=False)]
+    m.contacts("among", first, law=LUGRE)
+    m.contacts("road", first, {**ground, "on": m.ground}, LUGRE)
+    mechanism = m.mechanism()
+    for force in mechanism.forces:
+        function = force._function(force.name, range(-1, len(bodies)), _SharedData(0, mechanism.graph), False)
+        assert function.states == len(force.states)
+        taken = [k for k, bodies_of in enumerate(function.holders) if bodies_of]
+        assert taken
+        assert all(len(bodies_of) in (0, 2) for bodies_of in function.holders)
+        for kind in function.kinds:
+            for i, row in enumerate(function.tables[kind.first]):
+                for j, other in enumerate(function.tables[kind.second]):
+                    if row[0] != other[0] and (kind.first != kind.second or i < j):
+                        at = kind.held[0][i] + kind.held[1][j]
+                        assert 0 <= at < function.states
+                        assert {row[0], other[0]} == function.holders[at]
