@@ -78,7 +78,7 @@ class ContactShape:
     Attributes
     ----------
     kind : str
-        One of :data:`SHAPE_FIELDS`.
+        One of :data:`~.contact_shape_fields.SHAPE_FIELDS`.
     sizes : tuple of Expr
         radius; length, radius; of a box or polygon x and y of its corners, counterclockwise; of a profile or an outline
         its depth and x and y of its points, of outlines clockwise; of a sprocket its depth, teeth, pitch, seat, tip
