@@ -64,7 +64,8 @@ SYNONYMS = {
     "interpolate sample": "at", "write dump to_csv": "save", "export": "generate save", "keys": "names",
     "success": "status", "energy": "energies", "eom equations_of_motion equations": "derive",
     "potential": "V potential_energy", "kinetic": "T kinetic_energy", "L": "lagrangian", "H": "hamiltonian",
-    "forcing": "force", "latex": "explain",
+    "forcing": "force", "latex": "explain", "output_names outputs_names": "y_names", "input_names": "u_names",
+    "parameter_names": "p_names", "state_names": "x_names", "coordinate_names": "q_names",
     # pictures, verbs and options
     "animate animation movie video gif film": "animate draw view",
     "show view picture render display": "draw plot view", "draw sketch": "check", "plot graph": "run plot",

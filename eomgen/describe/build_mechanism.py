@@ -36,7 +36,7 @@ from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
 from .joint_data import check_display
 from .mass_properties import read_body
-from .mechanism import SUMS, Body, CarriedQuantity, Mechanism, Simulation
+from .mechanism import SUMS, Body, CarriedQuantity, Mechanism, Simulation, WrenchQuantity
 from .names import fault_of_model_name, nearest
 from .physical import check_bodies
 from .scope import Namespace
@@ -151,7 +151,9 @@ def build(description: Description) -> Mechanism:
         clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),
-        element_quantities={str(a): (a.name, a.element) for a in reader.asked if not a.carried} | state_rates,
+        element_quantities={str(a): (a.name, a.element) for a in reader.asked if not a.part and not a.carried}
+        | state_rates,
+        wrench_quantities=_exerted(reader),
         reaction_quantities=_carried(reader),
         initial=begun
         | begun_switches(graph, switched)
@@ -245,11 +247,21 @@ def _carried(reader: Reader) -> dict[str, CarriedQuantity]:
     return found
 
 
+def _exerted(reader: Reader) -> dict[str, WrenchQuantity]:
+    """The parts of what force elements exert on bodies that expressions speak of."""
+    found = {}
+    for asked, path in reader.asked.items():
+        if asked.on:
+            axes = reader.moving(asked.axes) if asked.axes else None
+            found[str(asked)] = WrenchQuantity(asked.element, asked.part, reader.moving(asked.on), axes, path)
+    return found
+
+
 def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
     """Report faults: quantities such as ``length(k1)`` of force elements that do not act along a path."""
     known = {force.name: force for force in forces}
-    for (quantity, name, *_), path in reader.asked.items():
-        if quantity != "power" and name in known and not known[name].acts_along:
+    for (quantity, name, *_, on), path in reader.asked.items():
+        if quantity != "power" and not on and name in known and not known[name].acts_along:
             remedy = f"power({name}) is known of every element; force, length and rate of elements along a path "
             reader.faults.add(
                 path, f"{name!r} does not act along a path", remedy + "or a coordinate, and of single contacts"

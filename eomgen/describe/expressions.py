@@ -18,8 +18,8 @@ from ..graph.core import Expr, Graph
 from ..operations import OPERATIONS
 from ..syntax_trees import parse_statement
 from .marker_quantities import ElementQuantity, MarkerQuantity
-from .names import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, function_words, nearest
-from .reaction_texts import multiplier_in, reaction_in
+from .names import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, WRENCH, function_words, nearest
+from .reaction_texts import multiplier_in, reaction_in, wrench_in
 from .typing_slips import find_slip
 
 LENGTH = 4000  #: characters of one expression
@@ -31,6 +31,9 @@ EXPONENT = 1000.0  #: size of a numeric exponent
 Resolve = Callable[[str], Expr]
 #: The motion of a marker, such as ``vx(rod.tip)``, or what an element does, as ``force(k1)``, -> its expression.
 Locate = Callable[[MarkerQuantity | ElementQuantity], Expr]
+
+#: Words with parts, or rows, and what reads them.
+_WRENCHES = {REACTION: reaction_in, MULTIPLIER: multiplier_in, WRENCH: wrench_in}
 
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/()<>=! \t\r\n]")
 #: A number that runs into a word: Python reads it as two, with a warning of its own.
@@ -268,7 +271,7 @@ class _Walker:
             return self.quantity(node, name)
         if name in OF_ELEMENTS and name not in self.graph.functions and not node.keywords:
             return self.element(node, name)
-        if name in (REACTION, MULTIPLIER) and name not in self.graph.functions:
+        if name in _WRENCHES and name not in self.graph.functions and (name != WRENCH or node.keywords):
             return self.carried(node, node)
         if node.keywords:
             raise self.fault(node, f"{name}() takes no keywords")
@@ -346,14 +349,14 @@ class _Walker:
             raise self.fault(argument, error.message, error.remedy) from None
 
     def carried(self, node: ast.expr, call: ast.Call) -> Expr:
-        """What a joint or an equation carries: ``reaction(A).x``, ``multiplier(mesh.ratio)``."""
-        if not isinstance(call.func, ast.Name) or call.func.id not in (REACTION, MULTIPLIER):
+        """``reaction(A).x``, ``multiplier(mesh.ratio)``, ``force(track, on=wheel).x``."""
+        if not isinstance(call.func, ast.Name) or call.func.id not in _WRENCHES:
             raise self.fault(node, _REFUSED[ast.Attribute])
         if self.locate is None:
             remedy = "use it in outputs, events and the laws of force elements"
             raise self.fault(node, f"{call.func.id}(...) cannot be used here", remedy)
         try:
-            return self.locate(multiplier_in(node) if call.func.id == MULTIPLIER else reaction_in(node))
+            return self.locate(_WRENCHES[call.func.id](node))
         except ExpressionError as error:
             raise self.fault(node, error.message, error.remedy) from None
 

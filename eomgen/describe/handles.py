@@ -9,9 +9,9 @@ from ..errors import UsageError
 from ..graph.shown import shown
 from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
-from .carried_handles import JointReaction
 from .described import Described
 from .description import GROUND_NAME, DescribedEntry, is_zero, items, label_of
+from .element_handles import JointReaction
 from .marker_quantities import MarkerQuantity
 from .mechanism import velocity_names
 from .scope import RATES
@@ -337,44 +337,6 @@ class JointHandle:
             shown = ", ".join(names) or "none"
             raise UsageError(f"joint {self.name!r} has {len(names)} coordinates ({shown}); use .coordinates")
         return names[0]
-
-
-class ForceHandle:
-    """A force element of the model; what it does can stand in outputs, events and other laws.
-
-    Attributes
-    ----------
-    model : Model
-        The model it belongs to.
-    name : str
-        Name of the element.
-    """
-
-    def __init__(self, model: Described, entry: DescribedEntry) -> None:
-        self.model, self.name, self._entry = model, entry.name, entry
-
-    def __repr__(self) -> str:
-        return f"<ForceHandle {self.name}: {self._entry.values.get('type')}>"
-
-    @property
-    def force(self) -> Any:
-        """Force along its path (N or N m), positive where it increases it; of a contact the normal force."""
-        return symbol(f"force({self.name})")
-
-    @property
-    def length(self) -> Any:
-        """Length or angle of its path (m or rad), or penetration of a contact (m)."""
-        return symbol(f"length({self.name})")
-
-    @property
-    def rate(self) -> Any:
-        """Rate of :attr:`length` (m/s or rad/s)."""
-        return symbol(f"rate({self.name})")
-
-    @property
-    def power(self) -> Any:
-        """Power of everything that it exerts (W): positive where it drives the mechanism."""
-        return symbol(f"power({self.name})")
 
 
 class Settings(dict[str, Any]):

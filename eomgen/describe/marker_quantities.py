@@ -7,12 +7,23 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ..errors import ExpressionError
-from .names import MULTIPLIER, OF_ELEMENTS, PAIRS, QUANTITIES, REACTION, REACTION_PARTS, RESOLVED
+from .names import (
+    MULTIPLIER,
+    OF_ELEMENTS,
+    PAIRS,
+    QUANTITIES,
+    REACTION,
+    REACTION_PARTS,
+    RESOLVED,
+    WRENCH,
+    WRENCH_PARTS,
+)
 
 _KEYWORD = re.compile(r"(from|in)\s*=\s*", re.ASCII)
 _OF_ELEMENT = re.compile(rf"({'|'.join(OF_ELEMENTS)})\((\w+)\)\Z", re.ASCII)
 _MULTIPLIER = re.compile(rf"{MULTIPLIER}\((\w+(?:\.\w+)?)\)\Z", re.ASCII)
 _REACTION = re.compile(rf"{REACTION}\((\w+)(?:, in=(.+))?\)\.({'|'.join(REACTION_PARTS)})\Z", re.ASCII)
+_WRENCH = re.compile(rf"{WRENCH}\((\w+), on=(.+?)(?:, in=(.+))?\)\.({'|'.join(WRENCH_PARTS)})\Z", re.ASCII)
 _CALL = re.compile(rf"({'|'.join(QUANTITIES)})\((.+)\)\Z", re.DOTALL)
 
 
@@ -82,18 +93,20 @@ class MarkerQuantity(NamedTuple):
 class ElementQuantity(NamedTuple):
     """What a force element does, as ``force(k1)``; see :class:`~eomgen.forces.force.Measured`.
 
-    Also a part of what a joint carries, ``reaction(A, in=rod).x``, along the axes of a marker (none: ground), and the
-    multiplier of an equation, ``multiplier(mesh.ratio)``.
+    Also a part of what a joint carries, ``reaction(A, in=rod).x``, along the axes of a marker (none: ground), the
+    multiplier of an equation, ``multiplier(mesh.ratio)``, and a part of what an element exerts on the body of a marker,
+    ``force(track, on=wheel, in=car).x``.
     """
 
     name: str
     element: str
     part: str = ""
     axes: str = ""
+    on: str = ""
 
     def __str__(self) -> str:
-        axes = f", in={self.axes}" if self.axes else ""
-        return f"{self.name}({self.element}{axes}){f'.{self.part}' if self.part else ''}"
+        axes, on = (f", {word}={label}" if label else "" for word, label in (("in", self.axes), ("on", self.on)))
+        return f"{self.name}({self.element}{on}{axes}){f'.{self.part}' if self.part else ''}"
 
     @property
     def carried(self) -> bool:
@@ -107,8 +120,8 @@ class ElementQuantity(NamedTuple):
 
     def renamed(self, rename: Callable[[str], str], marker: Callable[[str], str] | None = None) -> ElementQuantity:
         """The same of another element, and of axes that ``marker`` renames."""
-        axes = (marker or rename)(self.axes) if self.axes else ""
-        return ElementQuantity(self.name, rename(self.element), self.part, axes)
+        axes, on = ((marker or rename)(label) if label else "" for label in (self.axes, self.on))
+        return ElementQuantity(self.name, rename(self.element), self.part, axes, on)
 
 
 #: Quantities of two markers, of which the first may be left out: it is the ground then.
@@ -127,6 +140,8 @@ def element_quantity(symbol: str) -> ElementQuantity | None:
         return ElementQuantity(found[1], found[2])
     if found := _MULTIPLIER.match(symbol):
         return ElementQuantity(MULTIPLIER, found[1])
+    if found := _WRENCH.match(symbol):
+        return ElementQuantity(WRENCH, found[1], found[4], found[3] or "", found[2])
     found = _REACTION.match(symbol)
     return ElementQuantity(REACTION, found[1], found[3], found[2] or "") if found else None
 

@@ -162,6 +162,16 @@ def dimension_of(level: int, axis: int) -> dimensions.Dimension:
     return LEVEL_DIMENSIONS[level]
 
 
+class WrenchQuantity(NamedTuple):
+    """A part of what a force element exerts on the body of a marker, along the axes of a marker (None: ground)."""
+
+    element: str
+    part: str
+    on: Marker
+    axes: Marker | None
+    path: str  #: where an expression speaks of it first
+
+
 class CarriedQuantity(NamedTuple):
     """A part of the reaction of a joint, along the axes of a marker (None: ground), or the multiplier of an equation.
 
@@ -303,6 +313,7 @@ class Mechanism:
     events: tuple[Event, ...] = ()
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
     element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element
+    wrench_quantities: Mapping[str, WrenchQuantity] = field(default_factory=dict)  #: by symbol
     reaction_quantities: Mapping[str, CarriedQuantity] = field(default_factory=dict)  #: by symbol
     initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate, ``<coordinate>_dot`` or state
     initial_outputs: Mapping[str, Expr] = field(default_factory=dict)  #: by output, in its unit

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 from ..elements.element_type import ElementType
 from ..elements.field import Field
 from ..errors import UsageError
-from .carried_handles import ConstraintHandle
 from .described import Described
 from .description import items
-from .handles import ForceHandle, JointHandle, MarkerHandle
+from .element_handles import ConstraintHandle, ForceHandle
+from .handles import JointHandle, MarkerHandle
 from .keywords import check_keywords
 from .references import joint_reference, marker_reference
 

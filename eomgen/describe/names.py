@@ -47,6 +47,8 @@ OF_ELEMENTS = ("force", "length", "rate", "power")
 REACTION, MULTIPLIER = "reaction", "multiplier"
 #: Parts of a reaction: force and moment, size of the force, size of its part across the axis of the joint.
 REACTION_PARTS = ("x", "y", "z", "mx", "my", "mz", "size", "normal")
+#: What a force element exerts on the body of a marker, ``force(track, on=wheel).x``, and its parts.
+WRENCH, WRENCH_PARTS = "force", ("x", "y", "z", "mx", "my", "mz", "size")
 #: Levels of what only the accelerations tell.
 ACCELERATIONS = (2, 9, 10)
 #: Sums over all bodies that need no marker, in outputs; a name of the model's own comes first.

@@ -1,4 +1,4 @@
-"""Stage describe, reactions in texts: the tree of ``reaction(A, in=rod.tip).x`` -> the quantity that it speaks of."""
+"""Stage describe, wrenches in texts: the trees of ``reaction(A, in=rod.tip).x`` and others -> the quantities."""
 
 from __future__ import annotations
 
@@ -6,10 +6,14 @@ import ast
 
 from ..errors import ExpressionError
 from .marker_quantities import ElementQuantity
-from .names import MULTIPLIER, REACTION, REACTION_PARTS
+from .names import MULTIPLIER, REACTION, REACTION_PARTS, WRENCH, WRENCH_PARTS
 
 _WRITE_REACTION = (
     f"write {REACTION}(joint).part or {REACTION}(joint, in=marker).part; parts: {', '.join(REACTION_PARTS)}"
+)
+_WRITE_WRENCH = (
+    f"write {WRENCH}(element, on=marker).part or {WRENCH}(element, on=marker, in=marker).part; parts: "
+    f"{', '.join(WRENCH_PARTS)}"
 )
 _WRITE_MULTIPLIER = f"write {MULTIPLIER}(mesh) or, where an element has several equations, {MULTIPLIER}(roll.height)"
 
@@ -46,6 +50,27 @@ def multiplier_in(node: ast.expr) -> ElementQuantity:
     if not row or row.count(".") > 1:
         raise ExpressionError("a multiplier is that of one equation", 0, _WRITE_MULTIPLIER)
     return ElementQuantity(MULTIPLIER, row)
+
+
+def wrench_in(node: ast.expr) -> ElementQuantity:
+    """The part of what an element exerts on the body of a marker.
+
+    Raises
+    ------
+    ExpressionError
+    """
+    if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Call):
+        raise ExpressionError("what an element exerts on a body has several parts", 0, _WRITE_WRENCH)
+    call = node.value
+    element = _label(call.args[0]) if len(call.args) == 1 else ""
+    given = {keyword.arg: _label(keyword.value) for keyword in call.keywords}
+    if not element or "." in element or not given.get("on") or not given.keys() <= {"on", "_n"} or "" in given.values():
+        raise ExpressionError("what an element exerts on a body is that of one element", 0, _WRITE_WRENCH)
+    if node.attr not in WRENCH_PARTS:
+        raise ExpressionError(f"what an element exerts has no part {node.attr!r}", 0, _WRITE_WRENCH)
+    if "_n" in given and node.attr == "size":
+        raise ExpressionError("the part size does not depend on axes", 0, "leave in= out")
+    return ElementQuantity(WRENCH, element, node.attr, given.get("_n", ""), given["on"])
 
 
 def _label(node: ast.expr) -> str:

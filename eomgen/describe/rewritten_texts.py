@@ -14,7 +14,7 @@ from ..graph.core import Graph
 from ..graph.evaluate import evaluate
 from .expressions import parse
 from .marker_quantities import ElementQuantity, MarkerQuantity
-from .names import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, REACTION_PARTS
+from .names import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, REACTION_PARTS, WRENCH, WRENCH_PARTS
 
 _MARKER = r"[A-Za-z]\w*(?:\.\w+)*"
 _TOKEN = re.compile(
@@ -24,6 +24,8 @@ _TOKEN = re.compile(
     rf"|\b(?P<what>{'|'.join((*OF_ELEMENTS, MULTIPLIER))})\(\s*(?P<element>{_MARKER})\s*\)"
     rf"|\b{REACTION}\(\s*(?P<joint>{_MARKER})\s*(?:,\s*in\s*=\s*(?P<axes>{_MARKER})\s*)?\)"
     rf"\.(?P<part>{'|'.join(REACTION_PARTS)})\b"
+    rf"|\b{WRENCH}\(\s*(?P<pushing>{_MARKER})\s*,\s*on\s*=\s*(?P<on>{_MARKER})\s*"
+    rf"(?:,\s*in\s*=\s*(?P<along>{_MARKER})\s*)?\)\.(?P<component>{'|'.join(WRENCH_PARTS)})\b"
     r"|(?P<name>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)"
 )
 
@@ -53,6 +55,9 @@ def rewritten(value: Any, name: Rename, locate: Locate, element: Callable[[Eleme
             return found[0] if element is None else element(ElementQuantity(found["what"], found["element"]))
         if found["joint"] is not None:
             quantity = ElementQuantity(REACTION, found["joint"], found["part"], found["axes"] or "")
+            return found[0] if element is None else element(quantity)
+        if found["pushing"] is not None:
+            quantity = ElementQuantity(WRENCH, found["pushing"], found["component"], found["along"] or "", found["on"])
             return found[0] if element is None else element(quantity)
         return name(found[0])
 

@@ -21,9 +21,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..elements.element_type import ElementType
-from .carried_handles import ConstraintHandle
 from .described import Described
-from .handles import ForceHandle, JointHandle
+from .element_handles import ConstraintHandle, ForceHandle
+from .handles import JointHandle
 
 Value = Any  # a number, a text or a SymPy expression
 

@@ -83,6 +83,9 @@ class Reader:
             raise ExpressionError(
                 f"no force element {quantity.element!r}", 0, nearest(quantity.element, names, "elements")
             )
+        for label in (quantity.on, quantity.axes):
+            if label:
+                self.moving(label)
         self.asked.setdefault(quantity, path)
 
     def _ask_reaction(self, quantity: ElementQuantity) -> None:

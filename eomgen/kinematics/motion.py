@@ -15,8 +15,10 @@ from ..describe.mechanism import (
     CarriedQuantity,
     Mechanism,
     Quantity,
+    WrenchQuantity,
 )
 from ..errors import ModelError
+from ..forces.force import Force
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2, sqrt
@@ -25,6 +27,7 @@ from ..graph.spatial import Twist
 from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Mat3, Vec3
 from .angle_sums import sum_of_turns
+from .exerted import part_exerted
 from .momentum import Momentum
 from .reaction_parts import part_of_reaction
 from .state import MotionSymbols
@@ -182,7 +185,7 @@ class MarkerMotion:
                 mapping[self.graph.symbol(name)] = found
         for name in self.carried.keys() & used:
             mapping[self.graph.symbol(name)] = self.carried[name]
-        for name in mechanism.element_quantities.keys() & used:
+        for name in (mechanism.element_quantities.keys() | mechanism.wrench_quantities.keys()) & used:
             mapping[self.graph.symbol(name)] = self._of_element(mechanism, name)
         return mapping
 
@@ -203,20 +206,22 @@ class MarkerMotion:
         Raises
         ------
         ModelError
-            It depends on itself.
+            It depends on itself, or it exerts nothing on a body.
         """
-        quantity, element = mechanism.element_quantities[name]
+        exerted = mechanism.wrench_quantities.get(name)
+        quantity, element = mechanism.element_quantities[name] if exerted is None else ("", exerted.element)
         if name in self._open:
             way = " -> ".join([*self._open[self._open.index(name) :], name])
             remedy = "let one of the laws depend on positions and velocities instead"
             raise ModelError([mechanism.problem(f"forces.{element}", f"algebraic loop between laws: {way}", remedy)])
         force = next(force for force in mechanism.forces if force.name == element)
-        measured = None if quantity.startswith(STATE_RATE) else force.measured(self)
-        if quantity.startswith(STATE_RATE):
+        if exerted is not None:
+            found = self._exerted(mechanism, force, exerted)
+        elif quantity.startswith(STATE_RATE):
             if element not in self._state_rates:  # of all at once: one sum over pairs gives many
                 self._state_rates[element] = force.state_rates(self)
             found = self._state_rates[element][int(quantity.removeprefix(STATE_RATE))]
-        elif quantity == "power" or measured is None:
+        elif quantity == "power" or (measured := force.measured(self)) is None:
             found = force.power(self)
         else:
             found = {"length": measured.value, "rate": measured.rate, "force": measured.force}[quantity]
@@ -224,6 +229,13 @@ class MarkerMotion:
         mapping = self.derived_symbols(mechanism, symbols_of([found]))
         self._open.pop()
         return substitute([found], mapping)[0] if mapping else found
+
+    def _exerted(self, mechanism: Mechanism, force: Force, quantity: WrenchQuantity) -> Expr:
+        found = part_exerted(self, force, quantity)
+        if isinstance(found, str):
+            remedy = f"give a body on which it acts; power({force.name}) is known of every element"
+            raise ModelError([mechanism.problem(quantity.path, f"the element {force.name!r} {found}", remedy)])
+        return found
 
     def _quantity(self, quantity: Quantity) -> Expr:
         """Motion of a marker, or a sum over all bodies."""

@@ -62,8 +62,8 @@ CLASSES = (
     "eomgen.describe.handles.ForceHandle",
     "eomgen.describe.handles.MarkerHandle",
     "eomgen.describe.handles.JointHandle",
-    "eomgen.describe.carried_handles.JointReaction",
-    "eomgen.describe.carried_handles.ConstraintHandle",
+    "eomgen.describe.element_handles.JointReaction",
+    "eomgen.describe.element_handles.ConstraintHandle",
 )
 
 

@@ -1,0 +1,162 @@
+"""What force elements exert on bodies, ``force(track, on=wheel).x``: Newton and Euler for each body, and its names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen.errors import ModelError
+
+G = 9.81
+MASS, INERTIA = 1.4, (0.02, 0.03, 0.04)
+COM = (0.02, -0.01, 0.03)
+ELEMENTS = ("pull", "drag", "mount", "jet", "wheel", "touch")
+PARTS = ("x", "y", "z", "mx", "my", "mz")
+
+
+def craft(seen: str = "") -> eg.Model:
+    """A body under many elements, whose motion Newton and Euler give from all of them."""
+    m = eg.Model("craft", gravity=(0, 0, -G))
+    a = m.body("a", mass=MASS, com=COM, inertia=INERTIA)
+    b = m.body("b", mass=0.7, inertia=(0.01, 0.01, 0.02))
+    a.marker("c", at=COM)
+    m.free("fly", m.ground, a, rotation="euler_parameters")
+    m.free("glide", m.ground, b, rotation="euler_parameters")
+    m.spring("pull", m.ground.at(0, 0, 1), a.at(0.1, 0.05, 0), stiffness=40, length=0.3)
+    m.damper("drag", a.at(-0.1, 0, 0.02), b, damping=3)
+    m.bushing("mount", a.at(0, 0.1, 0, rpy=(0.1, 0.2, 0.3)), b.at(0, 0, 0.1), stiffness=[30, 20, 10, 1, 2, 3])
+    m.force("jet", a.at(0.05, 0, 0), (1, 2, 3), axes="body")
+    m.torque("wheel", a, (0.1, -0.2, 0.3), axes="body")
+    ball = {"shape": "sphere", "on": a, "radius": 0.2}
+    law = {"stiffness": 2e3, "dissipation": 0.3, "friction": 0.4, "smoothing": 0.01}
+    m.contacts("touch", ball, {"shape": "half_space", "on": m.ground}, law)
+    for name in ELEMENTS:
+        for part in PARTS:
+            m.output(f"{name}_{part}", f"force({name}, on=a.c{seen}).{part}")
+    for axis in "xyz":
+        m.output(f"a_{axis}", f"a{axis}(a.c)")
+        m.output(f"w_{axis}", f"w{axis}_body(a)")
+        m.output(f"t_{axis}", f"w{axis}_body_dot(a)")
+        for element in ("touch", "mount"):
+            m.output(
+                f"on_other_{element}_{axis}", f"force({element}, on={'ground' if element == 'touch' else 'b'}).{axis}"
+            )
+    return m
+
+
+def states(mod: eg.Module, count: int) -> list[np.ndarray]:
+    """Random ones, in which the ball is pressed into the floor."""
+    rng, found = np.random.default_rng(1), []
+    for _ in range(count):
+        x = mod.x0(fly_z=0.15, glide_x=0.3)
+        x[: mod.n_q] += 0.05 * rng.uniform(-1, 1, mod.n_q)
+        x[mod.n_q :] = 0.3 * rng.standard_normal(mod.n_v)
+        found.append(mod.project(x))
+    return found
+
+
+@pytest.mark.parametrize("method", ["recursive", "embedding"])
+def test_newton_and_euler(method: str) -> None:
+    ground = craft().compile(method=method, target="numpy")
+    body = craft(", in=a").compile(method=method, target="numpy")
+    pressed = 0
+    for x in states(ground, 8):
+        out = dict(zip(ground.y_names, ground.outputs(0.0, x), strict=True))
+        own = dict(zip(ground.y_names, body.outputs(0.0, x), strict=True))
+
+        def of(found: dict[str, float], ending: str) -> np.ndarray:
+            return np.array([found[f"{ending}_{k}"] for k in "xyz"])
+
+        total = sum(np.array([out[f"{name}_{part}"] for part in PARTS]) for name in ELEMENTS)
+        seen = sum(np.array([own[f"{name}_{part}"] for part in PARTS]) for name in ELEMENTS)
+        np.testing.assert_allclose(total[:3] - (0, 0, MASS * G), MASS * of(out, "a"), rtol=1e-9, atol=1e-9)
+        spin, turn = of(out, "w"), of(out, "t")
+        euler = np.array(INERTIA) * turn + np.cross(spin, np.array(INERTIA) * spin)
+        np.testing.assert_allclose(seen[3:], euler, rtol=1e-9, atol=1e-9)
+        assert np.linalg.norm(seen[:3]) == pytest.approx(np.linalg.norm(total[:3]), rel=1e-12)
+        for element in ("touch", "mount"):  # action and reaction
+            np.testing.assert_allclose(of(out, f"on_other_{element}"), -of(out, element), rtol=1e-12, atol=1e-12)
+        pressed += out["touch_z"] > 1
+    assert pressed > 4
+
+
+def test_a_law_reads_what_another_element_exerts() -> None:
+    """A damper of a coefficient by the load on the floor, exactly in the Jacobian; names in a file and of instances."""
+    m = eg.Model("brake", gravity=(0, -G, 0))
+    block = m.body("block", mass=2.0, inertia={"zz": 0.01})
+    m.planar("slide", m.ground, block)
+    floor = {"shape": "half_plane", "on": m.ground}
+    pads = m.contacts(
+        "floor", {"shape": "box", "on": block, "size": (0.2, 0.1)}, floor, {"stiffness": 1e5, "exponent": 1}
+    )
+    drag = m.damper("drag", m.ground.at(-5, 0, 0), block, damping="0.3*force(floor, on=block).y")
+    m.output("load", pads.on(block).force[1])
+    m.output("slows", drag.on(block, axes=block).force[0])
+    m.output("size", pads.on(block).size)
+    m.initial(slide_x=0.1, slide_y=0.05 - 2e-5, slide_x_dot=1.0)
+    mod = m.compile(target="numpy")
+    x = mod.x0()
+    load, slows, size = mod.outputs(0.0, x)
+    assert load == pytest.approx(2 * 1e5 * 2e-5, rel=1e-12)  # two corners
+    assert size == pytest.approx(load, rel=1e-12)
+    assert slows == pytest.approx(-0.3 * load * 5.1 / np.hypot(5.1, 0.05 - 2e-5), rel=1e-4)
+    assert mod.rhs(0.0, x)[3] == pytest.approx(slows / 2.0, rel=1e-3)
+    h = 1e-7 * np.eye(6)
+    sides = np.transpose([(mod.rhs(0.0, x + d) - mod.rhs(0.0, x - d)) / 2e-7 for d in h])
+    np.testing.assert_allclose(mod.jacobian(0.0, x), sides, rtol=1e-4, atol=1e-3)
+
+    two = eg.Model("two", gravity=(0, -G, 0))
+    two.add(m, "left_")
+    two.output("total", "force(left.floor, on=left.block).y")
+    again = two.compile(target="numpy")
+    assert again.outputs(0.0, again.x0(left_slide_y=0.05 - 2e-5))[-1] == pytest.approx(load, rel=1e-12)
+
+
+def test_it_is_written_again_and_verified(tmp_path: Path) -> None:
+    file = tmp_path / "craft.yaml"
+    m = craft(", in=a.c")
+    m.initial(fly_z=0.15, glide_x=0.3)
+    file.write_text(m.to_yaml())
+    mod, again = m.compile(target="numpy"), eg.load(file).compile(target="numpy")
+    x = mod.x0()
+    assert np.array_equal(mod.outputs(0.0, x), again.outputs(0.0, x))
+    report = mod.verify()
+    assert report.ok, report
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("force(touch, on=a)", "has several parts"),
+        ("force(touch, on=nobody).x", "no body 'nobody'"),
+        ("force(tuch, on=a).x", "no force element 'tuch'"),
+        ("force(touch, on=a).q", "no part 'q'"),
+        ("force(touch, on=a, in=b).size", "does not depend on axes"),
+        ("force(touch, by=a).x", "force(element, on=marker).part"),
+        ("force(touch, on=b).x", "the element 'touch' exerts nothing on b"),
+        ("force(turn, on=b).x", "the element 'turn' acts along the coordinate"),
+    ],
+)
+def test_what_is_wrong_is_told(text: str, told: str) -> None:
+    m = craft()
+    hub = m.body("hub", mass=1, inertia=INERTIA)
+    m.revolute("hinge", m.ground, hub)
+    m.joint_spring("turn", "hinge", stiffness=1.0)
+    m.output("bad", text)
+    with pytest.raises(ModelError) as error:
+        m.compile(target="numpy")
+    assert told in str(error.value)
+    assert "outputs.bad" in str(error.value)
+
+
+def test_forces_that_read_each_other_are_refused() -> None:
+    m = eg.Model("circle")
+    body = m.body("body", mass=1, inertia=INERTIA)
+    m.free("fly", m.ground, body)
+    m.force("one", body, ("force(two, on=body).x", 0, 0))
+    m.force("two", body, ("force(one, on=body).x", 0, 0))
+    with pytest.raises(ModelError, match="algebraic loop between laws"):
+        m.compile(target="numpy")
