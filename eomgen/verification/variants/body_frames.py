@@ -13,7 +13,7 @@ import numpy as np
 
 from ...describe.description import GROUND_NAME, DescribedEntry, Description, items
 from ...describe.fields import INERTIA
-from ...describe.marker_quantities import MarkerQuantity
+from ...describe.marker_quantities import ElementQuantity, MarkerQuantity
 from ...describe.rewritten_texts import is_zero, motions_of, number_of, product, rewritten, scaled, total
 from ...describe.visit import Slot, Visitor, bodies_of, copied, visit
 from ...numeric.rotation_matrices import from_quaternion, from_roll_pitch_yaw, roll_pitch_yaw
@@ -71,7 +71,11 @@ class _Moved(Visitor):
         self.places = places
 
     def scalar(self, value: Any, slot: Slot) -> Any:
-        return rewritten(value, lambda name: name, lambda quantity: str(quantity.renamed(self.moved)))
+        return rewritten(value, str, lambda quantity: str(quantity.renamed(self.moved)), self.element)
+
+    def element(self, quantity: ElementQuantity) -> str:
+        """What an element does, or what a joint carries along the axes of a marker."""
+        return str(quantity.renamed(str, self.moved))
 
     def moved(self, label: str) -> str:
         """The marker that is where a body's own frame was."""
@@ -210,7 +214,12 @@ class _Ground(_Moved):
                     return "(" + " + ".join([*parts, repr(-float(column @ shift))]) + ")"
             return str(quantity)
 
-        return rewritten(value, lambda name: name, locate)
+        return rewritten(value, str, locate, self.element)
+
+    def element(self, quantity: ElementQuantity) -> str:
+        if quantity.part and not quantity.axes and quantity.part not in ("size", "normal"):
+            quantity = quantity._replace(axes=GROUND_NAME)
+        return super().element(quantity)
 
 
 def length_of(description: Description) -> float:
