@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen.errors import ModelError
 
 G = 9.81
 X = {"f_e0": 0.9, "f_e1": 0.2, "f_e2": -0.3, "f_e3": np.sqrt(1 - 0.94), "f_x": 0.3, "f_y": -0.1}
@@ -62,18 +61,3 @@ def test_the_lowest_point_lies_on_the_plane_and_rests(support: str) -> None:
     run = mod.simulate(1.0, {**X, **SPIN}, rtol=1e-10, atol=1e-12)
     T, V = mod.energy(run.x)
     assert np.abs(T + V - T[0] - V[0]).max() < 1e-7 * T.max()
-
-
-@pytest.mark.parametrize(
-    ("keys", "told"),
-    [
-        ({"shape": "ellipsoid"}, "constraints.roll.semi_axes: is missing; shape: ellipsoid needs it"),
-        ({"shape": "ellipsoid", "semi_axes": (1, 1, 0)}, "semi_axes.*must be greater than 0"),
-        ({"shape": "ellipsoid", "semi_axes": (1, 1, 1), "radius": 1}, "constraints.roll.radius: .*has no radius"),
-        ({"shape": "disc"}, "constraints.roll.radius: is missing; give the radius of the disc"),
-        ({"shape": "sphere", "radius": 1, "support": "nx"}, "constraints.roll.support: a sphere has a radius"),
-    ],
-)
-def test_what_is_wrong_is_told(keys: dict[str, object], told: str) -> None:
-    with pytest.raises(ModelError, match=told):
-        stone(**keys).check()
