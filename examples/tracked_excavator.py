@@ -95,7 +95,7 @@ class Track:
             pins = walk(idler)
             return float((pins[-1] - pins[0])[1])
 
-        idler = float(brentq(gap, self.half - 0.4 * self.pitch, self.half + 0.4 * self.pitch))
+        idler = round(float(brentq(gap, self.half - 0.4 * self.pitch, self.half + 0.4 * self.pitch)), 9)
         return idler, walk(idler)
 
 
@@ -164,11 +164,12 @@ def undercarriage(m: eg.Model, track: Track, mass: float, inertia: Any, ground: 
     for k in range(1, track.links):
         m.revolute(f"turn{k}", links[k - 1].at(track.pitch, 0, 0), links[k])
     m.revolute("closure", links[-1].at(track.pitch, 0, 0), links[0])
-    turns = np.unwrap([math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(pins)])
+    along = np.unwrap([math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(pins)])
+    turns = [round(float(turn), 9) for turn in np.diff(along, prepend=0.0)]
     m.initial(x=0.0, y=track.height, pitch=0.0)
-    m.initial(chain_x=float(pins[0][0]), chain_y=float(pins[0][1]) + track.height, turn0=float(turns[0]))
-    for k in range(1, track.links):  # two of them follow from the closure
-        (m.initial if k < track.links - 2 else m.guess)(**{f"turn{k}": float(turns[k] - turns[k - 1])})
+    m.initial(chain_x=float(pins[0][0]), chain_y=float(pins[0][1]) + track.height)
+    for k, turn in enumerate(turns):  # two of them follow from the closure
+        (m.initial if k < track.links - 2 else m.guess)(**{f"turn{k}": turn})
 
     def line(radius: float, y: float, length: float) -> dict[str, Any]:
         on = [link.at(track.pitch / 2, y, 0) for link in links]
@@ -270,7 +271,7 @@ def build(track: Track | None = None, ground: Any = None, law: Any = None) -> eg
     m.parameter("slope", 0.0, doc="angle of the ground (rad)")
     frame = undercarriage(m, track, 3900, (2500, 7000, 5500), ground, law)
     superstructure(m, frame, track.height)
-    m.simulation(end=10, method="RK45", rtol=1e-4, atol=1e-5)
+    m.simulation(end=2, method="RK45", rtol=1e-4, atol=1e-5)
     return m
 
 
