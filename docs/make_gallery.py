@@ -17,13 +17,13 @@ from PIL import Image
 
 import eomgen as eg
 from eomgen.runtime.refined import states_at
+from eomgen.shipped import example_files, find_example
 from eomgen.show.film_frames import Frames
 from eomgen.show.palettes import indices_in, palette_of
 from eomgen.show.shown_motion import moving_scene, sample
 from eomgen.show.writers import gif_bytes
 
 DOCS = Path(__file__).parent
-EXAMPLES = DOCS.parent / "examples"
 STILL, MOVING, SPATIAL = 70.0, 42.0, 54.0  #: dots in an inch of a picture, of a film in the plane and of one in space
 COLORS, FILM_COLORS = 48, 64  #: of a picture that stands still, of a film
 LASTS, FPS = 4.0, 10.0  #: seconds of a film, frames in a second
@@ -78,7 +78,10 @@ def draw(shown: Shown) -> Path:
     file = DOCS / shown.picture
     moving = file.suffix == ".gif"
     robot: dict[str, Any] = {"limits": "off"} if shown.example.endswith(".urdf") else {}
-    module = eg.load(EXAMPLES / shown.example, **robot).compile(target="numpy")
+    example = find_example(shown.example, example_files())
+    assert example is not None
+    target = "cython" if example.parent.name == "large" else "numpy"
+    module = eg.load(example, **robot).compile(target=target)
     trajectory = module.simulate(shown.options.end, dense_output=True)
     rate = FPS * (2 if file.stem in QUICK else 1 if moving else SMOOTH)
     motion = sample(trajectory, lambda t: states_at(trajectory, module, t), rate, float(trajectory.t[-1]) / LASTS)

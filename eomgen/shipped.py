@@ -15,9 +15,13 @@ def shipped(name: str) -> Path:
 
 
 def example_files() -> dict[str, Path]:
-    """Every example by what to call it: a model file by its name alone, others with their suffix."""
+    """Every example by what to call it: a model file by its name alone, others with their suffix.
+
+    Those in the folder ``large`` take seconds to compile.
+    """
     found = {}
-    for file in sorted(shipped("examples").iterdir(), key=lambda f: f.name):
+    folder = shipped("examples")
+    for file in sorted([*folder.iterdir(), *(folder / "large").iterdir()], key=lambda f: f.name):
         if file.name.endswith(".yaml"):
             found[file.name.removesuffix(".yaml")] = file
         elif file.name.endswith(".urdf") or (file.name.endswith(".py") and not file.name.startswith("_")):

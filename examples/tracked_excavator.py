@@ -1,4 +1,7 @@
-"""Tracked excavator of the 22 t class in the plane of its tracks: python tracked_excavator.py [seconds]."""
+"""Tracked excavator of the 22 t class in the plane of its tracks: python tracked_excavator.py [seconds] [FILE.yaml].
+
+It drives so many seconds, 3 unless given, and says how fast; the model is written to a file if one is named.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,6 @@ import math
 import sys
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -93,7 +95,7 @@ class Track:
             pins = walk(idler)
             return float((pins[-1] - pins[0])[1])
 
-        idler = float(brentq(gap, self.half - 0.4 * self.pitch, self.half + 0.4 * self.pitch))
+        idler = round(float(brentq(gap, self.half - 0.4 * self.pitch, self.half + 0.4 * self.pitch)), 9)
         return idler, walk(idler)
 
 
@@ -162,11 +164,12 @@ def undercarriage(m: eg.Model, track: Track, mass: float, inertia: Any, ground: 
     for k in range(1, track.links):
         m.revolute(f"turn{k}", links[k - 1].at(track.pitch, 0, 0), links[k])
     m.revolute("closure", links[-1].at(track.pitch, 0, 0), links[0])
-    turns = np.unwrap([math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(pins)])
+    along = np.unwrap([math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(pins)])
+    turns = [round(float(turn), 9) for turn in np.diff(along, prepend=0.0)]
     m.initial(x=0.0, y=track.height, pitch=0.0)
-    m.initial(chain_x=float(pins[0][0]), chain_y=float(pins[0][1]) + track.height, turn0=float(turns[0]))
-    for k in range(1, track.links):  # two of them follow from the closure
-        (m.initial if k < track.links - 2 else m.guess)(**{f"turn{k}": float(turns[k] - turns[k - 1])})
+    m.initial(chain_x=float(pins[0][0]), chain_y=float(pins[0][1]) + track.height)
+    for k, turn in enumerate(turns):  # two of them follow from the closure
+        (m.initial if k < track.links - 2 else m.guess)(**{f"turn{k}": turn})
 
     def line(radius: float, y: float, length: float) -> dict[str, Any]:
         on = [link.at(track.pitch / 2, y, 0) for link in links]
@@ -189,3 +192,103 @@ def undercarriage(m: eg.Model, track: Track, mass: float, inertia: Any, ground: 
     m.output("chain_speed", f"sprocket_dot*{track.per_turn / (2.0 * math.pi)!r}", unit="m/s")
     m.output("drive", "power(motor)", unit="W")
     return frame
+
+
+#: Bore, stroke and length when closed (m), rods and how many there are: strokes and bores from the data sheet.
+CYLINDERS = {
+    "boom": (0.12, 1.26, 1.48, 0.085, 2),
+    "stick": (0.14, 1.504, 2.1, 0.1, 1),
+    "bucket": (0.12, 1.104, 1.6, 0.085, 1),
+}
+#: Pressures (Pa) that hold the equipment where it starts.
+HELD = {"boom_p": 11.7e6, "boom_q": 4.2e6, "stick_p": 1.5e6, "stick_q": 5.7e6, "bucket_p": 0.8e6, "bucket_q": 1.2e6}
+
+
+def cylinder(m: eg.Model, name: str, a: Any, b: Any) -> None:
+    """A double-acting hydraulic cylinder between two markers: the pressures of both chambers are states.
+
+    The valve lets oil in and out in the ratio of the areas, as much as its input says of the most; relief valves open
+    above 35 MPa, check valves below 0.
+    """
+    bore, stroke, closed, rod, count = CYLINDERS[name]
+    head = count * math.pi / 4 * bore**2
+    ring = count * math.pi / 4 * (bore**2 - rod**2)
+    area, back = m.parameter(f"{name}_area", head, unit="m^2"), m.parameter(f"{name}_ring", ring, unit="m^2")
+    m.input(f"{name}_valve", 0.0)
+    m.actuator(f"{name}_cylinder", a, b, f"{name}_area*{name}_p - {name}_ring*{name}_q")
+    long, speed = f"(length({name}_cylinder) - {closed})", f"rate({name}_cylinder)"
+    for p, size, left, way in (("p", area, long, 1), ("q", back, f"({stroke} - {long})", -1)):
+        state = f"{name}_{p}"
+        oil = f"{size}*({way}*({name}_valve*flow/{name}_area - {speed}))"
+        valves = f"open_relief*(max(0, -{state}) - max(0, {state} - p_relief))"
+        rate = f"bulk*({oil} + {valves})/(dead + {size}*max(0.05, {left}))"
+        m.state(state, rate, initial=HELD[state], unit="Pa")
+
+
+def superstructure(m: eg.Model, frame: Any, height: float) -> Any:
+    """Add the slewing upper structure with boom, stick, bucket and its four-bar; the bucket is returned.
+
+    Reach of boom and stick, tip radius of the bucket, counterweight and speed of slewing are those of the data sheet.
+    """
+    m.parameter("bulk", 1.2e9, unit="Pa", doc="bulk modulus of the oil in hoses")
+    m.parameter("dead", 4e-3, unit="m^3", doc="volume of hoses")
+    m.parameter("flow", 429e-3 / 60 / 2, unit="m^3/s", doc="of one of both pumps")
+    m.parameter("p_relief", 35e6, unit="Pa")
+    m.parameter("open_relief", 2e-9, doc="flow through an open valve for the pressure above its own (m^3/s/Pa)")
+    m.input("slewing", 0.0)
+    upper = m.body("upper", mass=10258, com=(-1.0, 0.9, 0), inertia=(9000, 26000, 24000))  # 4.2 t of it counterweight
+    m.revolute("slew", frame.at(0, 1.0 - height, 0), upper, axis="y")
+    m.torque("slew_motor", "slew", "2e5*(slewing - slew_dot)")
+    boom = m.body("boom", mass=1900, com=(2.7, 0.55, 0), inertia=(250, 6300, 6300))
+    stick = m.body("stick", mass=1000, com=(0.75, 0.1, 0), inertia=(70, 1050, 1050))
+    bucket = m.body("bucket", mass=1000, com=(0.7, 0.15, 0), inertia=(260, 330, 330))
+    rocker = m.body("rocker", mass=50, com=(0.3, 0, 0), inertia=(1, 2.5, 2.5))
+    link = m.body("link", mass=50, com=(0.3, 0, 0), inertia=(1, 2.5, 2.5))
+    m.revolute("boom_angle", upper.at(0.15, 0.8, 0), boom)
+    m.revolute("stick_angle", boom.at(5.7, 0, 0), stick)
+    m.revolute("bucket_angle", stick.at(2.9, 0, 0), bucket)
+    m.revolute("rocker_angle", stick.at(2.47, 0, 0), rocker)
+    m.revolute("link_angle", rocker.at(0.6, 0, 0), link)
+    m.revolute("bucket_pin", link.at(0.6, 0, 0), bucket.at(0.05, 0.45, 0))
+    cylinder(m, "boom", upper.at(0.8, 0.45, 0), boom.at(2.2, 0.5, 0))
+    cylinder(m, "stick", boom.at(2.85, 1.1, 0), stick.at(-0.65, 0.38, 0))
+    cylinder(m, "bucket", stick.at(0.32, 0.53, 0), rocker.at(0.6, 0, 0))
+    m.initial(slew=0.0, boom_angle=0.45, stick_angle=-1.6, bucket_angle=-0.6)
+    m.guess(rocker_angle=2.0, link_angle=-1.6)
+    m.output("tip_x", bucket.at(1.47, 0, 0).position[0])
+    m.output("tip_y", bucket.at(1.47, 0, 0).position[1])
+    return bucket
+
+
+def build(track: Track | None = None, ground: Any = None, law: Any = None) -> eg.Model:
+    """The whole machine; gravity is turned by ``slope``, so that the ground climbs along x.
+
+    It moves in the plane of its tracks: what the slewing upper structure exerts across is carried by the frame.
+    """
+    track = track or Track()
+    m = eg.Model("tracked_excavator", gravity=("-g*sin(slope)", "-g*cos(slope)", 0))
+    m.parameter("g", 9.81)
+    m.parameter("slope", 0.0, doc="angle of the ground (rad)")
+    frame = undercarriage(m, track, 3900, (2500, 7000, 5500), ground, law)
+    superstructure(m, frame, track.height)
+    m.simulation(end=2, method="RK45", rtol=1e-4, atol=1e-5)
+    return m
+
+
+def main() -> None:
+    """Build the machine, drive, and compare its speed with that of the chain."""
+    m = build()
+    if len(sys.argv) > 2:
+        m.save(sys.argv[2])
+    start = perf_counter()
+    mod = m.compile()
+    print(f"{len(m.bodies)} bodies, {mod.n_x} states, built in {perf_counter() - start:.1f} s")
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 3.0
+    start = perf_counter()
+    run = mod.simulate(seconds, inputs={"speed": ([0, 1], [0, 3])}, method="RK45", rtol=1e-4, atol=1e-5)
+    print(f"drove {run['x'][-1]:.3f} m in {seconds:g} s, {perf_counter() - start:.1f} s of computing;", end=" ")
+    print(f"{run['x_dot'][-1]:.3f} m/s, the chain {run['chain_speed'][-1]:.3f} m/s")
+
+
+if __name__ == "__main__":
+    main()

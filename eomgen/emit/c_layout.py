@@ -118,7 +118,8 @@ def _passing_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
         return (*rhs_files(program), *ACCELERATE, "multipliers", direct, *derive_files(program), "jacobian_passing")
     if name == "project":
         rates = any(d.name == "rhs" for d in program.drivers)
-        across = (*rhs_files(program), "rhs_across", "project_passing")
+        near = "nearness_direct" if "dynamics" in program.block_names else "nearness"
+        across = (*rhs_files(program), "rhs_across", near, "project_passing")
         return (*CLOSE, "is_closed", *(across if rates else ("project_drive",)))
     if name == "outputs" and not accelerates:
         return LOOPS[name]

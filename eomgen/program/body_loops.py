@@ -50,7 +50,8 @@ class BodyLoops(LoopBlocks):
         here = substitute([*solved.accelerations, *gamma, *pushed], moved)
         a, gamma, pushed = here[: terms.n_v], here[terms.n_v : -len(pushed)], here[-len(pushed) :]
         left = [x + y for x, y in zip(gamma, times(self.rows, a), strict=True)]
-        size = total_magnitude([*(x / s for x, s in zip(a, self.s, strict=True)), *(x * self.unit for x in pushed)])
+        moving = zip(a[: terms.n_v - terms.n_states], self.s, strict=False)
+        size = total_magnitude([*(x / s for x, s in moving), *(x * self.unit for x in pushed)])
         conditions.append(graph.apply("lt", total_magnitude(left) * self.unit, size * LEFT + NOTHING))
         dz = times(transpose(self.J, terms.n_v), self._factor[0].solve(left))
         a = [x - s * d for x, s, d in zip(a, self.s, dz, strict=True)]

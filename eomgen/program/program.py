@@ -40,7 +40,7 @@ class Limits:
     #: The same where all functions together are longer than ``long``, so that they take long to compile.  Measured
     #: (benchmarks/tracks.py) on a chain of 49 links round wheels: 13 s of work to compile it instead of 36 s.
     rolled_of_long: int = 2_500
-    long: int = 100_000
+    long: int = 50_000
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,11 @@ x = [q; v; s] without further rules.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
+from ..equations.articulated import ConstraintRow, TreeMotion
 from ..equations.tree_equations import LinearSystem
 from ..graph.core import Expr
 from ..kinematics.state import acceleration_name
@@ -45,7 +47,7 @@ def with_states(terms: SystemTerms, names: Sequence[str], rates: Sequence[Expr])
         system=None if terms.system is None else _system(terms.system, rates),
         slopes=None,
         turned=None,
-        constrained=None,
+        constrained=None if terms.constrained is None else partial(_constrained, terms.constrained, n, tuple(rates)),
         n_states=count,
     )
 
@@ -56,6 +58,26 @@ def _centroidal(given: Row, n: int, nothing: Row) -> Row:
         return ()
     rows = (given[3 + k * n : 3 + (k + 1) * n] for k in range(3))
     return (*given[:3], *(x for row in rows for x in (*row, *nothing)), *given[3 + 3 * n :])
+
+
+def _constrained(
+    solve: Callable[..., TreeMotion],
+    n: int,
+    rates: Sequence[Expr],
+    rows: Sequence[ConstraintRow] = (),
+    term: float = 0.0,
+    loaded: bool = True,
+    forces: Sequence[Expr] | None = None,
+) -> TreeMotion:
+    """The accelerations by articulated bodies and the rates of the states, which no constraint holds."""
+    moving = [replace(row, entries={k: x for k, x in row.entries.items() if k < n}) for row in rows]
+    found = solve(moving, term, loaded=loaded, forces=None if forces is None else forces[:n])
+    graph = rates[0].graph
+    unloaded = [graph.zero] * len(rates) if forces is None else forces[n:]
+    return found._replace(
+        accelerations=(*found.accelerations, *(rates if loaded else unloaded)),
+        pivots=(*found.pivots, *(graph.one,) * len(rates)),
+    )
 
 
 def _system(system: LinearSystem, rates: Sequence[Expr]) -> LinearSystem:

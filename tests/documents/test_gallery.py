@@ -13,7 +13,7 @@ from PIL import Image
 
 import eomgen as eg
 from eomgen.cli.verb_view import view
-from eomgen.shipped import example_files
+from eomgen.shipped import example_files, find_example
 from eomgen.show.data import read_picture
 
 ROOT = Path(__file__).parents[2]
@@ -60,7 +60,8 @@ def test_pictures_are_there_and_small() -> None:
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.example)
 def test_its_command_can_be_given(entry: Any) -> None:
-    file = ROOT / "examples" / entry.example
+    file = find_example(entry.example, example_files())
+    assert file is not None
     words = [str(file), *(f"--trace={name}" for name in entry.options.trace)]
     words += [f"--plot={name}" for name in entry.options.plot]
     words += [] if entry.options.end is None else [f"--end={entry.options.end}"]

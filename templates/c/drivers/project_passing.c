@@ -9,10 +9,9 @@ static int project_driver(double t, const double *restrict x, const double *rest
         return 0;
     }
     const int status = close_loops(t, x, u, c, w);
-    partition parts;
     normalise(w + AT_X);
     if (status == 0) {
-        const double weakest = find_weakest(t, w + AT_X, u, c, &parts, w);
+        const double weakest = nearness(t, w + AT_X, u, c, w);
         (void)rhs_across(t, x, u, c, weakest, 0, w + AT_RATED, w);
     }
     for (int k = 0; k < NQ + N; k++) {
