@@ -18,7 +18,7 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
-from ..graph.pair_calls import LOSSES, PairFunction, PairKind, pair_meeting, pair_sum
+from ..graph.pair_calls import LOSSES, PairFunction, PairKind, pair_meeting, pair_spots, pair_sum
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..numeric.pair_sums import POSE
@@ -38,7 +38,7 @@ from .contact_shapes import (
 )
 from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction_laws import DryFriction, has_bristles, read_friction
-from .normal_laws import HertzBodies, NormalLaw, read_normal_law
+from .normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, Rigid, read_normal_law
 
 
 class _PairView:
@@ -95,6 +95,8 @@ class ContactGroups(Force):
     second: tuple[ContactShape, ...]
     normal_law: NormalLaw
     friction: DryFriction | None
+    coefficient: Expr  #: of friction, where bodies are rigid
+    restitution: Expr  #: where bodies are rigid
 
     @property
     def laws(self) -> tuple[Any, ...]:
@@ -128,6 +130,19 @@ class ContactGroups(Force):
         markers, function, operands = self._operands(view, "")
         accelerations = [x for m in markers for x in (*view.acceleration(m), *view.angular_acceleration(m))]
         return pair_meeting(view.graph, function, operands, accelerations)
+
+    def near(self, view: View) -> list[Expr]:
+        _, function, operands = self._operands(view, "", still=True)
+        return pair_spots(view.graph, function, operands)
+
+    @property
+    def met_bodies(self) -> list[int]:
+        groups = [_features(self.first), *([_features(self.second)] if self.second else [])]
+        return [shape.marker.body for group in groups for features in group.values() for shape, _ in features]
+
+    @property
+    def is_rigid(self) -> bool:
+        return isinstance(self.normal_law, Rigid)
 
     def _results(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], list[Expr]]:
         """The bodies as markers at their origins, force and torque on each, and the energy; at rest, if asked."""
@@ -165,7 +180,7 @@ class ContactGroups(Force):
                 if apart and not twice and meet((first, second)):
                     sizes = tuple(len(groups[n][kind][0][1].sizes) for n, kind in ((g, first), (h, second)))
                     flat = planar and first != "half"  # which has no extent along its normal to leave out
-                    kinds.append(self._kind((first, second), (i, j), (sizes[0], sizes[1]), flat, data, lost))
+                    kinds.append(self._kind((first, second), (i, j), (sizes[0], sizes[1]), (planar, flat), data, lost))
         return PairFunction(name, len(bodies), tuple(x.value for x in data.values), tuple(tables), tuple(kinds))
 
     def _kind(
@@ -173,12 +188,16 @@ class ContactGroups(Force):
         kinds: tuple[str, str],
         tables: tuple[int, int],
         sizes: tuple[int, int],
-        planar: bool,
+        plane: tuple[bool, bool],
         data: _SharedData,
         lost: bool,
     ) -> PairKind:
-        """The law of one kind of pair in a graph of its own, with its derivative."""
+        """The law of one kind of pair in a graph of its own, with its derivative.
+
+        ``plane`` says whether shapes lie in a plane, and whether distances count across it only.
+        """
         graph = Graph()
+        in_plane, planar = plane
         view = _PairView(graph, planar)
         places: list[int] = []
 
@@ -210,12 +229,14 @@ class ContactGroups(Force):
         names += [f"l{k}" for k in range(len(places))]
         seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
         slopes = jvp(results, seeds)
-        across, depth, _, _ = contact.touch(view)
+        across, depth, arm, _ = contact.touch(view)
         if (share := contact.share(view)) is not None:  # beside a piece of ground nothing is in it
             depth = where(graph.apply("lt", 0.0, share), depth, graph.apply("min", depth, 0.0))
         touch = [*across, depth, turning_radius(kinds[1], given[1], graph)]
-        nodes, renamed = _kept(graph, [*results, *slopes, *touch])
-        ids, seen = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch))
+        flat = vec.transpose(view.rotation(markers[kinds[0] == "half"]))[2] if in_plane else vec.zero(graph)
+        spot = [*touch[:4], *vec.add(view.position(markers[0]), arm), *flat, own(self.coefficient), own(self.restitution)]
+        nodes, renamed = _kept(graph, [*results, *slopes, *touch, *spot])
+        ids, seen, place = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch, spot))
         rates = [f"d_{name}" for name in names]
         return PairKind(
             f"{kinds[0]}_{kinds[1]}_{tables[0]}_{tables[1]}",
@@ -227,6 +248,7 @@ class ContactGroups(Force):
             tuple(ids[: len(results)]),
             tuple(ids[len(results) :]),
             tuple(seen),
+            tuple(place),
         )
 
 
@@ -283,7 +305,21 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         remedy = "use brown_mcphee, or point_plane, sphere_plane or sphere_sphere for each pair"
         e.fault("friction_law", "lugre has states, which pairs of groups do not", remedy)
         return None
-    law, friction = read_normal_law(e), read_friction(e, "friction", "static_friction", "viscous_friction")
+    if e.choice("normal_law") == RIGID:
+        law: NormalLaw = Rigid()
+        friction, coefficient, restitution = None, e.given("friction"), e.given("restitution")
+        for key in CURVED:
+            if key not in ("normal_law", "friction", "restitution"):
+                e.refuse(key, f"has no meaning in normal_law: {RIGID}, which has friction (a coefficient) and restitution")
+        for key, value in (("friction", coefficient), ("restitution", restitution)):
+            if value is not None:
+                e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
+        if restitution is not None:
+            e.require("restitution", restitution, lambda x: x <= 1, "must be at most 1")
+    else:
+        law, friction = read_normal_law(e), read_friction(e, "friction", "static_friction", "viscous_friction")
+        coefficient = None if friction is None else friction.dynamic
+        restitution = e.given("restitution")
     if first is None or second is None or e.at_fault():
         return None
     _refuse_pairs(e, first, second)
@@ -291,7 +327,12 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         for key, shapes in (("first", first), ("second", second)):
             if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
                 e.fault(key, f"a {flat[0]} has no radius for Hertz's law from moduli", "give stiffness, not moduli")
-    return ContactGroups(e.name, first, second, law, friction)
+    zero = e.graph.zero
+    return ContactGroups(
+        *(e.name, first, second, law, friction),
+        zero if coefficient is None else coefficient,
+        zero if restitution is None else restitution,
+    )
 
 
 def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
@@ -354,6 +395,13 @@ _ALLOWED = (
     "each other and half_space; ellipsoid and cuboid meet half_space"
 )
 
+_NORMAL_LAW = CURVED["normal_law"]._replace(
+    choices=(*NORMAL_LAWS, RIGID),
+    doc=CURVED["normal_law"].doc + f"; {RIGID}, no penetration, for runs by the method moreau only",
+)
+_RESTITUTION = CURVED["restitution"]._replace(
+    doc="coefficient of restitution, from which the dissipation is computed; in runs by the method moreau Newton's"
+)
 _SHAPES = "shapes {shape, on, ...} of the "
 
 TYPES = table(
@@ -372,6 +420,8 @@ TYPES = table(
             ),
             "law": Field("law", "the keys that follow as a mapping, instead of one by one"),
             **CURVED,
+            "normal_law": _NORMAL_LAW,
+            "restitution": _RESTITUTION,
         },
         _contact_groups,
     )

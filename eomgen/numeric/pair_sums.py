@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.runs import APART, BEYOND, UP_TO, WITHIN
+from ..limits.runs import APART, BEYOND, NEAR, UP_TO, WITHIN
 
 #: Numbers that say how a body or a shape stands and moves: position, rotation by rows, velocity, angular velocity.
 POSE = 18
@@ -25,6 +25,11 @@ REST = 2
 MOTION = 6
 #: Numbers that say how shapes meet: time, penetration and thickness of the deepest pair, and its two shapes.
 MEETING = 5
+#: Numbers that say where two shapes are near each other: normal, penetration, point, direction out of the plane of
+#: shapes in the plane (0 in space), coefficient of friction, restitution.
+SPOT = 12
+#: The same in a list, behind the numbers of both shapes.
+RECORD = 2 + SPOT
 SORTED = 256  #: pairs of tables from which on near ones are found along an axis: below, testing all is as quick
 NEVER = 1e300  #: (s) where no shapes come towards each other
 
@@ -41,17 +46,23 @@ class PairSum:
     tables : sequence of (n, PLACE + sizes + REST) integers
         Shapes of one kind: body, then places in the data of the position (3) and rotation (9) in the body, of the
         sizes, of the radius of a sphere that bounds the shape (-1: none does), and of the thickness of the body.
-    kinds : sequence of (first, second, planar, law, value, slope, touch)
+    kinds : sequence of (first, second, planar, law, value, slope, touch, spot)
         Tables of the first and the second shape; whether distances count across z of the first only; places of the
         law's numbers; the function of one pair and its directional derivative, of the numbers of the first shape, of
         the second, and of the law (and of their rates in the same order); normal, penetration and turning radius of the
-        pair.
+        pair; and the ``SPOT`` numbers of :meth:`spots`.
+    room : int
+        How many pairs :meth:`spots` has room for.
     """
 
     def __init__(
-        self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[int, int, bool, Any, Narrow, Narrow, Narrow]]
+        self,
+        bodies: int,
+        tables: Sequence[Any],
+        kinds: Sequence[tuple[int, int, bool, Any, Narrow, Narrow, Narrow, Narrow]],
+        room: int,
     ):
-        self.bodies = bodies
+        self.bodies, self.room = bodies, room
         self.tables = [np.array(table, dtype=int) for table in tables]
         self.kinds = [(*kind, *self._pairs(*kind[:2])) for kind in kinds]
 
@@ -106,7 +117,7 @@ class PairSum:
         least = np.full(data.shape[1:], NEVER, dtype=data.dtype)
         deepest = np.zeros((MEETING - 1, *data.shape[1:]), dtype=data.dtype)
         starts = np.cumsum([0, *map(len, self.tables)])
-        for first, second, planar, law, _, _, touch, i, j in self.kinds:
+        for first, second, planar, law, _, _, touch, _, i, j in self.kinds:
             (a, arm_a), (b, arm_b) = placed[first], placed[second]
             tables = self.tables[first], self.tables[second]
             if not len(i):
@@ -163,12 +174,49 @@ class PairSum:
         found = [least, *deepest]
         return [x if np.ndim(x) else float(x) for x in found]
 
+    def spots(self, given: Sequence[Any]) -> list[Any]:
+        """How many pairs of shapes are near each other, and where: 1 + ``RECORD`` ``room`` numbers or arrays.
+
+        Near are pairs that are apart by at most half the sum of their thicknesses.  Records that are not used are 0.
+        """
+        data = _stacked(given)
+        out = np.zeros((1 + RECORD * self.room, *data.shape[1:]), dtype=data.dtype)
+        for column in np.ndindex(data.shape[1:]):
+            place = (slice(None), *column)
+            rows = self._spots(data[place])
+            out[(0, *column)] = len(rows)
+            flat = rows[: self.room].ravel()
+            out[(slice(1, 1 + flat.size), *column)] = flat
+        return list(out.tolist()) if out.ndim == 1 else list(out)
+
+    def _spots(self, data: np.ndarray) -> np.ndarray:
+        """Records of one state."""
+        placed = [self._place(table, data, None)[0] for table in self.tables]
+        starts = np.cumsum([0, *map(len, self.tables)])
+        found = [np.zeros((0, RECORD))]
+        for first, second, planar, law, _, _, _, spot, i, j in self.kinds:
+            a, b, tables = placed[first], placed[second], (self.tables[first], self.tables[second])
+            thick = data[tables[0][:, -1]], data[tables[1][:, -1]]
+            if not len(i):
+                continue
+            i, j = self._candidates(a, b, planar, (first, second), data, NEAR * (thick[0] + thick[1].max())) or (i, j)
+            margin = NEAR * (thick[0][i] + thick[1][j])
+            near = self._near(a, b, planar, i, j, tables, data, margin)
+            i, j, margin = i[near], j[near], margin[near]
+            if not len(i):
+                continue
+            numbers = [*a[i].T, *b[j].T, *data[list(law)][:, None]]
+            values = _table(spot(numbers), len(i), data)
+            rows = np.concatenate([[starts[first] + i, starts[second] + j], values]).T
+            found.append(rows[values[3] > -margin])
+        return np.concatenate(found)
+
     def _sum(self, data: np.ndarray, rates: np.ndarray | None) -> list[Any]:
         placed = [self._place(table, data, rates) for table in self.tables]
         out = np.zeros((6 * self.bodies + 1, *data.shape[1:]), dtype=data.dtype)
         if data.dtype == object:
             out = out + data[0] * 0
-        for first, second, planar, law, value, slope, _, i, j in self.kinds:
+        for first, second, planar, law, value, slope, _, _, i, j in self.kinds:
             (a, arm_a, da, d_arm_a), (b, arm_b, db, d_arm_b) = placed[first], placed[second]
             i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
             near = self._near(a, b, planar, i, j, (self.tables[first], self.tables[second]), data)
@@ -229,14 +277,14 @@ class PairSum:
         data = _stacked(given)
         placed = [self._place(table, data, None)[0] for table in self.tables]
         found = []
-        for first, second, planar, _, _, _, _, i, j in self.kinds:
+        for first, second, planar, _, _, _, _, _, i, j in self.kinds:
             a, b, tables = placed[first], placed[second], (self.tables[first], self.tables[second])
             i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
             found.append((len(i), int(self._near(a, b, planar, i, j, tables, data).sum())))
         return found
 
     def _candidates(
-        self, a: np.ndarray, b: np.ndarray, planar: bool, which: tuple[int, int], data: np.ndarray
+        self, a: np.ndarray, b: np.ndarray, planar: bool, which: tuple[int, int], data: np.ndarray, more: Any = 0.0
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Pairs whose spheres may meet, from the order of their centres along an axis; None where all are to be tested.
 
@@ -256,7 +304,7 @@ class PairSum:
             return None
         order = np.argsort(b[:, axis], kind="stable")
         places, middle = b[order, axis], a[:, axis]
-        wide = radii + max(others.max(), 0.0)
+        wide = radii + max(others.max(), 0.0) + more
         reach = wide + APART * (np.abs(middle) + np.abs(places).max() + wide)
         low, high = places.searchsorted(middle - reach), places.searchsorted(middle + reach, "right")
         i = np.repeat(np.arange(len(first)), high - low)
@@ -277,15 +325,16 @@ class PairSum:
         j: np.ndarray,
         tables: tuple[np.ndarray, np.ndarray],
         data: np.ndarray,
+        more: Any = 0.0,
     ) -> np.ndarray:
-        """Pairs whose bounding spheres meet, in any column."""
+        """Pairs whose bounding spheres, larger by a length ``more`` together, meet, in any column."""
         bounds = tables[0][i, -REST], tables[1][j, -REST]
         reach = b[j, 0:3] - a[i, 0:3]
         square = (reach * reach).sum(axis=1)
         if planar:
             along = (reach * a[i][:, [5, 8, 11]]).sum(axis=1)  # z of the first shape: the last column of its rotation
             square = square - along * along
-        size = data[np.maximum(bounds[0], 0)] + data[np.maximum(bounds[1], 0)]
+        size = data[np.maximum(bounds[0], 0)] + data[np.maximum(bounds[1], 0)] + more
         apart = np.asarray(square > size * size, dtype=bool)
         every = np.asarray(apart.all(axis=tuple(range(1, apart.ndim))))
         return np.asarray(~every | (bounds[0] < 0) | (bounds[1] < 0))
