@@ -148,6 +148,16 @@ def simulate(
         motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, kept, steps)
         if motion is not None:
             return motion
+    if isinstance(method, str) and method == "moreau":
+        from .moreau import step_rigidly
+
+        others = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, "checkpoint": checkpoint}
+        others |= {"dense_output": dense_output, "controllers": controllers, **settings}
+        return step_rigidly(module, span, initial, parameters, inputs, step, t_eval, events, progress, others)
+    if module.metadata.get("rigid_contacts"):
+        from .moreau import refuse_rigid
+
+        refuse_rigid(module, method)
     method, step = own_step(module, method, step)
     step, dense_output = check_method(method, step), read_flag("dense_output", dense_output)
     declared = declare(module)
