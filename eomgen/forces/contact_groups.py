@@ -209,7 +209,7 @@ class ContactGroups(Force):
 
         frame = Frame(vec.identity(graph), vec.zero(graph))
         normal = self.normal_law.mapped(own)
-        dry = self.friction
+        dry, rigid = self.friction, (own(self.coefficient), own(self.restitution))
         friction = None if dry is None else dry.mapped(own)
         markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
         given = [
@@ -234,7 +234,7 @@ class ContactGroups(Force):
             depth = where(graph.apply("lt", 0.0, share), depth, graph.apply("min", depth, 0.0))
         touch = [*across, depth, turning_radius(kinds[1], given[1], graph)]
         flat = vec.transpose(view.rotation(markers[kinds[0] == "half"]))[2] if in_plane else vec.zero(graph)
-        spot = [*touch[:4], *vec.add(view.position(markers[0]), arm), *flat, own(self.coefficient), own(self.restitution)]
+        spot = [*touch[:4], *vec.add(view.position(markers[0]), arm), *flat, *rigid]
         nodes, renamed = _kept(graph, [*results, *slopes, *touch, *spot])
         ids, seen, place = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch, spot))
         rates = [f"d_{name}" for name in names]

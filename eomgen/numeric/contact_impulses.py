@@ -9,8 +9,11 @@ contact problems prone to Newton like solution methods, Comput. Methods Appl. Me
 
     P_n - max(0, P_n - r y_n),      P_t - (P_t - s y_t) brought into the disc of radius mu max(0, P_n - r y_n),
 
-which a Newton method with the derivatives of the branch at hand solves.  Where it leads nowhere, sweeps over single
-contacts go on (M. Jean, The non-smooth contact dynamics method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257).
+which a Newton method with the derivatives of the branch at hand solves.  Contacts may be more than there are freedoms:
+each round solves for contacts that are a little softer about the impulses of the round before (the proximal point
+method, R. T. Rockafellar, SIAM J. Control Optim. 14 (1976), 877-898), which leaves the matrix regular and the solution
+as it is.  Where Newton leads nowhere, sweeps over single contacts go on (M. Jean, The non-smooth contact dynamics
+method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257).
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import EvaluationError
-from ..limits.rigid_contacts import BLURRED, HALVINGS, SWEEPS
+from ..limits.rigid_contacts import SHARP, SHRINKS, SOFT, SOFTER, SWEEPS, TRIED
 from . import algebra
 from .space import Array
 
@@ -56,6 +59,13 @@ class ContactProblem:
         self.across = np.where(across > 0.0, across, 1.0)
         self.scales = np.concatenate([self.normal[:, None], np.repeat(self.across[:, None], self.d - 1, axis=1)], axis=1)
 
+    def softer(self, P: Array, part: float) -> ContactProblem:
+        """The problem in which each contact is softer by a part of its compliance about impulses P."""
+        more = part * self.scales
+        made = ContactProblem(self.W + np.diag(more.ravel()), self.c - more * P, self.mu)
+        made.normal, made.across, made.scales = self.normal, self.across, self.scales
+        return made
+
     def velocities(self, P: Array) -> Array:
         """y (m, d)."""
         return np.asarray(self.c + (self.W @ P.ravel()).reshape(self.c.shape))
@@ -89,8 +99,8 @@ class ContactProblem:
         slides = on & (size >= reach)
         holds = on & ~slides
         A[~on] = unit[~on]
-        A[on, 0] = y_slopes[on, 0] / self.normal[on, None] + BLURRED * unit[on, 0]
-        A[holds, 1:] = y_slopes[holds, 1:] / self.across[holds, None, None] + BLURRED * unit[holds, 1:]
+        A[on, 0] = y_slopes[on, 0] / self.normal[on, None]
+        A[holds, 1:] = y_slopes[holds, 1:] / self.across[holds, None, None]
         for i in np.flatnonzero(slides):
             along = pulled[i] / size[i] if size[i] > 0.0 else np.zeros(d - 1)
             normal = unit[i, 0] - y_slopes[i, 0] / self.normal[i]
@@ -99,6 +109,34 @@ class ContactProblem:
             if d > 2 and size[i] > 0.0:
                 A[i, 1:] -= reach[i] / size[i] * (moved - np.outer(along, along @ moved))
         return -algebra.solve(A.reshape(m * d, m * d), misses.ravel()).reshape(m, d)
+
+    def smoothed_step(self, P: Array, rounding: float) -> tuple[Array, float]:
+        """Impulses after a Newton step for laws rounded over a velocity, and the residual before it (m/s)."""
+        m, d = P.shape
+        unit, slopes = np.eye(m * d).reshape(m, d, m * d), self.W.reshape(m, d, m * d)
+        y = self.velocities(P)
+        near, beside = rounding / self.normal, rounding / self.across
+        x, dx = P[:, 0] - y[:, 0] / self.normal, unit[:, 0] - slopes[:, 0] / self.normal[:, None]
+        root = np.sqrt(x * x + 4.0 * near * near)
+        pressed = np.where(x < 0.0, 2.0 * near * near / (np.abs(x) + root), 0.5 * (x + root))
+        rise = 0.5 * (1.0 + x / root)
+        misses, A = np.empty((m, d)), np.empty((m, d, m * d))
+        misses[:, 0], A[:, 0] = P[:, 0] - pressed, unit[:, 0] - rise[:, None] * dx
+        if d > 1:
+            reach, d_reach = self.mu * pressed, (self.mu * rise)[:, None] * dx
+            pulled = P[:, 1:] - y[:, 1:] / self.across[:, None]
+            d_pulled = unit[:, 1:] - slopes[:, 1:] / self.across[:, None, None]
+            size = np.sqrt((pulled * pulled).sum(axis=1) + beside * beside)
+            d_size = (pulled[:, :, None] * d_pulled).sum(axis=1) / size[:, None]
+            edge = np.sqrt((size - reach) ** 2 + 4.0 * beside * beside)
+            larger = 0.5 * (size + reach + edge)
+            d_larger = 0.5 * (d_size + d_reach) + ((size - reach) / (2.0 * edge))[:, None] * (d_size - d_reach)
+            part = reach / larger
+            d_part = (d_reach - part[:, None] * d_larger) / larger[:, None]
+            misses[:, 1:] = P[:, 1:] - part[:, None] * pulled
+            A[:, 1:] = unit[:, 1:] - part[:, None, None] * d_pulled - pulled[:, :, None] * d_part[:, None]
+        step = algebra.solve(A.reshape(m * d, m * d), misses.ravel()).reshape(m, d)
+        return P - step, self.size(misses)
 
     def sweep(self, P: Array) -> None:
         """Each contact for itself, one after the other, in place."""
@@ -128,33 +166,75 @@ def solve_contacts(problem: ContactProblem, start: Array, tolerance: float, most
         Iterations allowed.
     """
     P = np.array(start)
-    misses, pressed, pulled = problem.misses(P)
-    best, least = P, problem.size(misses)
+    best, least = P, problem.size(problem.misses(P)[0])
     count = 0
-    swept = False
-    while least > tolerance and count < most:
-        count += 1
-        try:
-            step = problem.step(P, misses, pressed, pulled)
-        except EvaluationError:
-            step = np.full(P.shape, np.nan)
-        part, size = 1.0, problem.size(misses)
-        for _ in range(HALVINGS):
-            tried = P + part * step
-            found = problem.misses(tried)
-            new = problem.size(found[0])
-            if new < size:
-                break
-            part *= 0.5
-        if new < size:
-            P, (misses, pressed, pulled), swept = tried, found, False
-        else:  # Newton leads nowhere from here
-            if not swept:
-                P = np.array(best)
+    for part in SOFTER:
+        if least <= tolerance or count >= most:
+            break
+        P, steps = _near(problem.softer(P, part), P, 0.5 * tolerance, min(TRIED, most - count))
+        count += max(steps, 1)
+        size = problem.size(problem.misses(P)[0])
+        if size < least:
+            best, least = np.array(P), size
+        if least > tolerance:
+            P = np.array(best)
             for _ in range(SWEEPS):
                 problem.sweep(P)
-            misses, pressed, pulled = problem.misses(P)
-            new, swept = problem.size(misses), True
-        if new < least:
-            best, least = np.array(P), new
+            size = problem.size(problem.misses(P)[0])
+            if size < least:
+                best, least = np.array(P), size
+    for shrinks in SHRINKS:
+        if least <= tolerance or count >= most:
+            break
+        P, steps, size = solve_smoothed(problem, tolerance, most - count, shrinks)
+        count += steps
+        if size < least:
+            best, least = P, size
     return ContactImpulses(best, count, least)
+
+
+def solve_smoothed(problem: ContactProblem, tolerance: float, most: int, shrinks: float) -> tuple[Array, int, float]:
+    """Impulses by rounded laws that become sharp (B. Chen, P. T. Harker, SIAM J. Matrix Anal. Appl. 14 (1993), 1168-1190).
+
+    max(0, x) is (x + sqrt(x^2 + 4 e^2)) / 2, with e that shrinks as Newton's method follows; the edge of the disc of
+    friction is rounded likewise.
+
+    Returns
+    -------
+    (m, d) array, int, float
+        Impulses, iterations and residual, those of least residual.
+    """
+    P = np.zeros(problem.c.shape)
+    best, least = P, np.inf
+    rounding, count = 1.0, 0
+    speed = float(np.abs(problem.c).max())
+    while least > tolerance and count < most and rounding > SHARP:
+        about = problem.softer(P, SOFT)
+        for _ in range(2):
+            try:
+                P, left = about.smoothed_step(P, rounding * speed)
+            except EvaluationError:
+                return best, count + 1, least
+            count += 1
+            if left < 0.1 * rounding * speed:
+                break
+        size = problem.size(problem.misses(P)[0])
+        if size < least:
+            best, least = P, size
+        if left < rounding * speed:
+            rounding *= shrinks
+    return best, count, least
+
+
+def _near(problem: ContactProblem, start: Array, tolerance: float, most: int) -> tuple[Array, int]:
+    """Newton's iterations for softer contacts, and how many there were; NaN where they have no step."""
+    P = np.array(start)
+    for count in range(most):
+        misses, pressed, pulled = problem.misses(P)
+        if problem.size(misses) <= tolerance:
+            return P, count
+        try:
+            P = P + problem.step(P, misses, pressed, pulled)
+        except EvaluationError:
+            return np.full(P.shape, np.nan), count
+    return P, most

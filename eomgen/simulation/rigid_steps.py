@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..limits.rigid_contacts import GENTLER, GROWN, REMOVED, RESTING
+from ..limits.rigid_contacts import GENTLER, GROWN, REMOVED, RESTING, YIELDING
 from ..numeric import algebra
 from ..numeric.contact_impulses import ContactImpulses, ContactProblem, solve_contacts
 from ..numeric.scales import Array
@@ -86,12 +86,8 @@ class RigidSteps:
         if not rows.gaps.size:
             return rows
         self.depth = max(self.depth, float(-rows.gaps.min()))
-        d = len(rows.jacobian) // len(rows.gaps)
         fastest = max(float(np.abs(rows.jacobian @ velocity).max()) for velocity in (v, free))
-        before = rows.jacobian[::d] @ v
-        change = rows.jacobian[::d] @ free - before
-        bounces = (rows.restitution > 0.0) & (before < -RESTING * np.abs(change))
-        return rows.chosen(np.flatnonzero((rows.gaps <= 0.0) | (~bounces & (rows.gaps <= 2.0 * h * fastest))))
+        return rows.chosen(np.flatnonzero(rows.gaps <= 2.0 * h * fastest))
 
     def _contact(self, held: _Held, rows: RigidRows, v: Array, free: Array, h: float) -> tuple[Array, Array]:
         """Velocities after the impulses of contacts, and these (m, d)."""
@@ -103,8 +99,9 @@ class RigidSteps:
         spread = held.inverse @ rows.jacobian.T
         W = rows.jacobian @ spread
         fast = before[:, 0] < -RESTING * np.abs(undisturbed[:, 0] - before[:, 0])
-        back = np.where(fast & (rows.gaps <= 0.0), -rows.restitution * before[:, 0], 0.0)
+        strikes = fast & (rows.restitution > 0.0) & (rows.gaps + h * undisturbed[:, 0] < 0.0)
         arrive = np.where(rows.gaps > 0.0, -rows.gaps / h, 0.0)
+        back = np.where(strikes, -rows.restitution * before[:, 0] - arrive, 0.0)
         scale = max(float(np.abs(before).max()), float(np.abs(undisturbed).max()))
         keys = [(int(a), int(b)) for a, b in rows.pairs]
         start = np.array([self._last.get(key, np.zeros(d))[:d] for key in keys])
@@ -115,10 +112,11 @@ class RigidSteps:
             found = solve_contacts(ContactProblem(W, c, rows.friction), start, self.tolerance * scale, self.allowed)
             P = found.impulses.ravel()
             after = undisturbed.ravel() + W @ P
-            moved = np.abs(P) @ np.abs(after) + np.abs(P) @ np.abs(undisturbed.ravel())
-            if not back.any() or 0.5 * float(P @ (after + undisturbed.ravel())) <= GROWN * moved:
+            both = after + before.ravel()  # P . both / 2 is their work: forces act with the velocity of the middle
+            if not back.any() or float(P @ both) <= GROWN * float(np.abs(P) @ np.abs(both)):
                 break  # impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985)
         self._note(found, scale, m)
+        self._rests = ~strikes
         self._last = dict(zip(keys, found.impulses, strict=True))
         return free + spread @ P, found.impulses
 
@@ -132,12 +130,13 @@ class RigidSteps:
         d = len(rows.jacobian) // len(rows.gaps)
         normal = rows.jacobian[::d]
         lasts = (rows.gaps < 0.0) & (P[:, 0] > 0.0)
-        lasts &= normal @ new <= 0.5 * rows.restitution * np.abs(new).max() + np.finfo(float).tiny
+        lasts &= self._rests
         if not lasts.any():
             return np.zeros(len(new))
         J, wanted = normal[lasts], -REMOVED * rows.gaps[lasts]
         spread = held.inverse @ J.T
-        problem = ContactProblem(J @ spread, -wanted[:, None], np.zeros(len(wanted)))
+        W = J @ spread
+        problem = ContactProblem(W + YIELDING * np.diag(np.diag(W)), -wanted[:, None], np.zeros(len(wanted)))
         found = solve_contacts(problem, np.zeros((len(wanted), 1)), self.tolerance * float(wanted.max()), self.allowed)
         return np.asarray(spread @ found.impulses.ravel())
 
