@@ -112,8 +112,8 @@ class RigidSteps:
             found = solve_contacts(ContactProblem(W, c, rows.friction), start, self.tolerance * scale, self.allowed)
             P = found.impulses.ravel()
             after = undisturbed.ravel() + W @ P
-            both = after + before.ravel()  # P . both / 2 is their work: forces act with the velocity of the middle
-            if not back.any() or float(P @ both) <= GROWN * float(np.abs(P) @ np.abs(both)):
+            work = P @ after, P @ before.ravel()  # twice: forces act with the velocity of the middle
+            if not back.any() or float(sum(work)) <= GROWN * float(np.abs(P) @ (np.abs(after) + np.abs(before.ravel()))):
                 break  # impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985)
         self._note(found, scale, m)
         self._rests = ~strikes
