@@ -44,7 +44,11 @@ def pile(kinds: Sequence[str], gravity: float = G, walls: bool = True) -> eg.Mod
         shapes.append({**SHAPES[kind], "on": body})
     m.contacts("among", shapes, law=rigid(friction="mu", restitution="e"))
     if walls:
-        sides = [m.ground, m.ground.at(-0.6, 0, 0, rpy=(0, 0, -np.pi / 2)), m.ground.at(0.6, 0, 0, rpy=(0, 0, np.pi / 2))]
+        sides = [
+            m.ground,
+            m.ground.at(-0.6, 0, 0, rpy=(0, 0, -np.pi / 2)),
+            m.ground.at(0.6, 0, 0, rpy=(0, 0, np.pi / 2)),
+        ]
         m.contacts("walls", shapes, {"shape": "half_plane", "on": sides}, rigid(friction="mu", restitution="e"))
     return m
 
@@ -54,5 +58,9 @@ def thrown(rng: np.random.Generator, count: int) -> dict[str, float]:
     start: dict[str, float] = {}
     for k in range(count):
         start |= {f"j{k}_x": -0.4 + 0.4 * (k % 3), f"j{k}_y": 0.25 + 0.4 * (k // 3), f"j{k}_3": rng.uniform(-3, 3)}
-        start |= {f"j{k}_x_dot": rng.uniform(-2, 2), f"j{k}_y_dot": rng.uniform(-2, 2), f"j{k}_3_dot": rng.uniform(-9, 9)}
+        start |= {
+            f"j{k}_x_dot": rng.uniform(-2, 2),
+            f"j{k}_y_dot": rng.uniform(-2, 2),
+            f"j{k}_3_dot": rng.uniform(-9, 9),
+        }
     return start

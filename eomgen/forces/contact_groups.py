@@ -310,7 +310,9 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         friction, coefficient, restitution = None, e.given("friction"), e.given("restitution")
         for key in CURVED:
             if key not in ("normal_law", "friction", "restitution"):
-                e.refuse(key, f"has no meaning in normal_law: {RIGID}, which has friction (a coefficient) and restitution")
+                e.refuse(
+                    key, f"has no meaning in normal_law: {RIGID}, which has friction (a coefficient) and restitution"
+                )
         for key, value in (("friction", coefficient), ("restitution", restitution)):
             if value is not None:
                 e.require(key, value, lambda x: x >= 0, "must be 0 or greater")

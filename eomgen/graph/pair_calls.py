@@ -290,7 +290,9 @@ def without_pairs(outputs: Sequence[Expr]) -> list[Expr]:
     if not outputs:
         return []
     graph = outputs[0].graph
-    items = [Expr(graph, i) for i in reachable(graph, (y.id for y in outputs)) if is_pair_item(graph, graph.nodes[i][0])]
+    items = [
+        Expr(graph, i) for i in reachable(graph, (y.id for y in outputs)) if is_pair_item(graph, graph.nodes[i][0])
+    ]
     return substitute(outputs, dict.fromkeys(items, graph.zero)) if items else list(outputs)
 
 

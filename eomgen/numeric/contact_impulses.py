@@ -57,7 +57,9 @@ class ContactProblem:
         self.normal = np.where(self.normal > 0.0, self.normal, 1.0)
         across = diagonal[:, 1:].sum(axis=1)
         self.across = np.where(across > 0.0, across, 1.0)
-        self.scales = np.concatenate([self.normal[:, None], np.repeat(self.across[:, None], self.d - 1, axis=1)], axis=1)
+        self.scales = np.concatenate(
+            [self.normal[:, None], np.repeat(self.across[:, None], self.d - 1, axis=1)], axis=1
+        )
 
     def softer(self, P: Array, part: float) -> ContactProblem:
         """The problem in which each contact is softer by a part of its compliance about impulses P."""

@@ -206,7 +206,10 @@ class BlockMaker:
             "meeting_time": lambda: terms.meeting_times,
             "near_pairs": lambda: terms.near_pairs,
             "bias_apart": lambda: without_pairs(terms.bias) if terms.near_pairs else (),
-            "motion_axes": lambda: (*terms.motion_axes, *[terms.graph.zero] * (6 * (terms.n_states if terms.near_pairs else 0))),
+            "motion_axes": lambda: (
+                *terms.motion_axes,
+                *[terms.graph.zero] * (6 * (terms.n_states if terms.near_pairs else 0)),
+            ),
             "events": lambda: terms.events,
             "resets": lambda: terms.resets,
             "event_slopes": lambda: derivatives(terms, terms.events, (*terms.q, *terms.v)),

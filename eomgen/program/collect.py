@@ -271,7 +271,11 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         **_signals(kinematics, equations),
         **({"input_rates": rates} if (rates := _input_rates(kinematics)) else {}),
         **({"constraint_inputs": used} if (used := _constraint_inputs(kinematics)) else {}),
-        **({"contact_shapes": shapes, **describe_contacts(kinematics)} if (shapes := _contact_shapes(kinematics)) else {}),
+        **(
+            {"contact_shapes": shapes, **describe_contacts(kinematics)}
+            if (shapes := _contact_shapes(kinematics))
+            else {}
+        ),
         "picture": describe_picture(m),
         "simulation": {
             "end": m.simulation.end,

@@ -60,7 +60,7 @@ def step_rigidly(
         A state is not finite, or more pairs are near than there is room for.
     """
     given = {key: value for key, value in options.items() if value is not None and value is not False}
-    check_names("option of method moreau", given, (), ("method", "step", "t_eval", "progress", *OWN))
+    check_names("option of method moreau", given, OWN, ("method", "step", "t_eval", "progress"))
     if step is None:
         raise UsageError("method moreau needs step=, the size of its steps (s), for example step=1e-3")
     h = check_step("step", step)
@@ -128,7 +128,9 @@ def step_rigidly(
     counts |= {"contact_residual": steps.residual, "penetration": steps.depth, "missed_steps": steps.missed}
     ends = (start, end)
     solution = Solution(t, x, [], [], None, 0, "The end of the span is reached.", counts, ends)
-    return record(bound, forcing, solution, NAME, {"step": h, "contact_tolerance": tolerance, "contact_iterations": iterations})
+    return record(
+        bound, forcing, solution, NAME, {"step": h, "contact_tolerance": tolerance, "contact_iterations": iterations}
+    )
 
 
 def _between(times: Array, states: Array, wanted: Array) -> Array:

@@ -50,12 +50,12 @@ class RigidContacts:
         self.lists: list[tuple[str, int, int]] = [tuple(row) for row in known["lists"]]
         parents = known["parents"]
         n = len(parents)
-        self.moves = np.zeros((len(known["moved_by"]), module.n_v))
+        self.moves = np.zeros((len(known["moved_by"]), module.layout.n_v))
         for shape, last in enumerate(known["moved_by"]):
             while last >= 0:
                 self.moves[shape, last] = 1.0
                 last = parents[last]
-        assert n <= module.n_v
+        assert n <= module.layout.n_v
         self.near = module.kernels.state("near_pairs")
         self.axes = module.kernels.state("motion_axes")
 

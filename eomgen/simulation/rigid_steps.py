@@ -113,7 +113,9 @@ class RigidSteps:
             P = found.impulses.ravel()
             after = undisturbed.ravel() + W @ P
             work = P @ after, P @ before.ravel()  # twice: forces act with the velocity of the middle
-            if not back.any() or float(sum(work)) <= GROWN * float(np.abs(P) @ (np.abs(after) + np.abs(before.ravel()))):
+            if not back.any() or float(sum(work)) <= GROWN * float(
+                np.abs(P) @ (np.abs(after) + np.abs(before.ravel()))
+            ):
                 break  # impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985)
         self._note(found, scale, m)
         self._rests = ~strikes
@@ -156,7 +158,7 @@ class _Held:
             self.inverse = algebra.inv(M)
             return
         C = kernels.constraint_jacobian(q, u=u, t=t)
-        x = np.concatenate([q, np.zeros(module.n_v)])
+        x = np.concatenate([q, np.zeros(module.layout.n_v)])
         self.drift = kernels.velocity_constraints(x, u=u, t=t)
         weight = np.trace(M) / max(float((C * C).sum()), np.finfo(float).tiny)
         whole = algebra.inv(M + weight * (C.T @ C))  # regular where M is singular but constraints hold the rest

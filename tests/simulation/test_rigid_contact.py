@@ -20,7 +20,9 @@ def test_bouncing_ball(target: str) -> None:
         hits = np.flatnonzero(np.diff(run["j_y_dot"]) > 0.1)
         tops = [run["j_y"][a:b].max() - 0.1 for a, b in zip(hits[:-1], hits[1:], strict=True)]
         times = [fall, fall * (1 + 2 * 0.8), fall * (1 + 2 * 0.8 + 2 * 0.64)]
-        errors.append(max(np.abs(run.t[hits[:3]] - times).max() / h, np.abs(np.subtract(tops[:2], (0.64, 0.4096))).max() / h))
+        errors.append(
+            max(np.abs(run.t[hits[:3]] - times).max() / h, np.abs(np.subtract(tops[:2], (0.64, 0.4096))).max() / h)
+        )
         assert run["j_y"].min() > 0.1 - 1e-12
         assert run.metadata["missed_steps"] == 0
     assert max(errors) < 5.0  # in steps: m/s and 1
@@ -62,7 +64,12 @@ def test_billiard_ball() -> None:
     m = eg.Model("billiard", gravity=(0, 0, -G))
     ball = m.body("ball", mass=0.2, inertia=(0.4 * 0.2 * 0.03**2,) * 3)
     m.free("j", m.ground, ball, rotation="euler_parameters")
-    m.contacts("c", {"shape": "sphere", "radius": 0.03, "on": ball}, {"shape": "half_space", "on": m.ground}, rigid(friction=0.2))
+    m.contacts(
+        "c",
+        {"shape": "sphere", "radius": 0.03, "on": ball},
+        {"shape": "half_space", "on": m.ground},
+        rigid(friction=0.2),
+    )
     m.output("px", ball.position[0]), m.output("py", ball.position[1])
     m.output("vx", ball.velocity[0]), m.output("vy", ball.velocity[1])
     mod = m.compile()
@@ -102,7 +109,12 @@ def test_rod_of_painleve() -> None:
     rod = m.body("rod", mass=1.0, inertia={"zz": 1.0 / 12.0})
     m.planar("j", m.ground, rod)
     tip = rod.at(-0.5, 0, 0)
-    m.contacts("c", {"shape": "circle", "radius": 1e-3, "on": tip}, {"shape": "half_plane", "on": m.ground}, rigid(friction=2.0))
+    m.contacts(
+        "c",
+        {"shape": "circle", "radius": 1e-3, "on": tip},
+        {"shape": "half_plane", "on": m.ground},
+        rigid(friction=2.0),
+    )
     mod = m.compile()
     p = np.pi / 3  # the tip is below the centre, on the side to which the rod moves
     assert 1 + 3 * np.cos(p) * (np.cos(p) - 2.0 * np.sin(p)) < 0
