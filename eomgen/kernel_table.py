@@ -169,7 +169,7 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
     Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
     Kernel("meeting_time", ("q", "v", "a"), lambda s: (5,), "s until shapes may meet; depth, thickness, deepest pair"),
-    Kernel("near_pairs", ("q",), lambda s: (s.n_spots,), "of each contact between groups: pairs that are near, how many",
+    Kernel("near_pairs", ("q",), lambda s: (s.n_spots,), "of each contact: how many pairs are near, and where",
            late="rigid contact"),
     Kernel("bias_apart", ("q", "v"), lambda s: (s.n_v if s.n_spots else 0,), "h without contacts between groups",
            late="rigid contact"),

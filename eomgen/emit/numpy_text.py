@@ -101,7 +101,8 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
         row = (kind.first, kind.second, kind.planar, kind.law)
         kinds.append(f"        ({', '.join([*map(repr, row), *names])}),\n")
     tables = "".join(f"        {table!r},\n" for table in function.tables)
-    made = f"PairSum(\n    {function.bodies},\n    (\n{tables}    ),\n    (\n{''.join(kinds)}    ),\n    {function.room},\n)"
+    listed = f"(\n{tables}    ),\n    (\n{''.join(kinds)}    ),"
+    made = f"PairSum(\n    {function.bodies},\n    {listed}\n    {function.room},\n)"
     return "\n\n".join([*texts, f"pairs_{function.name} = {made}"])
 
 

@@ -320,7 +320,7 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
             e.require("restitution", restitution, lambda x: x <= 1, "must be at most 1")
     else:
         law, friction = read_normal_law(e), read_friction(e, "friction", "static_friction", "viscous_friction")
-        coefficient = None if friction is None else friction.dynamic
+        coefficient = getattr(friction, "dynamic", None)
         restitution = e.given("restitution")
     if first is None or second is None or e.at_fault():
         return None

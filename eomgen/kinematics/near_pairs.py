@@ -1,4 +1,4 @@
-"""Stage kinematics: contacts between groups of shapes -> which shapes are near each other, and how velocities move them.
+"""Stage kinematics: contacts between groups -> which shapes are near each other, and how velocities move them.
 
 The twist of a body about the origin of the ground is the sum of the same columns for all bodies that a velocity moves,
 so that one column for each velocity says the motion of all (R. Featherstone, Rigid Body Dynamics Algorithms, 2008,
@@ -22,7 +22,7 @@ def near_pairs(kinematics: Kinematics) -> list[Expr]:
 
 
 def motion_axes(kinematics: Kinematics) -> list[Expr]:
-    """Per velocity the angular velocity (3) that it causes, and the velocity (3) of the point at the ground's origin."""
+    """Per velocity the angular velocity that it causes (3), and the velocity (3) of the point at the origin."""
     found = [kinematics.graph.zero] * (6 * len(kinematics.v))
     for k, link in enumerate(kinematics.links):
         place = kinematics.poses.link(k)
@@ -42,7 +42,7 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
     forces = [force for force in kinematics.mechanism.forces if force.met_shapes()]
     last: dict[int, int] = {GROUND: -1}
     links = kinematics.links
-    for k, link in enumerate(links):
+    for link in links:
         above = -1 if link.parent == GROUND else last[links[link.parent].body]
         last[link.body] = link.first + len(link.columns) - 1 if link.columns else above
     parents = [-1] * len(kinematics.v)

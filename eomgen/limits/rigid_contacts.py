@@ -12,7 +12,8 @@ SOFTER = (1e-8, 1e-6)
 TRIED = 10  #: iterations of a round: states of contacts that change still are in a circle
 SWEEPS = 5  #: over all contacts, after a round that led nowhere
 #: The same in Newton's method for rounded laws, whose impulses go on farther in each step; the part by which the
-#: rounding shrinks when a step was good, at first and where that leads nowhere; and the part of the velocities at which laws count as sharp.
+#: rounding shrinks when a step was good, at first and where that leads nowhere; and the part of the velocities at which
+#: laws count as sharp.
 SOFT, SHRINKS, SHARP = 1e-10, (0.2, 0.5), 1e-14
 #: Approach below this multiple of what forces change in one step is rest, without a rebound: a body that rests
 #: approaches at once the change of a step.

@@ -196,7 +196,10 @@ def solve_contacts(problem: ContactProblem, start: Array, tolerance: float, most
 
 
 def solve_smoothed(problem: ContactProblem, tolerance: float, most: int, shrinks: float) -> tuple[Array, int, float]:
-    """Impulses by rounded laws that become sharp (B. Chen, P. T. Harker, SIAM J. Matrix Anal. Appl. 14 (1993), 1168-1190).
+    """Impulses by rounded laws that become sharp.
+
+    B. Chen, P. T. Harker, A non-interior-point continuation method for linear complementarity problems, SIAM J. Matrix
+    Anal. Appl. 14 (1993), 1168-1190.
 
     max(0, x) is (x + sqrt(x^2 + 4 e^2)) / 2, with e that shrinks as Newton's method follows; the edge of the disc of
     friction is rounded likewise.

@@ -20,8 +20,8 @@ from ..graph.tape import record_tape
 from ..kinematics import Kinematics
 from ..kinematics.inertial_terms import inertial_terms
 from ..kinematics.loads import drives_cut_joint
-from ..kinematics.near_pairs import describe_contacts, motion_axes, near_pairs
 from ..kinematics.mobility import Mobility
+from ..kinematics.near_pairs import describe_contacts, motion_axes, near_pairs
 from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches

@@ -118,16 +118,21 @@ def step_rigidly(
     if steps.missed and not is_told_by_the_caller():
         warnings.warn(
             f"{steps.missed} of {count} steps leave a residual of the contact laws of up to {steps.residual:.3g} m/s, "
-            f"more than contact_tolerance = {tolerance:.3g} of their velocities, after contact_iterations = {iterations}: "
-            "allow more iterations, or a larger tolerance",
+            f"more than contact_tolerance = {tolerance:.3g} of their velocities, after contact_iterations = "
+            f"{iterations}: allow more iterations, or a larger tolerance",
             ContactWarning,
             stacklevel=calls_within() + 1,
         )
-    t, x = (times, states) if stored is None else (stored, _between(times, states, stored))
-    counts = {"nfev": 2 * count, "steps": count, "contact_iterations": steps.iterations, "contacts": steps.most}
+    counts: dict[str, Any] = {
+        "nfev": 2 * count,
+        "steps": count,
+        "contact_iterations": steps.iterations,
+        "contacts": steps.most,
+    }
     counts |= {"contact_residual": steps.residual, "penetration": steps.depth, "missed_steps": steps.missed}
     ends = (start, end)
-    solution = Solution(t, x, [], [], None, 0, "The end of the span is reached.", counts, ends)
+    told, found_states = (times, states) if stored is None else (stored, _between(times, states, stored))
+    solution = Solution(told, found_states, [], [], None, 0, "The end of the span is reached.", counts, ends)
     return record(
         bound, forcing, solution, NAME, {"step": h, "contact_tolerance": tolerance, "contact_iterations": iterations}
     )

@@ -23,7 +23,7 @@ class RigidRows(NamedTuple):
     friction: Array  #: (m,)
     restitution: Array  #: (m,)
 
-    def chosen(self, which: Array) -> RigidRows:
+    def chosen(self, which: Any) -> RigidRows:
         """Some of them."""
         m = len(self.gaps)
         rows = self.jacobian.reshape(m, -1, self.jacobian.shape[1])[which]

@@ -151,7 +151,13 @@ def simulate(
     if isinstance(method, str) and method == "moreau":
         from .moreau import step_rigidly
 
-        others = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, "checkpoint": checkpoint}
+        others: dict[str, Any] = {
+            "rtol": rtol,
+            "atol": atol,
+            "max_step": max_step,
+            "first_step": first_step,
+            "checkpoint": checkpoint,
+        }
         others |= {"dense_output": dense_output, "controllers": controllers, **settings}
         return step_rigidly(module, span, initial, parameters, inputs, step, t_eval, events, progress, others)
     if module.metadata.get("rigid_contacts"):

@@ -93,7 +93,7 @@ def test_impulses_as_by_enumeration() -> None:
 
 
 def test_friction_in_space_opposes_sliding() -> None:
-    """Random contacts in space obey Signorini's and Coulomb's laws as they are written, more contacts than freedoms too."""
+    """Random contacts in space obey Signorini's and Coulomb's laws, more contacts than freedoms too."""
     rng = np.random.default_rng(5)
     for columns in (20, 7):
         for _ in range(50):
