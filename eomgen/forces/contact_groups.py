@@ -38,7 +38,7 @@ from .contact_shapes import (
 )
 from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction_laws import DryFriction, has_bristles, read_friction
-from .normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, Rigid, read_normal_law
+from .normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, RigidLaw, read_normal_law
 
 
 class _PairView:
@@ -142,7 +142,7 @@ class ContactGroups(Force):
 
     @property
     def is_rigid(self) -> bool:
-        return isinstance(self.normal_law, Rigid)
+        return isinstance(self.normal_law, RigidLaw)
 
     def _results(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], list[Expr]]:
         """The bodies as markers at their origins, force and torque on each, and the energy; at rest, if asked."""
@@ -306,7 +306,7 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         e.fault("friction_law", "lugre has states, which pairs of groups do not", remedy)
         return None
     if e.choice("normal_law") == RIGID:
-        law: NormalLaw = Rigid()
+        law: NormalLaw = RigidLaw()
         friction, coefficient, restitution = None, e.given("friction"), e.given("restitution")
         for key in CURVED:
             if key not in ("normal_law", "friction", "restitution"):

@@ -155,7 +155,7 @@ class HertzBodies(NormalLaw):
 
 
 @dataclass(frozen=True)
-class Rigid(NormalLaw):
+class RigidLaw(NormalLaw):
     """No penetration: the force is what it takes, found by a time-stepping method; elsewhere it is none."""
 
     formula: ClassVar[str] = r"0 \le F_n \perp g \ge 0"
@@ -169,7 +169,7 @@ class Rigid(NormalLaw):
     def energy(self, depth: Expr) -> Expr:
         return depth.graph.zero
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> Rigid:
+    def mapped(self, own: Callable[[Expr], Expr]) -> RigidLaw:
         return self
 
 

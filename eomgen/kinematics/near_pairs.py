@@ -37,7 +37,7 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
     """What is known of contacts beside their numbers.
 
     ``lists`` has name, numbers and shapes of each contact; ``moved_by`` the last velocity that moves each shape, -1 for
-    ground; ``parents`` the velocity before each towards ground.
+    ground; ``parents`` the velocity before each towards ground.  ``rigid_only`` names contacts without a law of force.
     """
     forces = [force for force in kinematics.mechanism.forces if force.met_shapes()]
     last: dict[int, int] = {GROUND: -1}
@@ -56,6 +56,6 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
             "lists": listed,
             "moved_by": [last[body] for force in forces for body in force.met_bodies],
             "parents": parents,
-            "only": [force.name for force in forces if force.is_rigid],
-        }
+        },
+        **({"rigid_only": rigid} if (rigid := [force.name for force in forces if force.is_rigid]) else {}),
     }

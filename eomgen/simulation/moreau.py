@@ -11,12 +11,14 @@ from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, UsageError
 from ..limits.rigid_contacts import ITERATIONS, SOLVED
+from ..limits.runs import SAME
 from ..numeric.counts import as_count
 from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names
 from ..runtime.room import read_number, require_room, require_steps
 from ..runtime.signals import Forcing
+from ..texts import shown
 from .bound_run import watch_run
 from .events import Events, calls_within, is_told_by_the_caller
 from .integrate import Solution
@@ -44,6 +46,7 @@ def step_rigidly(
     initial: Start,
     parameters: Any,
     inputs: Mapping[str, Any] | None,
+    method: Any,
     step: Any,
     t_eval: ArrayLike | None,
     events: Any,
@@ -59,6 +62,7 @@ def step_rigidly(
     SimulationError
         A state is not finite, or more pairs are near than there is room for.
     """
+    _require_it(module, method)
     given = {key: value for key, value in options.items() if value is not None and value is not False}
     check_names("option of method moreau", given, OWN, ("method", "step", "t_eval", "progress"))
     if step is None:
@@ -90,7 +94,7 @@ def step_rigidly(
             "values, or put only shapes into groups that are apart"
         )
     watch = watch_run(start, end, progress)
-    count = max(int(np.ceil((end - start) / h - 1e-9)), 0)
+    count = max(int(np.ceil((end - start) / h - SAME)), 0)
     times = np.minimum(start + h * np.arange(count + 1), end)
     times[-1] = end
     states = np.empty((module.n_x, count + 1))
@@ -123,13 +127,9 @@ def step_rigidly(
             ContactWarning,
             stacklevel=calls_within() + 1,
         )
-    counts: dict[str, Any] = {
-        "nfev": 2 * count,
-        "steps": count,
-        "contact_iterations": steps.iterations,
-        "contacts": steps.most,
-    }
-    counts |= {"contact_residual": steps.residual, "penetration": steps.depth, "missed_steps": steps.missed}
+    counts: dict[str, Any] = {"nfev": 2 * count, "steps": count}
+    counts |= {"contact_iterations": steps.iterations, "contacts": steps.most, "missed_steps": steps.missed}
+    counts |= {"contact_residual": steps.residual, "penetration": steps.depth}
     ends = (start, end)
     told, found_states = (times, states) if stored is None else (stored, _between(times, states, stored))
     solution = Solution(told, found_states, [], [], None, 0, "The end of the span is reached.", counts, ends)
@@ -159,16 +159,16 @@ def _require_no_others(module: BoundModel, events: Any) -> None:
         raise UsageError(f"{module.name} has events that reset its state, which method moreau does not watch")
 
 
-def refuse_rigid(module: BoundModel, method: Any) -> None:
+def _require_it(module: BoundModel, method: Any) -> None:
     """Refuse another method for a model with rigid contacts.
 
     Raises
     ------
     UsageError
     """
-    names = module.metadata.get("rigid_contacts", {}).get("only", [])
-    if names:
-        told = "" if method is None else f", not {method if isinstance(method, str) else method.__name__}"
+    if not isinstance(method, str) or method != NAME:
+        names = module.metadata["rigid_only"]
+        told = "" if method is None else f", not {method if isinstance(method, str) else shown(method)}"
         raise UsageError(
             f"contacts {names[0]!r} have normal_law: rigid, which exerts impulses, not forces: run with "
             f"method='moreau' and step={told}, or choose another normal_law"
