@@ -29,6 +29,7 @@ from .contact_rounds import AtHeight
 from .contact_shapes import (
     GROUNDS,
     PLANAR,
+    SHAPE_FIELDS,
     ContactShape,
     Feature,
     ShapeMotion,
@@ -389,12 +390,20 @@ def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
     return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
 
 
-_CORNERED = ("box", "polygon", "profile", "smooth_profile")  #: shapes whose corners meet segments
+_CORNERED = (
+    "box",
+    "polygon",
+    "profile",
+    "smooth_profile",
+    "outline",
+    "smooth_outline",
+    "sprocket",
+)  #: shapes whose corners meet segments
 _ON_GROUND = ("ellipsoid", "cuboid")  #: shapes that meet a half-space alone
 _IN_SPACE = ("sphere", "capsule", *_ON_GROUND)
 _ALLOWED = (
-    "circle, segment, box, polygon meet each other, half_plane, profile and smooth_profile; sphere and capsule meet "
-    "each other and half_space; ellipsoid and cuboid meet half_space"
+    "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
+    "smooth_profile; sphere and capsule meet each other and half_space; ellipsoid and cuboid meet half_space"
 )
 
 _NORMAL_LAW = CURVED["normal_law"]._replace(
@@ -410,9 +419,8 @@ TYPES = table(
     ElementType(
         "contacts",
         "contact of every shape of a group with every shape of another, by one law.  Shapes are mappings of shape "
-        "(circle, segment, box, polygon, half_plane, profile, smooth_profile; sphere, capsule, half_space, ellipsoid, "
-        "cuboid), on (a marker or a list of markers) "
-        "and sizes.  Shapes of one body do not meet.",
+        f"({', '.join(PLANAR)}; {', '.join(kind for kind in SHAPE_FIELDS if kind not in PLANAR)}), "
+        "on (a marker or a list of markers) and sizes.  Shapes of one body do not meet.",
         {
             "first": Field("shapes", _SHAPES + "first group", required=True, dimension=LENGTH),
             "second": Field(

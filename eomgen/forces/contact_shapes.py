@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from functools import reduce
 from typing import NamedTuple
 
-from ..elements.dimensions import LENGTH
+from ..elements.dimensions import LENGTH, NONE
 from ..elements.field import Field, Fields
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Frame, Marker
@@ -20,7 +20,17 @@ from ..graph.core import Expr, Graph, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .contact import Contact, SpherePlane, joint_radius
-from .contact_profiles import ArcRound, EdgeRound, peaks, smooth_pieces, solid_depth, straight_pieces
+from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
+from .contact_profiles import (
+    ArcRound,
+    EdgeRound,
+    Point,
+    ProfilePart,
+    peaks,
+    smooth_pieces,
+    solid_depth,
+    straight_pieces,
+)
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_solids import EllipsoidPlane, RodRod
 
@@ -46,6 +56,20 @@ def _profile(how: str, least: int) -> Fields:
     }
 
 
+def _outline(how: str) -> Fields:
+    return {
+        "points": Field(
+            "corners", f"3 to {CORNERS} points [x, y] around the solid{how} (m)", required=True, dimension=LENGTH
+        ),
+        "depth": Field(
+            "expression",
+            "how far inside the outline what has passed it is pushed out (m); half of the narrowest place, of points "
+            "that are numbers, unless given",
+            dimension=LENGTH,
+        ),
+    }
+
+
 _SIZES: dict[str, Fields] = {
     "circle": {"radius": _RADIUS},
     "segment": {
@@ -61,6 +85,24 @@ _SIZES: dict[str, Fields] = {
     "half_plane": {},
     "profile": _profile("", 2),
     "smooth_profile": _profile(", by a smooth curve of circular arcs", 3),
+    "outline": _outline(", with straight edges between; it need not be convex"),
+    "smooth_outline": _outline(", with a smooth curve of circular arcs through them"),
+    "sprocket": {
+        "teeth": Field("count", "number of teeth, 3 or more", required=True),
+        "pitch": Field(
+            "expression", "straight distance between neighbouring pins (m)", required=True, dimension=LENGTH
+        ),
+        "seat": Field("expression", "radius of the seats of the pins (m)", required=True, dimension=LENGTH),
+        "tip_radius": Field("expression", "radius of the tips (m)", required=True, dimension=LENGTH),
+        "seat_angle": Field(
+            "expression", "angle over which the arc of a seat goes, 130 deg unless given (rad)", dimension=NONE
+        ),
+        "depth": Field(
+            "expression",
+            "how far inside the teeth what has passed them is pushed out (m); half of the tips unless given",
+            dimension=LENGTH,
+        ),
+    },
     "sphere": {"radius": _RADIUS},
     "capsule": {
         "length": Field("expression", _ALONG.format("z"), required=True, dimension=LENGTH),
@@ -79,9 +121,14 @@ _ON = {
 #: Kind of shape -> its keys; a shape in the plane lies in the x-y plane of its marker.
 SHAPE_FIELDS: dict[str, Fields] = {kind: {**_ON, **sizes} for kind, sizes in _SIZES.items()}
 #: Shapes of mechanisms in the plane; the others are shapes in space.
-PLANAR = ("circle", "segment", "box", "polygon", "half_plane", "profile", "smooth_profile")
+PLANAR = (
+    *("circle", "segment", "box", "polygon", "outline", "smooth_outline", "sprocket"),
+    *("half_plane", "profile", "smooth_profile"),
+)
 #: Shapes without an end, which do not meet each other.
 GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space")
+#: Shapes whose pieces are edges and arcs.
+_PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
 _SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
 _BOTH = (-1.0, 1.0)
 _STEPS = 24  #: lines of which the picture of an ellipse is made
@@ -120,8 +167,9 @@ class ContactShape:
     kind : str
         One of :data:`SHAPE_FIELDS`.
     sizes : tuple of Expr
-        radius; length, radius; of a box or polygon x and y of its corners, counterclockwise; of a profile its depth
-        and x and y of its points; half axes; lengths.
+        radius; length, radius; of a box or polygon x and y of its corners, counterclockwise; of a profile or an outline
+        its depth and x and y of its points, of outlines clockwise; of a sprocket its depth, teeth, pitch, seat, tip
+        radius and angle of a seat; half axes; lengths.
     """
 
     kind: str
@@ -135,7 +183,7 @@ class ContactShape:
             return [Feature("round", frame, self.sizes, self.sizes[0], 2.0 * self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
             return [Feature("half", self._facing(frame), (), None, zero)]
-        if self.kind in ("profile", "smooth_profile"):
+        if self.kind in _PIECED:
             return self._pieces(frame)
         if self.kind == "ellipsoid":
             return [Feature("ellipsoid", frame, self.sizes, _most(self.sizes), 2.0 * _least(self.sizes))]
@@ -167,20 +215,36 @@ class ContactShape:
         points = [Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, thick) for x, y in corners]
         return [Feature(f"polygon{len(corners)}", frame, tuple(edges), sqrt(reach), thick), *points]
 
-    def _points(self) -> list[tuple[Expr, Expr]]:
-        """Points of a profile."""
+    def _points(self) -> list[Point]:
+        """Points of a profile or an outline."""
+        if self.kind == "sprocket":
+            return self._sprocket()[2]
         return list(zip(self.sizes[1::2], self.sizes[2::2], strict=True))
 
+    def _sprocket(self) -> tuple[list[ProfilePart], list[Point], list[Point]]:
+        _, teeth, *sizes = self.sizes
+        assert teeth.value is not None
+        return sprocket_ring(int(teeth.value), *sizes)
+
+    def _parts(self) -> tuple[list[ProfilePart], list[Point]]:
+        """Pieces of a profile or an outline, and its corners, which meet what is flat."""
+        if self.kind == "sprocket":
+            pieces, tops, _ = self._sprocket()
+            return pieces, tops
+        points = self._points()
+        if self.kind in ("profile", "smooth_profile"):
+            return (straight_pieces if self.kind == "profile" else smooth_pieces)(points), peaks(points)
+        pieces = (straight_ring if self.kind == "outline" else smooth_ring)(points)
+        return pieces, peaks([points[-1], *points, points[0]])
+
     def _pieces(self, frame: Frame) -> list[Feature]:
-        """Pieces of a profile, and its peaks, which meet what is flat."""
-        points, depth, zero = self._points(), self.sizes[0], self.sizes[0].graph.zero
-        pieces = straight_pieces(points) if self.kind == "profile" else smooth_pieces(points)
+        depth, zero = self.sizes[0], self.sizes[0].graph.zero
+        pieces, tops = self._parts()
         depth = solid_depth(pieces, depth)
         found = [
             Feature(one.kind, one.frame(frame), (*one.sizes, depth), None if one.open else one.half + depth, depth)
             for one in pieces
         ]
-        tops = peaks(points)
         return [*found, *(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth) for x, y in tops)]
 
     def _facing(self, frame: Frame) -> Frame:
@@ -204,9 +268,10 @@ class ContactShape:
             return [Wheel(marker, self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
             return [Drawn((Marker(marker.body, self._facing(marker.frame), marker.label),), about=PLANE)]
-        if self.kind in ("profile", "smooth_profile"):
-            zero = self.sizes[0].graph.zero
-            places = [_moved(marker.frame, (x, y, zero)) for x, y in self._points()]
+        if self.kind in _PIECED:
+            zero, points = self.sizes[0].graph.zero, self._points()
+            line = points if self.kind in GROUNDS else [*points, points[0]]
+            places = [_moved(marker.frame, (x, y, zero)) for x, y in line]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
         if self.kind == "ellipsoid":
             return [self._ellipse(i, j) for i, j in ((0, 1), (1, 2), (2, 0))]
