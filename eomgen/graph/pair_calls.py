@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 from ..errors import UsageError
-from ..numeric.pair_sums import MEETING, MOTION, POSE, RECORD, PairSum
+from ..numeric.pair_sums import MEETING, MOTION, POSE, RECORD, PairSum, pairs_of_rows
 from ..records import dataclass
 from .core import Expr, Graph
 from .nodes import Node
@@ -52,6 +52,11 @@ class PairKind:
         of what its turning moves (0 where it is round).
     spot : tuple of int
         Where they touch: :data:`~eomgen.numeric.pair_sums.SPOT` nodes.
+    held : tuple of tuple of int
+        Of each row of the first table and of each of the second a number: their sum is the place of the pair's states
+        among all states of the sum.  Empty without states.
+    states : int
+        How many states a pair has.  What it adds to their rates stands behind the results.
     """
 
     name: str
@@ -65,6 +70,8 @@ class PairKind:
     slopes: tuple[int, ...]
     touch: tuple[int, ...]
     spot: tuple[int, ...]
+    held: tuple[tuple[int, ...], ...] = ()
+    states: int = 0
 
     def graph(self) -> Graph:
         """Its nodes as a graph."""
@@ -83,6 +90,11 @@ class PairKind:
         """The symbols that its results depend on."""
         return self.symbols[: len(self.symbols) // 2]
 
+    @property
+    def beside(self) -> tuple[int, tuple[tuple[int, ...], ...]] | tuple[()]:
+        """How many states a pair has and where they stand; nothing without states."""
+        return (self.states, self.held) if self.states else ()
+
 
 @dataclass(frozen=True, eq=False)
 class PairFunction:
@@ -95,10 +107,12 @@ class PairFunction:
     bodies : int
         Ground among them.
     data : tuple of float or None
-        Operands that follow the ``POSE`` numbers of each body, where they are numbers.
+        Operands that follow the ``POSE`` numbers of each body, where they are numbers; states of pairs are the last.
     tables : tuple
         Of shapes; see :class:`~eomgen.numeric.pair_sums.PairSum`.
     kinds : tuple of PairKind
+    states : int
+        How many states all pairs have together.
     """
 
     name: str
@@ -106,6 +120,7 @@ class PairFunction:
     data: tuple[float | None, ...]
     tables: tuple[tuple[tuple[int, ...], ...], ...]
     kinds: tuple[PairKind, ...]
+    states: int = 0
 
     @property
     def element(self) -> str:
@@ -119,8 +134,25 @@ class PairFunction:
 
     @property
     def results(self) -> int:
-        """How many numbers it gives: six for each body and the energy."""
-        return 6 * self.bodies + 1
+        """How many numbers it gives: six for each body, the energy, and rates of states."""
+        return 6 * self.bodies + 1 + self.states
+
+    @property
+    def first_state(self) -> int:
+        """The place of the first state among the operands."""
+        return self.count - self.states
+
+    @cached_property
+    def holders(self) -> tuple[frozenset[int], ...]:
+        """For each state the bodies on whose contact it depends."""
+        found: list[set[int]] = [set() for _ in range(self.states)]
+        for kind in self.kinds if self.states else ():
+            first, second = self.tables[kind.first], self.tables[kind.second]
+            for i, j in zip(*pairs_of_rows(first, second, kind.first == kind.second), strict=True):
+                at = kind.held[0][i] + kind.held[1][j]
+                for k in range(at, at + kind.states):
+                    found[k] |= {first[i][0], second[j][0]}
+        return tuple(map(frozenset, found))
 
     @cached_property
     def room(self) -> int:
@@ -152,10 +184,11 @@ class PairFunction:
                 *(k.first, k.second, k.planar, k.law),
                 *(made(k.expressions(), k.plain), made(k.expressions("slopes"), k.symbols)),
                 *(made(k.expressions("touch"), k.plain), made(k.expressions("spot"), k.plain)),
+                *k.beside,
             )
             for k in self.kinds
         ]
-        return PairSum(self.bodies, self.tables, kinds, self.room)
+        return PairSum(self.bodies, self.tables, kinds, self.room, self.states)
 
     def __getstate__(self) -> dict[str, Any]:
         return {
@@ -285,14 +318,18 @@ def pair_spots(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -
     return [Expr(graph, _item(graph, function, listed, k)) for k in range(function.spots)]
 
 
-def without_pairs(outputs: Sequence[Expr]) -> list[Expr]:
-    """Expressions in which no pair of shapes exerts anything."""
-    if not outputs:
+def without_pairs(outputs: Sequence[Expr], listed: Sequence[Expr]) -> list[Expr]:
+    """Expressions in which no pairs exert anything of sums whose near pairs are listed."""
+    if not outputs or not listed:
         return []
     graph = outputs[0].graph
-    items = [
-        Expr(graph, i) for i in reachable(graph, (y.id for y in outputs)) if is_pair_item(graph, graph.nodes[i][0])
-    ]
+
+    def calls(found: Sequence[Expr]) -> list[tuple[int, str]]:
+        nodes = ((i, pair_call(graph, graph.nodes[i][0])) for i in reachable(graph, (y.id for y in found)))
+        return [(i, call.function.element) for i, call in nodes if call is not None and call.part == "item"]
+
+    rigid = {element for _, element in calls(listed)}
+    items = [Expr(graph, i) for i, element in calls(outputs) if element in rigid]
     return substitute(outputs, dict.fromkeys(items, graph.zero)) if items else list(outputs)
 
 
@@ -335,7 +372,14 @@ def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
 
 def _acts(function: PairFunction, moving: PairCall, item: int) -> bool:
     """Whether a result can change with what moves."""
-    if item == function.results - 1 or any(k >= POSE * function.bodies for k in moving.numbers):
+    poses, first = POSE * function.bodies, function.first_state
+    if item == 6 * function.bodies or any(poses <= k < first for k in moving.numbers):
         return True
-    body = item // 6
-    return any(k // POSE == body or k // POSE in function.touching[body] for k in moving.numbers)
+    bodies = {k // POSE for k in moving.numbers if k < poses}
+    held = {k - first for k in moving.numbers if k >= first}
+    if item < 6 * function.bodies:
+        body = item // 6
+        return bool(bodies & {body, *function.touching[body]}) or any(body in function.holders[k] for k in held)
+    state = item - 6 * function.bodies - 1
+    each = function.kinds[0].states
+    return bool(bodies & function.holders[state]) or any(k // each == state // each for k in held)

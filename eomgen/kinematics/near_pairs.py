@@ -39,7 +39,9 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
     ``lists`` has name, numbers and shapes of each contact; ``moved_by`` the last velocity that moves each shape, -1 for
     ground; ``parents`` the velocity before each towards ground.  ``rigid_only`` names contacts without a law of force.
     """
-    forces = [force for force in kinematics.mechanism.forces if force.met_shapes()]
+    forces = [force for force in kinematics.mechanism.forces if force.near(kinematics.motion)]
+    if not forces:
+        return {}
     last: dict[int, int] = {GROUND: -1}
     links = kinematics.links
     for link in links:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..limits.runs import APART, BEYOND, NEAR, UP_TO, WITHIN
+from .pair_vectors import across, cross, dot, flat, parts, product, times
 
 #: Numbers that say how a body or a shape stands and moves: position, rotation by rows, velocity, angular velocity.
 POSE = 18
@@ -46,34 +47,28 @@ class PairSum:
     tables : sequence of (n, PLACE + sizes + REST) integers
         Shapes of one kind: body, then places in the data of the position (3) and rotation (9) in the body, of the
         sizes, of the radius of a sphere that bounds the shape (-1: none does), and of the thickness of the body.
-    kinds : sequence of (first, second, planar, law, value, slope, touch, spot)
+    kinds : sequence of (first, second, planar, law, value, slope, touch, spot), and of pairs with states (states, held)
         Tables of the first and the second shape; whether distances count across z of the first only; places of the
         law's numbers; the function of one pair and its directional derivative, of the numbers of the first shape, of
-        the second, and of the law (and of their rates in the same order); normal, penetration and turning radius of the
-        pair; and the ``SPOT`` numbers of :meth:`spots`.
+        the second, of the law, and of the pair's states (and of their rates in the same order); normal, penetration and
+        turning radius of the pair; the ``SPOT`` numbers of :meth:`spots`; how many states a pair has, and the numbers
+        of the rows of both tables whose sum is the place of its states.
     room : int
         How many pairs :meth:`spots` has room for.
+    states : int, optional
+        How many states all pairs have; they are the last of the data, and their rates the last of the results.
     """
 
     def __init__(
-        self,
-        bodies: int,
-        tables: Sequence[Any],
-        kinds: Sequence[tuple[int, int, bool, Any, Narrow, Narrow, Narrow, Narrow]],
-        room: int,
+        self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[Any, ...]], room: int, states: int = 0
     ):
-        self.bodies, self.room = bodies, room
+        self.bodies, self.room, self.states = bodies, room, states
         self.tables = [np.array(table, dtype=int) for table in tables]
-        self.kinds = [(*kind, *self._pairs(*kind[:2])) for kind in kinds]
+        self.kinds = [(*kind[:8], *self._pairs(*kind[:2])) for kind in kinds]
+        self.held = [(kind[8], *(np.array(rows) for rows in kind[9])) if states else None for kind in kinds]
 
     def _pairs(self, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of all pairs on different bodies, each once."""
-        a, b = self.tables[first], self.tables[second]
-        i, j = (x.ravel() for x in np.meshgrid(np.arange(len(a)), np.arange(len(b)), indexing="ij"))
-        keep = a[i, 0] != b[j, 0]
-        if first == second:
-            keep &= i < j
-        return i[keep], j[keep]
+        return pairs_of_rows(self.tables[first], self.tables[second], first == second)
 
     def __call__(self, given: Sequence[Any]) -> list[Any]:
         """Force and torque about the origin of each body, and the energy: 6 bodies + 1 numbers or arrays."""
@@ -128,33 +123,30 @@ class PairSum:
             a, b, change_a, spin = a[i], b[j], change_a[i], own[tables[0][i, 0]][:, 3:6]
             reach, speed, change = b[:, 0:3] - a[:, 0:3], b[:, 12:15] - a[:, 12:15], change_b[j] - change_a
             if planar:
-                across = a[:, [5, 8, 11]]  # z of the first shape
-                reach, speed, change = (x - _dot(across, x)[:, None] * across for x in (reach, speed, change))
-            distance = np.sqrt(_dot(reach, reach))
+                upright = a[:, [5, 8, 11]]  # z of the first shape
+                reach, speed, change = (x - dot(upright, x)[:, None] * upright for x in (reach, speed, change))
+            distance = np.sqrt(dot(reach, reach))
             bound = tables[0][i, -REST], tables[1][j, -REST]
             gap = distance - data[np.maximum(bound[0], 0)] - data[np.maximum(bound[1], 0)]
             free = ((bound[0] < 0) | (bound[1] < 0)).reshape(-1, *([1] * (data.ndim - 1)))
             near = free | ~(gap > 0.0)
             closing, towards = (
-                -_dot(reach, speed) / np.where(distance > 0.0, distance, 1.0),
-                np.sqrt(_dot(change, change)),
+                -dot(reach, speed) / np.where(distance > 0.0, distance, 1.0),
+                np.sqrt(dot(change, change)),
             )
             if near.any():
                 numbers = [*np.moveaxis(a, 1, 0), *np.moveaxis(b, 1, 0), *data[list(law)][:, None]]
                 nx, ny, nz, depth, radius = _table(touch(numbers), len(i), data)
                 normal, turning = np.stack([nx, ny, nz], axis=1), a[:, 15:18]
-                seen = speed - _across(turning, reach)
+                seen = speed - across(turning, reach)
                 felt = (
-                    change
-                    - _across(spin, reach)
-                    - _across(turning, _across(turning, reach))
-                    - 2.0 * _across(turning, seen)
+                    change - across(spin, reach) - across(turning, across(turning, reach)) - 2.0 * across(turning, seen)
                 )
                 turned, spun = b[:, 15:18] - turning, own[tables[1][j, 0]][:, 3:6] - spin
-                rate, own_rate, change_of_rate = (np.sqrt(_dot(x, x)) for x in (turned, turning, spun))
-                faster = radius * rate - _dot(normal, seen)  # of points of the second shape, which turns in the first
+                rate, own_rate, change_of_rate = (np.sqrt(dot(x, x)) for x in (turned, turning, spun))
+                faster = radius * rate - dot(normal, seen)  # of points of the second shape, which turns in the first
                 gap, closing = np.where(near, -depth, gap), np.where(near, faster, closing)
-                most = np.sqrt(_dot(felt, felt)) + radius * (change_of_rate + rate * (own_rate + rate))
+                most = np.sqrt(dot(felt, felt)) + radius * (change_of_rate + rate * (own_rate + rate))
                 towards = np.where(near, most, towards)
             thick = np.broadcast_to(data[tables[0][i, -1]] + data[tables[1][j, -1]], gap.shape)
             reached = np.maximum(gap * np.where(free, BEYOND, UP_TO), WITHIN * thick)
@@ -185,8 +177,8 @@ class PairSum:
             place = (slice(None), *column)
             rows = self._spots(data[place])
             out[(0, *column)] = len(rows)
-            flat = rows[: self.room].ravel()
-            out[(slice(1, 1 + flat.size), *column)] = flat
+            kept = rows[: self.room].ravel()
+            out[(slice(1, 1 + kept.size), *column)] = kept
         return list(out.tolist()) if out.ndim == 1 else list(out)
 
     def _spots(self, data: np.ndarray) -> np.ndarray:
@@ -213,10 +205,10 @@ class PairSum:
 
     def _sum(self, data: np.ndarray, rates: np.ndarray | None) -> list[Any]:
         placed = [self._place(table, data, rates) for table in self.tables]
-        out = np.zeros((6 * self.bodies + 1, *data.shape[1:]), dtype=data.dtype)
+        out = np.zeros((6 * self.bodies + 1 + self.states, *data.shape[1:]), dtype=data.dtype)
         if data.dtype == object:
             out = out + data[0] * 0
-        for first, second, planar, law, value, slope, _, _, i, j in self.kinds:
+        for (first, second, planar, law, value, slope, _, _, i, j), held in zip(self.kinds, self.held, strict=True):
             (a, arm_a, da, d_arm_a), (b, arm_b, db, d_arm_b) = placed[first], placed[second]
             i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
             near = self._near(a, b, planar, i, j, (self.tables[first], self.tables[second]), data)
@@ -225,48 +217,54 @@ class PairSum:
                 continue
             bodies = self.tables[first][i, 0], self.tables[second][j, 0]
             numbers = [*np.moveaxis(a[i], 1, 0), *np.moveaxis(b[j], 1, 0), *data[list(law)][:, None]]
+            places = [] if held is None else [held[1][i] + held[2][j] + k for k in range(held[0])]
+            begun = len(data) - self.states
+            numbers += [data[begun + at] for at in places]
             if rates is None:
                 result = _table(value(numbers), len(i), data)
                 force, torque_a, torque_b = result[0:3], result[3:6], result[6:9]
-                torque_a = torque_a - _cross(arm_a[i].swapaxes(0, 1), force)
-                torque_b = torque_b + _cross(arm_b[j].swapaxes(0, 1), force)
+                torque_a = torque_a - cross(arm_a[i].swapaxes(0, 1), force)
+                torque_b = torque_b + cross(arm_b[j].swapaxes(0, 1), force)
             else:
                 assert da is not None
                 assert db is not None
                 moving = [*np.moveaxis(da[i], 1, 0), *np.moveaxis(db[j], 1, 0), *rates[list(law)][:, None]]
+                moving += [rates[begun + at] for at in places]
                 force = _table(value(numbers), len(i), data)[0:3]
                 result = _table(slope([*numbers, *moving]), len(i), data)
                 turned = result[0:3]
-                torque_a = result[3:6] - _cross(arm_a[i].swapaxes(0, 1), turned)
-                torque_b = result[6:9] + _cross(arm_b[j].swapaxes(0, 1), turned)
-                torque_a = torque_a - _cross(d_arm_a[i].swapaxes(0, 1), force)
-                torque_b = torque_b + _cross(d_arm_b[j].swapaxes(0, 1), force)
+                torque_a = result[3:6] - cross(arm_a[i].swapaxes(0, 1), turned)
+                torque_b = result[6:9] + cross(arm_b[j].swapaxes(0, 1), turned)
+                torque_a = torque_a - cross(d_arm_a[i].swapaxes(0, 1), force)
+                torque_b = torque_b + cross(d_arm_b[j].swapaxes(0, 1), force)
                 force = turned
             for body, push, turn, sign in ((bodies[0], force, torque_a, -1), (bodies[1], force, torque_b, 1)):
                 for k in range(3):
                     np.add.at(out, 6 * body + k, sign * push[k])
                     np.add.at(out, 6 * body + 3 + k, turn[k])
-            out[-1] = out[-1] + result[9].sum(axis=0)
+            out[6 * self.bodies] = out[6 * self.bodies] + result[9].sum(axis=0)
+            for at, change in zip(places, result[RESULT:], strict=True):
+                np.add.at(out, 6 * self.bodies + 1 + at, change)
         return list(out.tolist()) if out.ndim == 1 and out.dtype == float else list(out)
 
     def _place(self, table: np.ndarray, data: np.ndarray, rates: np.ndarray | None) -> tuple[Any, Any, Any, Any]:
         """Numbers of all shapes of a table (n, POSE + sizes, ...), their arms, and the rates of both."""
         poses = data[: POSE * self.bodies].reshape(self.bodies, POSE, *data.shape[1:])[table[:, 0]]
         local, turn = data[table[:, 1:4]], data[table[:, 4:PLACE]].reshape(len(table), 3, 3, *data.shape[1:])
-        p, R, v, w = _parts(poses)
-        arm = _times(R, local)
-        numbers = [p + arm, _flat(_product(R, turn)), v + _across(w, arm), w, data[table[:, PLACE:-REST]]]
+        p, R, v, w = parts(poses)
+        arm = times(R, local)
+        numbers = [p + arm, flat(product(R, turn)), v + across(w, arm), w, data[table[:, PLACE:-REST]]]
         if rates is None:
             return np.concatenate(numbers, axis=1), arm, None, None
         moving = rates[: POSE * self.bodies].reshape(self.bodies, POSE, *rates.shape[1:])[table[:, 0]]
         d_local = rates[table[:, 1:4]]
         d_turn = rates[table[:, 4:PLACE]].reshape(len(table), 3, 3, *rates.shape[1:])
-        dp, dR, dv, dw = _parts(moving)
-        d_arm = _times(dR, local) + _times(R, d_local)
+        dp, dR, dv, dw = parts(moving)
+        d_arm = times(dR, local) + times(R, d_local)
         changes = [
             dp + d_arm,
-            _flat(_product(dR, turn) + _product(R, d_turn)),
-            dv + _across(dw, arm) + _across(w, d_arm),
+            flat(product(dR, turn) + product(R, d_turn)),
+            dv + across(dw, arm) + across(w, d_arm),
             dw,
             rates[table[:, PLACE:-REST]],
         ]
@@ -340,15 +338,20 @@ class PairSum:
         return np.asarray(~every | (bounds[0] < 0) | (bounds[1] < 0))
 
 
+def pairs_of_rows(first: Any, second: Any, same: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of all pairs on different bodies, each once where both tables are the same."""
+    a, b = np.array([row[0] for row in first]), np.array([row[0] for row in second])
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(len(a)), np.arange(len(b)), indexing="ij"))
+    keep = a[i] != b[j]
+    if same:
+        keep &= i < j
+    return i[keep], j[keep]
+
+
 def _changed(shapes: np.ndarray, arm: np.ndarray, own: np.ndarray) -> np.ndarray:
     """Accelerations of the centres of shapes (n, 3, ...) from those of their bodies."""
     turning = shapes[:, 15:18]
-    return np.asarray(own[:, 0:3] + _across(own[:, 3:6], arm) + _across(turning, _across(turning, arm)))
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> Any:
-    """Products of vectors (n, 3, ...)."""
-    return (a * b).sum(axis=1)
+    return np.asarray(own[:, 0:3] + across(own[:, 3:6], arm) + across(turning, across(turning, arm)))
 
 
 def _stacked(given: Sequence[Any]) -> np.ndarray:
@@ -366,31 +369,3 @@ def _table(result: Sequence[Any], count: int, data: np.ndarray) -> np.ndarray:
     """What a function of a pair gave as an array (RESULT, count, ...); a constant entry is one number."""
     shape = (count, *data.shape[1:])
     return np.array([np.broadcast_to(np.asarray(x, dtype=data.dtype), shape) for x in result])
-
-
-def _parts(poses: np.ndarray) -> tuple[Any, Any, Any, Any]:
-    rotation = poses[:, 3:12].reshape(len(poses), 3, 3, *poses.shape[2:])
-    return poses[:, 0:3], rotation, poses[:, 12:15], poses[:, 15:18]
-
-
-def _times(m: Any, a: Any) -> Any:
-    """Matrices (n, 3, 3, ...) times vectors (n, 3, ...)."""
-    return m[:, :, 0] * a[:, None, 0] + m[:, :, 1] * a[:, None, 1] + m[:, :, 2] * a[:, None, 2]
-
-
-def _product(m: Any, n: Any) -> Any:
-    return m[:, :, 0, None] * n[:, None, 0] + m[:, :, 1, None] * n[:, None, 1] + m[:, :, 2, None] * n[:, None, 2]
-
-
-def _flat(m: np.ndarray) -> np.ndarray:
-    return m.reshape(len(m), 9, *m.shape[3:])
-
-
-def _cross(a: Any, b: Any) -> np.ndarray:
-    """Cross products of vectors whose first axis is x, y, z."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-def _across(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products of vectors (n, 3, ...)."""
-    return np.moveaxis(_cross(np.moveaxis(a, 1, 0), np.moveaxis(b, 1, 0)), 0, 1)

@@ -205,11 +205,8 @@ class BlockMaker:
             "finite_forces": lambda: terms.finite_forces,
             "meeting_time": lambda: terms.meeting_times,
             "near_pairs": lambda: terms.near_pairs,
-            "bias_apart": lambda: without_pairs(terms.bias) if terms.near_pairs else (),
-            "motion_axes": lambda: (
-                *terms.motion_axes,
-                *[terms.graph.zero] * (6 * (terms.n_states if terms.near_pairs else 0)),
-            ),
+            "bias_apart": lambda: without_pairs(terms.bias, terms.near_pairs),
+            "motion_axes": lambda: terms.motion_axes,
             "events": lambda: terms.events,
             "resets": lambda: terms.resets,
             "event_slopes": lambda: derivatives(terms, terms.events, (*terms.q, *terms.v)),

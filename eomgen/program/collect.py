@@ -87,7 +87,7 @@ def collect_terms(
         finite_forces=tuple(flag for _, flag in flag_forces(kinematics)),
         meeting_times=tuple(_meeting_times(kinematics)),
         near_pairs=tuple(near_pairs(kinematics)),
-        motion_axes=tuple(motion_axes(kinematics)) if _contact_shapes(kinematics) else (),
+        motion_axes=tuple(motion_axes(kinematics)) if near_pairs(kinematics) else (),
         accelerations=equations.accelerations,
         pivots=equations.pivots,
         wrenches=find_wrenches(kinematics),
