@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 from ..graph.pair_calls import PairFunction, PairKind, PairPart
-from ..limits.runs import APART, BEYOND, UP_TO, WITHIN
-from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
+from ..limits.runs import APART, BEYOND, NEAR, UP_TO, WITHIN
+from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
 from ..program import Program
 from .c_text import print_pieces, used_helpers
 from .pair_sums_used import UsedSum, used_sums
@@ -47,6 +47,7 @@ def _file(program: Program, used: UsedSum) -> str:
     parts: list[tuple[PairPart, str]] = [("outputs", "")] if used.sums or used.slopes else []
     parts += [("slopes", "_slope")] if used.slopes else []
     parts += [("touch", "_touch")] if used.meets else []
+    parts += [("spot", "_spot")] if used.lists else []
     tables = _tables(function)
     functions: list[str] = []
     helpers: list[str] = []
@@ -94,6 +95,11 @@ def _file(program: Program, used: UsedSum) -> str:
         "sums": used.sums,
         "slopes": used.slopes,
         "meets": used.meets,
+        "lists": used.lists,
+        "spot": SPOT,
+        "record": RECORD,
+        "room": function.room,
+        "near": repr(NEAR),
         "turns": any(kind["turns"] for kind in kinds),
         "never": repr(NEVER),
         "meeting": MEETING,
@@ -145,6 +151,9 @@ def _declared(program: str, used: UsedSum) -> str:
     if used.sums:
         text += f"EOMGEN_PIECE void {prefix}_sum(const double *given, double *out, double *work);\n"
         text += _each(f"pairs_{function.name}_sum", f"{prefix}_sum", (n, 0, results))
+    if used.lists:
+        text += f"EOMGEN_PIECE void {prefix}_spots(const double *given, double *out, double *work);\n"
+        text += _each(f"pairs_{function.name}_spots", f"{prefix}_spots", (n, 0, function.spots))
     if used.meets:
         text += (
             f"EOMGEN_PIECE void {prefix}_meeting(const double *given, const double *accelerations, double *out, "

@@ -73,6 +73,8 @@ def _print_pair_node(call: PairCall, operands: Sequence[str]) -> str:
         return f"{name}({operands[0]})"
     if call.part == "slope":
         return f"{name}.slope_along({operands[0]}, {call.numbers}, [{', '.join(operands[1:])}])"
+    if call.part == "spots":
+        return f"{name}.spots({operands[0]})"
     if call.part == "meeting":
         return f"{name}.meeting({operands[0]}, [{', '.join(operands[1:])}])"
     return f"{operands[0]}[{call.numbers[0]}]"
@@ -83,7 +85,8 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
     texts, kinds = list[str](), list[str]()
     for kind in function.kinds:
         names = []
-        parts: list[tuple[PairPart, str]] = [("outputs", ""), ("slopes", "_slope"), ("touch", "_touch")]
+        parts: list[tuple[PairPart, str]] = [("outputs", ""), ("slopes", "_slope")]
+        parts += [("touch", "_touch"), ("spot", "_spot")]
         for part, ending in parts:
             name = f"_pairs_{function.name}_{kind.name}{ending}"
             outputs = kind.expressions(part)
@@ -98,8 +101,9 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
         row = (kind.first, kind.second, kind.planar, kind.law)
         kinds.append(f"        ({', '.join([*map(repr, row), *names, *map(repr, kind.beside)])}),\n")
     tables = "".join(f"        {table!r},\n" for table in function.tables)
+    listed = f"(\n{tables}    ),\n    (\n{''.join(kinds)}    ),"
     states = f"    {function.states},\n" if function.states else ""
-    made = f"PairSum(\n    {function.bodies},\n    (\n{tables}    ),\n    (\n{''.join(kinds)}    ),\n{states})"
+    made = f"PairSum(\n    {function.bodies},\n    {listed}\n    {function.room},\n{states})"
     return "\n\n".join([*texts, f"pairs_{function.name} = {made}"])
 
 

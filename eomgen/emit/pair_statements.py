@@ -12,7 +12,7 @@ from ..numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST
 def work_of(function: PairFunction) -> int:
     """Numbers that a sum works with: its shapes and their rates, and in lanes copies of what is given and found."""
     shapes = sum(len(rows) * (POSE + len(rows[0]) - PLACE - REST + 4) for rows in function.tables)
-    return 2 * shapes + 2 * function.count + function.results
+    return 2 * shapes + 2 * function.count + max(function.results, function.spots)
 
 
 class PairLists:
@@ -44,9 +44,8 @@ class PairLists:
                 continue
             function = call.function
             self._places[i] = end
-            end += {"given": function.count, "meeting": MEETING + MOTION * function.bodies}.get(
-                call.part, function.results
-            )
+            lengths = {"given": function.count, "meeting": MEETING + MOTION * function.bodies, "spots": function.spots}
+            end += lengths.get(call.part, function.results)
             if call.part == "slope" and function.name not in self._rates:
                 self._rates[function.name] = end
                 end += function.count
@@ -99,6 +98,8 @@ class PairLists:
             head = f"for (int i = 0; i < {len(function.data)}; i++) {{ w[{place + start} + i] = same({numbers}); }}"
             return [head, *filled]
         given = self._places[operands[0]]
+        if call.part == "spots":
+            return [f"pairs_{function.name}_spots(w + {given}, w + {place}, w + {work});"]
         if call.part == "sum":
             return [f"pairs_{function.name}_sum(w + {given}, w + {place}, w + {work});"]
         if call.part == "meeting":

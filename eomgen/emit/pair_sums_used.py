@@ -11,12 +11,13 @@ from ..program import Program
 
 
 class UsedSum(NamedTuple):
-    """A sum, and whether its value, its derivatives and the time in which shapes meet are used."""
+    """A sum, and whether its value, its derivatives, the time in which shapes meet and near pairs are used."""
 
     function: PairFunction
     sums: bool
     slopes: bool
     meets: bool
+    lists: bool
 
 
 def used_sums(program: Program) -> list[UsedSum]:
@@ -28,7 +29,7 @@ def used_sums(program: Program) -> list[UsedSum]:
     functions = {call.function.name: call.function for call in calls}
     parts = {(call.function.name, call.part) for call in calls}
     return [
-        UsedSum(functions[name], *((name, part) in parts for part in ("sum", "slope", "meeting")))
+        UsedSum(functions[name], *((name, part) in parts for part in ("sum", "slope", "meeting", "spots")))
         for name in sorted(functions)
     ]
 

@@ -20,6 +20,7 @@ LEFT_OUT = {
     "runtime/origin": "the origin of a result",
     "runtime/rate_checks": "inputs whose rates are in the equations",
     "runtime/signal_rates": "rates of inputs",
+    "simulation/moreau": "rigid contact",
     "simulation/led_state": "inputs that move constraints and depend on the state",
     "simulation/progress": "progress=",
     "simulation/stalling": "the detection of runs without progress",

@@ -15,7 +15,7 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
-from ..graph.pair_calls import LOSSES, PairFunction, PairKind, pair_meeting, pair_sum
+from ..graph.pair_calls import LOSSES, PairFunction, PairKind, pair_meeting, pair_spots, pair_sum
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..numeric.pair_sums import POSE
@@ -35,7 +35,8 @@ from .contact_shapes import (
 from .contact_states import class_of, pair_states
 from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction_laws import DryFriction
-from .normal_laws import NormalLaw
+from .normal_laws import NormalLaw, RigidLaw
+from .soil_laws import SoilPressure
 
 
 class _PairView:
@@ -94,6 +95,8 @@ class ContactGroups(Force):
     friction: DryFriction | None
     states: tuple[Expr, ...] = ()
     axes: int = 0  #: how many states a pair has of friction
+    coefficient: Expr | None = None  #: of friction, where bodies are rigid
+    restitution: Expr | None = None  #: where bodies are rigid
 
     @property
     def laws(self) -> tuple[Any, ...]:
@@ -154,6 +157,22 @@ class ContactGroups(Force):
         markers, function, operands = self._operands(view, "")
         accelerations = [x for m in markers for x in (*view.acceleration(m), *view.angular_acceleration(m))]
         return pair_meeting(view.graph, function, operands, accelerations)
+
+    def near(self, view: View) -> list[Expr]:
+        if isinstance(self.normal_law, SoilPressure):
+            return []  # soil yields
+        _, function, operands = self._operands(view, "", still=True)
+        placed = operands[: len(operands) - len(self.states)]
+        return pair_spots(view.graph, function, [*placed, *(view.graph.zero for _ in self.states)])
+
+    @property
+    def met_bodies(self) -> list[int]:
+        groups = [_features(self.first), *([_features(self.second)] if self.second else [])]
+        return [one.shape.marker.body for group in groups for features in group.values() for one in features]
+
+    @property
+    def is_rigid(self) -> bool:
+        return isinstance(self.normal_law, RigidLaw)
 
     def _results(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], list[Expr]]:
         """The bodies as markers at their origins, force and torque on each, and the energy; at rest, if asked."""
@@ -226,7 +245,7 @@ class ContactGroups(Force):
 
         frame = Frame(vec.identity(graph), vec.zero(graph))
         normal = self.normal_law.mapped(own)
-        dry = self.friction
+        dry, rigid = self.friction, [graph.zero if x is None else own(x) for x in (self.coefficient, self.restitution)]
         friction = None if dry is None else dry.mapped(own)
         markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
         held = tuple(graph.symbol(f"s{k}") for k in range(self._each if self.states else 0))
@@ -255,12 +274,14 @@ class ContactGroups(Force):
         names += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]
         seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
         slopes = jvp(results, seeds)
-        across, depth, _, _ = contact.touch(view)
+        across, depth, arm, _ = contact.touch(view)
         if share is not None:  # beside a piece of ground nothing is in it
             depth = where(graph.apply("lt", 0.0, share), depth, graph.apply("min", depth, 0.0))
         touch = [*across, depth, turning_radius(kinds[1], given[1], graph)]
-        nodes, renamed = _kept(graph, [*results, *slopes, *touch])
-        ids, seen = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch))
+        out = vec.transpose(view.rotation(markers[kinds[0] == "half"]))[2] if planar else vec.zero(graph)
+        spot = [*touch[:4], *vec.add(view.position(markers[0]), arm), *out, *rigid]
+        nodes, renamed = _kept(graph, [*results, *slopes, *touch, *spot])
+        ids, seen, place = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch, spot))
         return PairKind(
             f"{kinds[0]}_{kinds[1]}_{tables[0]}_{tables[1]}",
             *tables,
@@ -271,6 +292,7 @@ class ContactGroups(Force):
             tuple(ids[: len(results)]),
             tuple(ids[len(results) :]),
             tuple(seen),
+            tuple(place),
         )
 
 

@@ -15,7 +15,7 @@ from .contact_shape_fields import GROUNDS, PLANAR, SHAPE_FIELDS
 from .contact_shapes import ContactShape
 from .contact_states import ShapeParts, given_groups, pair_states
 from .friction_laws import DryFriction, has_bristles, read_friction
-from .normal_laws import HertzBodies, NormalLaw, read_normal_law
+from .normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, RigidLaw, read_normal_law
 from .soil_laws import LATERAL, SOIL, read_soil, states_of_soil
 
 
@@ -36,7 +36,8 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
             if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
                 e.fault(key, f"a {flat[0]} has no radius for Hertz's law from moduli", "give stiffness, not moduli")
     axes = len(_axes(e.values, given_groups(e.values), lateral)) if soil or has_bristles(e.values) else 0
-    return ContactGroups(e.name, first, second, law, friction, e.states(), axes)
+    rigidly = e.given("friction") if isinstance(law, RigidLaw) else getattr(friction, "dynamic", None)
+    return ContactGroups(e.name, first, second, law, friction, e.states(), axes, rigidly, e.given("restitution"))
 
 
 def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None] | None:
@@ -45,9 +46,26 @@ def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None] | None:
         return read_soil(e)
     for key in SOIL:
         e.refuse(key, "belongs to contacts that have soil")
+    if e.choice("normal_law") == RIGID:
+        return _rigid_law(e), None
     if not has_bristles(e.values):
         e.refuse("lateral", "belongs to contacts that have soil, or friction_law: lugre")
     return read_normal_law(e), read_friction(e, "friction", "static_friction", "viscous_friction")
+
+
+def _rigid_law(e: Entry) -> RigidLaw:
+    """The law without a stiffness, whose friction and restitution are numbers."""
+    for key in (*CURVED, *LATERAL):
+        if key not in ("normal_law", "friction", "restitution"):
+            e.refuse(key, f"has no meaning in normal_law: {RIGID}, which has friction (a coefficient) and restitution")
+    for key in ("friction", "restitution"):
+        value = e.given(key)
+        if value is not None:
+            e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
+    restitution = e.given("restitution")
+    if restitution is not None:
+        e.require("restitution", restitution, lambda x: x <= 1, "must be at most 1")
+    return RigidLaw()
 
 
 def _refuse_on_soil(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
@@ -157,6 +175,13 @@ _ALLOWED = (
     "smooth_profile; sphere and capsule meet each other and half_space; ellipsoid and cuboid meet half_space"
 )
 
+_NORMAL_LAW = CURVED["normal_law"]._replace(
+    choices=(*NORMAL_LAWS, RIGID),
+    doc=CURVED["normal_law"].doc + f"; {RIGID}, no penetration, for runs by the method moreau only",
+)
+_RESTITUTION = CURVED["restitution"]._replace(
+    doc="coefficient of restitution, from which the dissipation is computed; in runs by the method moreau Newton's"
+)
 _SHAPES = "shapes {shape, on, ...} of the "
 
 TYPES = table(
@@ -174,6 +199,8 @@ TYPES = table(
             ),
             "law": Field("law", "the keys that follow as a mapping, instead of one by one"),
             **CURVED,
+            "normal_law": _NORMAL_LAW,
+            "restitution": _RESTITUTION,
             **SOIL,
             **LATERAL,
         },

@@ -151,6 +151,20 @@ class Force(ABC):
         """Of a force that acts between shapes: when they may meet, and which two are deepest in each other."""
         return []
 
+    def near(self, view: View) -> list[Expr]:
+        """Of a force that acts between shapes: which are near each other, and where."""
+        return []
+
+    @property
+    def met_bodies(self) -> list[int]:
+        """The body of each of :meth:`met_shapes`."""
+        return []
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether it is a contact without a law of force, which only a time-stepping method solves."""
+        return False
+
     def remainder(self, view: View) -> list[Load]:
         """What the loads are beyond the slope of the potential, where there is one: friction, damping."""
         return []

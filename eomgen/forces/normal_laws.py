@@ -17,6 +17,7 @@ _PRESSURE = FORCE.times(LENGTH, -2)
 
 #: Laws of the force along the normal.
 NORMAL_LAWS = ("hunt_crossley", "hertz", LINEAR)
+RIGID = "rigid"  #: contact without penetration, of groups of shapes only
 
 #: Names of the formulas for the dissipation from a coefficient of restitution; see :func:`dissipation_of`.
 RESTITUTIONS = ("hunt_crossley", "lankarani", "flores")
@@ -168,6 +169,25 @@ class HertzBodies(NormalLaw):
 
     def energy(self, depth: Expr) -> Expr:
         raise NotImplementedError("radii are missing")
+
+
+@dataclass(frozen=True)
+class RigidLaw(NormalLaw):
+    """No penetration: the force is what it takes, found by a time-stepping method; elsewhere it is none."""
+
+    formula: ClassVar[str] = r"0 \le F_n \perp g \ge 0"
+
+    def force(self, depth: Expr, rate: Expr) -> Expr:
+        return depth.graph.zero
+
+    def elastic(self, depth: Expr) -> Expr:
+        return depth.graph.zero
+
+    def energy(self, depth: Expr) -> Expr:
+        return depth.graph.zero
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> RigidLaw:
+        return self
 
 
 NORMAL: Fields = {

@@ -3,7 +3,8 @@
 The law of one kind of pair is a small graph of its own (:class:`PairKind`), so that the nodes of a sum do not grow with
 the number of pairs.  ``pairs <name>(given)`` holds the operands, ``pairs <name>(sum)`` and ``pairs <name>(slope)`` are
 lists of results and of their directional derivatives, ``pairs <name>(k)`` is one entry of such a list.
-``pairs <name>(meeting)`` is a list of when shapes that are apart may meet, and of the deepest two.
+``pairs <name>(meeting)`` is a list of when shapes that are apart may meet, and of the deepest two, ``pairs
+<name>(spots)`` one of the pairs that are near.
 """
 
 from __future__ import annotations
@@ -13,12 +14,16 @@ from functools import cached_property
 from typing import Any, Literal
 
 from ..errors import UsageError
-from ..numeric.pair_sums import MEETING, MOTION, POSE, PairSum, pairs_of_rows
+from ..numeric.pair_sums import MEETING, MOTION, POSE, RECORD, PairSum, pairs_of_rows
 from ..records import dataclass
 from .core import Expr, Graph
 from .nodes import Node
+from .substitute import substitute
+from .traverse import reachable
 
-PairPart = Literal["outputs", "slopes", "touch"]
+PairPart = Literal["outputs", "slopes", "touch", "spot"]
+#: Pairs that a list of near ones has room for: so many, and so many for each part of a shape.
+SPARE, EACH = 16, 3
 LOSSES = "0"  #: begins the name of a sum of losses, as no name of a model does
 
 
@@ -45,6 +50,8 @@ class PairKind:
     touch : tuple of int
         Normal (3), from the first shape to the second, penetration, and the radius about the centre of the second shape
         of what its turning moves (0 where it is round).
+    spot : tuple of int
+        Where they touch: :data:`~eomgen.numeric.pair_sums.SPOT` nodes.
     held : tuple of tuple of int
         Of each row of the first table and of each of the second a number: their sum is the place of the pair's states
         among all states of the sum.  Empty without states.
@@ -62,6 +69,7 @@ class PairKind:
     outputs: tuple[int, ...]
     slopes: tuple[int, ...]
     touch: tuple[int, ...]
+    spot: tuple[int, ...]
     held: tuple[tuple[int, ...], ...] = ()
     states: int = 0
 
@@ -147,6 +155,17 @@ class PairFunction:
         return tuple(map(frozenset, found))
 
     @cached_property
+    def room(self) -> int:
+        """How many pairs a list of near ones has room for: all, or some for each shape."""
+        pairs = sum(len(self.tables[kind.first]) * len(self.tables[kind.second]) for kind in self.kinds)
+        return min(pairs, SPARE + EACH * sum(map(len, self.tables)))
+
+    @property
+    def spots(self) -> int:
+        """How many numbers such a list has."""
+        return 1 + RECORD * self.room
+
+    @cached_property
     def touching(self) -> tuple[frozenset[int], ...]:
         """For each body those with which it may be in contact."""
         found: list[set[int]] = [set() for _ in range(self.bodies)]
@@ -164,12 +183,12 @@ class PairFunction:
             (
                 *(k.first, k.second, k.planar, k.law),
                 *(made(k.expressions(), k.plain), made(k.expressions("slopes"), k.symbols)),
-                made(k.expressions("touch"), k.plain),
+                *(made(k.expressions("touch"), k.plain), made(k.expressions("spot"), k.plain)),
                 *k.beside,
             )
             for k in self.kinds
         ]
-        return PairSum(self.bodies, self.tables, kinds, self.states)
+        return PairSum(self.bodies, self.tables, kinds, self.room, self.states)
 
     def __getstate__(self) -> dict[str, Any]:
         return {
@@ -191,7 +210,7 @@ class PairCall:
     Attributes
     ----------
     function : PairFunction
-    part : {'given', 'sum', 'slope', 'meeting', 'item'}
+    part : {'given', 'sum', 'slope', 'meeting', 'spots', 'item'}
     numbers : tuple of int
         Of a slope the operands that have rates; of an item its place.
     """
@@ -226,6 +245,7 @@ class PairCall:
             return loops.meeting(flat[0], flat[1:])
 
         made: dict[str, Callable[..., Any]] = {"given": given, "sum": loops, "slope": slope, "meeting": meeting}
+        made["spots"] = loops.spots
         return made[self.part] if self.part in made else lambda listed: listed[self.numbers[0]]
 
 
@@ -297,6 +317,28 @@ def pair_meeting(
     return [Expr(graph, _item(graph, function, listed, k)) for k in range(MEETING)]
 
 
+def pair_spots(graph: Graph, function: PairFunction, operands: Sequence[Expr]) -> list[Expr]:
+    """Pairs that are near: see :meth:`~eomgen.numeric.pair_sums.PairSum.spots`."""
+    given = _node(graph, PairCall(function, "given"), f"pairs {function.name}(given)", [x.id for x in operands])
+    listed = _node(graph, PairCall(function, "spots"), f"pairs {function.name}(spots)", [given])
+    return [Expr(graph, _item(graph, function, listed, k)) for k in range(function.spots)]
+
+
+def without_pairs(outputs: Sequence[Expr], listed: Sequence[Expr]) -> list[Expr]:
+    """Expressions in which no pairs exert anything of sums whose near pairs are listed."""
+    if not outputs or not listed:
+        return []
+    graph = outputs[0].graph
+
+    def calls(found: Sequence[Expr]) -> list[tuple[int, str]]:
+        nodes = ((i, pair_call(graph, graph.nodes[i][0])) for i in reachable(graph, (y.id for y in found)))
+        return [(i, call.function.element) for i, call in nodes if call is not None and call.part == "item"]
+
+    rigid = {element for _, element in calls(listed)}
+    items = [Expr(graph, i) for i, element in calls(outputs) if element in rigid]
+    return substitute(outputs, dict.fromkeys(items, graph.zero)) if items else list(outputs)
+
+
 def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
     """The tangent of a node of a sum over pairs from those of the nodes before it; None where there is none.
 
@@ -318,8 +360,8 @@ def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
         return _item(graph, function, slope, call.numbers[0]) if _acts(function, moving, call.numbers[0]) else None
     if call.part == "given":
         return None
-    if call.part == "meeting":
-        raise UsageError(f"contacts {function.element!r}: the time in which shapes meet has no derivatives")
+    if call.part in ("meeting", "spots"):
+        raise UsageError(f"contacts {function.element!r}: where and when shapes meet has no derivatives")
     if call.part == "slope":
         raise UsageError(
             f"contacts {function.element!r}: second derivatives of contacts between groups are not made; use "

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.runs import APART, BEYOND, UP_TO, WITHIN
+from ..limits.runs import APART, BEYOND, NEAR, UP_TO, WITHIN
+from .pair_vectors import across, cross, dot, flat, parts, product, times
 
 #: Numbers that say how a body or a shape stands and moves: position, rotation by rows, velocity, angular velocity.
 POSE = 18
@@ -25,6 +26,11 @@ REST = 2
 MOTION = 6
 #: Numbers that say how shapes meet: time, penetration and thickness of the deepest pair, and its two shapes.
 MEETING = 5
+#: Numbers that say where two shapes are near each other: normal, penetration, point, direction out of the plane of
+#: shapes in the plane (0 in space), coefficient of friction, restitution.
+SPOT = 12
+#: The same in a list, behind the numbers of both shapes.
+RECORD = 2 + SPOT
 SORTED = 256  #: pairs of tables from which on near ones are found along an axis: below, testing all is as quick
 NEVER = 1e300  #: (s) where no shapes come towards each other
 
@@ -41,21 +47,25 @@ class PairSum:
     tables : sequence of (n, PLACE + sizes + REST) integers
         Shapes of one kind: body, then places in the data of the position (3) and rotation (9) in the body, of the
         sizes, of the radius of a sphere that bounds the shape (-1: none does), and of the thickness of the body.
-    kinds : sequence of (first, second, planar, law, value, slope, touch), and of pairs with states (states, held) too
+    kinds : sequence of (first, second, planar, law, value, slope, touch, spot), and of pairs with states (states, held)
         Tables of the first and the second shape; whether distances count across z of the first only; places of the
         law's numbers; the function of one pair and its directional derivative, of the numbers of the first shape, of
         the second, of the law, and of the pair's states (and of their rates in the same order); normal, penetration and
-        turning radius of the pair; how many states a pair has, and the numbers of the rows of both tables whose sum is
-        the place of its states.
+        turning radius of the pair; the ``SPOT`` numbers of :meth:`spots`; how many states a pair has, and the numbers
+        of the rows of both tables whose sum is the place of its states.
+    room : int
+        How many pairs :meth:`spots` has room for.
     states : int, optional
         How many states all pairs have; they are the last of the data, and their rates the last of the results.
     """
 
-    def __init__(self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[Any, ...]], states: int = 0):
-        self.bodies, self.states = bodies, states
+    def __init__(
+        self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[Any, ...]], room: int, states: int = 0
+    ):
+        self.bodies, self.room, self.states = bodies, room, states
         self.tables = [np.array(table, dtype=int) for table in tables]
-        self.kinds = [(*kind[:7], *self._pairs(*kind[:2])) for kind in kinds]
-        self.held = [(kind[7], *(np.array(rows) for rows in kind[8])) if states else None for kind in kinds]
+        self.kinds = [(*kind[:8], *self._pairs(*kind[:2])) for kind in kinds]
+        self.held = [(kind[8], *(np.array(rows) for rows in kind[9])) if states else None for kind in kinds]
 
     def _pairs(self, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:
         return pairs_of_rows(self.tables[first], self.tables[second], first == second)
@@ -102,7 +112,7 @@ class PairSum:
         least = np.full(data.shape[1:], NEVER, dtype=data.dtype)
         deepest = np.zeros((MEETING - 1, *data.shape[1:]), dtype=data.dtype)
         starts = np.cumsum([0, *map(len, self.tables)])
-        for first, second, planar, law, _, _, touch, i, j in self.kinds:
+        for first, second, planar, law, _, _, touch, _, i, j in self.kinds:
             (a, arm_a), (b, arm_b) = placed[first], placed[second]
             tables = self.tables[first], self.tables[second]
             if not len(i):
@@ -113,33 +123,30 @@ class PairSum:
             a, b, change_a, spin = a[i], b[j], change_a[i], own[tables[0][i, 0]][:, 3:6]
             reach, speed, change = b[:, 0:3] - a[:, 0:3], b[:, 12:15] - a[:, 12:15], change_b[j] - change_a
             if planar:
-                across = a[:, [5, 8, 11]]  # z of the first shape
-                reach, speed, change = (x - _dot(across, x)[:, None] * across for x in (reach, speed, change))
-            distance = np.sqrt(_dot(reach, reach))
+                upright = a[:, [5, 8, 11]]  # z of the first shape
+                reach, speed, change = (x - dot(upright, x)[:, None] * upright for x in (reach, speed, change))
+            distance = np.sqrt(dot(reach, reach))
             bound = tables[0][i, -REST], tables[1][j, -REST]
             gap = distance - data[np.maximum(bound[0], 0)] - data[np.maximum(bound[1], 0)]
             free = ((bound[0] < 0) | (bound[1] < 0)).reshape(-1, *([1] * (data.ndim - 1)))
             near = free | ~(gap > 0.0)
             closing, towards = (
-                -_dot(reach, speed) / np.where(distance > 0.0, distance, 1.0),
-                np.sqrt(_dot(change, change)),
+                -dot(reach, speed) / np.where(distance > 0.0, distance, 1.0),
+                np.sqrt(dot(change, change)),
             )
             if near.any():
                 numbers = [*np.moveaxis(a, 1, 0), *np.moveaxis(b, 1, 0), *data[list(law)][:, None]]
                 nx, ny, nz, depth, radius = _table(touch(numbers), len(i), data)
                 normal, turning = np.stack([nx, ny, nz], axis=1), a[:, 15:18]
-                seen = speed - _across(turning, reach)
+                seen = speed - across(turning, reach)
                 felt = (
-                    change
-                    - _across(spin, reach)
-                    - _across(turning, _across(turning, reach))
-                    - 2.0 * _across(turning, seen)
+                    change - across(spin, reach) - across(turning, across(turning, reach)) - 2.0 * across(turning, seen)
                 )
                 turned, spun = b[:, 15:18] - turning, own[tables[1][j, 0]][:, 3:6] - spin
-                rate, own_rate, change_of_rate = (np.sqrt(_dot(x, x)) for x in (turned, turning, spun))
-                faster = radius * rate - _dot(normal, seen)  # of points of the second shape, which turns in the first
+                rate, own_rate, change_of_rate = (np.sqrt(dot(x, x)) for x in (turned, turning, spun))
+                faster = radius * rate - dot(normal, seen)  # of points of the second shape, which turns in the first
                 gap, closing = np.where(near, -depth, gap), np.where(near, faster, closing)
-                most = np.sqrt(_dot(felt, felt)) + radius * (change_of_rate + rate * (own_rate + rate))
+                most = np.sqrt(dot(felt, felt)) + radius * (change_of_rate + rate * (own_rate + rate))
                 towards = np.where(near, most, towards)
             thick = np.broadcast_to(data[tables[0][i, -1]] + data[tables[1][j, -1]], gap.shape)
             reached = np.maximum(gap * np.where(free, BEYOND, UP_TO), WITHIN * thick)
@@ -159,12 +166,49 @@ class PairSum:
         found = [least, *deepest]
         return [x if np.ndim(x) else float(x) for x in found]
 
+    def spots(self, given: Sequence[Any]) -> list[Any]:
+        """How many pairs of shapes are near each other, and where: 1 + ``RECORD`` ``room`` numbers or arrays.
+
+        Near are pairs that are apart by at most half the sum of their thicknesses.  Records that are not used are 0.
+        """
+        data = _stacked(given)
+        out = np.zeros((1 + RECORD * self.room, *data.shape[1:]), dtype=data.dtype)
+        for column in np.ndindex(data.shape[1:]):
+            place = (slice(None), *column)
+            rows = self._spots(data[place])
+            out[(0, *column)] = len(rows)
+            kept = rows[: self.room].ravel()
+            out[(slice(1, 1 + kept.size), *column)] = kept
+        return list(out.tolist()) if out.ndim == 1 else list(out)
+
+    def _spots(self, data: np.ndarray) -> np.ndarray:
+        """Records of one state."""
+        placed = [self._place(table, data, None)[0] for table in self.tables]
+        starts = np.cumsum([0, *map(len, self.tables)])
+        found = [np.zeros((0, RECORD))]
+        for first, second, planar, law, _, _, _, spot, i, j in self.kinds:
+            a, b, tables = placed[first], placed[second], (self.tables[first], self.tables[second])
+            thick = data[tables[0][:, -1]], data[tables[1][:, -1]]
+            if not len(i):
+                continue
+            i, j = self._candidates(a, b, planar, (first, second), data, NEAR * (thick[0] + thick[1].max())) or (i, j)
+            margin = NEAR * (thick[0][i] + thick[1][j])
+            near = self._near(a, b, planar, i, j, tables, data, margin)
+            i, j, margin = i[near], j[near], margin[near]
+            if not len(i):
+                continue
+            numbers = [*a[i].T, *b[j].T, *data[list(law)][:, None]]
+            values = _table(spot(numbers), len(i), data)
+            rows = np.concatenate([[starts[first] + i, starts[second] + j], values]).T
+            found.append(rows[values[3] > -margin])
+        return np.concatenate(found)
+
     def _sum(self, data: np.ndarray, rates: np.ndarray | None) -> list[Any]:
         placed = [self._place(table, data, rates) for table in self.tables]
         out = np.zeros((6 * self.bodies + 1 + self.states, *data.shape[1:]), dtype=data.dtype)
         if data.dtype == object:
             out = out + data[0] * 0
-        for (first, second, planar, law, value, slope, _, i, j), held in zip(self.kinds, self.held, strict=True):
+        for (first, second, planar, law, value, slope, _, _, i, j), held in zip(self.kinds, self.held, strict=True):
             (a, arm_a, da, d_arm_a), (b, arm_b, db, d_arm_b) = placed[first], placed[second]
             i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
             near = self._near(a, b, planar, i, j, (self.tables[first], self.tables[second]), data)
@@ -179,8 +223,8 @@ class PairSum:
             if rates is None:
                 result = _table(value(numbers), len(i), data)
                 force, torque_a, torque_b = result[0:3], result[3:6], result[6:9]
-                torque_a = torque_a - _cross(arm_a[i].swapaxes(0, 1), force)
-                torque_b = torque_b + _cross(arm_b[j].swapaxes(0, 1), force)
+                torque_a = torque_a - cross(arm_a[i].swapaxes(0, 1), force)
+                torque_b = torque_b + cross(arm_b[j].swapaxes(0, 1), force)
             else:
                 assert da is not None
                 assert db is not None
@@ -189,10 +233,10 @@ class PairSum:
                 force = _table(value(numbers), len(i), data)[0:3]
                 result = _table(slope([*numbers, *moving]), len(i), data)
                 turned = result[0:3]
-                torque_a = result[3:6] - _cross(arm_a[i].swapaxes(0, 1), turned)
-                torque_b = result[6:9] + _cross(arm_b[j].swapaxes(0, 1), turned)
-                torque_a = torque_a - _cross(d_arm_a[i].swapaxes(0, 1), force)
-                torque_b = torque_b + _cross(d_arm_b[j].swapaxes(0, 1), force)
+                torque_a = result[3:6] - cross(arm_a[i].swapaxes(0, 1), turned)
+                torque_b = result[6:9] + cross(arm_b[j].swapaxes(0, 1), turned)
+                torque_a = torque_a - cross(d_arm_a[i].swapaxes(0, 1), force)
+                torque_b = torque_b + cross(d_arm_b[j].swapaxes(0, 1), force)
                 force = turned
             for body, push, turn, sign in ((bodies[0], force, torque_a, -1), (bodies[1], force, torque_b, 1)):
                 for k in range(3):
@@ -207,20 +251,20 @@ class PairSum:
         """Numbers of all shapes of a table (n, POSE + sizes, ...), their arms, and the rates of both."""
         poses = data[: POSE * self.bodies].reshape(self.bodies, POSE, *data.shape[1:])[table[:, 0]]
         local, turn = data[table[:, 1:4]], data[table[:, 4:PLACE]].reshape(len(table), 3, 3, *data.shape[1:])
-        p, R, v, w = _parts(poses)
-        arm = _times(R, local)
-        numbers = [p + arm, _flat(_product(R, turn)), v + _across(w, arm), w, data[table[:, PLACE:-REST]]]
+        p, R, v, w = parts(poses)
+        arm = times(R, local)
+        numbers = [p + arm, flat(product(R, turn)), v + across(w, arm), w, data[table[:, PLACE:-REST]]]
         if rates is None:
             return np.concatenate(numbers, axis=1), arm, None, None
         moving = rates[: POSE * self.bodies].reshape(self.bodies, POSE, *rates.shape[1:])[table[:, 0]]
         d_local = rates[table[:, 1:4]]
         d_turn = rates[table[:, 4:PLACE]].reshape(len(table), 3, 3, *rates.shape[1:])
-        dp, dR, dv, dw = _parts(moving)
-        d_arm = _times(dR, local) + _times(R, d_local)
+        dp, dR, dv, dw = parts(moving)
+        d_arm = times(dR, local) + times(R, d_local)
         changes = [
             dp + d_arm,
-            _flat(_product(dR, turn) + _product(R, d_turn)),
-            dv + _across(dw, arm) + _across(w, d_arm),
+            flat(product(dR, turn) + product(R, d_turn)),
+            dv + across(dw, arm) + across(w, d_arm),
             dw,
             rates[table[:, PLACE:-REST]],
         ]
@@ -231,14 +275,14 @@ class PairSum:
         data = _stacked(given)
         placed = [self._place(table, data, None)[0] for table in self.tables]
         found = []
-        for first, second, planar, _, _, _, _, i, j in self.kinds:
+        for first, second, planar, _, _, _, _, _, i, j in self.kinds:
             a, b, tables = placed[first], placed[second], (self.tables[first], self.tables[second])
             i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
             found.append((len(i), int(self._near(a, b, planar, i, j, tables, data).sum())))
         return found
 
     def _candidates(
-        self, a: np.ndarray, b: np.ndarray, planar: bool, which: tuple[int, int], data: np.ndarray
+        self, a: np.ndarray, b: np.ndarray, planar: bool, which: tuple[int, int], data: np.ndarray, more: Any = 0.0
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Pairs whose spheres may meet, from the order of their centres along an axis; None where all are to be tested.
 
@@ -258,7 +302,7 @@ class PairSum:
             return None
         order = np.argsort(b[:, axis], kind="stable")
         places, middle = b[order, axis], a[:, axis]
-        wide = radii + max(others.max(), 0.0)
+        wide = radii + max(others.max(), 0.0) + more
         reach = wide + APART * (np.abs(middle) + np.abs(places).max() + wide)
         low, high = places.searchsorted(middle - reach), places.searchsorted(middle + reach, "right")
         i = np.repeat(np.arange(len(first)), high - low)
@@ -279,15 +323,16 @@ class PairSum:
         j: np.ndarray,
         tables: tuple[np.ndarray, np.ndarray],
         data: np.ndarray,
+        more: Any = 0.0,
     ) -> np.ndarray:
-        """Pairs whose bounding spheres meet, in any column."""
+        """Pairs whose bounding spheres, larger by a length ``more`` together, meet, in any column."""
         bounds = tables[0][i, -REST], tables[1][j, -REST]
         reach = b[j, 0:3] - a[i, 0:3]
         square = (reach * reach).sum(axis=1)
         if planar:
             along = (reach * a[i][:, [5, 8, 11]]).sum(axis=1)  # z of the first shape: the last column of its rotation
             square = square - along * along
-        size = data[np.maximum(bounds[0], 0)] + data[np.maximum(bounds[1], 0)]
+        size = data[np.maximum(bounds[0], 0)] + data[np.maximum(bounds[1], 0)] + more
         apart = np.asarray(square > size * size, dtype=bool)
         every = np.asarray(apart.all(axis=tuple(range(1, apart.ndim))))
         return np.asarray(~every | (bounds[0] < 0) | (bounds[1] < 0))
@@ -306,12 +351,7 @@ def pairs_of_rows(first: Any, second: Any, same: bool) -> tuple[np.ndarray, np.n
 def _changed(shapes: np.ndarray, arm: np.ndarray, own: np.ndarray) -> np.ndarray:
     """Accelerations of the centres of shapes (n, 3, ...) from those of their bodies."""
     turning = shapes[:, 15:18]
-    return np.asarray(own[:, 0:3] + _across(own[:, 3:6], arm) + _across(turning, _across(turning, arm)))
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> Any:
-    """Products of vectors (n, 3, ...)."""
-    return (a * b).sum(axis=1)
+    return np.asarray(own[:, 0:3] + across(own[:, 3:6], arm) + across(turning, across(turning, arm)))
 
 
 def _stacked(given: Sequence[Any]) -> np.ndarray:
@@ -329,31 +369,3 @@ def _table(result: Sequence[Any], count: int, data: np.ndarray) -> np.ndarray:
     """What a function of a pair gave as an array (RESULT, count, ...); a constant entry is one number."""
     shape = (count, *data.shape[1:])
     return np.array([np.broadcast_to(np.asarray(x, dtype=data.dtype), shape) for x in result])
-
-
-def _parts(poses: np.ndarray) -> tuple[Any, Any, Any, Any]:
-    rotation = poses[:, 3:12].reshape(len(poses), 3, 3, *poses.shape[2:])
-    return poses[:, 0:3], rotation, poses[:, 12:15], poses[:, 15:18]
-
-
-def _times(m: Any, a: Any) -> Any:
-    """Matrices (n, 3, 3, ...) times vectors (n, 3, ...)."""
-    return m[:, :, 0] * a[:, None, 0] + m[:, :, 1] * a[:, None, 1] + m[:, :, 2] * a[:, None, 2]
-
-
-def _product(m: Any, n: Any) -> Any:
-    return m[:, :, 0, None] * n[:, None, 0] + m[:, :, 1, None] * n[:, None, 1] + m[:, :, 2, None] * n[:, None, 2]
-
-
-def _flat(m: np.ndarray) -> np.ndarray:
-    return m.reshape(len(m), 9, *m.shape[3:])
-
-
-def _cross(a: Any, b: Any) -> np.ndarray:
-    """Cross products of vectors whose first axis is x, y, z."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-def _across(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products of vectors (n, 3, ...)."""
-    return np.moveaxis(_cross(np.moveaxis(a, 1, 0), np.moveaxis(b, 1, 0)), 0, 1)

@@ -7,7 +7,7 @@ from functools import cached_property
 
 from ..graph.core import Expr
 from ..graph.differentiate import jvp
-from ..graph.pair_calls import pairs_of_bodies
+from ..graph.pair_calls import pairs_of_bodies, without_pairs
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from ..kernel_table import DAE, NAMED, Sizes
@@ -204,6 +204,9 @@ class BlockMaker:
             "dae_residual": lambda: self._dae_residual,
             "finite_forces": lambda: terms.finite_forces,
             "meeting_time": lambda: terms.meeting_times,
+            "near_pairs": lambda: terms.near_pairs,
+            "bias_apart": lambda: without_pairs(terms.bias, terms.near_pairs),
+            "motion_axes": lambda: terms.motion_axes,
             "events": lambda: terms.events,
             "resets": lambda: terms.resets,
             "event_slopes": lambda: derivatives(terms, terms.events, (*terms.q, *terms.v)),

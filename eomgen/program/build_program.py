@@ -166,6 +166,7 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_resets=len(terms.resets),
         n_strike=_strike_rows(terms),
         n_states=terms.n_states,
+        n_spots=len(terms.near_pairs),
         n_dae=len(terms.q) + terms.n_v + terms.n_c + len(terms.constraints),
     )
 

@@ -21,6 +21,7 @@ from ..kinematics import Kinematics
 from ..kinematics.inertial_terms import inertial_terms
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
+from ..kinematics.near_pairs import describe_contacts, motion_axes, near_pairs
 from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
@@ -85,6 +86,8 @@ def collect_terms(
         coordinate_slopes=c.slopes,
         finite_forces=tuple(flag for _, flag in flag_forces(kinematics)),
         meeting_times=tuple(_meeting_times(kinematics)),
+        near_pairs=tuple(near_pairs(kinematics)),
+        motion_axes=tuple(motion_axes(kinematics)) if near_pairs(kinematics) else (),
         accelerations=equations.accelerations,
         pivots=equations.pivots,
         wrenches=find_wrenches(kinematics),
@@ -268,7 +271,11 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         **_signals(kinematics, equations),
         **({"input_rates": rates} if (rates := _input_rates(kinematics)) else {}),
         **({"constraint_inputs": used} if (used := _constraint_inputs(kinematics)) else {}),
-        **({"contact_shapes": shapes} if (shapes := _contact_shapes(kinematics)) else {}),
+        **(
+            {"contact_shapes": shapes, **describe_contacts(kinematics)}
+            if (shapes := _contact_shapes(kinematics))
+            else {}
+        ),
         "picture": describe_picture(m),
         "simulation": {
             "end": m.simulation.end,

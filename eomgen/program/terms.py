@@ -83,6 +83,8 @@ class SystemTerms:
     resets: Row = ()  #: of (q, v): new values of states after events
     meeting_times: Row = ()  #: (0 or 5,) of (q, v, a): how long a step may be that passes over no contact, and
     #: penetration, thickness and numbers of the deepest two shapes
+    near_pairs: Row = ()  #: of q: the lists of pairs of shapes that are near each other
+    motion_axes: Row = ()  #: (6 n,) of q, with such lists: the twist that each velocity causes, at the origin
     input_rates: tuple[tuple[str, str], ...] = ()  #: inputs with the input that is their rate
     impacts: bool = False  #: whether an event is a gap with a restitution
     n_states: int = 0  #: first-order states, the last of the velocities: of unit inertia, no coordinate's rate

@@ -39,6 +39,8 @@ class SolverOptions(BoundValues, total=False):
     lband: int | None
     uband: int | None
     min_step: float
+    contact_tolerance: Number
+    contact_iterations: int
 
 
 class ReducedOptions(BoundValues, total=False):

@@ -82,7 +82,8 @@ def simulate(
         with SciPy's steps unless there are inputs that are functions; in large mechanisms with loops (more than 8
         velocities) each step of the first three starts on the constraints where the last came near
         them.  Implicit ones get the exact Jacobian.  In compiled code only: RK4, which takes steps of one size, and
-        Taylor, of orders up to 23, for smooth trees of a few bodies at tight tolerances.
+        Taylor, of orders up to 23, for smooth trees of a few bodies at tight tolerances.  moreau takes contacts between
+        groups as rigid, with Coulomb's friction, in steps of one size.
     rtol, atol : float, optional
         The model's own, or 1e-8 and 1e-10.
     t_eval : (n_t,) array, optional
@@ -98,7 +99,7 @@ def simulate(
         Keep a continuous solution for ``Trajectory.at``.
     max_step, first_step : float, optional
     step : float, optional
-        Size of the steps of RK4 (s), and only of it.
+        Size of the steps of RK4 and of moreau (s), and only of these.
     progress : bool, optional
         Show progress on stderr; by default for runs of more than two seconds on a terminal.
     checkpoint : str or Path, optional
@@ -108,7 +109,8 @@ def simulate(
     resume : bool, optional
         True: the file must be there; False: begin anew; by default go on if it is there.
     **options
-        Passed on to the solver; unknown ones are an error for SciPy's methods.
+        Passed on to the solver; unknown ones are an error for SciPy's methods.  Of moreau ``contact_tolerance`` and
+        ``contact_iterations``.
 
     Returns
     -------
@@ -148,6 +150,12 @@ def simulate(
         motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, kept, steps)
         if motion is not None:
             return motion
+    if (isinstance(method, str) and method == "moreau") or "rigid_only" in module.metadata:
+        from .moreau import step_rigidly
+
+        others: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
+        others |= {"dense_output": dense_output, "checkpoint": checkpoint, "controllers": controllers, **settings}
+        return step_rigidly(module, span, initial, parameters, inputs, method, step, t_eval, events, progress, others)
     method, step = own_step(module, method, step)
     step, dense_output = check_method(method, step), read_flag("dense_output", dense_output)
     declared = declare(module)

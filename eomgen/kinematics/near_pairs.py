@@ -1,0 +1,63 @@
+"""Stage kinematics: contacts between groups -> which shapes are near each other, and how velocities move them.
+
+The twist of a body about the origin of the ground is the sum of the same columns for all bodies that a velocity moves,
+so that one column for each velocity says the motion of all (R. Featherstone, Rigid Body Dynamics Algorithms, 2008,
+section 4.3.1).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..frames import GROUND
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from .kinematics import Kinematics
+
+
+def near_pairs(kinematics: Kinematics) -> list[Expr]:
+    """The list of each contact, one after the other."""
+    found = [x for force in kinematics.mechanism.forces for x in force.near(kinematics.motion)]
+    return kinematics.resolve(found)
+
+
+def motion_axes(kinematics: Kinematics) -> list[Expr]:
+    """Per velocity the angular velocity that it causes (3), and the velocity (3) of the point at the origin."""
+    found = [kinematics.graph.zero] * (6 * len(kinematics.v))
+    for k, link in enumerate(kinematics.links):
+        place = kinematics.poses.link(k)
+        for n, (angular, linear) in enumerate(link.columns, link.first):
+            turning = vec.times(place.rotation, angular)
+            moving = vec.add(vec.times(place.rotation, linear), vec.cross(place.position, turning))
+            found[6 * n : 6 * n + 6] = [*turning, *moving]
+    return kinematics.resolve(found)
+
+
+def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
+    """What is known of contacts beside their numbers.
+
+    ``lists`` has name, numbers and shapes of each contact; ``moved_by`` the last velocity that moves each shape, -1 for
+    ground; ``parents`` the velocity before each towards ground.  ``rigid_only`` names contacts without a law of force.
+    """
+    forces = [force for force in kinematics.mechanism.forces if force.near(kinematics.motion)]
+    if not forces:
+        return {}
+    last: dict[int, int] = {GROUND: -1}
+    links = kinematics.links
+    for link in links:
+        above = -1 if link.parent == GROUND else last[links[link.parent].body]
+        last[link.body] = link.first + len(link.columns) - 1 if link.columns else above
+    parents = [-1] * len(kinematics.v)
+    for link in links:
+        above = -1 if link.parent == GROUND else last[links[link.parent].body]
+        for n in range(len(link.columns)):
+            parents[link.first + n] = above if n == 0 else link.first + n - 1
+    listed = [[force.name, len(force.near(kinematics.motion)), len(force.met_shapes())] for force in forces]
+    return {
+        "rigid_contacts": {
+            "lists": listed,
+            "moved_by": [last[body] for force in forces for body in force.met_bodies],
+            "parents": parents,
+        },
+        **({"rigid_only": rigid} if (rigid := [force.name for force in forces if force.is_rigid]) else {}),
+    }

@@ -1,0 +1,175 @@
+"""Simulation: a run with rigid contacts by steps of one size -> Trajectory."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import EvaluationError, SimulationError, UsageError
+from ..limits.rigid_contacts import ITERATIONS, SOLVED
+from ..limits.runs import SAME
+from ..numeric.counts import as_count
+from ..numeric.scales import Array
+from ..runtime.given_start import Span, Start
+from ..runtime.near_names import check_names
+from ..runtime.room import read_number, require_room, require_steps
+from ..runtime.signals import Forcing
+from ..texts import shown
+from .bound_run import watch_run
+from .events import Events, calls_within, is_told_by_the_caller
+from .integrate import Solution
+from .meetings import deep_start
+from .recording import record
+from .rigid_steps import RigidSteps
+from .run_arguments import find_span, find_state, ordered_times
+from .tolerances import check_step
+
+if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
+    from ..runtime.trajectory import Trajectory
+
+NAME = "moreau"
+OWN = ("contact_tolerance", "contact_iterations")
+
+
+class ContactWarning(UserWarning):
+    """A run by the method moreau has steps in which the laws of contact are not met as well as asked for."""
+
+
+def step_rigidly(
+    module: BoundModel,
+    span: Span,
+    initial: Start,
+    parameters: Any,
+    inputs: Mapping[str, Any] | None,
+    method: Any,
+    step: Any,
+    t_eval: ArrayLike | None,
+    events: Any,
+    progress: bool | None,
+    options: Mapping[str, Any],
+) -> Trajectory:
+    """The motion of a mechanism whose contacts between groups are rigid.
+
+    Raises
+    ------
+    UsageError
+        No contacts, no step, options of other methods, shapes deep in each other at the start.
+    SimulationError
+        A state is not finite, or more pairs are near than there is room for.
+    """
+    _require_it(module, method)
+    given = {key: value for key, value in options.items() if value is not None and value is not False}
+    check_names("option of method moreau", given, OWN, ("method", "step", "t_eval", "progress"))
+    if step is None:
+        raise UsageError("method moreau needs step=, the size of its steps (s), for example step=1e-3")
+    h = check_step("step", step)
+    tolerance = read_number("contact_tolerance", given.get("contact_tolerance", SOLVED))
+    if not tolerance > 0.0:
+        raise UsageError(f"contact_tolerance must be greater than 0, not {tolerance:.6g}")
+    iterations = as_count(given.get("contact_iterations", ITERATIONS))
+    if iterations is None or iterations < 1:
+        raise UsageError(f"contact_iterations must be a whole number from 1, not {given['contact_iterations']}")
+    forcing = Forcing(module.layout, inputs)
+    start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
+    if end < start:
+        raise UsageError("method moreau runs forwards only: impacts cannot be undone")
+    require_steps("step", h, start, end)
+    _require_no_others(module, events)
+    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
+    forcing.attach(bound)
+    forcing.enter(start, end)
+    stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
+    require_room("a run", (end - start) / h * (1 + module.n_x), "give a longer step, or run in parts")
+    x = find_state(bound, initial, start, forcing)
+    steps = RigidSteps(bound, forcing, tolerance, iterations)
+    found = deep_start(bound, start, x, forcing(start, x) if forcing else None)
+    if found is not None:
+        raise UsageError(
+            f"{module.name} starts with shapes inside each other; {found}. Rigid shapes cannot: change the initial "
+            "values, or put only shapes into groups that are apart"
+        )
+    watch = watch_run(start, end, progress)
+    count = max(int(np.ceil((end - start) / h - SAME)), 0)
+    times = np.minimum(start + h * np.arange(count + 1), end)
+    times[-1] = end
+    states = np.empty((module.n_x, count + 1))
+    states[:, 0] = x
+    n_q = module.n_q
+    q, v = x[:n_q].copy(), x[n_q:].copy()
+    try:
+        for k in range(count):
+            t = float(times[k])
+            try:
+                q, v = steps.step(t, q, v, float(times[k + 1]) - t)
+            except EvaluationError as error:
+                raise SimulationError(f"moreau stopped at t = {t:.6g} s of {end:.6g} s: {error}") from error
+            if not (np.isfinite(q).all() and np.isfinite(v).all()):
+                raise SimulationError(
+                    f"moreau stopped at t = {t:.6g} s of {end:.6g} s: the state is not finite. Velocity-dependent and "
+                    "stiff forces are taken explicitly: try a smaller step"
+                )
+            states[:n_q, k + 1], states[n_q:, k + 1] = q, v
+            if watch is not None:
+                watch(t)
+    finally:
+        if watch is not None:
+            watch.close()
+    if steps.missed and not is_told_by_the_caller():
+        warnings.warn(
+            f"{steps.missed} of {count} steps leave a residual of the contact laws of up to {steps.residual:.3g} m/s, "
+            f"more than contact_tolerance = {tolerance:.3g} of their velocities, after contact_iterations = "
+            f"{iterations}: allow more iterations, or a larger tolerance",
+            ContactWarning,
+            stacklevel=calls_within() + 1,
+        )
+    counts: dict[str, Any] = {"nfev": 2 * count, "steps": count}
+    counts |= {"contact_iterations": steps.iterations, "contacts": steps.most, "missed_steps": steps.missed}
+    counts |= {"contact_residual": steps.residual, "penetration": steps.depth}
+    ends = (start, end)
+    told, found_states = (times, states) if stored is None else (stored, _between(times, states, stored))
+    solution = Solution(told, found_states, [], [], None, 0, "The end of the span is reached.", counts, ends)
+    return record(
+        bound, forcing, solution, NAME, {"step": h, "contact_tolerance": tolerance, "contact_iterations": iterations}
+    )
+
+
+def _between(times: Array, states: Array, wanted: Array) -> Array:
+    """States at other times, linear in between."""
+    return np.array([np.interp(wanted, times, row) for row in states])
+
+
+def _require_no_others(module: BoundModel, events: Any) -> None:
+    """Refuse what steps of one size do not see.
+
+    Raises
+    ------
+    UsageError
+    """
+    if events is not None:
+        raise UsageError("method moreau watches no events; run without events=, or by another method")
+    if module.layout.reaction_laws:
+        names = ", ".join(module.layout.reaction_laws)
+        raise UsageError(f"method moreau has no friction by reactions of joints (here {names}); use another method")
+    if Events(module.layout, None).resets:
+        raise UsageError(f"{module.name} has events that reset its state, which method moreau does not watch")
+
+
+def _require_it(module: BoundModel, method: Any) -> None:
+    """Refuse another method for a model with rigid contacts.
+
+    Raises
+    ------
+    UsageError
+    """
+    if not isinstance(method, str) or method != NAME:
+        names = module.metadata["rigid_only"]
+        told = "" if method is None else f", not {method if isinstance(method, str) else shown(method)}"
+        raise UsageError(
+            f"contacts {names[0]!r} have normal_law: rigid, which exerts impulses, not forces: run with "
+            f"method='moreau' and step={told}, or choose another normal_law"
+        )

@@ -1,0 +1,180 @@
+"""Simulation: one step of a mechanism with rigid contacts, forces, impacts and friction at once.
+
+The scheme is Moreau's midpoint rule (J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, in
+Nonsmooth Mechanics and Applications, 1988, 1-82; V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical
+Systems, 2008, section 10.1).  With the position q_m = q + h/2 N v half a step on,
+
+    M (v+ - v) + h b(q_m, (v + v+)/2) = J^T P + C^T L,      C v+ + C_t = 0,      q+ = q_m + h/2 N v+,
+
+and the laws of :mod:`~eomgen.numeric.contact_impulses` between impulses P and velocities J v+.  The normal velocity is
+to be at least -e times the one before where shapes touch, and -g/h where they are a gap g apart and come to rest on
+each other (D. E. Stewart, J. C. Trinkle, An implicit time-stepping scheme for rigid body dynamics with inelastic
+collisions and Coulomb friction, Int. J. Numer. Methods Eng. 39 (1996), 2673-2691).  What is left of penetrations and of
+open loops is removed from the positions alone (V. Acary, Projected event-capturing time-stepping schemes, Comput.
+Methods Appl. Mech. Eng. 256 (2013), 224-250).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..limits.rigid_contacts import GENTLER, GROWN, REMOVED, RESTING, YIELDING
+from ..numeric import algebra
+from ..numeric.contact_impulses import ContactImpulses, ContactProblem, solve_contacts
+from ..numeric.scales import Array
+from .rigid_rows import RigidContacts, RigidRows
+
+if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
+    from ..runtime.signals import Forcing
+
+
+class RigidSteps:
+    """The steps of one run; attributes tell how well contacts were solved.
+
+    Attributes
+    ----------
+    residual, scale : float
+        (m/s) The largest residual of a step, and the velocities of contacts there.
+    missed : int
+        Steps whose residual is larger than it should be.
+    iterations, most : int
+        The most that a step took, and the most contacts that acted at once.
+    depth : float
+        The deepest penetration (m).
+    """
+
+    def __init__(self, module: BoundModel, forcing: Forcing, tolerance: float, iterations: int) -> None:
+        self.module, self.forcing = module, forcing
+        self.tolerance, self.allowed = tolerance, iterations
+        self.contacts = RigidContacts(module)
+        self.bias = module.kernels.timed("bias_apart")
+        self.residual, self.missed, self.iterations, self.most, self.depth = 0.0, 0, 0, 0, 0.0
+        self._last: dict[tuple[int, int], Array] = {}
+
+    def move(self, q: Array, d: Array) -> Array:
+        """The position that velocities d (n_v,) lead to in unit time."""
+        space = self.module.layout.space
+        return q + d if space is None else space.normalised(space.move(q, d))
+
+    def step(self, t: float, q: Array, v: Array, h: float) -> tuple[Array, Array]:
+        """Position and velocities (n_q,), (n_v,) a time h later."""
+        middle, n_q = t + 0.5 * h, len(q)
+        q_m = self.move(q, 0.5 * h * v)
+        x = np.concatenate([q_m, v])
+        u = self.forcing(middle, x) if self.forcing else None
+        held = _Held(self.module, middle, q_m, u)
+        bias = self.bias(middle, x, u=u)
+        free = held.free(v - h * (held.inverse @ bias))
+        rows = self._near(self.contacts.rows(middle, q_m, u), v, free, h)
+        new, P = self._contact(held, rows, v, free, h)
+        x[n_q:] = 0.5 * (v + new)
+        again = self.bias(middle, x, u=u)
+        if not np.array_equal(again, bias):
+            free = held.free(v - h * (held.inverse @ again))
+            new, P = self._contact(held, rows, v, free, h)
+        position = self.move(q_m, 0.5 * h * new)
+        away = held.closing(position, t + h)
+        if rows.gaps.size:
+            away = away + self._out(held, rows, P, new)
+        return (self.move(position, away) if away.any() else position), new
+
+    def _near(self, rows: RigidRows, v: Array, free: Array, h: float) -> RigidRows:
+        """Contacts that may act in this step: those that touch, or would soon."""
+        if not rows.gaps.size:
+            return rows
+        self.depth = max(self.depth, float(-rows.gaps.min()))
+        fastest = max(float(np.abs(rows.jacobian @ velocity).max()) for velocity in (v, free))
+        return rows.chosen(np.flatnonzero(rows.gaps <= 2.0 * h * fastest))
+
+    def _contact(self, held: _Held, rows: RigidRows, v: Array, free: Array, h: float) -> tuple[Array, Array]:
+        """Velocities after the impulses of contacts, and these (m, d)."""
+        m = len(rows.gaps)
+        if not m:
+            return free, np.zeros((0, 2))
+        d = len(rows.jacobian) // m
+        before, undisturbed = ((rows.jacobian @ velocity).reshape(m, d) for velocity in (v, free))
+        spread = held.inverse @ rows.jacobian.T
+        W = rows.jacobian @ spread
+        fast = before[:, 0] < -RESTING * np.abs(undisturbed[:, 0] - before[:, 0])
+        strikes = fast & (rows.restitution > 0.0) & (rows.gaps + h * undisturbed[:, 0] < 0.0)
+        arrive = np.where(rows.gaps > 0.0, -rows.gaps / h, 0.0)
+        back = np.where(strikes, -rows.restitution * before[:, 0] - arrive, 0.0)
+        scale = max(float(np.abs(before).max()), float(np.abs(undisturbed).max()))
+        keys = [(int(a), int(b)) for a, b in rows.pairs]
+        start = np.array([self._last.get(key, np.zeros(d))[:d] for key in keys])
+        for k in range(GENTLER + 1):
+            part = 0.0 if k == GENTLER else 0.5**k
+            c = undisturbed.copy()
+            c[:, 0] -= arrive + part * back
+            found = solve_contacts(ContactProblem(W, c, rows.friction), start, self.tolerance * scale, self.allowed)
+            P = found.impulses.ravel()
+            after = undisturbed.ravel() + W @ P
+            work = P @ after, P @ before.ravel()  # twice: forces act with the velocity of the middle
+            if not back.any() or float(sum(work)) <= GROWN * float(
+                np.abs(P) @ (np.abs(after) + np.abs(before.ravel()))
+            ):
+                break  # impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985)
+        self._note(found, scale, m)
+        self._rests = ~strikes
+        self._last = dict(zip(keys, found.impulses, strict=True))
+        return free + spread @ P, found.impulses
+
+    def _note(self, found: ContactImpulses, scale: float, m: int) -> None:
+        self.residual = max(self.residual, found.residual)
+        self.missed += found.residual > self.tolerance * scale
+        self.iterations, self.most = max(self.iterations, found.iterations), max(self.most, m)
+
+    def _out(self, held: _Held, rows: RigidRows, P: Array, new: Array) -> Array:
+        """A displacement (n_v,) that removes a part of the penetration of contacts that last."""
+        d = len(rows.jacobian) // len(rows.gaps)
+        normal = rows.jacobian[::d]
+        lasts = (rows.gaps < 0.0) & (P[:, 0] > 0.0)
+        lasts &= self._rests
+        if not lasts.any():
+            return np.zeros(len(new))
+        J, wanted = normal[lasts], -REMOVED * rows.gaps[lasts]
+        spread = held.inverse @ J.T
+        W = J @ spread
+        problem = ContactProblem(W + YIELDING * np.diag(np.diag(W)), -wanted[:, None], np.zeros(len(wanted)))
+        found = solve_contacts(problem, np.zeros((len(wanted), 1)), self.tolerance * float(wanted.max()), self.allowed)
+        return np.asarray(spread @ found.impulses.ravel())
+
+
+class _Held:
+    """The inertia and the constraints at one position.
+
+    ``inverse`` is the matrix A with which velocities change by A f under impulses f, constraints held.
+    """
+
+    def __init__(self, module: BoundModel, t: float, q: Array, u: Any) -> None:
+        kernels = module.kernels
+        self.module, self.t, self.u = module, t, u
+        M = kernels.mass_matrix(q, u=u, t=t)
+        self.rows: Array | None = None
+        if not module.layout.n_c:
+            self.inverse = algebra.inv(M)
+            return
+        C = kernels.constraint_jacobian(q, u=u, t=t)
+        x = np.concatenate([q, np.zeros(module.layout.n_v)])
+        self.drift = kernels.velocity_constraints(x, u=u, t=t)
+        weight = np.trace(M) / max(float((C * C).sum()), np.finfo(float).tiny)
+        whole = algebra.inv(M + weight * (C.T @ C))  # regular where M is singular but constraints hold the rest
+        spread = whole @ C.T
+        self.back = spread @ algebra.pinv(C @ spread)
+        self.rows = C
+        self.inverse = whole - self.back @ spread.T
+        self.inverse = 0.5 * (self.inverse + self.inverse.T)
+
+    def free(self, v: Array) -> Array:
+        """Velocities that obey the constraints, from what forces alone would make of them."""
+        return v if self.rows is None else v - self.back @ (self.rows @ v + self.drift)
+
+    def closing(self, q: Array, t: float) -> Array:
+        """A displacement (n_v,) that closes the loops: a Newton step."""
+        if self.rows is None or not self.module.layout.n_h:
+            return np.zeros(self.inverse.shape[0])
+        found = self.module.kernels.constraints(q, u=self.u, t=t)
+        return np.asarray(-self.back[:, : len(found)] @ found)

@@ -1,0 +1,66 @@
+"""Scenes of rigid contact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+import eomgen as eg
+
+G = 9.81
+SHAPES: dict[str, dict[str, Any]] = {
+    "circle": {"shape": "circle", "radius": 0.1},
+    "box": {"shape": "box", "size": (0.2, 0.14)},
+    "triangle": {"shape": "polygon", "points": ((0.12, 0.01), (-0.1, 0.1), (-0.08, -0.1))},
+    "segment": {"shape": "segment", "length": 0.3, "radius": 0.03},
+}
+
+
+def rigid(**law: Any) -> dict[str, Any]:
+    return {"normal_law": "rigid", **law}
+
+
+def on_floor(
+    shape: Mapping[str, Any], law: Mapping[str, Any], slope: float = 0.0, inertia: float = 0.005, target: str = "cython"
+) -> Any:
+    """A body of 1 kg in the plane on a floor along x that falls towards +x by an angle."""
+    m = eg.Model("on_floor", gravity=(G * np.sin(slope), -G * np.cos(slope), 0))
+    body = m.body("b", mass=1.0, inertia={"zz": inertia})
+    m.planar("j", m.ground, body)
+    m.contacts("c", {**shape, "on": body}, {"shape": "half_plane", "on": m.ground}, rigid(**law))
+    return m.compile(target=target)
+
+
+def pile(kinds: Sequence[str], gravity: float = G, walls: bool = True) -> eg.Model:
+    """Bodies of several shapes among themselves, between two walls on a floor or free."""
+    m = eg.Model("pile", gravity=(0, -gravity, 0))
+    m.parameter("mu", 0.3), m.parameter("e", 0.0)
+    shapes = []
+    for k, kind in enumerate(kinds):
+        body = m.body(f"b{k}", mass=1.0 + 0.2 * k, inertia={"zz": 0.01})
+        m.planar(f"j{k}", m.ground, body)
+        shapes.append({**SHAPES[kind], "on": body})
+    m.contacts("among", shapes, law=rigid(friction="mu", restitution="e"))
+    if walls:
+        sides = [
+            m.ground,
+            m.ground.at(-0.6, 0, 0, rpy=(0, 0, -np.pi / 2)),
+            m.ground.at(0.6, 0, 0, rpy=(0, 0, np.pi / 2)),
+        ]
+        m.contacts("walls", shapes, {"shape": "half_plane", "on": sides}, rigid(friction="mu", restitution="e"))
+    return m
+
+
+def thrown(rng: np.random.Generator, count: int) -> dict[str, float]:
+    """Initial values of a pile, apart from each other and fast."""
+    start: dict[str, float] = {}
+    for k in range(count):
+        start |= {f"j{k}_x": -0.4 + 0.4 * (k % 3), f"j{k}_y": 0.25 + 0.4 * (k // 3), f"j{k}_3": rng.uniform(-3, 3)}
+        start |= {
+            f"j{k}_x_dot": rng.uniform(-2, 2),
+            f"j{k}_y_dot": rng.uniform(-2, 2),
+            f"j{k}_3_dot": rng.uniform(-9, 9),
+        }
+    return start
