@@ -16,8 +16,7 @@ from ..graph.core import Expr, Graph
 from ..graph.traverse import LEAVES, parts, reachable
 from ..records import dataclass
 from .angles import CIRCULAR
-
-FEW = 3  #: segments of fewer members are not worth a loop
+from .repeats import FEW, find_repeats
 
 #: ("x", 3): a place in an array; ("const", 2.0); ("t", 0).
 Place = tuple[str, float]
@@ -128,7 +127,10 @@ def find_segments(
     segments: list[tuple[int, ...]] = []
     for group, alike in zip(groups, common, strict=True):
         segments += [tuple(chain.from_iterable(group))] if alike else group
-    segments = _merged(segments, _common(reader, segments), longest)
+    segments = _merged(segments, _common(reader, segments))
+    segments = _repeated(reader, segments, _common(reader, segments), 2 * longest)
+    segments = _merged(segments, _common(reader, segments))
+    segments = _shortened(segments, _common(reader, segments), longest)
     read = [reader.read(segment) for segment in segments]
     return _laid_out(segments, read, tuple(angles), known, results, checked)
 
@@ -161,15 +163,36 @@ def _common(reader: SegmentReader, segments: Sequence[tuple[int, ...]]) -> list[
     return [counts[signature] >= FEW for signature in signatures]
 
 
-def _merged(segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int) -> list[tuple[int, ...]]:
-    """Segments; rare ones that follow each other are one, as long as may be."""
+def _merged(segments: Sequence[tuple[int, ...]], common: Sequence[bool]) -> list[tuple[int, ...]]:
+    """Segments; rare ones that follow each other are one."""
     result: list[tuple[int, ...]] = []
     for alike, run in groupby(zip(segments, common, strict=True), key=lambda pair: pair[1]):
-        if alike:
-            result += [segment for segment, _ in run]
-            continue
-        joined = [i for segment, _ in run for i in segment]
-        result += [tuple(joined[k : k + longest]) for k in range(0, len(joined), longest)]
+        every = [segment for segment, _ in run]
+        result += every if alike else [tuple(chain.from_iterable(every))]
+    return result
+
+
+def _repeated(
+    reader: SegmentReader, segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int
+) -> list[tuple[int, ...]]:
+    """Segments; rare ones are cut where they repeat themselves."""
+    result: list[tuple[int, ...]] = []
+    for segment, alike in zip(segments, common, strict=True):
+        done = 0
+        for start, period, count in () if alike else find_repeats(reader.letters(segment), longest):
+            result += [segment[done:start]] if start > done else []
+            done = start + period * count
+            result += [segment[k : k + period] for k in range(start, done, period)]
+        result += [segment[done:]] if done < len(segment) else []
+    return result
+
+
+def _shortened(segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int) -> list[tuple[int, ...]]:
+    """Segments; rare ones are as long as may be."""
+    result: list[tuple[int, ...]] = []
+    for segment, alike in zip(segments, common, strict=True):
+        step = len(segment) if alike else longest
+        result += [segment[k : k + step] for k in range(0, len(segment), step)]
     return result
 
 
@@ -191,6 +214,20 @@ class SegmentReader:
         if segment not in self.found:
             self.found[segment] = self._read(segment)
         return self.found[segment]
+
+    def letters(self, segment: Sequence[int]) -> list[Signature]:
+        """What each statement of a segment is like: where it reads, and whether others need it, but not which."""
+        nodes, known = self.nodes, self.known
+        found = []
+        for i in segment:
+            node = nodes[i]
+            letter: list[object] = [node[0]]
+            for j in node[1:]:
+                place = known.get(j)
+                letter.append("w" if place is None else place[0])
+            letter += [len(self.results.get(i, ())), i in self.checked]
+            found.append(tuple(letter))
+        return found
 
     def _read(self, segment: Sequence[int]) -> tuple[Signature, tuple[int, ...]]:
         nodes, known = self.nodes, self.known
