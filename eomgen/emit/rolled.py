@@ -2,8 +2,9 @@
 
 A recursion over a big tree does the same for many bodies, but for where it reads and writes.  The graph marks where the
 part of another body begins.  Statements between two marks are a segment; segments whose statements are the same
-function of what they read are of one kind.  Statements stay in the order in which the graph was made, but that the
-segments of one body in several passes come together where what they read allows.
+function of what they read are of one kind.  What has no marks is cut where it repeats itself (:mod:`.repeats`).
+Statements stay in the order in which the graph was made, but that the segments of one body in several passes come
+together where what they read allows.
 """
 
 from __future__ import annotations
@@ -91,6 +92,7 @@ def find_segments(
     skipped: frozenset[int],
     given: Mapping[int, Place],
     longest: int,
+    searched: bool = True,
 ) -> Segments:
     """The segments of a block and the kinds that they are of.
 
@@ -102,6 +104,8 @@ def find_segments(
         Symbols and hoisted values.
     longest : int
         Most statements in a segment.
+    searched : bool
+        Whether statements between marks are searched for what repeats itself.
     """
     nodes = graph.nodes
     places: dict[int, list[int]] = {}
@@ -128,8 +132,9 @@ def find_segments(
     for group, alike in zip(groups, common, strict=True):
         segments += [tuple(chain.from_iterable(group))] if alike else group
     segments = _merged(segments, _common(reader, segments))
-    segments = _repeated(reader, segments, _common(reader, segments), 2 * longest)
-    segments = _merged(segments, _common(reader, segments))
+    if searched:
+        segments = _repeated(reader, segments, _common(reader, segments), 2 * longest)
+        segments = _merged(segments, _common(reader, segments))
     segments = _shortened(segments, _common(reader, segments), longest)
     read = [reader.read(segment) for segment in segments]
     return _laid_out(segments, read, tuple(angles), known, results, checked)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
+from functools import cached_property
 from math import prod
 from typing import Any
 
@@ -37,6 +38,13 @@ class Limits:
     #: spatial chains, microseconds of loops and of text without: 3.2 and 3.0 at 12,000 operations, 6.1 and 6.5 at
     #: 25,000, 23 and 32 at 103,000, where text without loops takes 10 times as long to compile.
     rolled: int = 16_000
+    #: Functions of more operations are searched for what repeats itself without a mark of the graph (constraint rows,
+    #: their factor, derivatives).  Short loops keep more in memory, so the two blocks of the right-hand side of loops
+    #: are searched only above the second number.  Measured (closed chains, rows of four-bars), microseconds of loops
+    #: and of text without: 21 and 18 at 38,000 operations, 50 and 39 at 75,000, 84 and 87 at 179,000; text without
+    #: takes 3 to 4 times as long to compile.
+    repeated: int = 32_000
+    repeated_dynamics: int = 100_000
 
 
 @dataclass(frozen=True)
@@ -164,7 +172,13 @@ class Program:
         """Whether a block, or ``precompute``, is so long that what is alike in it is written once."""
         return self.counts[name].total > self.limits.rolled
 
-    @property
+    def is_searched(self, name: str) -> bool:
+        """Whether what is alike in a block, or in ``precompute``, is found without marks of the graph too."""
+        limits = self.limits
+        most = limits.repeated_dynamics if name in ("closing", "dynamics") else limits.repeated
+        return self.counts[name].total > most
+
+    @cached_property
     def twins(self) -> dict[str, str]:
         """Blocks that compute exactly what an earlier one does -> the name of that one; never blocks of drivers."""
         needed = {name for d in self.drivers for name in d.blocks}
