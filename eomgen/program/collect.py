@@ -18,6 +18,7 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute, symbols_of
 from ..graph.tape import record_tape
 from ..kinematics import Kinematics
+from ..kinematics.closing_gradients import shortest_rows
 from ..kinematics.inertial_terms import inertial_terms
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
@@ -63,7 +64,7 @@ def collect_terms(
         kinetic=equations.kinetic_energy,
         potential=equations.potential_energy,
         constraints=c.values,
-        constraint_jacobian=c.jacobian,
+        constraint_jacobian=shortest_rows(kinematics),
         constraint_rate=c.time_derivative,
         velocity_constraints=c.velocity,
         gamma=c.gamma,
