@@ -8,10 +8,11 @@ cut joint, times the wrench by which the equation acts there.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from ..describe.mechanism import JointSpec
 from ..graph import vectors as vec
-from ..graph.core import Expr
+from ..graph.core import Expr, Graph
 from ..graph.count import count
 from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
@@ -38,13 +39,24 @@ class ClosingGradients:
     in_turns: bool
 
 
-def closing_gradients(kinematics: Kinematics, spec: JointSpec) -> ClosingGradients:
-    """Differentiate the equations of a cut joint by its relative pose."""
+class PoseEquations(NamedTuple):
+    """Equations, then coordinates, of a cut joint as functions of symbols for its relative pose, and what these are."""
+
+    labels: tuple[str, ...]
+    expressions: list[Expr]
+    rotation: Mat3
+    position: Vec3
+    turn: Expr
+    true: dict[Expr, Expr]
+    in_turns: bool
+
+
+def pose_equations(kinematics: Kinematics, spec: JointSpec) -> PoseEquations:
+    """The equations of a cut joint with its relative pose not put in."""
     graph, poses = kinematics.graph, kinematics.poses
     pose = poses.relative(spec.predecessor, spec.successor)
     rotation, position = pose.rotation, pose.position
-    R: Mat3 = tuple(tuple(graph.symbol(f"R({i},{k})") for k in range(3)) for i in range(3))  # type: ignore[assignment]
-    r: Vec3 = (graph.symbol("r(0)"), graph.symbol("r(1)"), graph.symbol("r(2)"))
+    R, r = pose_symbols(graph, "")
     turn = graph.symbol("turn(z)")
     angles = [k for k, coordinate in enumerate(spec.joint.coordinates) if coordinate.kind == "angle"]
     turns = sum_of_turns(graph, rotation, kinematics.q) if len(angles) == 1 else None
@@ -55,9 +67,27 @@ def closing_gradients(kinematics: Kinematics, spec: JointSpec) -> ClosingGradien
     measured = spec.joint.measure(graph, R, r)
     if turns is not None:
         measured[angles[0]] = turn
-    true = dict(zip((x for row in R for x in row), (x for row in rotation for x in row), strict=True))
-    true |= dict(zip(r, position, strict=True)) | ({turn: turns[0]} if turns is not None else {})
+    true = put_pose(R, r, rotation, position) | ({turn: turns[0]} if turns is not None else {})
     expressions = [*(row.expression for row in rows), *measured]
+    return PoseEquations(tuple(row.label for row in rows), expressions, R, r, turn, true, turns is not None)
+
+
+def pose_symbols(graph: Graph, of: str) -> tuple[Mat3, Vec3]:
+    """Symbols for a rotation and a place, or for rates of them."""
+    R = tuple(tuple(graph.symbol(f"R{of}({i},{k})") for k in range(3)) for i in range(3))
+    return R, tuple(graph.symbol(f"r{of}({i})") for i in range(3))  # type: ignore[return-value]
+
+
+def put_pose(R: Mat3, r: Vec3, rotation: Mat3, position: Vec3) -> dict[Expr, Expr]:
+    """Symbols -> values."""
+    values = [*(x for row in rotation for x in row), *position]
+    return dict(zip([*(x for row in R for x in row), *r], values, strict=True))
+
+
+def closing_gradients(kinematics: Kinematics, spec: JointSpec) -> ClosingGradients:
+    """Differentiate the equations of a cut joint by its relative pose."""
+    graph = kinematics.graph
+    labels, expressions, R, r, turn, true, in_turns = pose_equations(kinematics, spec)
     entries = jacobian(expressions, [*r, *(R[i][k] for k in range(3) for i in range(3)), turn])
     gradients: list[tuple[Vec3, Vec3]] = []
     for k in range(len(expressions)):
@@ -68,8 +98,7 @@ def closing_gradients(kinematics: Kinematics, spec: JointSpec) -> ClosingGradien
             moment = vec.add(moment, vec.cross(column, (d[3 + 3 * c], d[4 + 3 * c], d[5 + 3 * c])))
         x = substitute([d[0], d[1], d[2], *moment], true)
         gradients.append(((x[0], x[1], x[2]), (x[3], x[4], x[5])))
-    labels = tuple(row.label for row in rows)
-    return ClosingGradients(labels, tuple(gradients), set(labels).issuperset(COMMON), turns is not None)
+    return ClosingGradients(labels, tuple(gradients), set(labels).issuperset(COMMON), in_turns)
 
 
 def shortest_rows(kinematics: Kinematics) -> tuple[tuple[Expr, ...], ...]:

@@ -19,6 +19,7 @@ from ..graph.substitute import substitute, symbols_of
 from ..graph.tape import record_tape
 from ..kinematics import Kinematics
 from ..kinematics.closing_gradients import shortest_rows
+from ..kinematics.closing_rates import shortest_gamma
 from ..kinematics.inertial_terms import inertial_terms
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
@@ -67,7 +68,7 @@ def collect_terms(
         constraint_jacobian=shortest_rows(kinematics),
         constraint_rate=c.time_derivative,
         velocity_constraints=c.velocity,
-        gamma=c.gamma,
+        gamma=shortest_gamma(kinematics),
         poses=tuple(_poses(kinematics)),
         outputs=tuple(resolved_outputs(kinematics, equations)),
         loop_coordinates=(*loop.values, *loop.rates, *loop.accelerations),
