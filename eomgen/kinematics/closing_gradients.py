@@ -106,7 +106,7 @@ def shortest_rows(kinematics: Kinematics) -> tuple[tuple[Expr, ...], ...]:
     c = kinematics.constraints
     if kinematics.given_rates or not c.values or not kinematics.topology.cut:
         return c.jacobian
-    found = {label: row for k in kinematics.topology.cut for label, row in _rows(kinematics, k).items()}
+    found = {label: row for k in kinematics.topology.cut for label, row in twist_rows(kinematics, k).items()}
     if not found:
         return c.jacobian
     zero = kinematics.graph.zero
@@ -126,7 +126,7 @@ def _operations(outputs: Sequence[Expr]) -> int:
     return count(outputs).total
 
 
-def _rows(kinematics: Kinematics, cut: int) -> dict[str, tuple[Expr, ...]]:
+def twist_rows(kinematics: Kinematics, cut: int) -> dict[str, tuple[Expr, ...]]:
     """Rows of a cut joint by their labels; none of one whose loop lies in a plane, where derivatives are sums."""
     graph, poses, spec = kinematics.graph, kinematics.poses, kinematics.mechanism.joints[cut]
     base, within = poses.between(spec.predecessor, spec.successor)

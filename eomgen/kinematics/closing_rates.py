@@ -38,8 +38,7 @@ def shortest_gamma(kinematics: Kinematics) -> tuple[Expr, ...]:
     c = kinematics.constraints
     if kinematics.given_rates or c.stabilised is not None or not c.values or not kinematics.topology.cut:
         return c.gamma
-    rates = joint_rates(kinematics)
-    found = {label: x for k in kinematics.topology.cut for label, x in _gamma(kinematics, rates, k).items()}
+    found = end_gammas(kinematics)
     if not found:
         return c.gamma
     still = [rate.is_zero for rate in c.time_derivative]
@@ -50,6 +49,12 @@ def shortest_gamma(kinematics: Kinematics) -> tuple[Expr, ...]:
     shared = [*c.values, *(x for omega, _ in kinematics.twists for x in omega)]
     shorter = count([*shared, *values]).total < SHORTER * count([*shared, *c.gamma]).total
     return values if shorter else c.gamma
+
+
+def end_gammas(kinematics: Kinematics) -> dict[str, Expr]:
+    """Gamma of the rows of cut joints by their labels, of those whose loops do not lie in a plane."""
+    rates = joint_rates(kinematics)
+    return {label: x for k in kinematics.topology.cut for label, x in _gamma(kinematics, rates, k).items()}
 
 
 def _gamma(kinematics: Kinematics, rates: Sequence[JointRates], cut: int) -> dict[str, Expr]:
