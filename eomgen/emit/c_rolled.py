@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from ..graph.core import Expr
 from ..program import Block, Program
 from .c_text import ARGUMENTS, SIGNATURE, BlockPrinter, Printed, direct_results, function_text
+from .repeats import FEW
 from .rolled import Place, SegmentKind, Segments, find_segments
 from .straight import Pieces, PrintedFunction, conditions, references
 
 CALLED = 24  #: runs in one function; more go through a table of runs
 ROW = 12  #: numbers in a line of a table
+CARRIED = 6  #: values that a loop keeps in variables from one body to the next at most
 #: A function is made of loops where that takes the text of so many times fewer statements.
 ALIKE = 2
 
@@ -21,30 +24,34 @@ ALIKE = 2
 def print_rolled(program: Program, block: Block) -> Printed | None:
     """The C functions of a block whose alike segments are loops; None if too few of its segments are alike."""
     texts = references(program, block.inputs)
-    return _print(program, f"{block.name}_block", block.outputs, block.checks, program.parameter_only, texts)
+    return _print(program, block.name, block.outputs, block.checks, program.parameter_only, texts)
 
 
 def print_rolled_precompute(program: Program) -> Printed | None:
     """The same of ``precompute_block``."""
     texts = {program.graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)}
-    return _print(program, "precompute_block", program.hoisted, (), frozenset(), texts)
+    return _print(program, "precompute", program.hoisted, (), frozenset(), texts)
 
 
 def _print(
     program: Program,
-    name: str,
+    block: str,
     outputs: Sequence[Expr],
     checks: Sequence[Expr],
     skipped: frozenset[int],
     texts: dict[int, str],
 ) -> Printed | None:
-    graph = program.graph
+    graph, name = program.graph, f"{block}_block"
     given = {i: _place(text) for i, text in texts.items()}
     longest = max(1, program.limits.statements // 2)
-    found = find_segments(graph, outputs, checks, skipped, given, longest)
+    found = find_segments(graph, outputs, checks, skipped, given, longest, program.is_searched(block))
     if ALIKE * found.written > found.carried_out:
         return None
-    printed = [_print_kind(program, found, k, f"{name}_{n}") for n, k in enumerate(found.kinds)]
+    carried = _find_carried(found)
+    printed = [
+        _print_kind(program, found, kind, along, f"{name}_{n}")
+        for n, (kind, along) in enumerate(zip(found.kinds, carried, strict=True))
+    ]
     made = {i for k in found.kinds for segment in k.members for i in segment}
     direct = tuple((k, y.id) for k, y in enumerate(outputs) if y.id not in made)
     bare = tuple(sorted({y.id for y in checks} - made))
@@ -117,7 +124,41 @@ def _print_list(found: Segments, i: int, name: str) -> str:
     return f"{tables}{head}\n{{\n    EOMGEN_BEGIN\n{lines}\n    EOMGEN_RETURN\n}}\n"
 
 
-def _print_kind(program: Program, found: Segments, kind: SegmentKind, name: str) -> str:
+class Carried(NamedTuple):
+    """What every member of a kind reads from the one before it, so that it stays in a variable."""
+
+    reads: dict[int, int]  #: what the first member reads -> number of the export of the member before
+    first: dict[int, int]  #: number of the export -> where the first member reads it
+    alone: frozenset[int]  #: exports that nothing else reads, which are stored by the last member of a run
+
+
+def _find_carried(found: Segments) -> list[Carried]:
+    """Of every kind; kinds that carry much are left as they are, since registers are few."""
+    result = []
+    read: set[int] = set()
+    for kind in found.kinds:
+        stride, n = len(kind.exports), len(kind.members)
+        reads, first = {}, {}
+        for column in zip(*kind.reads, strict=True):
+            places = [int(at) if array == "w" else -1 for array, at in (found.places[j] for j in column)]
+            e = places[1] - kind.start if n > 1 else -1
+            follows = 0 <= e < stride and all(at == kind.start + m * stride + e for m, at in enumerate(places[1:]))
+            if follows and e not in first and n > FEW:
+                reads[column[0]], first[e] = e, places[0]
+            else:
+                read.update(places)
+        if len(reads) > CARRIED:
+            read.update(kind.start + m * stride + e for e in first for m in range(n))
+            reads, first = {}, {}
+        result.append((reads, first))
+    return [
+        Carried(reads, first, frozenset(e for e in first if read.isdisjoint(
+            range(kind.start + e, kind.start + (len(kind.members) - 1) * len(kind.exports), len(kind.exports)))))
+        for kind, (reads, first) in zip(found.kinds, result, strict=True)
+    ]  # fmt: skip
+
+
+def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: Carried, name: str) -> str:
     """A function that evaluates members ``first`` to ``last`` of a kind."""
     if found.lists.is_list(kind.members[0][0]):
         return _print_list(found, kind.members[0][0], name)
@@ -134,6 +175,8 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, name: str)
             values = tuple(value for _, value in where)
             if len(set(values)) > 1:
                 fixed[i] = f"k[{numbers.setdefault(values, len(numbers))}]"
+        elif i in carried.reads:
+            fixed[i] = f"r{carried.reads[i]}"
         elif array == "w":
             loads[i] = table.text([at for _, at in where])
         else:
@@ -142,23 +185,27 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, name: str)
     statements = kind.members[0]
     stride = len(kind.exports)
     stores = {
-        statements[index]: table.text([kind.start + m * stride + e for m in range(n)])
+        statements[index]: table.text([kind.start + e + m * stride for m in range(n)])
         for e, index in enumerate(kind.exports)
+        if e not in carried.alone
     }
     results = {
         i: tuple(table.text([found.results[one[k]][at] for one in kind.members]) for at in range(len(found.results[i])))
         for k, i in enumerate(statements)
         if i in found.results
     }
-    kept = {*stores, *results}
+    kept = {*(statements[index] for index in kind.exports), *results}
     checks = found.checks.intersection(statements)
     inlined = conditions(program.graph, statements, kept, checks)
     printer = BlockPrinter(program, fixed, Pieces((), (), (), 0))
     printer.lists = found.lists
     lines = printer.lines(PrintedFunction(statements, loads, stores, results, checks, inlined))
+    lines += [f"r{e} = {printer.real(statements[kind.exports[e]])};" for e in carried.first]
+    before, after = _print_carried(kind, carried)
+    used.update("w" for _ in before)
     head = [f"const int *restrict const i = {name}_places[m];"] if table.rows else []
     head += [f"const double *restrict const k = {name}_numbers[m];"] if numbers else []
-    unused = [f"(void){a};" for a in ARGUMENTS if a not in {*printer.used, *used}]
+    before += [f"(void){a};" for a in ARGUMENTS if a not in {*printer.used, *used}]
     body = "\n".join(f"        {line}" for line in head + lines)
     tables = ""
     if table.rows:
@@ -168,11 +215,23 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, name: str)
         every = list(zip(*numbers, strict=True))
         tables += f"EOMGEN_SHARED const double {name}_numbers[{n}][{len(numbers)}] = {{\n{_rows(every)}\n}};\n"
     loop = "for (int m = first; m < last; m++)"
-    note = f"    {' '.join(unused)}\n" if unused else ""
+    opening, closing = ("".join(f"    {line}\n" for line in part) for part in (before, after))
     return (
-        f"{tables}static EOMGEN_APART flag {name}({SIGNATURE}, int first, int last)\n{{\n    EOMGEN_BEGIN\n{note}"
-        f"    {loop} {{\n{body}\n    }}\n    EOMGEN_RETURN\n}}\n"
+        f"{tables}static EOMGEN_APART flag {name}({SIGNATURE}, int first, int last)\n{{\n    EOMGEN_BEGIN\n{opening}"
+        f"    {loop} {{\n{body}\n    }}\n{closing}    EOMGEN_RETURN\n}}\n"
     )
+
+
+def _print_carried(kind: SegmentKind, carried: Carried) -> tuple[list[str], list[str]]:
+    """What comes before and after the loop over members."""
+    stride = len(kind.exports)
+    before, after = [], []
+    for e, place in carried.first.items():
+        last = f"{kind.start + e - stride} + {stride}"
+        before.append(f"real r{e} = w[first ? {last}*first : {place}];")
+        if e in carried.alone:
+            after.append(f"w[{last}*last] = r{e};")
+    return before, after
 
 
 def _rows(rows: Sequence[Sequence[float]]) -> str:

@@ -41,6 +41,7 @@ class BlockPrinter:
         every = (i for piece in pieces.pieces for i in piece.statements)
         self.lists = PairLists(program.graph, every, pieces.work)
         self._graph, self._nodes, self._calls = program.graph, program.graph.nodes, program.graph.calls
+        self.zero = program.graph.zero.id
         self._angles: dict[int, int] = {}  #: angles whose sin and cos are there -> their places
         self._fixed = references
         self._beside_numbers = operations_with(lambda row: row.takes_numbers)
@@ -198,13 +199,13 @@ def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, s
 
 def direct_results(printer: BlockPrinter, pieces: Pieces) -> list[str]:
     """Results that need no statement; a long run of zeros becomes a loop that later results overwrite."""
-    texts = [(k, printer.real(i)) for k, i in pieces.direct]
-    zeros = [k for k, text in texts if text == "same(0.0)"]
+    zero, direct = printer.zero, pieces.direct
+    zeros = [k for k, i in direct if i == zero]
     lines = []
     if len(zeros) >= FILLED:
         lines.append(f"for (int i = {zeros[0]}; i <= {zeros[-1]}; i++) {{ out[i] = same(0.0); }}")
-        texts = [(k, text) for k, text in texts if text != "same(0.0)"]
-    return lines + [f"out[{k}] = {text};" for k, text in texts]
+        direct = tuple((k, i) for k, i in direct if i != zero)
+    return lines + [f"out[{k}] = {printer.real(i)};" for k, i in direct]
 
 
 def print_precompute(program: Program) -> Printed:

@@ -2,8 +2,9 @@
 
 A recursion over a big tree does the same for many bodies, but for where it reads and writes.  The graph marks where the
 part of another body begins.  Statements between two marks are a segment; segments whose statements are the same
-function of what they read are of one kind.  Statements stay in the order in which the graph was made, but that the
-segments of one body in several passes come together where what they read allows.
+function of what they read are of one kind.  What has no marks is cut where it repeats itself (:mod:`.repeats`).
+Statements stay in the order in which the graph was made, but that the segments of one body in several passes come
+together where what they read allows.
 """
 
 from __future__ import annotations
@@ -17,8 +18,7 @@ from ..graph.traverse import LEAVES, parts, reachable
 from ..records import dataclass
 from .angles import CIRCULAR
 from .pair_statements import PairLists
-
-FEW = 3  #: segments of fewer members are not worth a loop
+from .repeats import FEW, find_repeats
 
 #: ("x", 3): a place in an array; ("const", 2.0); ("t", 0).
 Place = tuple[str, float]
@@ -96,6 +96,7 @@ def find_segments(
     skipped: frozenset[int],
     given: Mapping[int, Place],
     longest: int,
+    searched: bool = True,
 ) -> Segments:
     """The segments of a block and the kinds that they are of.
 
@@ -107,6 +108,8 @@ def find_segments(
         Symbols and hoisted values.
     longest : int
         Most statements in a segment.
+    searched : bool
+        Whether statements between marks are searched for what repeats itself.
     """
     nodes = graph.nodes
     places: dict[int, list[int]] = {}
@@ -136,9 +139,11 @@ def find_segments(
     segments: list[tuple[int, ...]] = []
     for group, alike in zip(groups, common, strict=True):
         segments += [tuple(chain.from_iterable(group))] if alike else group
-    segments = _merged(
-        segments, [s[0] in alone or c for s, c in zip(segments, _common(reader, segments), strict=True)], longest
-    )
+    segments = _merged(segments, _kept(reader, segments))
+    if searched:
+        segments = _repeated(reader, segments, _kept(reader, segments), 2 * longest)
+        segments = _merged(segments, _kept(reader, segments))
+    segments = _shortened(segments, _kept(reader, segments), longest)
     read = [reader.read(segment) for segment in segments]
     return _laid_out(segments, read, tuple(angles), known, results, checked, lists)
 
@@ -185,15 +190,42 @@ def _common(reader: SegmentReader, segments: Sequence[tuple[int, ...]]) -> list[
     return [counts[signature] >= FEW for signature in signatures]
 
 
-def _merged(segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int) -> list[tuple[int, ...]]:
-    """Segments; rare ones that follow each other are one, as long as may be."""
+def _kept(reader: SegmentReader, segments: Sequence[tuple[int, ...]]) -> list[bool]:
+    """Whether a segment stays as it is: one of several of its kind, or a list."""
+    alike = _common(reader, segments)
+    return [segment[0] in reader.alone or common for segment, common in zip(segments, alike, strict=True)]
+
+
+def _merged(segments: Sequence[tuple[int, ...]], common: Sequence[bool]) -> list[tuple[int, ...]]:
+    """Segments; rare ones that follow each other are one."""
     result: list[tuple[int, ...]] = []
     for alike, run in groupby(zip(segments, common, strict=True), key=lambda pair: pair[1]):
-        if alike:
-            result += [segment for segment, _ in run]
-            continue
-        joined = [i for segment, _ in run for i in segment]
-        result += [tuple(joined[k : k + longest]) for k in range(0, len(joined), longest)]
+        every = [segment for segment, _ in run]
+        result += every if alike else [tuple(chain.from_iterable(every))]
+    return result
+
+
+def _repeated(
+    reader: SegmentReader, segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int
+) -> list[tuple[int, ...]]:
+    """Segments; rare ones are cut where they repeat themselves."""
+    result: list[tuple[int, ...]] = []
+    for segment, alike in zip(segments, common, strict=True):
+        done = 0
+        for start, period, count in () if alike else find_repeats(reader.letters(segment), longest):
+            result += [segment[done:start]] if start > done else []
+            done = start + period * count
+            result += [segment[k : k + period] for k in range(start, done, period)]
+        result += [segment[done:]] if done < len(segment) else []
+    return result
+
+
+def _shortened(segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int) -> list[tuple[int, ...]]:
+    """Segments; rare ones are as long as may be."""
+    result: list[tuple[int, ...]] = []
+    for segment, alike in zip(segments, common, strict=True):
+        step = len(segment) if alike else longest
+        result += [segment[k : k + step] for k in range(0, len(segment), step)]
     return result
 
 
@@ -217,6 +249,20 @@ class SegmentReader:
         if segment not in self.found:
             self.found[segment] = self._read(segment)
         return self.found[segment]
+
+    def letters(self, segment: Sequence[int]) -> list[Signature]:
+        """What each statement of a segment is like: where it reads, and whether others need it, but not which."""
+        nodes, known = self.nodes, self.known
+        found = []
+        for i in segment:
+            node = nodes[i]
+            letter: list[object] = [node[0]]
+            for j in node[1:]:
+                place = known.get(j)
+                letter.append("w" if place is None else place[0])
+            letter += [len(self.results.get(i, ())), i in self.checked]
+            found.append(tuple(letter))
+        return found
 
     def _read(self, segment: Sequence[int]) -> tuple[Signature, tuple[int, ...]]:
         nodes, known = self.nodes, self.known

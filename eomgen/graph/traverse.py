@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Container, Iterable, Iterator, Sequence
+from operator import itemgetter
 
 from .core import Expr, Graph
 from .nodes import Node
@@ -59,16 +60,13 @@ def reachable(graph: Graph, roots: Iterable[int], stop: Container[int] = ()) -> 
 def parts(graph: Graph, ids: Sequence[int]) -> list[tuple[int, Sequence[int]]]:
     """Ids in ascending order, cut where the graph has marks, each with the number of its pass; none is empty."""
     found: list[tuple[int, Sequence[int]]] = []
-    if not ids:
-        return found
-    first = bisect_left(graph.marks, (ids[0] + 1,))
-    last = bisect_left(graph.marks, (ids[-1] + 1,))
-    start, number = 0, graph.marks[first - 1][1] if first else 0
-    for mark, following in [*graph.marks[first:last], (len(graph.nodes), 0)]:
-        end = bisect_left(ids, mark, start)
-        if end > start:
-            found.append((number, ids[start:end]))
-        start, number = end, following
+    marks, start = graph.marks, 0
+    while start < len(ids):
+        following = bisect_right(marks, ids[start], key=itemgetter(0))
+        number = marks[following - 1][1] if following else 0
+        end = bisect_left(ids, marks[following][0], start) if following < len(marks) else len(ids)
+        found.append((number, ids[start:end]))
+        start = end
     return found
 
 

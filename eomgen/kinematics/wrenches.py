@@ -18,9 +18,9 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.spatial import Twist
 from ..graph.substitute import substitute
-from ..graph.vectors import Mat3, Vec3
+from ..graph.vectors import Vec3
 from ..records import dataclass
-from .angle_sums import sum_of_turns
+from .closing_gradients import COMMON, closing_gradients
 from .constraint_equations import couple
 from .kinematics import Kinematics
 from .motion import MarkerMotion
@@ -156,48 +156,22 @@ class JointWrenches:
 
     def _cut_joint(self, spec: JointSpec) -> CutJoint:
         graph, poses = self.kinematics.graph, self.kinematics.poses
-        pose = poses.relative(spec.predecessor, spec.successor)
-        rotation, position = pose.rotation, pose.position
-        R: Mat3 = tuple(tuple(graph.symbol(f"R({i},{k})") for k in range(3)) for i in range(3))  # type: ignore[assignment]
-        r: Vec3 = (graph.symbol("r(0)"), graph.symbol("r(1)"), graph.symbol("r(2)"))
-        turn = graph.symbol("turn(z)")
-        angles = [k for k, coordinate in enumerate(spec.joint.coordinates) if coordinate.kind == "angle"]
-        turns = sum_of_turns(graph, rotation, self.kinematics.q) if len(angles) == 1 else None
-        if turns is None:
-            rows = spec.joint.closure(graph, R, r)
-        else:
-            rows = spec.joint.closure_in_turns(graph, R, r, turn)
-        measured = spec.joint.measure(graph, R, r)
-        if turns is not None:
-            measured[angles[0]] = turn
-        true = dict(zip((x for row in R for x in row), (x for row in rotation for x in row), strict=True))
-        true |= dict(zip(r, position, strict=True)) | ({turn: turns[0]} if turns is not None else {})
-        expressions = [*(row.expression for row in rows), *measured]
-        symbols = [*r, *(R[i][k] for k in range(3) for i in range(3)), turn]
-        entries = jacobian(expressions, symbols)
+        closing = closing_gradients(self.kinematics, spec)
         to_ground = poses.marker(spec.predecessor).rotation
         gradients: list[Row6] = []
-        for k in range(len(expressions)):
-            d = [entries.get((k, j), graph.zero) for j in range(13)]
-            moment = (graph.zero, graph.zero, d[12])
-            for c in range(3):  # a column of R turns by theta x column
-                column = (R[0][c], R[1][c], R[2][c])
-                moment = vec.add(moment, vec.cross(column, (d[3 + 3 * c], d[4 + 3 * c], d[5 + 3 * c])))
-            values = substitute([d[0], d[1], d[2], *moment], true)
-            force = vec.times(to_ground, (values[0], values[1], values[2]))
-            turned = vec.times(to_ground, (values[3], values[4], values[5]))
-            gradients.append((*force, *turned))
-        labels = [row.label for row in rows]
-        if {"r_x", "r_y", "r_z"} <= set(labels):  # then these rows are along common axes (see close_loop)
+        for push, turn in closing.gradients:
+            gradients.append((*vec.times(to_ground, push), *vec.times(to_ground, turn)))
+        labels = closing.labels
+        if closing.common:  # then these rows are along common axes (see close_loop)
             base, common = poses.between(spec.predecessor, spec.successor)
             axes = vec.product(poses.link(base).rotation, common.rotation)
-            for k, letter in enumerate("xyz"):
-                gradients[labels.index(f"r_{letter}")] = (*(row[k] for row in axes), *vec.zero(graph))
+            for k, label in enumerate(COMMON):
+                gradients[labels.index(label)] = (*(row[k] for row in axes), *vec.zero(graph))
         named = [f"{spec.name}.{label}" for label in labels]
         return CutJoint(
             spec,
-            tuple(zip(named, gradients[: len(rows)], strict=True)),
-            tuple(zip(spec.coordinates, gradients[len(rows) :], strict=True)),
+            tuple(zip(named, gradients[: len(named)], strict=True)),
+            tuple(zip(spec.coordinates, gradients[len(named) :], strict=True)),
         )
 
     def _on_ends(self, spec: JointSpec, gradient: Row6) -> dict[int, Row6]:

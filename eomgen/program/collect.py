@@ -18,6 +18,8 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute, symbols_of
 from ..graph.tape import record_tape
 from ..kinematics import Kinematics
+from ..kinematics.closing_gradients import shortest_rows
+from ..kinematics.closing_rates import shortest_gamma
 from ..kinematics.inertial_terms import inertial_terms
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
@@ -64,10 +66,10 @@ def collect_terms(
         kinetic=equations.kinetic_energy,
         potential=equations.potential_energy,
         constraints=c.values,
-        constraint_jacobian=c.jacobian,
+        constraint_jacobian=shortest_rows(kinematics),
         constraint_rate=c.time_derivative,
         velocity_constraints=c.velocity,
-        gamma=c.gamma,
+        gamma=shortest_gamma(kinematics),
         poses=tuple(_poses(kinematics)),
         outputs=tuple(resolved_outputs(kinematics, equations)),
         loop_coordinates=(*loop.values, *loop.rates, *loop.accelerations),

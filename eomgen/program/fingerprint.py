@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ def fingerprint(program: Program) -> str | None:
     decide on orders.
     """
     try:
-        text = repr([_spell(part) for name, part in vars(program).items() if name != "graph"])
+        text = repr([_spell(getattr(program, part.name)) for part in fields(program) if part.name != "graph"])
         text += repr(_spell_graph(program))
     except TypeError:
         return None
