@@ -1,7 +1,19 @@
 """Force elements: geometry (a path or a marker) times a law; :data:`FORCES` is the table of their types."""
 
 from ..elements.element_type import ElementType, Types
-from . import actuators, attraction, bushing, contact, contact_groups_read, friction, laws, muscle, springs, stops
+from . import (
+    actuators,
+    attraction,
+    bushing,
+    contact,
+    contact_groups_read,
+    friction,
+    laws,
+    muscle,
+    springs,
+    stops,
+    tyres,
+)
 from .actuators import Actuator, BodyTorque, PointForce
 from .attraction import PointGravity
 from .bushing import Bushing
@@ -19,9 +31,12 @@ from .reaction_friction import ReactionFriction
 from .routes import Route
 from .springs import Damper, Spring
 from .stops import JointStop
+from .tyres import Tyre
 
 FORCES: Types = {}
-for _home in (actuators, springs, laws, bushing, attraction, friction, stops, contact, contact_groups_read, muscle):
+for _home in (actuators, springs, laws, bushing, attraction, friction, stops, contact):
+    FORCES |= _home.TYPES
+for _home in (contact_groups_read, muscle, tyres):
     FORCES |= _home.TYPES
 
 __all__ = [
@@ -59,5 +74,6 @@ __all__ = [
     "SphereSphere",
     "Spring",
     "Turn",
+    "Tyre",
     "View",
 ]
