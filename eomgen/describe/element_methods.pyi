@@ -201,9 +201,9 @@ class ElementMethods(Described):
         via: Sequence[Any] | None = None) -> ForceHandle:
         """Add a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion."""
     def tyre(self, name: str, road: Any, wheel: Any, radius: Value, stiffness: Value, relaxation: Sequence[Value],
-        damping: Value = 0, axis: str | Sequence[float] | None = None, rolling_radius: Value = None,
-        law: str | None = None, slip_stiffness: Value = None, friction: Value = None, half_length: Value = None,
-        shifts: bool | None = None) -> ForceHandle:
+        damping: Value = 0, settling: Value = 0, axis: str | Sequence[float] | None = None,
+        rolling_radius: Value = None, law: str | None = None, slip_stiffness: Value = None, friction: Value = None,
+        half_length: Value = None, shifts: bool | None = None) -> ForceHandle:
         """Add a tyre on a plane road: the first marker is the road (z out of it), the second the centre of the
         wheel."""
     def coupling(self, name: str, coordinates: Mapping[Any, Value] | None = None, offset: Value = 0,

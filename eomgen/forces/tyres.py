@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, NamedTuple
 
-from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, STIFFNESS
+from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, STIFFNESS, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field
@@ -45,10 +45,12 @@ class Tyre(Force):
     The load is max(0, k d + c d') of the penetration d of the wheel's circle, at its lowest point; forces in the road's
     plane act where the line from the centre to that point meets the plane.  Deflections u, v of the tread are states:
 
-        u' = V_sx - |V_x| u / s_x,  v' = V_sy - |V_x| v / s_y
+        u' = V_sx - |V_x| kappa,  v' = V_sy - |V_x| tan alpha
+        kappa = (u + tau V_sx) / s_x,  tan alpha = (v + tau V_sy) / s_y,  tau = tau_0 / (1 + |V_x| tau_0 / s)
 
-    with slip velocities V_s and relaxation lengths s; the law of forces sees u / s_x and v / s_y (Pacejka, Tyre and
-    Vehicle Dynamics (2nd edition, 2006), section 7.2).  A wheel in the air rolls its deflections off.
+    with slip velocities V_s and relaxation lengths s (Pacejka, Tyre and Vehicle Dynamics (2nd edition, 2006), section
+    7.2, where tau is 0).  The time tau_0 damps a wheel at rest and does not change steady slips.  A wheel in the air
+    rolls its deflections off.
     """
 
     sentence: ClassVar[str] = (
@@ -63,6 +65,7 @@ class Tyre(Force):
     load_law: DampedLinear
     law: TyreLaw
     relaxation: tuple[Expr, Expr]
+    settling: Expr
     deflections: tuple[Expr, Expr]
 
     @property
@@ -114,6 +117,16 @@ class Tyre(Force):
             vec.dot(across, velocity),
         )
 
+    def _slips(self, way: _Rolling) -> tuple[Expr, Expr]:
+        """Longitudinal slip and tangent of the slip angle of the law."""
+        speed, (x, y), (u, v) = way.depth.graph.apply("abs", way.forward), self.relaxation, self.deflections
+
+        def slip(deflection: Expr, velocity: Expr, length: Expr) -> Expr:
+            tau = self.settling / (1.0 + speed * self.settling / length)
+            return (deflection + tau * velocity) / length
+
+        return slip(u, way.forward - way.rolling, x), slip(v, way.sideways, y)
+
     def loads(self, view: View) -> list[Load]:
         return self._loads(view, True)
 
@@ -127,8 +140,7 @@ class Tyre(Force):
         way = self._rolling(view)
         load = self.load_law.force(way.depth, way.rate)
         push = load if whole else load - self.load_law.elastic(way.depth)
-        (u, v), (x, y) = self.deflections, self.relaxation
-        slips = Slips(u / x, v / y, way.camber)
+        slips = Slips(*self._slips(way), way.camber)
         bears = view.graph.apply("lt", 0.0, load)
         found = self.law.forces(slips, where(bears, load, 1.0))
         along, across, moment = (where(bears, one, 0.0) for one in found)
@@ -150,8 +162,12 @@ class Tyre(Force):
         bears, most = graph.apply("lt", 0.0, load), self.law.most(load)
         off = speed + graph.apply("abs", way.rolling)
         found = []
-        for slip, deflection, length in ((way.forward - way.rolling, u, x), (way.sideways, v, y)):
-            rate = slip - speed / length * deflection
+        kappa, tangent = self._slips(way)
+        for velocity, slip, deflection, length in (
+            (way.forward - way.rolling, kappa, u, x),
+            (way.sideways, tangent, v, y),
+        ):
+            rate = velocity - speed * slip
             grows = graph.apply("lt", 0.0, rate * deflection)
             full = graph.apply("lt", most * length, graph.apply("abs", deflection))
             held = where(grows, where(full, 0.0, rate), rate)
@@ -163,7 +179,8 @@ class Tyre(Force):
 def _tyre(e: Entry) -> Tyre | None:
     pair, axis, radius = e.pair(), e.axis("axis"), e.positive("radius")
     rolling = e.positive("rolling_radius") if "rolling_radius" in e.values else radius
-    damping, relaxation = e.law("damping"), e.several("relaxation", 2)
+    damping, settling, relaxation = e.law("damping"), e.law("settling"), e.several("relaxation", 2)
+    e.require("settling", settling, lambda x: x >= 0, "must be 0 or greater")
     e.require("damping", damping, lambda c: c >= 0, "must be 0 or greater")
     for k, length in enumerate(relaxation or ()):
         e.require(f"relaxation[{k}]", length, lambda x: x > 0, "must be greater than 0")
@@ -172,7 +189,7 @@ def _tyre(e: Entry) -> Tyre | None:
         return None
     u, v = e.states()
     lengths = (relaxation[0], relaxation[1])
-    return Tyre(e.name, *pair, axis, radius, rolling, load_law, law, lengths, (u, v))
+    return Tyre(e.name, *pair, axis, radius, rolling, load_law, law, lengths, settling, (u, v))
 
 
 def _law(e: Entry) -> TyreLaw | None:
@@ -204,6 +221,10 @@ TYPES = table(
                 "radii", "relaxation lengths along and across the wheel (m)", required=True, dimension=LENGTH
             ),
             "damping": Field("expression", "radial damping (N s/m)", default=0, dimension=DAMPING),
+            "settling": Field(
+                "expression", "time (s) that damps the deflections at rest; steady slips do not depend on it",
+                default=0, dimension=TIME,
+            ),
             "axis": Field("axis", "axis of the wheel to its left, in its marker", default="y"),
             "rolling_radius": Field(
                 "expression", "effective rolling radius (m), the radius unless given", dimension=LENGTH

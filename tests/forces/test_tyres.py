@@ -141,7 +141,7 @@ def bicycle(steer: float, law: dict[str, Any]) -> eg.Model:
 @pytest.mark.parametrize("law", [POINT, {"law": "magic_formula", "shifts": False}], ids=["brush", "magic_formula"])
 def test_steady_cornering_is_that_of_the_linear_bicycle(law: dict[str, Any]) -> None:
     """r = V delta / (L + K V^2), K = (m / L) (b / C_f - a / C_r), for small angles."""
-    steer, V = 1e-3, 20.0
+    steer, V = 1e-4, 20.0  # small: the brush weakens by r = C alpha / (3 mu F_z)
     mod = bicycle(steer, law).compile()
     start = {"j_x_dot": V, "spin_front_dot": V / R, "spin_rear_dot": V / R}
     traj = mod.simulate(3.0, initial=start)
@@ -196,10 +196,28 @@ def test_relaxation_of_a_step_in_the_slip_angle() -> None:
     assert np.abs(mod.bias(0.0, x)).max() < 1e-9
 
 
+def test_settling_damps_a_standing_wheel_and_no_steady_slip() -> None:
+    """m s^2 + (C tau / s_y) s + C / s_y = 0 sideways at rest; tan alpha = V_sy / |V_x| while it rolls."""
+    tau = 0.04
+    mod = corner({**BRUSH, "settling": tau}).compile(target="numpy")
+    names = list(mod.x_names)
+    x = mod.x0(z=R - 0.02)
+    rows = [names.index(name) for name in ("y_dot", "tyre_deflection_y")]
+    found = np.linalg.eigvals(mod.jacobian(0.0, x)[np.ix_(rows, rows)])
+    wanted = np.roots([120.0, C * tau / RELAXATION[1], C / RELAXATION[1]])
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(wanted), rtol=1e-9)
+    x = mod.x0(z=R - 0.02, x_dot=10.0, y_dot=0.1, spin_dot=10.0 / R)
+    slip = tau / (1 + 10.0 * tau / RELAXATION[1]) * 0.1 / RELAXATION[1]
+    x[rows[1]] = RELAXATION[1] * (0.01 - slip)
+    assert mod.rhs(0.0, x)[rows[1]] == pytest.approx(0.0, abs=1e-12)
+    r = C * 0.01 / (3 * MU * 0.02 * STIFFNESS)
+    assert mod.bias(0.0, x)[1] == pytest.approx(MU * 0.02 * STIFFNESS * (1 - (1 - r) ** 3), rel=1e-9)
+
+
 @pytest.mark.parametrize("target", ["numpy", "cython"])
 @pytest.mark.parametrize("law", [BRUSH, {"law": "magic_formula"}], ids=["brush", "magic_formula"])
 def test_exact_derivatives(target: str, law: dict[str, Any]) -> None:
-    mod = corner({**law, "damping": 300.0}, camber=0.03).compile(target=target)
+    mod = corner({**law, "damping": 300.0, "settling": 0.03}, camber=0.03).compile(target=target)
     x = mod.x0(z=R - 0.02, x_dot=10.0, y_dot=0.4, z_dot=-0.1, spin_dot=9.5 / R)
     x[8:] = [0.01, 0.02]
     units, step = np.eye(len(x)), 1e-7
@@ -230,6 +248,7 @@ def test_turned_road_energy_and_verify() -> None:
         ({**BRUSH, "friction": -1}, "friction", "is -1"),
         ({**BRUSH, "relaxation": (0.2, 0)}, "relaxation[1]", "is 0"),
         ({**BRUSH, "damping": -5}, "damping", "is -5"),
+        ({**BRUSH, "settling": -1}, "settling", "is -1"),
         ({**BRUSH, "shifts": False}, "shifts", "belongs to law: magic_formula"),
         ({"law": "magic_formula", "half_length": 0.1}, "half_length", "belongs to law: brush"),
     ],
