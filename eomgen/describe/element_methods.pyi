@@ -206,6 +206,12 @@ class ElementMethods(Described):
         lateral_spin: Value = 0, spin: Value = 0, speed: Value = None, creep_law: str | None = None,
         normal: Value = None, friction: Value = None) -> ForceHandle:
         """Add creep forces of a rolling wheel on its track (Kalker; Vermeulen and Johnson; Polach)."""
+    def tyre(self, name: str, road: Any, wheel: Any, radius: Value, stiffness: Value, relaxation: Sequence[Value],
+        damping: Value = 0, settling: Value = 0, axis: str | Sequence[float] | None = None,
+        rolling_radius: Value = None, law: str | None = None, slip_stiffness: Value = None, friction: Value = None,
+        half_length: Value = None, shifts: bool | None = None) -> ForceHandle:
+        """Add a tyre on a plane road: the first marker is the road (z out of it), the second the centre of the
+        wheel."""
     def coupling(self, name: str, coordinates: Mapping[Any, Value] | None = None, offset: Value = 0,
         equation: Value = None, closes: Value = None, opens: Value = None, closed: bool | None = None,
         releases: Sequence[Any] | None = None, stabilisation: Value = 10) -> ConstraintHandle:

@@ -13,6 +13,7 @@ from . import (
     muscle,
     springs,
     stops,
+    tyres,
 )
 from .actuators import Actuator, BodyTorque, PointForce
 from .attraction import PointGravity
@@ -32,9 +33,13 @@ from .reaction_friction import ReactionFriction
 from .routes import Route
 from .springs import Damper, Spring
 from .stops import JointStop
+from .tyres import Tyre
 
 FORCES: Types = {}
-_HOMES = (actuators, springs, laws, bushing, attraction, friction, stops, contact, contact_groups_read, muscle, creep)
+_HOMES = (
+    *(actuators, springs, laws, bushing, attraction, friction, stops, contact, contact_groups_read, muscle, creep),
+    tyres,
+)
 for _home in _HOMES:
     FORCES |= _home.TYPES
 
@@ -74,5 +79,6 @@ __all__ = [
     "SphereSphere",
     "Spring",
     "Turn",
+    "Tyre",
     "View",
 ]

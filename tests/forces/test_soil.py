@@ -288,3 +288,56 @@ def test_shapes_that_do_not_lie_on_soil() -> None:
     bare.contacts("s", thin, {**ground, "on": bare.ground}, EXAMPLE)
     with pytest.raises(ModelError, match=r"s\.first\[0\]\.width: is missing"):
         bare.mechanism()
+
+
+def sled(initial: bool = False) -> eg.Model:
+    m = eg.Model("sled", gravity=(0, -G, 0))
+    body = m.body("sole", mass=400.0, inertia={"zz": 30.0})
+    m.planar("j", m.ground, body)
+    shape = {"shape": "plate", "on": body, "length": 1.0, "width": 0.3}
+    law = {"soil": "dry_sand", "friction_angle": m.parameter("phi", 0.5), "dissipation": 1.0, "lateral": False}
+    m.contacts("sand", shape, {"shape": "half_plane", "on": m.ground}, law)
+    if initial:
+        m.initial(j_x_dot=1.0, j_y=-0.001)
+    return m
+
+
+def test_runs_ensembles_and_sensitivities() -> None:
+    """The way of a sled that slides to rest: runs of an ensemble are single runs, derivatives are differences."""
+    mod = sled().compile()
+    start = {"j_x_dot": 1.0, "j_y": -0.001}
+    ends = {phi: mod.simulate(0.2, initial=start, parameters={"phi": phi}) for phi in (0.499, 0.5, 0.501)}
+    assert ends[0.5]["j_x_dot"][-1] < 0.7
+    assert ends[0.5]["sand_shear_1"][-1] > 0.005
+    many = mod.simulate_many(0.2, initial=start, parameters={"phi": [0.499, 0.501]})
+    for k, phi in enumerate((0.499, 0.501)):
+        assert np.ravel(many["j_x"])[k] == pytest.approx(ends[phi]["j_x"][-1], rel=1e-7)
+    slope = mod.sensitivities(["phi"], 0.2, initial=start)
+    wanted = (ends[0.501]["j_x"][-1] - ends[0.499]["j_x"][-1]) / 0.002
+    assert slope["j_x", "phi"][-1] == pytest.approx(wanted, rel=1e-3)
+
+
+def test_momentum_is_kept_and_no_plate_pulls() -> None:
+    """Two free bodies, plates on a profile: the soil's force is that on the other body, and its normal part pushes."""
+    m = eg.Model("pair", gravity=(0, 0, 0))
+    bodies = [m.body(f"b{k}", mass=2.0 + k, inertia={"zz": 0.3 + k}) for k in range(2)]
+    for k, body in enumerate(bodies):
+        m.planar(f"j{k}", m.ground, body)
+    ground = {"shape": "profile", "on": bodies[0], "points": [[-2, 0], [0, 0.1], [2, -0.1]], "depth": 0.5}
+    shape = {"shape": "plate", "on": bodies[1], "length": 0.8, "width": 0.3}
+    m.contacts("soil", ground, shape, {"soil": "dry_sand", "lateral": False})
+    mod = m.compile(target="numpy")
+    rng, pressed = np.random.default_rng(8), 0
+    for _ in range(200):
+        x = np.concatenate([rng.uniform(-0.1, 0.1, 6), rng.standard_normal(6), rng.uniform(-0.02, 0.05, mod.n_x - 12)])
+        force = -mod.bias(0.0, x)[:6]
+        if not np.abs(force).max():
+            continue
+        pressed += 1
+        size = np.abs(force).max()
+        assert np.abs(force[:2] + force[3:5]).max() <= 1e-11 * size
+        moment = x[0] * force[1] - x[1] * force[0] + force[2] + x[3] * force[4] - x[4] * force[3] + force[5]
+        assert abs(moment) <= 1e-11 * size
+        up = x[2] + math.pi / 2  # y of the ground
+        assert force[3] * math.cos(up) + force[4] * math.sin(up) > -0.6 * np.hypot(force[3], force[4])
+    assert pressed > 30

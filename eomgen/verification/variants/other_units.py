@@ -40,6 +40,8 @@ def in_units(description: Description, random: Any, scales: UnitScales = MM_T_MS
         raise NotApplicable("the dimensions of a bare Lagrangian and of given equations are not known")
     if any(entry.values.get("soil", OWN) != OWN for entry in description.sections["forces"]):
         raise NotApplicable("the numbers of a published soil are in SI units")
+    if any(entry.values.get("law") == "magic_formula" for entry in description.sections["forces"]):
+        raise NotApplicable("the coefficients of a published tyre are in SI units")
     visitor = _Scaled(description, scales)
     made = visit(description, visitor)
     simulation = made.values.get("simulation")

@@ -1,0 +1,257 @@
+"""Force elements, a tyre on a plane road: a wheel's motion -> load, slips with relaxation as states, and forces."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, NamedTuple
+
+from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, STIFFNESS, TIME
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import LAW, Field
+from ..elements.looks import PLANE, Drawn, Seen, Wheel
+from ..frames import Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr, sqrt
+from ..graph.vectors import Vec3
+from ..records import dataclass
+from .branches import where
+from .force import Force, Load, MarkerLoad, Measured, View
+from .normal_laws import DampedLinear
+from .tyre_laws import Brush, MagicFormula, Slips, TyreLaw
+
+LAWS = ("brush", "magic_formula")
+
+
+class _Rolling(NamedTuple):
+    """How a wheel stands on the road and moves over it."""
+
+    normal: Vec3
+    along: Vec3
+    across: Vec3
+    lowest: Vec3  #: from the wheel's centre, of the tyre without load
+    patch: Vec3  #: from the wheel's centre, on the road
+    depth: Expr
+    rate: Expr
+    camber: Expr
+    forward: Expr  #: V_x
+    rolling: Expr  #: Omega R
+    sideways: Expr  #: V_sy
+
+
+@dataclass(frozen=True)
+class Tyre(Force):
+    """A tyre of a thin wheel on a plane road.
+
+    The load is max(0, k d + c d') of the penetration d of the wheel's circle, at its lowest point; forces in the road's
+    plane act where the line from the centre to that point meets the plane.  Deflections u, v of the tread are states:
+
+        u' = V_sx - |V_x| kappa,  v' = V_sy - |V_x| tan alpha
+        kappa = (u + tau V_sx) / s_x,  tan alpha = (v + tau V_sy) / s_y,  tau = tau_0 / (1 + |V_x| tau_0 / s)
+
+    with slip velocities V_s and relaxation lengths s (Pacejka, Tyre and Vehicle Dynamics (2nd edition, 2006), section
+    7.2, where tau is 0).  The time tau_0 damps a wheel at rest and does not change steady slips.  A wheel in the air
+    rolls its deflections off.
+    """
+
+    sentence: ClassVar[str] = (
+        "A tyre on a road: load from its penetration, forces in the plane of the road from slips that build up over "
+        "relaxation lengths."
+    )
+    road: Marker
+    wheel: Marker
+    axis: Vec3  #: in the wheel's axes
+    radius: Expr
+    rolling_radius: Expr
+    load_law: DampedLinear
+    law: TyreLaw
+    relaxation: tuple[Expr, Expr]
+    settling: Expr
+    deflections: tuple[Expr, Expr]
+
+    @property
+    def laws(self) -> tuple[Any, ...]:
+        return (self.load_law, self.law)
+
+    @property
+    def acts_along(self) -> bool:
+        return True
+
+    def drawn(self) -> list[Seen]:
+        return [Drawn((self.road,), about=PLANE), Wheel(self.wheel, self.radius)]
+
+    def measured(self, view: View) -> Measured:
+        way = self._rolling(view)
+        return Measured(way.depth, way.rate, self.load_law.force(way.depth, way.rate))
+
+    def _rolling(self, view: View) -> _Rolling:
+        normal = vec.transpose(view.rotation(self.road))[2]
+        axis = vec.times(view.rotation(self.wheel), self.axis)
+        reach = vec.sub(view.position(self.wheel), view.position(self.road))
+        height, tilt = vec.dot(normal, reach), vec.dot(normal, axis)
+        upright = sqrt(1.0 - tilt * tilt)  # cos of the camber
+        up = vec.scale(1.0 / upright, vec.sub(normal, vec.scale(tilt, axis)))  # in the wheel's plane
+        along = vec.scale(1.0 / upright, vec.cross(axis, normal))
+        across = vec.cross(normal, along)
+        spin = view.angular_velocity(self.wheel)
+        turning = vec.sub(spin, vec.scale(vec.dot(spin, axis), axis))  # of the carcass, which does not spin
+        lowest, patch = vec.scale(-self.radius, up), vec.scale(-height / upright, up)
+        whirl = view.angular_velocity(self.road)
+
+        def over_road(arm: Vec3) -> Vec3:
+            own = vec.add(view.velocity(self.wheel), vec.cross(turning, arm))
+            return vec.sub(own, vec.add(view.velocity(self.road), vec.cross(whirl, vec.add(reach, arm))))
+
+        velocity = over_road(patch)
+        omega = vec.dot(vec.sub(spin, whirl), axis)
+        return _Rolling(
+            normal,
+            along,
+            across,
+            lowest,
+            patch,
+            self.radius * upright - height,
+            -vec.dot(normal, over_road(lowest)),
+            view.graph.apply("asin", tilt),
+            vec.dot(along, velocity),
+            omega * self.rolling_radius,
+            vec.dot(across, velocity),
+        )
+
+    def _slips(self, way: _Rolling) -> tuple[Expr, Expr]:
+        """Longitudinal slip and tangent of the slip angle of the law."""
+        speed, (x, y), (u, v) = way.depth.graph.apply("abs", way.forward), self.relaxation, self.deflections
+
+        def slip(deflection: Expr, velocity: Expr, length: Expr) -> Expr:
+            tau = self.settling / (1.0 + speed * self.settling / length)
+            return (deflection + tau * velocity) / length
+
+        return slip(u, way.forward - way.rolling, x), slip(v, way.sideways, y)
+
+    def loads(self, view: View) -> list[Load]:
+        return self._loads(view, True)
+
+    def potential(self, view: View) -> Expr | None:
+        return self.load_law.energy(self._rolling(view).depth)
+
+    def remainder(self, view: View) -> list[Load]:
+        return self._loads(view, False)
+
+    def _loads(self, view: View, whole: bool) -> list[Load]:
+        way = self._rolling(view)
+        load = self.load_law.force(way.depth, way.rate)
+        push = load if whole else load - self.load_law.elastic(way.depth)
+        slips = Slips(*self._slips(way), way.camber)
+        bears = view.graph.apply("lt", 0.0, load)
+        found = self.law.forces(slips, where(bears, load, 1.0))
+        along, across, moment = (where(bears, one, 0.0) for one in found)
+        sliding = vec.add(vec.scale(along, way.along), vec.scale(across, way.across))
+        pressing, turn = vec.scale(push, way.normal), vec.scale(moment, way.normal)
+        force = vec.add(pressing, sliding)
+        torque = vec.add(vec.add(vec.cross(way.lowest, pressing), vec.cross(way.patch, sliding)), turn)
+        reach = vec.sub(view.position(self.wheel), view.position(self.road))
+        return [
+            MarkerLoad(self.wheel, force, torque),
+            MarkerLoad(self.road, vec.neg(force), vec.neg(vec.add(torque, vec.cross(reach, force)))),
+        ]
+
+    def state_rates(self, view: View) -> tuple[Expr, ...]:
+        way, graph = self._rolling(view), view.graph
+        (u, v), (x, y) = self.deflections, self.relaxation
+        speed = graph.apply("abs", way.forward)
+        load = self.load_law.force(way.depth, way.rate)
+        bears, most = graph.apply("lt", 0.0, load), self.law.most(load)
+        off = speed + graph.apply("abs", way.rolling)
+        found = []
+        kappa, tangent = self._slips(way)
+        for velocity, slip, deflection, length in (
+            (way.forward - way.rolling, kappa, u, x),
+            (way.sideways, tangent, v, y),
+        ):
+            rate = velocity - speed * slip
+            grows = graph.apply("lt", 0.0, rate * deflection)
+            full = graph.apply("lt", most * length, graph.apply("abs", deflection))
+            held = where(grows, where(full, 0.0, rate), rate)
+            found.append(where(bears, held, -off / length * deflection))
+        return tuple(found)
+
+
+# -- reading ----------------------------------------------------------------------------------------------------------
+def _tyre(e: Entry) -> Tyre | None:
+    pair, axis, radius = e.pair(), e.axis("axis"), e.positive("radius")
+    rolling = e.positive("rolling_radius") if "rolling_radius" in e.values else radius
+    damping, settling, relaxation = e.law("damping"), e.law("settling"), e.several("relaxation", 2)
+    e.require("settling", settling, lambda x: x >= 0, "must be 0 or greater")
+    e.require("damping", damping, lambda c: c >= 0, "must be 0 or greater")
+    for k, length in enumerate(relaxation or ()):
+        e.require(f"relaxation[{k}]", length, lambda x: x > 0, "must be greater than 0")
+    law, load_law = _law(e), DampedLinear(e.positive("stiffness"), damping)
+    if pair is None or law is None or relaxation is None or e.at_fault():
+        return None
+    u, v = e.states()
+    lengths = (relaxation[0], relaxation[1])
+    return Tyre(e.name, *pair, axis, radius, rolling, load_law, law, lengths, settling, (u, v))
+
+
+def _law(e: Entry) -> TyreLaw | None:
+    kind = e.choice("law")
+    if kind == "brush":
+        e.refuse("shifts", "belongs to law: magic_formula")
+        for key in ("slip_stiffness", "friction"):
+            if key not in e.values:
+                e.fault(key, "is missing", "law: brush needs slip_stiffness and friction")
+        if e.at_fault():
+            return None
+        half = e.positive("half_length") if "half_length" in e.values else None
+        return Brush(e.positive("slip_stiffness"), e.positive("friction"), half)
+    for key in ("slip_stiffness", "half_length"):
+        e.refuse(key, "belongs to law: brush")
+    friction = e.positive("friction") if "friction" in e.values else e.graph.one
+    return MagicFormula(e.flag("shifts"), friction)
+
+
+TYPES = table(
+    ElementType(
+        "tyre",
+        "a tyre on a plane road: the first marker is the road (z out of it), the second the centre of the wheel.",
+        {
+            "between": Field("pair", "the road and the wheel's centre", required=True),
+            "radius": Field("expression", "radius without load (m)", required=True, dimension=LENGTH),
+            "stiffness": Field("expression", "radial stiffness (N/m)", required=True, dimension=STIFFNESS),
+            "relaxation": Field(
+                "radii", "relaxation lengths along and across the wheel (m)", required=True, dimension=LENGTH
+            ),
+            "damping": Field("expression", "radial damping (N s/m)", default=0, dimension=DAMPING),
+            "settling": Field(
+                "expression", "time (s) that damps the deflections at rest; steady slips do not depend on it",
+                default=0, dimension=TIME,
+            ),
+            "axis": Field("axis", "axis of the wheel to its left, in its marker", default="y"),
+            "rolling_radius": Field(
+                "expression", "effective rolling radius (m), the radius unless given", dimension=LENGTH
+            ),
+            "law": Field(
+                "choice",
+                "law of the forces: brush; magic_formula, of the car tyre 205/60R15 91V of Pacejka (2006)",
+                default=LAWS[0],
+                choices=LAWS,
+            ),
+            "slip_stiffness": Field(
+                "expression", "force of the brush per slip (N), along and across", level=LAW, dimension=FORCE
+            ),
+            "friction": Field(
+                "expression", "friction coefficient of the brush, or factor of the peaks of the Magic Formula",
+                level=LAW, dimension=NONE,
+            ),
+            "half_length": Field(
+                "expression", "half of the length of contact (m) of the brush, for its aligning moment",
+                dimension=LENGTH,
+            ),
+            "shifts": Field(
+                "flag", "whether the Magic Formula has its forces at no slip (conicity, ply steer)", default=True
+            ),
+        },
+        _tyre,
+        states=lambda values: {"deflection_x": "m", "deflection_y": "m"},
+        ends=("road", "wheel"),
+    )
+)  # fmt: skip
