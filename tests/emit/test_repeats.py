@@ -115,7 +115,7 @@ def test_loops_found_in_closed_mechanisms_give_the_bits_of_straight_text(
     for label, change in (
         ("loops", {"rolled": 0, "repeated": 0, "repeated_dynamics": 0}),
         ("marks", {"rolled": 0, "repeated": NEVER, "repeated_dynamics": NEVER}),
-        ("straight", {"rolled": NEVER}),
+        ("straight", {"rolled": NEVER, "rolled_of_long": NEVER}),
     ):
         limits = replace(program.limits, **change)
         sources = emit_c(replace(program, limits=limits), "double", lanes=False)
