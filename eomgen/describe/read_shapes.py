@@ -7,7 +7,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..forces.contact_shapes import CORNERS, SHAPE_FIELDS, ContactShape
+from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS
+from ..forces.contact_shapes import ContactShape
+from ..forces.contact_states import POINTS, points_of_plate
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from .checks import check_keys
@@ -82,12 +84,26 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         for k, x in enumerate(lengths or ()):
             positive(reader, f"{path}.{key}[{k}]", x)
         return None if lengths is None else tuple(lengths)
+    if kind == "plate":
+        return _plate(reader, path, given)
     names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius",)
     sizes = [reader.expression(f"{path}.{name}", given.get(name, 0)) for name in names]
     for name, x in zip(names, sizes, strict=True):
         if name in given:
             positive(reader, f"{path}.{name}", x, kind == "segment" and name == "radius")
     return tuple(sizes)
+
+
+def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+    """Length, width and number of points of a plate."""
+    sizes = [reader.expression(f"{path}.{name}", given[name]) for name in ("length", "width")]
+    for name, x in zip(("length", "width"), sizes, strict=True):
+        positive(reader, f"{path}.{name}", x)
+    count = points_of_plate(given)
+    if count is None:
+        remedy = f"give a whole number from 1 to {POINTS}"
+        reader.faults.add(f"{path}.points", f"is {shown(given['points'])}", remedy)
+    return (*sizes, reader.graph.constant(float(count or 1)))
 
 
 def _several(reader: Reader, path: str, value: Any, count: int) -> list[Expr] | None:

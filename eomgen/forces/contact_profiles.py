@@ -148,13 +148,13 @@ def arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: P
     )
 
 
-def peaks(points: Sequence[Point]) -> list[Point]:
-    """Inner points at which the profile turns down, as far as numbers tell: corners that meet what is flat."""
+def peaks(points: Sequence[Point]) -> list[tuple[int, Point]]:
+    """Inner points, numbered, at which the profile turns down, as far as numbers tell: they meet what is flat."""
     found = []
-    for a, b, c in zip(points, points[1:], points[2:], strict=False):
+    for k, (a, b, c) in enumerate(zip(points, points[1:], points[2:], strict=False)):
         turn = cross(minus(b, a), minus(c, b)).value
         if turn is None or turn < 0.0:
-            found.append(b)
+            found.append((k, b))
     return found
 
 
