@@ -96,7 +96,8 @@ class Creep(Force):
         force = vec.times(axes, (kept * first, kept * second, zero))
         moment = vec.times(axes, (zero, zero, kept * (self.lateral_spin * y - self.spin * p)))
         point = vec.sub(vec.add(view.position(self.wheel), arm), view.position(self.track))
-        back, turned = vec.scale(-1.0, force), vec.scale(-1.0, vec.add(moment, vec.cross(point, force)))
+        still = vec.zero(view.graph)
+        back, turned = vec.sub(still, force), vec.sub(still, vec.add(moment, vec.cross(point, force)))
         return [
             MarkerLoad(self.wheel, force, vec.add(moment, vec.cross(arm, force))),
             MarkerLoad(self.track, back, turned),
@@ -111,15 +112,17 @@ def _creep(e: Entry) -> Creep | None:
             e.refuse(key, "the linear law does not saturate")
         elif key not in e.values:
             e.fault(key, "is missing", f"the law {law} needs the normal force and the coefficient of friction")
-    coefficients = [e.law(key) for key in ("longitudinal", "lateral", "lateral_spin", "spin")]
-    for key, value in zip(("longitudinal", "lateral"), coefficients, strict=False):
+    along, across, turning, spin = (e.law(key) for key in ("longitudinal", "lateral", "lateral_spin", "spin"))
+    for key, value in (("longitudinal", along), ("lateral", across)):
         e.require(key, value, lambda f: f >= 0, "must be 0 or greater")
     friction = e.given("friction")
     if friction is not None:
         e.require("friction", friction, lambda m: m >= 0, "must be 0 or greater")
     if pair is None or e.at_fault():
         return None
-    return Creep(e.name, *pair, radius, e.given("speed"), *coefficients, law, e.given("normal"), friction)
+    track, wheel = pair
+    speed, normal = e.given("speed"), e.given("normal")
+    return Creep(e.name, track, wheel, radius, speed, along, across, turning, spin, law, normal, friction)
 
 
 TYPES = table(

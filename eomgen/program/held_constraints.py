@@ -11,10 +11,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ..forces.branches import where
 from ..graph.core import Expr
 from ..kinematics import Kinematics
-from ..kinematics.eliminate import Matrix, eliminate, total
+from ..kinematics.eliminate import Matrix, total
 from ..kinematics.switched import SwitchedRow
+from ..limits.inertia import SINGULAR
 
 
 class LinearValues(NamedTuple):
@@ -37,7 +39,7 @@ def hold(found: LinearValues, rows: Sequence[SwitchedRow], count: int) -> Linear
     A = _switched_matrix(inner, on)
     right = [[-(s * w) for s, w in zip(on, found.still[n:], strict=True)]]
     right += [[-(s * row[j]) for s, row in zip(on, found.gain[n:], strict=True)] for j in range(count)]
-    first, *columns = [eliminate(A, column) for column in right]
+    first, *columns = _solve(A, right)
     still = [_with(N, row[count:], first) for N, row in zip(found.still[:n], found.gain, strict=False)]
     gain = [[_with(row[j], row[count:], columns[j]) for j in range(count)] for row in found.gain[:n]]
     return LinearValues(still, gain)
@@ -63,7 +65,7 @@ def plastic_impacts(
             continue
         on = [set_to.get(row.state, _closed(row)) for row in rows]
         A = _switched_matrix(inner, on)
-        impulses = eliminate(A, [-(s * row.rate) for s, row in zip(on, rows, strict=True)])
+        (impulses,) = _solve(A, [[-(s * row.rate) for s, row in zip(on, rows, strict=True)]])
         after = []
         for j, (name, v) in enumerate(zip(kinematics.velocity_names, kinematics.v, strict=True)):
             change = [column[j] * i for column, i in zip(columns, impulses, strict=True)]
@@ -82,6 +84,31 @@ def _switched_matrix(inner: Matrix, on: Sequence[Expr]) -> Matrix:
     """Negative definite: that of the rows that are closed, -1 on the diagonal of the others."""
     size = range(len(on))
     return [[on[i] * inner[i][j] * on[j] + ((on[i] - 1.0) if i == j else 0.0) for j in size] for i in size]
+
+
+def _solve(given: Matrix, right: Sequence[Sequence[Expr]]) -> list[list[Expr]]:
+    """Solutions for a negative semidefinite matrix; a row that follows from those before it gets 0.
+
+    There its pivot is rounding of its own diagonal, and so is all that is left of the row.
+    """
+    graph, n, A = given[0][0].graph, len(given), [list(row) for row in given]
+    columns, pivots = [list(column) for column in right], list[Expr]()
+    own = []
+    for k in range(n):
+        least = SINGULAR * graph.apply("abs", given[k][k])
+        own.append(graph.apply("lt", least, graph.apply("abs", A[k][k])))
+        pivots.append(where(own[k], A[k][k], 1.0))
+        for i in range(k + 1, n):
+            ratio = where(own[k], A[i][k] / pivots[k], 0.0)
+            for j in range(k + 1, n):
+                A[i][j] = A[i][j] - ratio * A[k][j]
+            for column in columns:
+                column[i] = column[i] - ratio * column[k]
+    for x in columns:
+        for k in reversed(range(n)):
+            rest = total([x[k], *(-(A[k][j] * x[j]) for j in range(k + 1, n))])
+            x[k] = where(own[k], rest / pivots[k], 0.0)
+    return columns
 
 
 def _with(base: Expr, factors: Sequence[Expr], values: Sequence[Expr]) -> Expr:

@@ -45,6 +45,19 @@ def test_two_carts_latch(method: str, target: str) -> None:
 
 
 @pytest.mark.parametrize("target", TARGETS)
+def test_a_second_latch_carries_nothing(target: str) -> None:
+    """Of two that demand the same; the motion is that of one."""
+    m = carts()
+    again = m.coupling("again", {"x1": 2, "x2": -2}, closes="x2 - x1")
+    m.output("F2", again.multiplier())
+    mod, single = m.compile(target=target), carts().compile(target="numpy")
+    run, other = mod.simulate(3.0), single.simulate(3.0)
+    assert run["x1"][-1] == pytest.approx(other["x1"][-1], abs=1e-8)
+    assert [run["latch_closed"][-1], run["again_closed"][-1]] == [1.0, 1.0]
+    assert mod.outputs(run.t, run.x)[1][-1] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("target", TARGETS)
 def test_latch_opens_where_it_would_pull(target: str) -> None:
     """Bodies that only touch part where the spring begins to pull: after half a swing, at the speed of the impact."""
     m = carts(opens="multiplier(latch)")

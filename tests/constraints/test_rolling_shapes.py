@@ -1,4 +1,4 @@
-"""Convex shapes that roll: an ellipsoid against points of its surface and a ball, an egg against energy and grip."""
+"""Convex shapes that roll: an ellipsoid against points of its surface and a ball, an egg against its energy."""
 
 from __future__ import annotations
 
