@@ -121,12 +121,15 @@ def _walk(belt: np.ndarray, pitch: float, count: int) -> np.ndarray:
     return np.array(places)
 
 
-SOIL = {"stiffness": "k_ground", "dissipation": 0.5, "friction": "mu_ground", "smoothing": "slip"}
+GROUND = {"stiffness": "k_ground", "dissipation": 0.5, "friction": "mu_ground", "smoothing": "slip"}
 STEEL = {"stiffness": "k_wheels", "dissipation": 0.5, "friction": "mu_wheels", "smoothing": "slip"}
 
 
-def undercarriage(m: eg.Model, track: Track, mass: float, inertia: Any, ground: Any = None, law: Any = None) -> Any:
-    """Add frame, wheels and chain to a model, and the contacts between them; the frame is returned."""
+def undercarriage(m: eg.Model, track: Track, mass: float, inertia: Any, ground: Any = None, soil: str = "") -> Any:
+    """Add frame, wheels and chain to a model, and the contacts between them; the frame is returned.
+
+    The ground, a flat one unless given, is hard but for the named soil.
+    """
     m.parameter("k_ground", 1e8, doc="of a corner of a shoe on the ground (N/m^1.5)")
     m.parameter("mu_ground", 0.7)
     m.parameter("k_wheels", 8e8, doc="of rails on rollers, bushings on the sprocket (N/m^1.5)")
@@ -185,7 +188,12 @@ def undercarriage(m: eg.Model, track: Track, mass: float, inertia: Any, ground: 
         "seat": track.bushing + 0.0005,
         "tip_radius": track.sprocket + track.tip,
     }
-    m.contacts("ground", shoes, ground or {"shape": "half_plane", "on": m.ground}, law or SOIL)
+    law: dict[str, Any] = GROUND
+    if soil:  # shoes of 0.6 m, of both tracks
+        under = [link.at(track.pitch / 2, -track.shoe, 0) for link in links]
+        shoes = {"shape": "plate", "on": under, "length": track.pitch, "width": 1.2}
+        law = {"soil": soil, "contact_width": 0.6, "dissipation": 1.0, "lateral": False}
+    m.contacts("ground", shoes, ground or {"shape": "half_plane", "on": m.ground}, law)
     m.contacts("wheels", rails, wheels, STEEL)
     m.contacts("mesh", {"shape": "circle", "on": links, "radius": track.bushing}, teeth, STEEL)
     m.torque("motor", "sprocket", "max(-relief, min(relief, gain*(speed - sprocket_dot)))")
@@ -260,7 +268,7 @@ def superstructure(m: eg.Model, frame: Any, height: float) -> Any:
     return bucket
 
 
-def build(track: Track | None = None, ground: Any = None, law: Any = None) -> eg.Model:
+def build(track: Track | None = None, ground: Any = None, soil: str = "") -> eg.Model:
     """The whole machine; gravity is turned by ``slope``, so that the ground climbs along x.
 
     It moves in the plane of its tracks: what the slewing upper structure exerts across is carried by the frame.
@@ -269,7 +277,7 @@ def build(track: Track | None = None, ground: Any = None, law: Any = None) -> eg
     m = eg.Model("tracked_excavator", gravity=("-g*sin(slope)", "-g*cos(slope)", 0))
     m.parameter("g", 9.81)
     m.parameter("slope", 0.0, doc="angle of the ground (rad)")
-    frame = undercarriage(m, track, 3900, (2500, 7000, 5500), ground, law)
+    frame = undercarriage(m, track, 3900, (2500, 7000, 5500), ground, soil)
     superstructure(m, frame, track.height)
     m.simulation(end=2, method="RK45", rtol=1e-4, atol=1e-5)
     return m

@@ -12,7 +12,7 @@ import pytest
 
 import eomgen as eg
 from eomgen.shipped import example_files
-from examples.tracked_excavator import SOIL, Track, build, undercarriage
+from examples.tracked_excavator import GROUND, Track, build, undercarriage
 
 SHORT = Track(links=27, rollers=3, carriers=1, raised=0.015)
 
@@ -67,7 +67,7 @@ def ground_force(mod: Any, x: np.ndarray) -> np.ndarray:
         turning = (mod.poses(q + h * v)[rows][:, 1, 0] - mod.poses(q - h * v)[rows][:, 1, 0]) / (2 * h)
         cosine = mod.poses(q)[rows][:, 0, 0]
         middle = speed[:, 0] + turning / cosine * (0.015 - 0.5 * depth)  # below the end, in the middle of the overlap
-        push = 1e8 * np.maximum(depth, 0) ** 1.5 * np.maximum(0, 1 - SOIL["dissipation"] * speed[:, 1])
+        push = 1e8 * np.maximum(depth, 0) ** 1.5 * np.maximum(0, 1 - GROUND["dissipation"] * speed[:, 1])
         total += push.sum(), -(0.7 * push * middle / np.sqrt(middle**2 + 0.02**2)).sum()
     return total[::-1]
 
@@ -99,3 +99,19 @@ def test_it_drives_as_fast_as_teeth_pass() -> None:
     way = np.interp(start + count, passed, run["x"]) - np.interp(start, passed, run["x"])
     assert count > 8
     assert way == pytest.approx(count * SHORT.pitch, rel=0.01)
+
+
+@pytest.mark.slow
+def test_soil_in_loops_of_c_equals_numpy() -> None:
+    m = eg.Model("track_on_sand", gravity=(0, -9.81, 0))
+    undercarriage(m, SHORT, 6000, {"zz": 3000}, soil="dry_sand")
+    compiled, plain = m.compile(kernels=["rhs"]), m.compile(target="numpy")
+    x = plain.x0()
+    x[plain.x_names.index("y")] -= 0.03  # a part of the shoes in the sand
+    x[plain.x_names.index("chain_y")] -= 0.03
+    moving = slice(plain.n_q, plain.n_q + 12)
+    x[moving] = 0.1 * np.sin(np.arange(12))
+    x = plain.project(x)
+    expected = plain.rhs(0.0, x)
+    assert np.abs(expected).max() > 100
+    np.testing.assert_allclose(compiled.rhs(0.0, x), expected, rtol=0, atol=1e-8 * np.abs(expected).max())
