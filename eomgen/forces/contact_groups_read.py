@@ -13,7 +13,7 @@ from .contact import CURVED
 from .contact_groups import ContactGroups
 from .contact_shape_fields import GROUNDS, PLANAR, SHAPE_FIELDS
 from .contact_shapes import ContactShape
-from .contact_states import ShapeParts, given_groups, pair_states
+from .contact_states import MOST_PAIRS, ShapeParts, given_groups, pair_states
 from .friction_laws import DryFriction, has_bristles, read_friction
 from .normal_laws import HertzBodies, NormalLaw, read_normal_law
 from .soil_laws import LATERAL, SOIL, read_soil, states_of_soil
@@ -35,7 +35,13 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         for key, shapes in (("first", first), ("second", second)):
             if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
                 e.fault(key, f"a {flat[0]} has no radius for Hertz's law from moduli", "give stiffness, not moduli")
-    axes = len(_axes(e.values, given_groups(e.values), lateral)) if soil or has_bristles(e.values) else 0
+    if not soil and not has_bristles(e.values):
+        return ContactGroups(e.name, first, second, law, friction)
+    groups = given_groups(e.values)
+    axes, pairs = len(_axes(e.values, groups, lateral)), pair_states(groups)[1]
+    if pairs > MOST_PAIRS:
+        told = f"has {pairs} pairs with states; at most {MOST_PAIRS} may have them"
+        e.fault("", told, "put only shapes that stick to each other into the groups, or use friction_law: brown_mcphee")
     return ContactGroups(e.name, first, second, law, friction, e.states(), axes)
 
 
@@ -81,7 +87,8 @@ def _states(values: Mapping[str, Any]) -> dict[str, str]:
     groups = given_groups(values)
     axes = _axes(values, groups, values.get("lateral", True) is not False)
     names = states_of_soil(axes) if soil else tuple(f"bristle{axis}" for axis in axes)
-    return {f"{name}_{k + 1}": "m" for k in range(pair_states(groups)[1]) for name in names}
+    pairs = pair_states(groups)[1]
+    return {f"{name}_{k + 1}": "m" for k in range(pairs) for name in names} if pairs <= MOST_PAIRS else {}
 
 
 def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
@@ -154,7 +161,8 @@ _ON_GROUND = ("ellipsoid", "cuboid")  #: shapes that meet a half-space alone
 _IN_SPACE = ("sphere", "capsule", *_ON_GROUND)
 _ALLOWED = (
     "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
-    "smooth_profile; sphere and capsule meet each other and half_space; ellipsoid and cuboid meet half_space"
+    "smooth_profile, which plates meet too; sphere and capsule meet each other and half_space; ellipsoid and cuboid "
+    "meet half_space"
 )
 
 _SHAPES = "shapes {shape, on, ...} of the "

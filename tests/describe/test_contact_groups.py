@@ -98,7 +98,11 @@ FAULTS = [
     (LAST, "", "forces.among: has no law; give law: {stiffness: ...}"),
     (LAST, "law: {friction: 0.2, smoothing: 0.1}", "forces.among.stiffness: is missing"),
     (LAST, "law: {stiffness: 1, stifness: 1}", "forces.among.stifness: unknown key"),
-    (FLOOR, "{shape: half_space, on: ground}", "circle and half_space do not meet; circle, segment, box, polygon, outline"),
+    (
+        FLOOR,
+        "{shape: half_space, on: ground}",
+        "circle and half_space do not meet; circle, segment, box, polygon, outline",
+    ),
     (FLOOR, "{shape: circle, on: a, radius: r}", "the shape on a is in both groups; give second only what is not in"),
     (BOXES, BOXES.replace("[a, b]", "a"), "forces.among: has shapes on one body only"),
     (
