@@ -13,7 +13,7 @@ from .contact import CURVED
 from .contact_groups import ContactGroups
 from .contact_shape_fields import GROUNDS, PLANAR, SHAPE_FIELDS
 from .contact_shapes import ContactShape
-from .contact_states import ShapeParts, given_groups, pair_states
+from .contact_states import MOST_PAIRS, ShapeParts, given_groups, pair_states
 from .friction_laws import DryFriction, has_bristles, read_friction
 from .normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, RigidLaw, read_normal_law
 from .soil_laws import LATERAL, SOIL, read_soil, states_of_soil
@@ -35,8 +35,15 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         for key, shapes in (("first", first), ("second", second)):
             if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
                 e.fault(key, f"a {flat[0]} has no radius for Hertz's law from moduli", "give stiffness, not moduli")
-    axes = len(_axes(e.values, given_groups(e.values), lateral)) if soil or has_bristles(e.values) else 0
     rigidly = e.given("friction") if isinstance(law, RigidLaw) else getattr(friction, "dynamic", None)
+    axes = 0
+    if soil or has_bristles(e.values):
+        groups = given_groups(e.values)
+        axes, pairs = len(_axes(e.values, groups, lateral)), pair_states(groups)[1]
+        if pairs > MOST_PAIRS:
+            told = f"has {pairs} pairs with states; at most {MOST_PAIRS} may have them"
+            remedy = "put only shapes that stick to each other into the groups, or use friction_law: brown_mcphee"
+            e.fault("", told, remedy)
     return ContactGroups(e.name, first, second, law, friction, e.states(), axes, rigidly, e.given("restitution"))
 
 
@@ -99,7 +106,8 @@ def _states(values: Mapping[str, Any]) -> dict[str, str]:
     groups = given_groups(values)
     axes = _axes(values, groups, values.get("lateral", True) is not False)
     names = states_of_soil(axes) if soil else tuple(f"bristle{axis}" for axis in axes)
-    return {f"{name}_{k + 1}": "m" for k in range(pair_states(groups)[1]) for name in names}
+    pairs = pair_states(groups)[1]
+    return {f"{name}_{k + 1}": "m" for k in range(pairs) for name in names} if pairs <= MOST_PAIRS else {}
 
 
 def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
@@ -172,7 +180,8 @@ _ON_GROUND = ("ellipsoid", "cuboid")  #: shapes that meet a half-space alone
 _IN_SPACE = ("sphere", "capsule", *_ON_GROUND)
 _ALLOWED = (
     "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
-    "smooth_profile; sphere and capsule meet each other and half_space; ellipsoid and cuboid meet half_space"
+    "smooth_profile, which plates meet too; sphere and capsule meet each other and half_space; ellipsoid and cuboid "
+    "meet half_space"
 )
 
 _NORMAL_LAW = CURVED["normal_law"]._replace(

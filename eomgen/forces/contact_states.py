@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+MOST_PAIRS = 2000  #: pairs that may have states: equations grow with states, and circles among themselves with squares
 PLATE = 2  #: points of a plate unless given
 POINTS = 8  #: most points of a plate
 #: Parts that meet surfaces, in the order in which their states stand.

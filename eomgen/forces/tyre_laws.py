@@ -9,11 +9,11 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
 
 from ..graph.core import Expr, sqrt
+from ..limits.contacts import NO_SLIP
 from ..records import dataclass
 from .branches import where
 
 MOST = 3.0  #: slip up to which measured curves are followed, that of an angle of 72 degrees
-SMALL = 1e-9  #: squared slip, and 1 less longitudinal slip, below which the direction of sliding is not asked for
 
 
 class Slips(NamedTuple):
@@ -65,9 +65,9 @@ class Brush(TyreLaw):
         graph = load.graph
         kappa, tangent = slips.along, slips.across
         square = kappa * kappa + tangent * tangent
-        sliding = graph.apply("lt", SMALL * SMALL, square)
+        sliding = graph.apply("lt", NO_SLIP * NO_SLIP, square)
         size = where(sliding, sqrt(where(sliding, square, 1.0)), 0.0)
-        turning = graph.apply("max", SMALL, graph.apply("abs", 1.0 - kappa))  # |Omega| R / |V_x|
+        turning = graph.apply("max", NO_SLIP, graph.apply("abs", 1.0 - kappa))  # |Omega| R / |V_x|
         most = self.friction * load
         theta = self.stiffness / (3.0 * most)
         r = theta * size / turning

@@ -22,7 +22,7 @@ from .tyre_laws import Brush, MagicFormula, Slips, TyreLaw
 LAWS = ("brush", "magic_formula")
 
 
-class _Rolling(NamedTuple):
+class _WheelMotion(NamedTuple):
     """How a wheel stands on the road and moves over it."""
 
     normal: Vec3
@@ -83,7 +83,7 @@ class Tyre(Force):
         way = self._rolling(view)
         return Measured(way.depth, way.rate, self.load_law.force(way.depth, way.rate))
 
-    def _rolling(self, view: View) -> _Rolling:
+    def _rolling(self, view: View) -> _WheelMotion:
         normal = vec.transpose(view.rotation(self.road))[2]
         axis = vec.times(view.rotation(self.wheel), self.axis)
         reach = vec.sub(view.position(self.wheel), view.position(self.road))
@@ -103,7 +103,7 @@ class Tyre(Force):
 
         velocity = over_road(patch)
         omega = vec.dot(vec.sub(spin, whirl), axis)
-        return _Rolling(
+        return _WheelMotion(
             normal,
             along,
             across,
@@ -117,7 +117,7 @@ class Tyre(Force):
             vec.dot(across, velocity),
         )
 
-    def _slips(self, way: _Rolling) -> tuple[Expr, Expr]:
+    def _slips(self, way: _WheelMotion) -> tuple[Expr, Expr]:
         """Longitudinal slip and tangent of the slip angle of the law."""
         speed, (x, y), (u, v) = way.depth.graph.apply("abs", way.forward), self.relaxation, self.deflections
 

@@ -11,3 +11,6 @@ SHARED = 1e-8
 #: Squared sine of the angle of two rods below which they count as parallel: nearest points of skew rods lose
 #: 1e-16 / sine^2 of their place, which moves them along the rods, where the distance changes by the sine of that.
 PARALLEL = 1e-12
+#: Slip of a tyre that counts as none, and part of the velocity below which a wheel counts as locked: a brush adheres up
+#: to slips of 3 mu F_z / C, hundredths, beside which it is nothing, and its square, 1e-18, is a number.
+NO_SLIP = 1e-9

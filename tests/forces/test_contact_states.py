@@ -215,3 +215,19 @@ def test_numbers_of_states_are_those_of_the_parts() -> None:
                         at = kind.held[0][i] + kind.held[1][j]
                         assert 0 <= at < function.states
                         assert {row[0], other[0]} == function.holders[at]
+
+
+def test_too_many_pairs_with_states_are_refused() -> None:
+    m, (a, b) = scenes.planar("crowd", 2)
+    groups = [{"shape": "circle", "on": [body.at(k, 0, 0) for k in range(45)], "radius": 0.1} for body in (a, b)]
+    m.contacts("touch", *groups, LUGRE)
+    with pytest.raises(ModelError, match=r"touch: has 2025 pairs with states; at most 2000 may have them"):
+        m.mechanism()
+
+
+def test_plates_meet_ground_alone() -> None:
+    m, (a, b) = scenes.planar("plates", 2)
+    plate = {"shape": "plate", "on": a, "length": 0.2, "width": 0.1}
+    m.contacts("touch", plate, on(PLANAR["circle"], b), {"stiffness": 1e4})
+    with pytest.raises(ModelError, match="circle and plate do not meet; plates meet half_plane, profile"):
+        m.mechanism()
