@@ -109,6 +109,8 @@ class ContactGroups(Force):
         return self._loads(view, "")
 
     def potential(self, view: View) -> Expr | None:
+        if self.is_rigid:
+            return view.graph.zero
         markers, results = self._results(view, "", still=True)
         return results[6 * len(markers)]
 
@@ -142,6 +144,8 @@ class ContactGroups(Force):
         return self._loads(view, LOSSES)
 
     def _loads(self, view: View, part: str) -> list[Load]:
+        if self.is_rigid:
+            return []
         markers, results = self._results(view, part)
         return [
             MarkerLoad(marker, _vector(results[6 * k : 6 * k + 3]), _vector(results[6 * k + 3 : 6 * k + 6]))
