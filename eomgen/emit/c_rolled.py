@@ -103,7 +103,7 @@ def _place(text: str) -> Place:
     return (text, 0) if text == "t" else (text[0], int(text[2:-1]))
 
 
-class Carried(NamedTuple):
+class FromBefore(NamedTuple):
     """What every member of a kind reads from the one before it, so that it stays in a variable."""
 
     reads: dict[int, int]  #: what the first member reads -> number of the export of the member before
@@ -111,7 +111,7 @@ class Carried(NamedTuple):
     alone: frozenset[int]  #: exports that nothing else reads, which are stored by the last member of a run
 
 
-def _find_carried(found: Segments) -> list[Carried]:
+def _find_carried(found: Segments) -> list[FromBefore]:
     """Of every kind; kinds that carry much are left as they are, since registers are few."""
     result = []
     read: set[int] = set()
@@ -131,13 +131,13 @@ def _find_carried(found: Segments) -> list[Carried]:
             reads, first = {}, {}
         result.append((reads, first))
     return [
-        Carried(reads, first, frozenset(e for e in first if read.isdisjoint(
+        FromBefore(reads, first, frozenset(e for e in first if read.isdisjoint(
             range(kind.start + e, kind.start + (len(kind.members) - 1) * len(kind.exports), len(kind.exports)))))
         for kind, (reads, first) in zip(found.kinds, result, strict=True)
     ]  # fmt: skip
 
 
-def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: Carried, name: str) -> str:
+def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: FromBefore, name: str) -> str:
     """A function that evaluates members ``first`` to ``last`` of a kind."""
     n = len(kind.members)
     table = PlaceTable("i", n)
@@ -198,7 +198,7 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: C
     )
 
 
-def _print_carried(kind: SegmentKind, carried: Carried) -> tuple[list[str], list[str]]:
+def _print_carried(kind: SegmentKind, carried: FromBefore) -> tuple[list[str], list[str]]:
     """What comes before and after the loop over members."""
     stride = len(kind.exports)
     before, after = [], []
