@@ -124,7 +124,7 @@ def _print_list(found: Segments, i: int, name: str) -> str:
     return f"{tables}{head}\n{{\n    EOMGEN_BEGIN\n{lines}\n    EOMGEN_RETURN\n}}\n"
 
 
-class Carried(NamedTuple):
+class FromBefore(NamedTuple):
     """What every member of a kind reads from the one before it, so that it stays in a variable."""
 
     reads: dict[int, int]  #: what the first member reads -> number of the export of the member before
@@ -132,7 +132,7 @@ class Carried(NamedTuple):
     alone: frozenset[int]  #: exports that nothing else reads, which are stored by the last member of a run
 
 
-def _find_carried(found: Segments) -> list[Carried]:
+def _find_carried(found: Segments) -> list[FromBefore]:
     """Of every kind; kinds that carry much are left as they are, since registers are few."""
     result = []
     read: set[int] = set()
@@ -152,13 +152,13 @@ def _find_carried(found: Segments) -> list[Carried]:
             reads, first = {}, {}
         result.append((reads, first))
     return [
-        Carried(reads, first, frozenset(e for e in first if read.isdisjoint(
+        FromBefore(reads, first, frozenset(e for e in first if read.isdisjoint(
             range(kind.start + e, kind.start + (len(kind.members) - 1) * len(kind.exports), len(kind.exports)))))
         for kind, (reads, first) in zip(found.kinds, result, strict=True)
     ]  # fmt: skip
 
 
-def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: Carried, name: str) -> str:
+def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: FromBefore, name: str) -> str:
     """A function that evaluates members ``first`` to ``last`` of a kind."""
     if found.lists.is_list(kind.members[0][0]):
         return _print_list(found, kind.members[0][0], name)
@@ -222,7 +222,7 @@ def _print_kind(program: Program, found: Segments, kind: SegmentKind, carried: C
     )
 
 
-def _print_carried(kind: SegmentKind, carried: Carried) -> tuple[list[str], list[str]]:
+def _print_carried(kind: SegmentKind, carried: FromBefore) -> tuple[list[str], list[str]]:
     """What comes before and after the loop over members."""
     stride = len(kind.exports)
     before, after = [], []
