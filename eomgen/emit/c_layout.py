@@ -167,7 +167,7 @@ def _areas_of_bodies(program: Program) -> list[tuple[str, int]]:
     return [
         ("SLOPES", n + 2),  # v, whether sound, whether far
         ("COEFFICIENTS", known - n_q),
-        ("TURNING", n_q),  # a direction of q or of v
+        ("TURNING", max(n_q, n)),  # a direction of q or of v
         ("CHANGE", n_q + n),  # of q' and v'
         ("SPAN", 2 * f * (n_q + n)),
         ("SHARES", f * f),

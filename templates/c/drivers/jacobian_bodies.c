@@ -1,7 +1,7 @@
 /* The Jacobian where the straight-line right-hand side is sound: along a direction the accelerations and multipliers change
    as a sweep over the bodies with the same pivots says. Few freedoms: along those alone, since all directions are first
    projected, P e_j = sum Z_k y_k of the projected units Z_k of the preferred coordinates, A y = (P e_j)_preferred. */
-enum { FEW = NQ == N && MH == M && 2 * F <= N, CHANGES = NQ + N };
+enum { FEW = NQ == N && MH == M && 2 * F <= N, CHANGES = NQ + N, TURNED = NQ > N ? NQ : N };
 
 /* [q'; v'] along the direction in w + AT_TURNING, of q or of v. */
 static void change_along(int of_q, double t, const double *restrict u, const double *restrict c, double *restrict change,
@@ -16,7 +16,7 @@ static void change_along(int of_q, double t, const double *restrict u, const dou
 
 static void turn_to(int place, double *restrict w)
 {
-    for (int k = 0; k < NQ; k++) {
+    for (int k = 0; k < TURNED; k++) {
         w[AT_TURNING + k] = k == place ? 1.0 : 0.0;
     }
 }
