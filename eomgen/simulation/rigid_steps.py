@@ -36,8 +36,8 @@ class RigidSteps:
 
     Attributes
     ----------
-    residual, scale : float
-        (m/s) The largest residual of a step, and the velocities of contacts there.
+    residual : float
+        (m/s) The largest residual of a step.
     missed : int
         Steps whose residual is larger than it should be.
     iterations, most : int
@@ -52,6 +52,7 @@ class RigidSteps:
         self.contacts = RigidContacts(module)
         self.bias = module.kernels.timed("bias_apart")
         self.residual, self.missed, self.iterations, self.most, self.depth = 0.0, 0, 0, 0, 0.0
+        self._misses = False
         self._last: dict[tuple[int, int], Array] = {}
 
     def move(self, q: Array, d: Array) -> Array:
@@ -62,6 +63,7 @@ class RigidSteps:
     def step(self, t: float, q: Array, v: Array, h: float) -> tuple[Array, Array]:
         """Position and velocities (n_q,), (n_v,) a time h later."""
         middle, n_q = t + 0.5 * h, len(q)
+        self._misses = False
         q_m = self.move(q, 0.5 * h * v)
         x = np.concatenate([q_m, v])
         u = self.forcing(middle, x) if self.forcing else None
@@ -76,6 +78,7 @@ class RigidSteps:
             free = held.free(v - h * (held.inverse @ again))
             new, P = self._contact(held, rows, v, free, h)
         position = self.move(q_m, 0.5 * h * new)
+        self.missed += self._misses
         away = held.closing(position, t + h)
         if rows.gaps.size:
             away = away + self._out(held, rows, P, new)
@@ -124,7 +127,7 @@ class RigidSteps:
 
     def _note(self, found: ContactImpulses, scale: float, m: int) -> None:
         self.residual = max(self.residual, found.residual)
-        self.missed += found.residual > self.tolerance * scale
+        self._misses = self._misses or found.residual > self.tolerance * scale
         self.iterations, self.most = max(self.iterations, found.iterations), max(self.most, m)
 
     def _out(self, held: _Held, rows: RigidRows, P: Array, new: Array) -> Array:
