@@ -190,7 +190,11 @@ class ElementMethods(Described):
         stribeck: Value = None, viscous_friction: Value = 0, smoothing: Value = None, normal_law: str | None = None,
         damping: Value = None, friction_law: str | None = None, transition: Value = None,
         bristle_stiffness: Value = None, bristle_damping: Value = None, moduli: Sequence[Value] | None = None,
-        poisson: Sequence[Value] | None = None) -> ForceHandle:
+        poisson: Sequence[Value] | None = None, soil: str | None = None, cohesive_modulus: Value = None,
+        frictional_modulus: Value = None, sinkage_exponent: Value = None, cohesion: Value = None,
+        friction_angle: Value = None, shear_modulus: Value = None, contact_width: Value = None, rebound: Value = None,
+        unloading_stiffness: Value = None, unloading_rise: Value = None, recovery: Value = None,
+        lateral: bool | None = None) -> ForceHandle:
         """Add contact of every shape of a group with every shape of another, by one law."""
     def muscle(self, name: str, a: Any, b: Any, activation: Value, force_max: Value, fiber_length: Value,
         slack_length: Value, velocity_max: Value = None, pennation: Value = 0, damping: Value = 0.1,

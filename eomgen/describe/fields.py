@@ -22,7 +22,7 @@ from ..elements.field import OUTPUT as OUTPUT
 from ..elements.field import Field as Field
 from ..elements.field import Fields as Fields
 from ..forces import FORCES
-from ..forces.contact_shapes import SHAPE_FIELDS
+from ..forces.contact_shape_fields import SHAPE_FIELDS
 from ..joints import JOINTS
 from ..numeric.splines import KINDS as TABLES
 from ..solids import SOLIDS

@@ -7,12 +7,15 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..forces.contact_shapes import CORNERS, SHAPE_FIELDS, ContactShape
+from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS
+from ..forces.contact_shapes import ContactShape
+from ..forces.contact_states import POINTS, points_of_plate
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from .checks import check_keys
 from .description import items
 from .names import nearest
+from .read_outlines import outline_sizes, positive, sprocket_sizes
 from .values import Reader
 
 
@@ -63,25 +66,44 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         if size is None:
             return None
         for k, x in enumerate(size):
-            _positive(reader, f"{path}.size[{k}]", x)
+            positive(reader, f"{path}.size[{k}]", x)
         x, y = 0.5 * size[0], 0.5 * size[1]
         return (-x, -y, x, -y, x, y, -x, y)
     if kind == "polygon":
         return _corners(reader, f"{path}.points", given["points"])
+    if kind in ("outline", "smooth_outline"):
+        corners = _corners(reader, f"{path}.points", given["points"], False)
+        return None if corners is None else outline_sizes(reader, path, given, corners)
+    if kind == "sprocket":
+        return sprocket_sizes(reader, path, given)
     if kind in ("profile", "smooth_profile"):
         return _profile(reader, path, given, 2 if kind == "profile" else 3)
     if kind in ("ellipsoid", "cuboid"):
         key = "semi_axes" if kind == "ellipsoid" else "size"
         lengths = _several(reader, f"{path}.{key}", given[key], 3)
         for k, x in enumerate(lengths or ()):
-            _positive(reader, f"{path}.{key}[{k}]", x)
+            positive(reader, f"{path}.{key}[{k}]", x)
         return None if lengths is None else tuple(lengths)
+    if kind == "plate":
+        return _plate(reader, path, given)
     names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius",)
     sizes = [reader.expression(f"{path}.{name}", given.get(name, 0)) for name in names]
     for name, x in zip(names, sizes, strict=True):
         if name in given:
-            _positive(reader, f"{path}.{name}", x, kind == "segment" and name == "radius")
+            positive(reader, f"{path}.{name}", x, kind == "segment" and name == "radius")
     return tuple(sizes)
+
+
+def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+    """Length, width and number of points of a plate."""
+    sizes = [reader.expression(f"{path}.{name}", given[name]) for name in ("length", "width")]
+    for name, x in zip(("length", "width"), sizes, strict=True):
+        positive(reader, f"{path}.{name}", x)
+    count = points_of_plate(given)
+    if count is None:
+        remedy = f"give a whole number from 1 to {POINTS}"
+        reader.faults.add(f"{path}.points", f"is {shown(given['points'])}", remedy)
+    return (*sizes, reader.graph.constant(float(count or 1)))
 
 
 def _several(reader: Reader, path: str, value: Any, count: int) -> list[Expr] | None:
@@ -90,12 +112,6 @@ def _several(reader: Reader, path: str, value: Any, count: int) -> list[Expr] | 
         reader.wrong(path, value, "two" if count == 2 else "vector")
         return None
     return [reader.expression(f"{path}[{k}]", x) for k, x in enumerate(listed)]
-
-
-def _positive(reader: Reader, path: str, x: Expr, or_zero: bool = False) -> None:
-    number = reader.known(x)
-    if number is not None and (number < 0 if or_zero else number <= 0):
-        reader.faults.add(path, f"is {number:g}", "must be 0 or greater" if or_zero else "must be greater than 0")
 
 
 def _profile(reader: Reader, path: str, given: Mapping[str, Any], least: int) -> tuple[Expr, ...] | None:
@@ -116,14 +132,14 @@ def _profile(reader: Reader, path: str, given: Mapping[str, Any], least: int) ->
             return None
     if "depth" in given:
         depth = reader.expression(f"{path}.depth", given["depth"])
-        _positive(reader, f"{path}.depth", depth)
+        positive(reader, f"{path}.depth", depth)
     else:
         depth = 0.1 * (points[-1][0] - points[0][0])
     return (depth, *(x for point in points for x in point))
 
 
-def _corners(reader: Reader, path: str, value: Any) -> tuple[Expr, ...] | None:
-    """Corners of a polygon, counterclockwise."""
+def _corners(reader: Reader, path: str, value: Any, convex: bool = True) -> tuple[Expr, ...] | None:
+    """Corners of an outline, counterclockwise."""
     listed = items(value)
     if listed is None or not 3 <= len(listed) <= CORNERS:
         reader.faults.add(path, "is no outline", f"give 3 to {CORNERS} corners [x, y]")
@@ -135,7 +151,7 @@ def _corners(reader: Reader, path: str, value: Any) -> tuple[Expr, ...] | None:
     known = [(reader.known(x), reader.known(y)) for x, y in points]
     numbers = [(x, y) for x, y in known if x is not None and y is not None]
     if len(numbers) == len(points):
-        turned = _outline(reader, path, numbers)
+        turned = _outline(reader, path, numbers, convex)
         if turned is None:
             return None
         if turned < 0:
@@ -143,14 +159,14 @@ def _corners(reader: Reader, path: str, value: Any) -> tuple[Expr, ...] | None:
     return tuple(x for point in points for x in point)
 
 
-def _outline(reader: Reader, path: str, points: Sequence[tuple[float, float]]) -> int | None:
-    """1 where a convex outline runs counterclockwise, -1 where clockwise; None where it is none, which is noted."""
+def _outline(reader: Reader, path: str, points: Sequence[tuple[float, float]], convex: bool) -> int | None:
+    """1 where an outline runs counterclockwise, -1 where clockwise; None where something is wrong, which is noted."""
     n, turns, total = len(points), set[bool](), 0.0
     for k in range(n):
         (x0, y0), (x1, y1), (x2, y2) = points[k - 1], points[k], points[(k + 1) % n]
         a, b = (x1 - x0, y1 - y0), (x2 - x1, y2 - y1)
         cross, along = a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]
-        if cross == 0:
+        if cross == 0 and (convex or along <= 0):
             reader.faults.add(
                 f"{path}[{k}]", "lies on a line with the corners beside it, or on one of them", "leave it out"
             )
@@ -161,8 +177,8 @@ def _outline(reader: Reader, path: str, points: Sequence[tuple[float, float]]) -
         message = f"the edges that begin at corners {crossing[0]} and {crossing[1]} cross each other"
         reader.faults.add(path, message, "give the corners in their order around the outline")
         return None
-    if len(turns) > 1:
-        reader.faults.add(path, "is not convex", "make it of several convex polygons on the same marker")
+    if convex and len(turns) > 1:
+        reader.faults.add(path, "is not convex", "give it as shape outline, which need not be")
         return None
     return 1 if total > 0 else -1
 

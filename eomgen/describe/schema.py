@@ -8,7 +8,7 @@ from ..constraints import CONSTRAINTS
 from ..constraints.planetary import WHEELS
 from ..elements.element_type import Types
 from ..forces import FORCES
-from ..forces.contact_shapes import CORNERS, SHAPE_FIELDS
+from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS
 from ..joints import JOINTS
 from ..numeric.rigid_inertia import CHECKS
 from .fields import (

@@ -68,6 +68,8 @@ def _file(program: Program, used: UsedSum) -> str:
                 "second": tables[kind.second],
                 "planar": int(kind.planar),
                 "law": kind.law,
+                "states": kind.states,
+                "held": kind.held,
             }
         )
     context = {
@@ -79,6 +81,8 @@ def _file(program: Program, used: UsedSum) -> str:
         "pair": RESULT,
         "place": PLACE,
         "results": function.results,
+        "states": function.states,
+        "first_state": function.first_state,
         "numbers": [repr(0.0 if x is None else x) for x in function.data] or ["0.0"],
         "tables": tables,
         "kinds": kinds,
@@ -119,11 +123,13 @@ def _law(
         rate = k >= count
         plain = symbol.removeprefix("d_")
         letter, number = plain[0], int(plain[1:])
-        step = len(kind.law) if letter == "l" else tables[kind.first if letter == "a" else kind.second]["length"]
-        places[graph.symbol(symbol).id] = f"{'xuc'['abl'.index(letter)]}[{number + rate * step}]"
-    own = replace(program, graph=graph)
+        own = len(kind.law) + kind.states  # states stand behind the numbers of the law
+        step = own if letter in "ls" else tables[kind.first if letter == "a" else kind.second]["length"]
+        number += len(kind.law) * (letter == "s")
+        places[graph.symbol(symbol).id] = f"{'xucc'['abls'.index(letter)]}[{number + rate * step}]"
+    alone = replace(program, graph=graph)
     pieces = cut(graph, outputs, (), frozenset(), len(graph.nodes) + 1)
-    return print_pieces(own, name, pieces, places).text, used_helpers(own, outputs)
+    return print_pieces(alone, name, pieces, places).text, used_helpers(alone, outputs)
 
 
 def pair_declarations(program: Program) -> list[str]:

@@ -96,9 +96,10 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
             texts.append(text.replace(f"def {name}(t, x, u, c):", f"def {name}(x):"))
             names.append(name)
         row = (kind.first, kind.second, kind.planar, kind.law)
-        kinds.append(f"        ({', '.join([*map(repr, row), *names])}),\n")
+        kinds.append(f"        ({', '.join([*map(repr, row), *names, *map(repr, kind.beside)])}),\n")
     tables = "".join(f"        {table!r},\n" for table in function.tables)
-    made = f"PairSum(\n    {function.bodies},\n    (\n{tables}    ),\n    (\n{''.join(kinds)}    ),\n)"
+    states = f"    {function.states},\n" if function.states else ""
+    made = f"PairSum(\n    {function.bodies},\n    (\n{tables}    ),\n    (\n{''.join(kinds)}    ),\n{states})"
     return "\n\n".join([*texts, f"pairs_{function.name} = {made}"])
 
 

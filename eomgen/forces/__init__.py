@@ -1,7 +1,7 @@
 """Force elements: geometry (a path or a marker) times a law; :data:`FORCES` is the table of their types."""
 
 from ..elements.element_type import ElementType, Types
-from . import actuators, attraction, bushing, contact, contact_groups, friction, laws, muscle, springs, stops
+from . import actuators, attraction, bushing, contact, contact_groups_read, friction, laws, muscle, springs, stops
 from .actuators import Actuator, BodyTorque, PointForce
 from .attraction import PointGravity
 from .bushing import Bushing
@@ -21,7 +21,7 @@ from .springs import Damper, Spring
 from .stops import JointStop
 
 FORCES: Types = {}
-for _home in (actuators, springs, laws, bushing, attraction, friction, stops, contact, contact_groups, muscle):
+for _home in (actuators, springs, laws, bushing, attraction, friction, stops, contact, contact_groups_read, muscle):
     FORCES |= _home.TYPES
 
 __all__ = [

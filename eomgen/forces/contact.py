@@ -61,7 +61,7 @@ class Contact(Force):
     def loads(self, view: View) -> list[Load]:
         normal, depth, arms, sliding, rate = self._motion(view)
         push = self._shared(view, self.normal_law.force(depth, rate))
-        drag = self._drag(push, self._slip(view, normal, depth, sliding))
+        drag = self._drag(self._slip(view, normal, depth, sliding, push))
         return self._pair(arms, vec.add(vec.scale(push, normal), drag))
 
     def potential(self, view: View) -> Expr | None:
@@ -71,14 +71,21 @@ class Contact(Force):
         normal, depth, arms, sliding, rate = self._motion(view)
         push = self._shared(view, self.normal_law.force(depth, rate))
         lost = push - self._shared(view, self.normal_law.elastic(depth))
-        drag = self._drag(push, self._slip(view, normal, depth, sliding))
+        drag = self._drag(self._slip(view, normal, depth, sliding, push))
         return self._pair(arms, vec.add(vec.scale(lost, normal), drag))
 
     def state_rates(self, view: View) -> tuple[Expr, ...]:
+        normal, depth, _, sliding, rate = self._motion(view)
+        own = self.normal_law.rates(depth, rate)
         if self.friction is None:
-            return ()
-        normal, depth, _, sliding, _ = self._motion(view)
-        return self.friction.rates_in_plane(self._slip(view, normal, depth, sliding))
+            return own
+        push = self.normal_law.force(depth, rate)
+        return (*self.friction.rates_in_plane(self._slip(view, normal, depth, sliding, push)), *own)
+
+    def rates_apart(self) -> tuple[Expr, ...]:
+        """Rates of its states where the surfaces are apart; those of friction come first."""
+        friction = () if self.friction is None else self.friction.rates_apart()
+        return (*friction, *self.normal_law.rates_apart())
 
     @property
     def acts_along(self) -> bool:
@@ -99,11 +106,11 @@ class Contact(Force):
         parting = vec.dot(normal, relative)
         return normal, depth, (first, second), vec.sub(relative, vec.scale(parting, normal)), -parting
 
-    def _slip(self, view: View, normal: Vec3, depth: Expr, sliding: Vec3) -> Slip:
-        return Slip(sliding, normal, depth, view.rotation(self.first))
+    def _slip(self, view: View, normal: Vec3, depth: Expr, sliding: Vec3, push: Expr) -> Slip:
+        return Slip(sliding, normal, depth, push, view.rotation(self.first))
 
-    def _drag(self, push: Expr, slip: Slip) -> Vec3:
-        return vec.zero(push.graph) if self.friction is None else vec.scale(-push, self.friction.in_plane(slip))
+    def _drag(self, slip: Slip) -> Vec3:
+        return vec.zero(slip.push.graph) if self.friction is None else self.friction.drag(slip.push, slip)
 
     def _pair(self, arms: tuple[Vec3, Vec3], force: Vec3) -> list[Load]:
         """The force on the second body at the contact point, its opposite on the first."""

@@ -7,12 +7,9 @@ model's graph (:mod:`~eomgen.graph.pair_calls`), so that equations do not grow w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from dataclasses import replace
+from typing import Any, ClassVar, NamedTuple
 
-from ..elements.dimensions import LENGTH
-from ..elements.element_type import ElementType, table
-from ..elements.entry import Entry
-from ..elements.field import Field
 from ..elements.looks import Seen
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -24,11 +21,10 @@ from ..graph.vectors import Vec3
 from ..numeric.pair_sums import POSE
 from ..records import dataclass
 from .branches import where
-from .contact import CURVED, SpherePlane
+from .contact import SpherePlane
 from .contact_rounds import AtHeight
+from .contact_shape_fields import PLANAR
 from .contact_shapes import (
-    GROUNDS,
-    PLANAR,
     ContactShape,
     Feature,
     ShapeMotion,
@@ -36,9 +32,10 @@ from .contact_shapes import (
     touching,
     turning_radius,
 )
+from .contact_states import class_of, pair_states
 from .force import Force, Load, MarkerLoad, MovingView, View
-from .friction_laws import DryFriction, has_bristles, read_friction
-from .normal_laws import HertzBodies, NormalLaw, read_normal_law
+from .friction_laws import DryFriction
+from .normal_laws import NormalLaw
 
 
 class _PairView:
@@ -95,6 +92,8 @@ class ContactGroups(Force):
     second: tuple[ContactShape, ...]
     normal_law: NormalLaw
     friction: DryFriction | None
+    states: tuple[Expr, ...] = ()
+    axes: int = 0  #: how many states a pair has of friction
 
     @property
     def laws(self) -> tuple[Any, ...]:
@@ -107,7 +106,34 @@ class ContactGroups(Force):
         return self._loads(view, "")
 
     def potential(self, view: View) -> Expr | None:
-        return self._results(view, "", still=True)[1][-1]
+        markers, results = self._results(view, "", still=True)
+        return results[6 * len(markers)]
+
+    def state_rates(self, view: View) -> tuple[Expr, ...]:
+        if not self.states:
+            return ()
+        markers, results = self._results(view, "")
+        return tuple(map(Expr.__add__, self._rates_apart(), results[6 * len(markers) + 1 :]))
+
+    def _rates_apart(self) -> list[Expr]:
+        """Rates of all states where no shapes meet."""
+        found: list[Expr] = []
+        for k in range(0, len(self.states), self._each):
+            friction, normal = self._holding(self.normal_law, self.friction, self.states[k : k + self._each], None)
+            found += [*(() if friction is None else friction.rates_apart()), *normal.rates_apart()]
+        return found
+
+    @property
+    def _each(self) -> int:
+        """How many states a pair has."""
+        return self.axes + self.normal_law.count
+
+    def _holding(
+        self, normal: NormalLaw, friction: DryFriction | None, states: tuple[Expr, ...], lateral: Vec3 | None
+    ) -> tuple[DryFriction | None, NormalLaw]:
+        """The laws of a pair with its states."""
+        held = None if friction is None else friction.holding(states[: self.axes], lateral)
+        return held, normal.holding(states[self.axes :])
 
     def remainder(self, view: View) -> list[Load]:
         return self._loads(view, LOSSES)
@@ -121,7 +147,7 @@ class ContactGroups(Force):
 
     def met_shapes(self) -> list[str]:
         groups = [_features(self.first), *([_features(self.second)] if self.second else [])]
-        parts = [shape for group in groups for features in group.values() for shape, _ in features]
+        parts = [one.shape for group in groups for features in group.values() for one in features]
         return [f"{shape.kind} on {shape.marker.label}" for shape in parts]
 
     def meeting(self, view: MovingView) -> list[Expr]:
@@ -149,37 +175,47 @@ class ContactGroups(Force):
             operands += [graph.zero if still else x for v in moving for x in v]
         data = _SharedData(len(operands), graph)
         function = self._function(f"{part}{self.name}", bodies, data, bool(part))
-        return markers, function, [*operands, *data.values]
+        return markers, function, [*operands, *data.values, *self.states]
 
     def _function(self, name: str, bodies: Sequence[int], data: _SharedData, lost: bool) -> PairFunction:
-        groups = [_features(self.first), _features(self.second)] if self.second else [_features(self.first)]
+        shapes = [self.first, self.second] if self.second else [self.first]
+        groups = [_features(group) for group in shapes]
         place = {body: k for k, body in enumerate(bodies)}
         keys = [(g, kind) for g, group in enumerate(groups) for kind in group]
-        tables = [tuple(data.row(place[shape.marker.body], f) for shape, f in groups[g][kind]) for g, kind in keys]
+        tables = [tuple(data.row(place[one.shape.marker.body], one.feature) for one in groups[g][k]) for g, k in keys]
         planar = any(shape.kind in PLANAR for shape in (*self.first, *self.second))
+        blocks, _ = pair_states([[shape.parts() for shape in group] for group in shapes]) if self.states else ({}, 0)
         kinds = []
         for i, (g, first) in enumerate(keys):
             for j, (h, second) in enumerate(keys):
                 apart = g != h or len(groups) == 1
                 twice = first == second and i > j  # round beside round, once
                 if apart and not twice and meet((first, second)):
-                    sizes = tuple(len(groups[n][kind][0][1].sizes) for n, kind in ((g, first), (h, second)))
+                    sizes = tuple(len(groups[n][kind][0].feature.sizes) for n, kind in ((g, first), (h, second)))
                     flat = planar and first != "half"  # which has no extent along its normal to leave out
-                    kinds.append(self._kind((first, second), (i, j), (sizes[0], sizes[1]), flat, data, lost))
-        return PairFunction(name, len(bodies), tuple(x.value for x in data.values), tuple(tables), tuple(kinds))
+                    kind = self._kind((first, second), (i, j), (sizes[0], sizes[1]), flat, planar, data, lost)
+                    if self.states:
+                        block = blocks[g, h, class_of(first), second]
+                        rows = tuple(self._each * block.of_first(x.number, k) for k, x in enumerate(groups[g][first]))
+                        columns = tuple(self._each * one.column for one in groups[h][second])
+                        kind = replace(kind, held=(rows, columns), states=self._each)
+                    kinds.append(kind)
+        numbers = (*(x.value for x in data.values), *(None for _ in self.states))
+        return PairFunction(name, len(bodies), numbers, tuple(tables), tuple(kinds), len(self.states))
 
     def _kind(
         self,
         kinds: tuple[str, str],
         tables: tuple[int, int],
         sizes: tuple[int, int],
+        flat: bool,
         planar: bool,
         data: _SharedData,
         lost: bool,
     ) -> PairKind:
         """The law of one kind of pair in a graph of its own, with its derivative."""
         graph = Graph()
-        view = _PairView(graph, planar)
+        view = _PairView(graph, flat)
         places: list[int] = []
 
         def own(x: Expr) -> Expr:
@@ -193,37 +229,45 @@ class ContactGroups(Force):
         dry = self.friction
         friction = None if dry is None else dry.mapped(own)
         markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
+        held = tuple(graph.symbol(f"s{k}") for k in range(self._each if self.states else 0))
+        if held:
+            lateral = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2] if planar else None
+            friction, normal = self._holding(normal, friction, held, lateral)
         given = [
             tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
         ]
         bare = SpherePlane(self.name, *markers, normal, friction, graph.zero)
         contact = touching(kinds, markers, (given[0], given[1]), bare)
-        if planar:
-            contact = AtHeight(self.name, *markers, contact.normal_law, friction, contact, view.height())
+        if flat:
+            contact = AtHeight(self.name, *markers, contact.normal_law, contact.friction, contact, view.height())
         on_second, on_first = contact.remainder(view) if lost else contact.loads(view)
         assert isinstance(on_second, MarkerLoad)
         assert isinstance(on_first, MarkerLoad)
         energy = graph.zero if lost else contact.potential(view)
         assert energy is not None
         results = [*on_second.force, *on_first.torque, *on_second.torque, energy]
+        share = contact.share(view)
+        if held and not lost:
+            rates = zip(contact.state_rates(view), contact.rates_apart(), strict=True)
+            results += [(x - apart) * (1.0 if share is None else share) for x, apart in rates]
+        results += [graph.zero] * (len(held) if lost else 0)
         names = [f"a{k}" for k in range(POSE + sizes[0])] + [f"b{k}" for k in range(POSE + sizes[1])]
-        names += [f"l{k}" for k in range(len(places))]
+        names += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]
         seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
         slopes = jvp(results, seeds)
         across, depth, _, _ = contact.touch(view)
-        if (share := contact.share(view)) is not None:  # beside a piece of ground nothing is in it
+        if share is not None:  # beside a piece of ground nothing is in it
             depth = where(graph.apply("lt", 0.0, share), depth, graph.apply("min", depth, 0.0))
         touch = [*across, depth, turning_radius(kinds[1], given[1], graph)]
         nodes, renamed = _kept(graph, [*results, *slopes, *touch])
         ids, seen = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch))
-        rates = [f"d_{name}" for name in names]
         return PairKind(
             f"{kinds[0]}_{kinds[1]}_{tables[0]}_{tables[1]}",
             *tables,
-            planar,
+            flat,
             tuple(places),
             nodes,
-            (*names, *rates),
+            (*names, *(f"d_{name}" for name in names)),
             tuple(ids[: len(results)]),
             tuple(ids[len(results) :]),
             tuple(seen),
@@ -251,12 +295,25 @@ class _SharedData:
         return (body, *(self.place(x) for x in entries), bound, self.place(feature.thickness))
 
 
-def _features(shapes: Sequence[ContactShape]) -> dict[str, list[tuple[ContactShape, Feature]]]:
+class _Part(NamedTuple):
+    """A feature, its shape and the number of that in its group, and its number among all of its class there."""
+
+    shape: ContactShape
+    feature: Feature
+    number: int
+    column: int
+
+
+def _features(shapes: Sequence[ContactShape]) -> dict[str, list[_Part]]:
     """Features of shapes, by class."""
-    found: dict[str, list[tuple[ContactShape, Feature]]] = {}
-    for shape in shapes:
+    found: dict[str, list[_Part]] = {}
+    before: dict[str, int] = {}
+    for number, shape in enumerate(shapes):
         for feature in shape.features():
-            found.setdefault(feature.kind, []).append((shape, feature))
+            column = before.get(feature.kind, 0) + feature.slot
+            found.setdefault(feature.kind, []).append(_Part(shape, feature, number, column))
+        for kind, count in shape.parts().parts.items():
+            before[kind] = before.get(kind, 0) + count
     return found
 
 
@@ -273,106 +330,3 @@ def _kept(graph: Graph, results: Sequence[Expr]) -> tuple[tuple[tuple[object, ..
 
 def _vector(x: Sequence[Expr]) -> Vec3:
     return x[0], x[1], x[2]
-
-
-# -- reading ----------------------------------------------------------------------------------------------------------
-def _contact_groups(e: Entry) -> ContactGroups | None:
-    first = e.shapes("first")
-    second = e.shapes("second") if "second" in e.values else ()
-    if has_bristles(e.values):
-        remedy = "use brown_mcphee, or point_plane, sphere_plane or sphere_sphere for each pair"
-        e.fault("friction_law", "lugre has states, which pairs of groups do not", remedy)
-        return None
-    law, friction = read_normal_law(e), read_friction(e, "friction", "static_friction", "viscous_friction")
-    if first is None or second is None or e.at_fault():
-        return None
-    _refuse_pairs(e, first, second)
-    if isinstance(law, HertzBodies):
-        for key, shapes in (("first", first), ("second", second)):
-            if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
-                e.fault(key, f"a {flat[0]} has no radius for Hertz's law from moduli", "give stiffness, not moduli")
-    return ContactGroups(e.name, first, second, law, friction)
-
-
-def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
-    """Note shapes that cannot meet, and a shape that is in both groups."""
-    kinds = sorted({shape.kind for shape in first}), sorted({shape.kind for shape in second or first})
-    for a in kinds[0]:
-        for b in kinds[1]:
-            if (a in PLANAR) != (b in PLANAR):
-                e.fault("second", f"{a} and {b} do not meet", _ALLOWED)
-            elif (
-                (a in GROUNDS and b in GROUNDS)
-                or (a in _ON_GROUND and b in _IN_SPACE)
-                or (b in _ON_GROUND and a in _IN_SPACE)
-            ) and (second or a != b or _differ(first, a)):
-                told = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
-                e.fault("second" if second else "first", told, _ALLOWED)
-    thin = [shape for shape in first if _is_thin(shape)], [shape for shape in second or first if _is_thin(shape)]
-    for k, others in enumerate((second or first, first)):
-        cornered = sorted({shape.kind for shape in others if shape.kind in _CORNERED or _is_thin(shape)})
-        if thin[k] and cornered and (second or _differ_in_body(first)):
-            e.fault(
-                ("first", "second")[k] if second else "first",
-                f"corners of {cornered[0]} pass through a segment of radius 0, which has no inside",
-                "give the segment a radius greater than 0",
-            )
-            break
-    for key, shapes in (("first", first), ("second", second)):
-        if twice := [shape for k, shape in enumerate(shapes) if shape in shapes[:k]]:
-            e.fault(key, f"has the {twice[0].kind} on {twice[0].marker.label} twice", "give each shape once")
-    both = {shape.marker.label for shape in first if shape in second}
-    if both:
-        e.fault(
-            "second",
-            f"the shape on {sorted(both)[0]} is in both groups",
-            "give second only what is not in first; without second the shapes of first meet among themselves",
-        )
-    bodies = {shape.marker.body for shape in (*first, *second)}
-    if len(bodies) == 1:
-        e.fault("", "has shapes on one body only", "shapes of one body do not meet; give shapes on other bodies")
-
-
-def _is_thin(shape: ContactShape) -> bool:
-    return shape.kind == "segment" and shape.sizes[1].is_zero
-
-
-def _differ_in_body(shapes: Sequence[ContactShape]) -> bool:
-    return len({shape.marker.body for shape in shapes}) > 1
-
-
-def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
-    """Whether shapes of a kind are on different bodies."""
-    return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
-
-
-_CORNERED = ("box", "polygon", "profile", "smooth_profile")  #: shapes whose corners meet segments
-_ON_GROUND = ("ellipsoid", "cuboid")  #: shapes that meet a half-space alone
-_IN_SPACE = ("sphere", "capsule", *_ON_GROUND)
-_ALLOWED = (
-    "circle, segment, box, polygon meet each other, half_plane, profile and smooth_profile; sphere and capsule meet "
-    "each other and half_space; ellipsoid and cuboid meet half_space"
-)
-
-_SHAPES = "shapes {shape, on, ...} of the "
-
-TYPES = table(
-    ElementType(
-        "contacts",
-        "contact of every shape of a group with every shape of another, by one law.  Shapes are mappings of shape "
-        "(circle, segment, box, polygon, half_plane, profile, smooth_profile; sphere, capsule, half_space, ellipsoid, "
-        "cuboid), on (a marker or a list of markers) "
-        "and sizes.  Shapes of one body do not meet.",
-        {
-            "first": Field("shapes", _SHAPES + "first group", required=True, dimension=LENGTH),
-            "second": Field(
-                "shapes",
-                _SHAPES + "second group; without it those of the first meet among themselves",
-                dimension=LENGTH,
-            ),
-            "law": Field("law", "the keys that follow as a mapping, instead of one by one"),
-            **CURVED,
-        },
-        _contact_groups,
-    )
-)

@@ -1,4 +1,4 @@
-"""Force elements, contact with a height profile y(x) in the plane: points -> pieces, and how a circle touches a piece.
+"""Force elements, contact with a profile in the plane: points of ground -> pieces, and how a circle touches a piece.
 
 A piece owns the points whose nearest point of the profile it holds: those between the bisectors at its ends.  Its depth
 counts for them alone, so that every circle meets one piece, or several where it bridges a valley that is narrower.
@@ -47,26 +47,29 @@ class ProfilePart(NamedTuple):
 
 def straight_pieces(points: Sequence[Point]) -> list[ProfilePart]:
     """Edges from point to point; the first and the last go on beyond their ends."""
-    width = SHARED * _length(_minus(points[-1], points[0]))
-    edges = [_minus(b, a) for a, b in itertools.pairwise(points)]
-    ways = [_unit(edge) for edge in edges]
+    width = SHARED * length(minus(points[-1], points[0]))
+    edges = [minus(b, a) for a, b in itertools.pairwise(points)]
+    ways = [unit(one) for one in edges]
     return [
-        _edge(points[k], edge, ways[k - 1] if k else None, ways[k + 1] if k + 1 < len(edges) else None, width)
-        for k, edge in enumerate(edges)
+        edge(points[k], one, ways[k - 1] if k else None, ways[k + 1] if k + 1 < len(edges) else None, width)
+        for k, one in enumerate(edges)
     ]
 
 
-def _edge(start: Point, edge: Point, before: Point | None, after: Point | None, width: Expr) -> ProfilePart:
-    """Sizes: half of its length; at the left and the right end x and y of the bisector and 1, or 0 without an end."""
-    graph, way, half = width.graph, _unit(edge), 0.5 * _length(edge)
+def edge(start: Point, reach: Point, before: Point | None, after: Point | None, width: Expr) -> ProfilePart:
+    """A straight piece between neighbours of two directions.
+
+    Sizes: half of its length; at the left and the right end x and y of the bisector and 1, or 0 without an end.
+    """
+    graph, way, half = width.graph, unit(reach), 0.5 * length(reach)
     ends: list[Expr] = []
     for other, inward in ((before, 1.0), (after, -1.0)):
         if other is None:
             ends += [graph.zero, graph.one, graph.zero]
             continue
-        bisector = _unit((-way[1] - other[1], way[0] + other[0]))  # the sum of both normals
-        ends += [inward * _dot(bisector, way), way[0] * bisector[1] - way[1] * bisector[0], graph.one]
-    middle = (start[0] + 0.5 * edge[0], start[1] + 0.5 * edge[1])
+        bisector = unit((-way[1] - other[1], way[0] + other[0]))  # the sum of both normals
+        ends += [inward * dot(bisector, way), way[0] * bisector[1] - way[1] * bisector[0], graph.one]
+    middle = (start[0] + 0.5 * reach[0], start[1] + 0.5 * reach[1])
     return ProfilePart("edge", middle, way, (half, *ends, width), half, before is None or after is None)
 
 
@@ -76,18 +79,23 @@ def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
     The tangent at a point is that of the circle through it and its neighbours, so that points of a circle give the
     circle; the arcs are those of equal tangent lengths (Bolton, 1975, Computer-Aided Design 7, 83-89).
     """
-    width = SHARED * _length(_minus(points[-1], points[0]))
+    width = SHARED * length(minus(points[-1], points[0]))
     ways = _tangents(points)
-    first, last = _minus(points[1], points[0]), _minus(points[-1], points[-2])
-    ray = _times(ways[0], _length(first))
-    found = [_edge(_minus(points[0], ray), ray, None, ways[0], width)]
+    first, last = minus(points[1], points[0]), minus(points[-1], points[-2])
+    ray = times(ways[0], length(first))
+    found = [edge(minus(points[0], ray), ray, None, ways[0], width)]
     for (a, b), (s, t) in zip(itertools.pairwise(points), itertools.pairwise(ways), strict=True):
-        v, both = _minus(b, a), (s[0] + t[0], s[1] + t[1])
-        along, square = _dot(v, both), _dot(v, v)
-        d = square / (along + sqrt(along * along + 2.0 * (1.0 - _dot(s, t)) * square))
-        joint = (0.5 * (a[0] + b[0] + d * (s[0] - t[0])), 0.5 * (a[1] + b[1] + d * (s[1] - t[1])))
-        found += [_arc(a, joint, s, width), _arc(joint, b, None, width, t)]
-    return [*found, _edge(points[-1], _times(ways[-1], _length(last)), ways[-1], None, width)]
+        found += biarcs(a, b, s, t, width)
+    return [*found, edge(points[-1], times(ways[-1], length(last)), ways[-1], None, width)]
+
+
+def biarcs(a: Point, b: Point, s: Point, t: Point, width: Expr) -> tuple[ProfilePart, ProfilePart]:
+    """Two arcs of one tangent from a point to another, at which the directions are s and t."""
+    v, both = minus(b, a), (s[0] + t[0], s[1] + t[1])
+    along, square = dot(v, both), dot(v, v)
+    d = square / (along + sqrt(along * along + 2.0 * (1.0 - dot(s, t)) * square))
+    joint = (0.5 * (a[0] + b[0] + d * (s[0] - t[0])), 0.5 * (a[1] + b[1] + d * (s[1] - t[1])))
+    return arc(a, joint, s, width), arc(joint, b, None, width, t)
 
 
 def solid_depth(pieces: Sequence[ProfilePart], depth: Expr) -> Expr:
@@ -102,30 +110,37 @@ def solid_depth(pieces: Sequence[ProfilePart], depth: Expr) -> Expr:
 
 def _tangents(points: Sequence[Point]) -> list[Point]:
     """Directions of the circles through each point and its neighbours."""
-    chords = [_minus(b, a) for a, b in itertools.pairwise(points)]
-    inner = []
-    for before, after in itertools.pairwise(chords):
-        p, q = _dot(before, before), _dot(after, after)
-        inner.append(_unit((before[0] * q + after[0] * p, before[1] * q + after[1] * p)))
-    return [_mirrored(inner[0], chords[0]), *inner, _mirrored(inner[-1], chords[-1])]
+    inner = [tangent(a, b, c) for a, b, c in zip(points, points[1:], points[2:], strict=False)]
+    first, last = minus(points[1], points[0]), minus(points[-1], points[-2])
+    return [_mirrored(inner[0], first), *inner, _mirrored(inner[-1], last)]
+
+
+def tangent(a: Point, b: Point, c: Point) -> Point:
+    """The direction at b of the circle through three points."""
+    before, after = minus(b, a), minus(c, b)
+    p, q = dot(before, before), dot(after, after)
+    return unit((before[0] * q + after[0] * p, before[1] * q + after[1] * p))
 
 
 def _mirrored(way: Point, chord: Point) -> Point:
     """The tangent at the other end of a chord of a circle."""
-    c = _unit(chord)
-    along = 2.0 * _dot(way, c)
+    c = unit(chord)
+    along = 2.0 * dot(way, c)
     return along * c[0] - way[0], along * c[1] - way[1]
 
 
-def _arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: Point | None = None) -> ProfilePart:
-    """Sizes: curvature; half of the chord; height of the ends over the middle; cos and sin of the half angle."""
-    chord = _minus(end, start)
-    c, half = _unit(chord), 0.5 * _length(chord)
+def arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: Point | None = None) -> ProfilePart:
+    """A circular arc, given the direction at its start or its end.
+
+    Sizes: curvature; half of the chord; height of the ends over the middle; cos and sin of the half angle.
+    """
+    chord = minus(end, start)
+    c, half = unit(chord), 0.5 * length(chord)
     if at_start is not None:
-        cosine, sine = _dot(at_start, c), at_start[0] * c[1] - at_start[1] * c[0]
+        cosine, sine = dot(at_start, c), at_start[0] * c[1] - at_start[1] * c[0]
     else:
         assert at_end is not None
-        cosine, sine = _dot(at_end, c), c[0] * at_end[1] - c[1] * at_end[0]
+        cosine, sine = dot(at_end, c), c[0] * at_end[1] - c[1] * at_end[0]
     rise = half * sine / (1.0 + cosine)
     middle = (start[0] + half * c[0] + rise * c[1], start[1] + half * c[1] - rise * c[0])
     return ProfilePart(
@@ -133,36 +148,45 @@ def _arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: 
     )
 
 
-def peaks(points: Sequence[Point]) -> list[Point]:
-    """Inner points at which the profile turns down, as far as numbers tell: corners that meet what is flat."""
+def peaks(points: Sequence[Point]) -> list[tuple[int, Point]]:
+    """Inner points, numbered, at which the profile turns down, as far as numbers tell: they meet what is flat."""
     found = []
-    for a, b, c in zip(points, points[1:], points[2:], strict=False):
-        before, after = _minus(b, a), _minus(c, b)
-        turn = (before[0] * after[1] - before[1] * after[0]).value
+    for k, (a, b, c) in enumerate(zip(points, points[1:], points[2:], strict=False)):
+        turn = cross(minus(b, a), minus(c, b)).value
         if turn is None or turn < 0.0:
-            found.append(b)
+            found.append((k, b))
     return found
 
 
-def _minus(a: Point, b: Point) -> Point:
+def minus(a: Point, b: Point) -> Point:
+    """The difference of two places."""
     return a[0] - b[0], a[1] - b[1]
 
 
-def _times(a: Point, factor: Expr) -> Point:
+def times(a: Point, factor: Expr) -> Point:
+    """A vector times a number."""
     return a[0] * factor, a[1] * factor
 
 
-def _dot(a: Point, b: Point) -> Expr:
+def dot(a: Point, b: Point) -> Expr:
+    """The scalar product."""
     return a[0] * b[0] + a[1] * b[1]
 
 
-def _length(a: Point) -> Expr:
-    return sqrt(_dot(a, a))
+def cross(a: Point, b: Point) -> Expr:
+    """The component of the vector product along z."""
+    return a[0] * b[1] - a[1] * b[0]
 
 
-def _unit(a: Point) -> Point:
-    length = _length(a)
-    return a[0] / length, a[1] / length
+def length(a: Point) -> Expr:
+    """The length of a vector."""
+    return sqrt(dot(a, a))
+
+
+def unit(a: Point) -> Point:
+    """The vector of length 1 of the same direction."""
+    size = length(a)
+    return a[0] / size, a[1] / size
 
 
 def _part(side: Expr, width: Expr) -> Expr:

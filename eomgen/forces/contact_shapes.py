@@ -6,13 +6,14 @@ shapes, which are round of radius 0 or of the shape's own.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from functools import reduce
 from typing import NamedTuple
 
-from ..elements.dimensions import LENGTH
-from ..elements.field import Field, Fields
+import numpy as np
+
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -20,68 +21,24 @@ from ..graph.core import Expr, Graph, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .contact import Contact, SpherePlane, joint_radius
-from .contact_profiles import ArcRound, EdgeRound, peaks, smooth_pieces, solid_depth, straight_pieces
+from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
+from .contact_profiles import (
+    ArcRound,
+    EdgeRound,
+    Point,
+    ProfilePart,
+    peaks,
+    smooth_pieces,
+    solid_depth,
+    straight_pieces,
+)
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
+from .contact_shape_fields import GROUNDS
 from .contact_solids import EllipsoidPlane, RodRod
+from .contact_states import ShapeParts, parts_of
 
-CORNERS = 64  #: most corners of a polygon
-
-_RADIUS = Field("expression", "radius (m)", required=True, dimension=LENGTH)
-_ALONG = "length between the centres of its ends (m), along {} of the marker"
-
-
-def _profile(how: str, least: int) -> Fields:
-    return {
-        "points": Field(
-            "places",
-            f"{least} or more points [x, y] from left to right that the ground runs through{how} (m)",
-            required=True,
-            dimension=LENGTH,
-        ),
-        "depth": Field(
-            "expression",
-            "how far the solid reaches below it (m); a tenth of its length unless given",
-            dimension=LENGTH,
-        ),
-    }
-
-
-_SIZES: dict[str, Fields] = {
-    "circle": {"radius": _RADIUS},
-    "segment": {
-        "length": Field("expression", _ALONG.format("x"), required=True, dimension=LENGTH),
-        "radius": _RADIUS._replace(required=False, default=0),
-    },
-    "box": {"size": Field("two", "lengths along x and y (m)", required=True, dimension=LENGTH)},
-    "polygon": {
-        "points": Field(
-            "corners", f"3 to {CORNERS} corners [x, y] of a convex outline (m)", required=True, dimension=LENGTH
-        ),
-    },
-    "half_plane": {},
-    "profile": _profile("", 2),
-    "smooth_profile": _profile(", by a smooth curve of circular arcs", 3),
-    "sphere": {"radius": _RADIUS},
-    "capsule": {
-        "length": Field("expression", _ALONG.format("z"), required=True, dimension=LENGTH),
-        "radius": _RADIUS,
-    },
-    "half_space": {},
-    "ellipsoid": {
-        "semi_axes": Field("vector", "semi-axes along x, y and z (m)", required=True, dimension=LENGTH),
-    },
-    "cuboid": {"size": Field("vector", "lengths along x, y and z (m)", required=True, dimension=LENGTH)},
-}
-_ON = {
-    "shape": Field("choice", "kind of shape", required=True, choices=tuple(_SIZES)),
-    "on": Field("on", "the marker to which it is fixed, or a list of markers that have one each", required=True),
-}
-#: Kind of shape -> its keys; a shape in the plane lies in the x-y plane of its marker.
-SHAPE_FIELDS: dict[str, Fields] = {kind: {**_ON, **sizes} for kind, sizes in _SIZES.items()}
-#: Shapes of mechanisms in the plane; the others are shapes in space.
-PLANAR = ("circle", "segment", "box", "polygon", "half_plane", "profile", "smooth_profile")
-#: Shapes without an end, which do not meet each other.
-GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space")
+#: Shapes whose pieces are edges and arcs.
+_PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
 _SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
 _BOTH = (-1.0, 1.0)
 _STEPS = 24  #: lines of which the picture of an ellipse is made
@@ -102,6 +59,8 @@ class Feature(NamedTuple):
     thickness : Expr
         How far another body goes from one side of the shape to the other at least; greater than 0 but for a half-plane,
         which has no other side.
+    slot : int
+        Its number among those of its class on the shape.
     """
 
     kind: str
@@ -109,6 +68,7 @@ class Feature(NamedTuple):
     sizes: tuple[Expr, ...]
     bound: Expr | None
     thickness: Expr
+    slot: int = 0
 
 
 @dataclass(frozen=True)
@@ -118,10 +78,11 @@ class ContactShape:
     Attributes
     ----------
     kind : str
-        One of :data:`SHAPE_FIELDS`.
+        One of :data:`~.contact_shape_fields.SHAPE_FIELDS`.
     sizes : tuple of Expr
-        radius; length, radius; of a box or polygon x and y of its corners, counterclockwise; of a profile its depth
-        and x and y of its points; half axes; lengths.
+        radius; length, radius; of a box or polygon x and y of its corners, counterclockwise; of a profile or an outline
+        its depth and x and y of its points, of outlines clockwise; of a sprocket its depth, teeth, pitch, seat, tip
+        radius and angle of a seat; half axes; lengths; of a plate length, width and number of points.
     """
 
     kind: str
@@ -135,25 +96,26 @@ class ContactShape:
             return [Feature("round", frame, self.sizes, self.sizes[0], 2.0 * self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
             return [Feature("half", self._facing(frame), (), None, zero)]
-        if self.kind in ("profile", "smooth_profile"):
+        if self.kind in _PIECED:
             return self._pieces(frame)
         if self.kind == "ellipsoid":
             return [Feature("ellipsoid", frame, self.sizes, _most(self.sizes), 2.0 * _least(self.sizes))]
         if self.kind == "cuboid":
             x, y, z = (0.5 * size for size in self.sizes)
             thick = _least(self.sizes)
+            ways = enumerate(itertools.product(_BOTH, repeat=3))
             return [
-                Feature("end", _moved(frame, (i * x, j * y, k * z)), (zero,), zero, thick)
-                for i in _BOTH
-                for j in _BOTH
-                for k in _BOTH
+                Feature("end", _moved(frame, (i * x, j * y, k * z)), (zero,), zero, thick, n) for n, (i, j, k) in ways
             ]
+        if self.kind == "plate":
+            return self._pads(frame)
         if self.kind in ("segment", "capsule"):
             along = frame if self.kind == "segment" else _turned(frame, (2, 0, 1))
             half, radius = 0.5 * self.sizes[0], self.sizes[1]
             whole, end = ("segment", "corner") if self.kind == "segment" else ("rod", "end")
             thick = zero.graph.apply("max", 2.0 * radius, _SLIM * half)
-            ends = [Feature(end, _moved(along, (x, zero, zero)), (radius,), radius, thick) for x in (-half, half)]
+            sides = enumerate((-half, half))
+            ends = [Feature(end, _moved(along, (x, zero, zero)), (radius,), radius, thick, k) for k, x in sides]
             return [Feature(whole, along, (half, radius), half + radius, thick), *ends]
         corners = list(zip(self.sizes[::2], self.sizes[1::2], strict=True))
         edges: list[Expr] = []
@@ -164,24 +126,67 @@ class ContactShape:
             edges += [x, y, dy / length, -dx / length, length]
             reach = reach.graph.apply("max", reach, x * x + y * y)
         thick = _width(edges, corners)
-        points = [Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, thick) for x, y in corners]
+        points = [
+            Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, thick, k) for k, (x, y) in enumerate(corners)
+        ]
         return [Feature(f"polygon{len(corners)}", frame, tuple(edges), sqrt(reach), thick), *points]
 
-    def _points(self) -> list[tuple[Expr, Expr]]:
-        """Points of a profile."""
+    def parts(self) -> ShapeParts:
+        """How many parts of each class it has."""
+        counts = {"polygon": len(self.sizes) // 2, "sprocket": self._whole(1), "plate": self._whole(2)}
+        return parts_of(self.kind, counts.get(self.kind, (len(self.sizes) - 1) // 2))
+
+    def _whole(self, k: int) -> int:
+        """A size that is a whole number."""
+        return int(self.sizes[k].value or 0) if k < len(self.sizes) else 0
+
+    def _pads(self, frame: Frame) -> list[Feature]:
+        """Points of a plate: those of Gauss's rule along x, with parts of the area.
+
+        Where the pressure of n points is a polynomial of degree 2 n - 2 or less along the plate, force and moment are
+        exact.
+        """
+        length, width, _ = self.sizes
+        zero, found = length.graph.zero, list[Feature]()
+        for x, weight in zip(*np.polynomial.legendre.leggauss(self._whole(2)), strict=True):
+            area = 0.5 * float(weight) * length * width
+            place = _moved(frame, (0.5 * float(x) * length, zero, zero))
+            found.append(Feature("pad", place, (area, width), zero, length, len(found)))
+        return found
+
+    def _points(self) -> list[Point]:
+        """Points of a profile or an outline."""
+        if self.kind == "sprocket":
+            return self._sprocket()[2]
         return list(zip(self.sizes[1::2], self.sizes[2::2], strict=True))
 
+    def _sprocket(self) -> tuple[list[ProfilePart], list[Point], list[Point]]:
+        _, teeth, *sizes = self.sizes
+        assert teeth.value is not None
+        return sprocket_ring(int(teeth.value), *sizes)
+
+    def _parts(self) -> tuple[list[ProfilePart], list[tuple[int, Point]]]:
+        """Pieces of a profile or an outline, and its corners, numbered, which meet what is flat."""
+        if self.kind == "sprocket":
+            pieces, tops, _ = self._sprocket()
+            return pieces, list(enumerate(tops))
+        points = self._points()
+        if self.kind in ("profile", "smooth_profile"):
+            return (straight_pieces if self.kind == "profile" else smooth_pieces)(points), peaks(points)
+        pieces = (straight_ring if self.kind == "outline" else smooth_ring)(points)
+        return pieces, peaks([points[-1], *points, points[0]])
+
     def _pieces(self, frame: Frame) -> list[Feature]:
-        """Pieces of a profile, and its peaks, which meet what is flat."""
-        points, depth, zero = self._points(), self.sizes[0], self.sizes[0].graph.zero
-        pieces = straight_pieces(points) if self.kind == "profile" else smooth_pieces(points)
+        depth, zero = self.sizes[0], self.sizes[0].graph.zero
+        pieces, tops = self._parts()
         depth = solid_depth(pieces, depth)
         found = [
             Feature(one.kind, one.frame(frame), (*one.sizes, depth), None if one.open else one.half + depth, depth)
             for one in pieces
         ]
-        tops = peaks(points)
-        return [*found, *(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth) for x, y in tops)]
+        for k, (x, y) in tops:
+            found.append(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth, k))
+        return found
 
     def _facing(self, frame: Frame) -> Frame:
         """The frame whose z axis points out of the solid: y of a half-plane's marker, z of a half-space's."""
@@ -204,9 +209,10 @@ class ContactShape:
             return [Wheel(marker, self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
             return [Drawn((Marker(marker.body, self._facing(marker.frame), marker.label),), about=PLANE)]
-        if self.kind in ("profile", "smooth_profile"):
-            zero = self.sizes[0].graph.zero
-            places = [_moved(marker.frame, (x, y, zero)) for x, y in self._points()]
+        if self.kind in _PIECED:
+            zero, points = self.sizes[0].graph.zero, self._points()
+            line = points if self.kind in GROUNDS else [*points, points[0]]
+            places = [_moved(marker.frame, (x, y, zero)) for x, y in line]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
         if self.kind == "ellipsoid":
             return [self._ellipse(i, j) for i, j in ((0, 1), (1, 2), (2, 0))]
@@ -214,6 +220,10 @@ class ContactShape:
             found = [feature.frame for feature in self.features()]
             ways = ((0, 1, 3, 2, 0, 4, 5, 7, 6, 4), (1, 5), (2, 6), (3, 7))
             return [Drawn(tuple(Marker(marker.body, found[k], marker.label) for k in way)) for way in ways]
+        if self.kind == "plate":
+            half, zero = 0.5 * self.sizes[0], self.sizes[0].graph.zero
+            places = [_moved(marker.frame, (x, zero, zero)) for x in (-half, half)]
+            return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
         frames = [feature.frame for feature in self.features()[1:]]
         closed = frames if self.kind in ("segment", "capsule") else [*frames, frames[0]]
         return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in closed))]
@@ -259,6 +269,7 @@ _FLAT = ("segment", "polygon", "edge", "arc")
 MEETINGS = (
     ("round", "round"),
     *((surface, soft) for surface in ("half", *_FLAT) for soft in ("round", "corner")),
+    *((surface, "pad") for surface in ("half", "edge", "arc")),
     ("half", "end"),
     ("half", "ellipsoid"),
     ("rod", "round"),
@@ -289,7 +300,12 @@ def touching(
     """The contact of one feature with another; ``law`` has the laws."""
     first, radius = sizes[0], sizes[1][0]
     normal = law.normal_law.at(lambda: joint_radius(first[0], radius) if kinds[0] == "round" else radius)
-    laws = (law.name, *markers, normal, law.friction)
+    friction = law.friction
+    if kinds[1] == "pad":
+        area, width = sizes[1]
+        normal, radius = normal.on_pad(area, width), radius.graph.zero
+        friction = None if friction is None else friction.on_pad(area)
+    laws = (law.name, *markers, normal, friction)
     if kinds[0] == "round":
         return RoundRound(*laws, (first[0], radius))
     if kinds[1] == "ellipsoid":

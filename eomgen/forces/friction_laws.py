@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar, NamedTuple
 
 from ..elements.dimensions import NONE, RATE, REACH
@@ -40,7 +41,23 @@ class DryFriction(ABC):
 
     @abstractmethod
     def mapped(self, own: Callable[[Expr], Expr]) -> DryFriction:
-        """The law with other expressions, in the graph of a pair."""
+        """The law with other expressions, in the graph of a pair; without its states."""
+
+    def on_pad(self, area: Expr) -> DryFriction:
+        """The law of a point that stands for an area of a plate."""
+        return self
+
+    def holding(self, states: tuple[Expr, ...], lateral: Vec3 | None) -> DryFriction:
+        """The law with its states; in contacts of the plane ``lateral`` is the direction across the plane."""
+        return self
+
+    def drag(self, push: Expr, slip: Slip) -> Vec3:
+        """The force on the second surface (N), across the normal, beside a normal force."""
+        return vec.scale(-push, self.in_plane(slip))
+
+    def rates_apart(self) -> tuple[Expr, ...]:
+        """Rates of its states where surfaces are apart."""
+        return ()
 
     def rates_along(self, rate: Expr) -> tuple[Expr, ...]:
         """Rates of its states at a velocity along a line."""
@@ -52,12 +69,26 @@ class DryFriction(ABC):
 
 
 class Slip(NamedTuple):
-    """How surfaces slide: velocity and normal (ground axes), penetration, and axes in which states are written."""
+    """How surfaces slide: velocity and normal (ground axes), penetration, normal force, and axes of the first one."""
 
     velocity: Vec3
     normal: Vec3
     depth: Expr
+    push: Expr
     axes: Mat3
+
+    def axes_of_states(self, lateral: Vec3 | None) -> Mat3:
+        """In whose axes states are written: of the first surface, or along the surface, across the plane, normal."""
+        if lateral is None:
+            return self.axes
+        return vec.transpose((vec.cross(self.normal, lateral), lateral, self.normal))
+
+    def across(self, states: Sequence[Expr], lateral: Vec3 | None) -> Vec3:
+        """A vector of states in ground axes, less its part along the normal."""
+        zero = self.depth.graph.zero
+        x, y, z = (*states, zero, zero)[:3]
+        found = vec.times(self.axes_of_states(lateral), (x, y, z))
+        return vec.sub(found, vec.scale(vec.dot(found, self.normal), self.normal))
 
 
 class SlidingFriction(DryFriction):
@@ -183,6 +214,7 @@ class LuGre(DryFriction):
     static: Expr | None
     stribeck: Expr | None
     deflections: tuple[Expr, ...]
+    lateral: Vec3 | None = None
 
     def along(self, rate: Expr) -> Expr:
         (z,), (change,) = self.deflections, self.rates_along(rate)
@@ -194,29 +226,34 @@ class LuGre(DryFriction):
 
     def in_plane(self, slip: Slip) -> Vec3:
         """Of deflections in the axes of the first surface; those along the normal have no effect."""
-        zero = slip.depth.graph.zero
         pushed = [
             self.stiffness * z + self.damping * change
             for z, change in zip(self.deflections, self.rates_in_plane(slip), strict=True)
         ]
-        x, y, z = (*pushed, zero)[:3]
-        found = vec.times(slip.axes, (x, y, z))
-        across = vec.sub(found, vec.scale(vec.dot(found, slip.normal), slip.normal))
-        return vec.add(across, vec.scale(self.viscous, slip.velocity))
+        return vec.add(slip.across(pushed, self.lateral), vec.scale(self.viscous, slip.velocity))
 
     def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
         squared = vec.dot(slip.velocity, slip.velocity)
         speed = beyond_zero(squared, sqrt)  # the root has no slope at rest
         decay = self.stiffness * speed / _level(squared, self.dynamic, self.static, self.stribeck)
-        relaxed = self.stiffness / self.damping
         touches = squared.graph.apply("lt", 0.0, slip.depth)
-        velocity = vec.transpose_times(slip.axes, slip.velocity)
+        velocity = vec.transpose_times(slip.axes_of_states(self.lateral), slip.velocity)
+        apart = self.rates_apart()
         return tuple(
-            where(touches, v - decay * z, -relaxed * z) for v, z in zip(velocity, self.deflections, strict=False)
+            where(touches, v - decay * z, back) for v, z, back in zip(velocity, self.deflections, apart, strict=False)
         )
 
+    def rates_apart(self) -> tuple[Expr, ...]:
+        relaxed = self.stiffness / self.damping
+        return tuple(-relaxed * z for z in self.deflections)
+
     def mapped(self, own: Callable[[Expr], Expr]) -> LuGre:
-        raise NotImplementedError("bristles have states, which pairs of groups do not")
+        static, stribeck = (None if x is None else own(x) for x in (self.static, self.stribeck))
+        dynamic, stiffness, damping = own(self.dynamic), own(self.stiffness), own(self.damping)
+        return LuGre(dynamic, stiffness, damping, own(self.viscous), static, stribeck, ())
+
+    def holding(self, states: tuple[Expr, ...], lateral: Vec3 | None) -> LuGre:
+        return replace(self, deflections=states, lateral=lateral)
 
 
 def has_bristles(values: Mapping[str, Any]) -> bool:

@@ -46,6 +46,7 @@ class NormalLaw(ABC):
     """The force along the normal from the penetration and its rate; ``formula`` says it in LaTeX."""
 
     formula: ClassVar[str] = r"F_n = k d^n (1 + \lambda \dot{d}), \quad d > 0"
+    count: ClassVar[int] = 0  #: how many states it has
 
     @abstractmethod
     def force(self, depth: Expr, rate: Expr) -> Expr:
@@ -66,6 +67,22 @@ class NormalLaw(ABC):
     def at(self, radius: Callable[[], Expr]) -> NormalLaw:
         """The law of two surfaces of an effective radius R, 1 / R = 1 / R1 + 1 / R2."""
         return self
+
+    def on_pad(self, area: Expr, width: Expr) -> NormalLaw:
+        """The law of a point that stands for an area of a plate."""
+        return self
+
+    def holding(self, states: tuple[Expr, ...]) -> NormalLaw:
+        """The law with its states."""
+        return self
+
+    def rates(self, depth: Expr, rate: Expr) -> tuple[Expr, ...]:
+        """Rates of its states."""
+        return ()
+
+    def rates_apart(self) -> tuple[Expr, ...]:
+        """Rates of its states where surfaces are apart."""
+        return ()
 
 
 @dataclass(frozen=True)

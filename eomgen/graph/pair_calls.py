@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 from ..errors import UsageError
-from ..numeric.pair_sums import MEETING, MOTION, POSE, PairSum
+from ..numeric.pair_sums import MEETING, MOTION, POSE, PairSum, pairs_of_rows
 from ..records import dataclass
 from .core import Expr, Graph
 from .nodes import Node
@@ -45,6 +45,11 @@ class PairKind:
     touch : tuple of int
         Normal (3), from the first shape to the second, penetration, and the radius about the centre of the second shape
         of what its turning moves (0 where it is round).
+    held : tuple of tuple of int
+        Of each row of the first table and of each of the second a number: their sum is the place of the pair's states
+        among all states of the sum.  Empty without states.
+    states : int
+        How many states a pair has.  What it adds to their rates stands behind the results.
     """
 
     name: str
@@ -57,6 +62,8 @@ class PairKind:
     outputs: tuple[int, ...]
     slopes: tuple[int, ...]
     touch: tuple[int, ...]
+    held: tuple[tuple[int, ...], ...] = ()
+    states: int = 0
 
     def graph(self) -> Graph:
         """Its nodes as a graph."""
@@ -75,6 +82,11 @@ class PairKind:
         """The symbols that its results depend on."""
         return self.symbols[: len(self.symbols) // 2]
 
+    @property
+    def beside(self) -> tuple[int, tuple[tuple[int, ...], ...]] | tuple[()]:
+        """How many states a pair has and where they stand; nothing without states."""
+        return (self.states, self.held) if self.states else ()
+
 
 @dataclass(frozen=True, eq=False)
 class PairFunction:
@@ -87,10 +99,12 @@ class PairFunction:
     bodies : int
         Ground among them.
     data : tuple of float or None
-        Operands that follow the ``POSE`` numbers of each body, where they are numbers.
+        Operands that follow the ``POSE`` numbers of each body, where they are numbers; states of pairs are the last.
     tables : tuple
         Of shapes; see :class:`~eomgen.numeric.pair_sums.PairSum`.
     kinds : tuple of PairKind
+    states : int
+        How many states all pairs have together.
     """
 
     name: str
@@ -98,6 +112,7 @@ class PairFunction:
     data: tuple[float | None, ...]
     tables: tuple[tuple[tuple[int, ...], ...], ...]
     kinds: tuple[PairKind, ...]
+    states: int = 0
 
     @property
     def element(self) -> str:
@@ -111,8 +126,25 @@ class PairFunction:
 
     @property
     def results(self) -> int:
-        """How many numbers it gives: six for each body and the energy."""
-        return 6 * self.bodies + 1
+        """How many numbers it gives: six for each body, the energy, and rates of states."""
+        return 6 * self.bodies + 1 + self.states
+
+    @property
+    def first_state(self) -> int:
+        """The place of the first state among the operands."""
+        return self.count - self.states
+
+    @cached_property
+    def holders(self) -> tuple[frozenset[int], ...]:
+        """For each state the bodies on whose contact it depends."""
+        found: list[set[int]] = [set() for _ in range(self.states)]
+        for kind in self.kinds if self.states else ():
+            first, second = self.tables[kind.first], self.tables[kind.second]
+            for i, j in zip(*pairs_of_rows(first, second, kind.first == kind.second), strict=True):
+                at = kind.held[0][i] + kind.held[1][j]
+                for k in range(at, at + kind.states):
+                    found[k] |= {first[i][0], second[j][0]}
+        return tuple(map(frozenset, found))
 
     @cached_property
     def touching(self) -> tuple[frozenset[int], ...]:
@@ -133,10 +165,11 @@ class PairFunction:
                 *(k.first, k.second, k.planar, k.law),
                 *(made(k.expressions(), k.plain), made(k.expressions("slopes"), k.symbols)),
                 made(k.expressions("touch"), k.plain),
+                *k.beside,
             )
             for k in self.kinds
         ]
-        return PairSum(self.bodies, self.tables, kinds)
+        return PairSum(self.bodies, self.tables, kinds, self.states)
 
     def __getstate__(self) -> dict[str, Any]:
         return {
@@ -297,7 +330,14 @@ def push_pairs(graph: Graph, i: int, tangents: Mapping[int, int]) -> int | None:
 
 def _acts(function: PairFunction, moving: PairCall, item: int) -> bool:
     """Whether a result can change with what moves."""
-    if item == function.results - 1 or any(k >= POSE * function.bodies for k in moving.numbers):
+    poses, first = POSE * function.bodies, function.first_state
+    if item == 6 * function.bodies or any(poses <= k < first for k in moving.numbers):
         return True
-    body = item // 6
-    return any(k // POSE == body or k // POSE in function.touching[body] for k in moving.numbers)
+    bodies = {k // POSE for k in moving.numbers if k < poses}
+    held = {k - first for k in moving.numbers if k >= first}
+    if item < 6 * function.bodies:
+        body = item // 6
+        return bool(bodies & {body, *function.touching[body]}) or any(body in function.holders[k] for k in held)
+    state = item - 6 * function.bodies - 1
+    each = function.kinds[0].states
+    return bool(bodies & function.holders[state]) or any(k // each == state // each for k in held)

@@ -48,6 +48,7 @@ class MarkerMotion:
         self.state = state
         self.turning = turning or {}
         self.carried: Mapping[str, Expr] = {}  # what symbols of reactions stand for, once that is solved for
+        self._state_rates: dict[str, tuple[Expr, ...]] = {}
         self._open: list[str] = []  # quantities of elements being resolved, each asked for by the one before
 
     def relative(self, start: Marker, end: Marker) -> Frame:
@@ -186,7 +187,9 @@ class MarkerMotion:
         force = next(force for force in mechanism.forces if force.name == element)
         measured = None if quantity.startswith(STATE_RATE) else force.measured(self)
         if quantity.startswith(STATE_RATE):
-            found = force.state_rates(self)[int(quantity.removeprefix(STATE_RATE))]
+            if element not in self._state_rates:  # of all at once: one sum over pairs gives many
+                self._state_rates[element] = force.state_rates(self)
+            found = self._state_rates[element][int(quantity.removeprefix(STATE_RATE))]
         elif quantity == "power" or measured is None:
             found = force.power(self)
         else:

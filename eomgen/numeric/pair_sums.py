@@ -41,28 +41,24 @@ class PairSum:
     tables : sequence of (n, PLACE + sizes + REST) integers
         Shapes of one kind: body, then places in the data of the position (3) and rotation (9) in the body, of the
         sizes, of the radius of a sphere that bounds the shape (-1: none does), and of the thickness of the body.
-    kinds : sequence of (first, second, planar, law, value, slope, touch)
+    kinds : sequence of (first, second, planar, law, value, slope, touch), and of pairs with states (states, held) too
         Tables of the first and the second shape; whether distances count across z of the first only; places of the
         law's numbers; the function of one pair and its directional derivative, of the numbers of the first shape, of
-        the second, and of the law (and of their rates in the same order); normal, penetration and turning radius of the
-        pair.
+        the second, of the law, and of the pair's states (and of their rates in the same order); normal, penetration and
+        turning radius of the pair; how many states a pair has, and the numbers of the rows of both tables whose sum is
+        the place of its states.
+    states : int, optional
+        How many states all pairs have; they are the last of the data, and their rates the last of the results.
     """
 
-    def __init__(
-        self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[int, int, bool, Any, Narrow, Narrow, Narrow]]
-    ):
-        self.bodies = bodies
+    def __init__(self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[Any, ...]], states: int = 0):
+        self.bodies, self.states = bodies, states
         self.tables = [np.array(table, dtype=int) for table in tables]
-        self.kinds = [(*kind, *self._pairs(*kind[:2])) for kind in kinds]
+        self.kinds = [(*kind[:7], *self._pairs(*kind[:2])) for kind in kinds]
+        self.held = [(kind[7], *(np.array(rows) for rows in kind[8])) if states else None for kind in kinds]
 
     def _pairs(self, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of all pairs on different bodies, each once."""
-        a, b = self.tables[first], self.tables[second]
-        i, j = (x.ravel() for x in np.meshgrid(np.arange(len(a)), np.arange(len(b)), indexing="ij"))
-        keep = a[i, 0] != b[j, 0]
-        if first == second:
-            keep &= i < j
-        return i[keep], j[keep]
+        return pairs_of_rows(self.tables[first], self.tables[second], first == second)
 
     def __call__(self, given: Sequence[Any]) -> list[Any]:
         """Force and torque about the origin of each body, and the energy: 6 bodies + 1 numbers or arrays."""
@@ -165,10 +161,10 @@ class PairSum:
 
     def _sum(self, data: np.ndarray, rates: np.ndarray | None) -> list[Any]:
         placed = [self._place(table, data, rates) for table in self.tables]
-        out = np.zeros((6 * self.bodies + 1, *data.shape[1:]), dtype=data.dtype)
+        out = np.zeros((6 * self.bodies + 1 + self.states, *data.shape[1:]), dtype=data.dtype)
         if data.dtype == object:
             out = out + data[0] * 0
-        for first, second, planar, law, value, slope, _, i, j in self.kinds:
+        for (first, second, planar, law, value, slope, _, i, j), held in zip(self.kinds, self.held, strict=True):
             (a, arm_a, da, d_arm_a), (b, arm_b, db, d_arm_b) = placed[first], placed[second]
             i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
             near = self._near(a, b, planar, i, j, (self.tables[first], self.tables[second]), data)
@@ -177,6 +173,9 @@ class PairSum:
                 continue
             bodies = self.tables[first][i, 0], self.tables[second][j, 0]
             numbers = [*np.moveaxis(a[i], 1, 0), *np.moveaxis(b[j], 1, 0), *data[list(law)][:, None]]
+            places = [] if held is None else [held[1][i] + held[2][j] + k for k in range(held[0])]
+            begun = len(data) - self.states
+            numbers += [data[begun + at] for at in places]
             if rates is None:
                 result = _table(value(numbers), len(i), data)
                 force, torque_a, torque_b = result[0:3], result[3:6], result[6:9]
@@ -186,6 +185,7 @@ class PairSum:
                 assert da is not None
                 assert db is not None
                 moving = [*np.moveaxis(da[i], 1, 0), *np.moveaxis(db[j], 1, 0), *rates[list(law)][:, None]]
+                moving += [rates[begun + at] for at in places]
                 force = _table(value(numbers), len(i), data)[0:3]
                 result = _table(slope([*numbers, *moving]), len(i), data)
                 turned = result[0:3]
@@ -198,7 +198,9 @@ class PairSum:
                 for k in range(3):
                     np.add.at(out, 6 * body + k, sign * push[k])
                     np.add.at(out, 6 * body + 3 + k, turn[k])
-            out[-1] = out[-1] + result[9].sum(axis=0)
+            out[6 * self.bodies] = out[6 * self.bodies] + result[9].sum(axis=0)
+            for at, change in zip(places, result[RESULT:], strict=True):
+                np.add.at(out, 6 * self.bodies + 1 + at, change)
         return list(out.tolist()) if out.ndim == 1 and out.dtype == float else list(out)
 
     def _place(self, table: np.ndarray, data: np.ndarray, rates: np.ndarray | None) -> tuple[Any, Any, Any, Any]:
@@ -289,6 +291,16 @@ class PairSum:
         apart = np.asarray(square > size * size, dtype=bool)
         every = np.asarray(apart.all(axis=tuple(range(1, apart.ndim))))
         return np.asarray(~every | (bounds[0] < 0) | (bounds[1] < 0))
+
+
+def pairs_of_rows(first: Any, second: Any, same: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of all pairs on different bodies, each once where both tables are the same."""
+    a, b = np.array([row[0] for row in first]), np.array([row[0] for row in second])
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(len(a)), np.arange(len(b)), indexing="ij"))
+    keep = a[i] != b[j]
+    if same:
+        keep &= i < j
+    return i[keep], j[keep]
 
 
 def _changed(shapes: np.ndarray, arm: np.ndarray, own: np.ndarray) -> np.ndarray:

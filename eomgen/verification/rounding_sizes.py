@@ -111,7 +111,8 @@ def _of_pairs(call: PairCall, given: Sequence[Any]) -> Any:
     at = [a for a, _ in operands]
     found = value(at)
     size = abs(found)  # a component of a body's force or moment may be what is left of the others
-    size[:-1] = np.repeat(size[:-1].reshape(-1, 6, *size.shape[1:]).max(axis=1), 6, axis=0)
+    wrenches = 6 * call.function.bodies
+    size[:wrenches] = np.repeat(size[:wrenches].reshape(-1, 6, *size.shape[1:]).max(axis=1), 6, axis=0)
     bounds = PAIR_ROUNDING * UNIT * size
     for k, (a, own) in enumerate(operands):
         error = own + PAIR_ROUNDING * UNIT * abs(a)

@@ -98,7 +98,7 @@ FAULTS = [
     (LAST, "", "forces.among: has no law; give law: {stiffness: ...}"),
     (LAST, "law: {friction: 0.2, smoothing: 0.1}", "forces.among.stiffness: is missing"),
     (LAST, "law: {stiffness: 1, stifness: 1}", "forces.among.stifness: unknown key"),
-    (FLOOR, "{shape: half_space, on: ground}", "circle and half_space do not meet; circle, segment, box, polygon meet"),
+    (FLOOR, "{shape: half_space, on: ground}", "circle and half_space do not meet; circle, segment, box, polygon, outline"),
     (FLOOR, "{shape: circle, on: a, radius: r}", "the shape on a is in both groups; give second only what is not in"),
     (BOXES, BOXES.replace("[a, b]", "a"), "forces.among: has shapes on one body only"),
     (
@@ -106,7 +106,7 @@ FAULTS = [
         POINTS.format("[[0, 0], [1, 1], [1, 0], [0, 1]]"),
         "the edges that begin at corners 0 and 2 cross each other",
     ),
-    (BOXES, POINTS.format("[[0, 0], [1, 0], [0.2, 0.2], [0, 1]]"), "points: is not convex; make it of several"),
+    (BOXES, POINTS.format("[[0, 0], [1, 0], [0.2, 0.2], [0, 1]]"), "points: is not convex; give it as shape outline"),
     (BOXES, POINTS.format("[[0, 0], [1, 0], [2, 0], [0, 1]]"), "points[1]: lies on a line with the corners beside it"),
     (BOXES, POINTS.format("[[0, 0], [1, 0]]"), "points: is no outline; give 3 to 64 corners [x, y]"),
 ]

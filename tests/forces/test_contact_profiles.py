@@ -228,7 +228,7 @@ def test_what_is_wrong_with_a_profile_is_told(given: dict[str, Any], place: str,
 def test_profiles_do_not_meet_each_other() -> None:
     m, (ball,) = scenes.planar("wrong", 1)
     m.contacts("floor", ground(m, HILLS), on({"shape": "half_plane"}, ball), LAW)
-    with pytest.raises(ModelError, match="profile and half_plane do not meet; circle, segment, box, polygon meet"):
+    with pytest.raises(ModelError, match="profile and half_plane do not meet; circle, segment, box, polygon, outline"):
         m.mechanism()
 
 

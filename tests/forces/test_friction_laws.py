@@ -255,9 +255,24 @@ def test_what_is_wrong_with_a_law_of_friction_is_told(law: dict[str, Any], place
     assert told in found.get(f"forces.touch.{place}", f"nothing there: {found}"), found
 
 
-def test_groups_have_no_bristles() -> None:
-    with pytest.raises(ModelError, match="lugre has states, which pairs of groups do not; use brown_mcphee, or point_"):
-        block(0.1, LUGRE, bulk=True).mechanism()
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_bristles_of_groups_as_those_of_one_pair(target: str) -> None:
+    """A sphere in a group, on a half-space, has the bristles of sphere_plane, whose plane is the same."""
+    single = eg.Model("slope", gravity=(G * np.sin(0.2), 0, -G * np.cos(0.2)))
+    single.body("cart", mass=0)
+    body = single.body("block", mass=2.0, inertia=(0.01, 0.01, 0.01))
+    single.prismatic("x", single.ground, "cart", axis="x")
+    single.prismatic("z", "cart", body, axis="z")
+    single.sphere_plane("touch", single.ground, body.at(0, 0, 0.1), radius=0.1, **GROUND, **LUGRE)
+    mods = [m.compile(target=target) for m in (single, block(0.2, LUGRE, bulk=True))]
+    assert mods[0].x_names[4:] == ("touch_bristle_x", "touch_bristle_y")
+    assert mods[1].x_names[4:] == ("touch_bristle_x_1", "touch_bristle_y_1")
+    for z, v in ((-SINK, 0.0), (-SINK, 0.03), (0.01, 0.2)):
+        x = np.array([0.1, z, v, -0.02, 2e-6, -1e-6])
+        values = [mod.rhs(0.0, x) for mod in mods]
+        np.testing.assert_allclose(values[1], values[0], rtol=1e-11, atol=1e-12)  # of a depth of 2e-5 m beside 0.1 m
+        slopes = [mod.jacobian(0.0, x) for mod in mods]
+        np.testing.assert_allclose(slopes[1], slopes[0], rtol=1e-11, atol=1e-12 * np.abs(slopes[0]).max())
 
 
 def test_names_of_bristles_are_taken() -> None:

@@ -18,6 +18,7 @@ from ...describe.rewritten_texts import rewritten, scaled
 from ...describe.scope import ENERGIES
 from ...describe.visit import Slot, Visitor, visit
 from ...elements.dimensions import ENERGY, LENGTH, NONE, SPEED, SPIN, Dimension
+from ...forces.soil_laws import OWN
 from .variant import NotApplicable, UnitScales, Variant, coordinates_of, kinds_of, velocities_of
 
 #: The engineer's units: millimetre, tonne, millisecond.
@@ -37,6 +38,8 @@ def in_units(description: Description, random: Any, scales: UnitScales = MM_T_MS
     """
     if any(description.values.get(key) is not None for key in ("lagrangian", "equations")):
         raise NotApplicable("the dimensions of a bare Lagrangian and of given equations are not known")
+    if any(entry.values.get("soil", OWN) != OWN for entry in description.sections["forces"]):
+        raise NotApplicable("the numbers of a published soil are in SI units")
     visitor = _Scaled(description, scales)
     made = visit(description, visitor)
     simulation = made.values.get("simulation")

@@ -1,0 +1,64 @@
+"""Stage describe, closed outlines of contacts: points or sizes of a sprocket -> the sizes of a shape."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..forces.contact_outlines import half_gap, half_tip, sprocket_fault
+from ..graph.core import Expr
+from ..graph.shown import shown
+from .values import Reader
+
+SEAT_ANGLE = math.radians(130)  #: ISO 606 allows 120 to 140 degrees
+
+
+def positive(reader: Reader, path: str, x: Expr, or_zero: bool = False) -> None:
+    """Note a number that is not greater than 0."""
+    number = reader.known(x)
+    if number is not None and (number < 0 if or_zero else number <= 0):
+        reader.faults.add(path, f"is {number:g}", "must be 0 or greater" if or_zero else "must be greater than 0")
+
+
+def outline_sizes(reader: Reader, path: str, given: Mapping[str, Any], corners: Sequence[Expr]) -> tuple[Expr, ...]:
+    """Depth and points, clockwise, of an outline whose corners are known, counterclockwise."""
+    points = list(zip(corners[::2], corners[1::2], strict=True))[::-1]
+    known = [(reader.known(x), reader.known(y)) for x, y in points]
+    numbers = [(x, y) for x, y in known if x is not None and y is not None]
+    if "depth" in given:
+        depth = reader.expression(f"{path}.depth", given["depth"])
+        positive(reader, f"{path}.depth", depth)
+    elif all(x.value is not None for x in corners):
+        depth = reader.graph.constant(half_gap(numbers))
+    else:
+        reader.faults.add(f"{path}.depth", "is missing", "points with parameters do not tell it; give a length")
+        depth = reader.stand_in
+    return (depth, *(x for point in points for x in point))
+
+
+def sprocket_sizes(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+    """Depth, number of teeth, pitch, radii of seats and tips, angle of a seat."""
+    teeth = given["teeth"]
+    if isinstance(teeth, bool) or not isinstance(teeth, int) or teeth < 3:
+        reader.faults.add(f"{path}.teeth", f"is {shown(teeth)}", "give a whole number of 3 or more")
+        return ()
+    keys = ("pitch", "seat", "tip_radius")
+    sizes = [reader.expression(f"{path}.{key}", given[key]) for key in keys]
+    for key, x in zip(keys, sizes, strict=True):
+        positive(reader, f"{path}.{key}", x)
+    sizes.append(reader.expression(f"{path}.seat_angle", given.get("seat_angle", SEAT_ANGLE)))
+    numbers = [reader.known(x) for x in sizes]
+    known = [x for x in numbers if x is not None]
+    if reader.faults.under(path):
+        return ()
+    if len(known) == len(sizes) and (fault := sprocket_fault(teeth, *known)) is not None:
+        key, message, remedy = fault
+        reader.faults.add(f"{path}.{key}", message, remedy)
+        return ()
+    if "depth" in given:
+        depth = reader.expression(f"{path}.depth", given["depth"])
+        positive(reader, f"{path}.depth", depth)
+    else:
+        depth = half_tip(teeth, *sizes)
+    return (depth, reader.graph.constant(float(teeth)), *sizes)

@@ -1,0 +1,183 @@
+"""Force elements, contact in bulk: an entry with groups of shapes and a law -> the element, and the states it has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..elements.dimensions import LENGTH
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import Field
+from .contact import CURVED
+from .contact_groups import ContactGroups
+from .contact_shape_fields import GROUNDS, PLANAR, SHAPE_FIELDS
+from .contact_shapes import ContactShape
+from .contact_states import ShapeParts, given_groups, pair_states
+from .friction_laws import DryFriction, has_bristles, read_friction
+from .normal_laws import HertzBodies, NormalLaw, read_normal_law
+from .soil_laws import LATERAL, SOIL, read_soil, states_of_soil
+
+
+def _contact_groups(e: Entry) -> ContactGroups | None:
+    first = e.shapes("first")
+    second = e.shapes("second") if "second" in e.values else ()
+    soil = "soil" in e.values
+    laws = _laws(e)
+    lateral = e.flag("lateral")
+    if first is None or second is None or laws is None or e.at_fault():
+        return None
+    law, friction = laws
+    _refuse_pairs(e, first, second)
+    if soil:
+        _refuse_on_soil(e, first, second)
+    if isinstance(law, HertzBodies):
+        for key, shapes in (("first", first), ("second", second)):
+            if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
+                e.fault(key, f"a {flat[0]} has no radius for Hertz's law from moduli", "give stiffness, not moduli")
+    axes = len(_axes(e.values, given_groups(e.values), lateral)) if soil or has_bristles(e.values) else 0
+    return ContactGroups(e.name, first, second, law, friction, e.states(), axes)
+
+
+def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None] | None:
+    """The law of the normal force and that of friction."""
+    if "soil" in e.values:
+        return read_soil(e)
+    for key in SOIL:
+        e.refuse(key, "belongs to contacts that have soil")
+    if not has_bristles(e.values):
+        e.refuse("lateral", "belongs to contacts that have soil, or friction_law: lugre")
+    return read_normal_law(e), read_friction(e, "friction", "static_friction", "viscous_friction")
+
+
+def _refuse_on_soil(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
+    """Note groups that are not plates on ground."""
+    for shapes, others, key in ((first, second, "second"), (second, first, "first")):
+        if any(shape.kind in GROUNDS for shape in shapes):
+            wrong = sorted({shape.kind for shape in others if shape.kind != "plate"})
+            if wrong:
+                e.fault(key, f"a {wrong[0]} does not lie on soil", "give plates: the undersides of links, soles, feet")
+            return
+    e.fault("", "has soil, but no ground", "give half_plane or a profile as one group, plates as the other")
+
+
+def _axes(values: Mapping[str, Any], groups: Sequence[Sequence[ShapeParts]], lateral: bool) -> tuple[str, ...]:
+    """How states of friction are called, by their axes.
+
+    In the plane along the surface, and across the plane; in space along x and y of half-spaces, or x, y, z of others.
+    """
+    kinds = {shape.kind for group in groups for shape in group}
+    if kinds & set(PLANAR):
+        return ("_x", "_z") if lateral else ("",)
+    round_pairs = any(first in ("round", "rod") for _, _, first, _ in pair_states(groups)[0])
+    return ("_x", "_y", "_z") if round_pairs else ("_x", "_y")
+
+
+def _states(values: Mapping[str, Any]) -> dict[str, str]:
+    """States of all pairs and their units, pair after pair."""
+    soil = "soil" in values
+    if not soil and not has_bristles(values):
+        return {}
+    groups = given_groups(values)
+    axes = _axes(values, groups, values.get("lateral", True) is not False)
+    names = states_of_soil(axes) if soil else tuple(f"bristle{axis}" for axis in axes)
+    return {f"{name}_{k + 1}": "m" for k in range(pair_states(groups)[1]) for name in names}
+
+
+def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
+    """Note shapes that cannot meet, and a shape that is in both groups."""
+    kinds = sorted({shape.kind for shape in first}), sorted({shape.kind for shape in second or first})
+    for a in kinds[0]:
+        for b in kinds[1]:
+            if (a in PLANAR) != (b in PLANAR):
+                e.fault("second", f"{a} and {b} do not meet", _ALLOWED)
+            elif (
+                (a in GROUNDS and b in GROUNDS)
+                or (a in _ON_GROUND and b in _IN_SPACE)
+                or (b in _ON_GROUND and a in _IN_SPACE)
+            ) and (second or a != b or _differ(first, a)):
+                told = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
+                e.fault("second" if second else "first", told, _ALLOWED)
+    for key, own, met in (("second", kinds[0], kinds[1]), ("first", kinds[1], kinds[0])):
+        if "plate" in own and (wrong := [kind for kind in met if kind not in _UNDER_PLATES]):
+            e.fault(key, f"{wrong[0]} and plate do not meet", f"plates meet {', '.join(_UNDER_PLATES)}")
+            break
+    thin = [shape for shape in first if _is_thin(shape)], [shape for shape in second or first if _is_thin(shape)]
+    for k, others in enumerate((second or first, first)):
+        cornered = sorted({shape.kind for shape in others if shape.kind in _CORNERED or _is_thin(shape)})
+        if thin[k] and cornered and (second or _differ_in_body(first)):
+            e.fault(
+                ("first", "second")[k] if second else "first",
+                f"corners of {cornered[0]} pass through a segment of radius 0, which has no inside",
+                "give the segment a radius greater than 0",
+            )
+            break
+    for key, shapes in (("first", first), ("second", second)):
+        if twice := [shape for k, shape in enumerate(shapes) if shape in shapes[:k]]:
+            e.fault(key, f"has the {twice[0].kind} on {twice[0].marker.label} twice", "give each shape once")
+    both = {shape.marker.label for shape in first if shape in second}
+    if both:
+        e.fault(
+            "second",
+            f"the shape on {sorted(both)[0]} is in both groups",
+            "give second only what is not in first; without second the shapes of first meet among themselves",
+        )
+    bodies = {shape.marker.body for shape in (*first, *second)}
+    if len(bodies) == 1:
+        e.fault("", "has shapes on one body only", "shapes of one body do not meet; give shapes on other bodies")
+
+
+def _is_thin(shape: ContactShape) -> bool:
+    return shape.kind == "segment" and shape.sizes[1].is_zero
+
+
+def _differ_in_body(shapes: Sequence[ContactShape]) -> bool:
+    return len({shape.marker.body for shape in shapes}) > 1
+
+
+def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
+    """Whether shapes of a kind are on different bodies."""
+    return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
+
+
+_UNDER_PLATES = ("half_plane", "profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
+_CORNERED = (
+    "box",
+    "polygon",
+    "profile",
+    "smooth_profile",
+    "outline",
+    "smooth_outline",
+    "sprocket",
+)  #: shapes whose corners meet segments
+_ON_GROUND = ("ellipsoid", "cuboid")  #: shapes that meet a half-space alone
+_IN_SPACE = ("sphere", "capsule", *_ON_GROUND)
+_ALLOWED = (
+    "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
+    "smooth_profile; sphere and capsule meet each other and half_space; ellipsoid and cuboid meet half_space"
+)
+
+_SHAPES = "shapes {shape, on, ...} of the "
+
+TYPES = table(
+    ElementType(
+        "contacts",
+        "contact of every shape of a group with every shape of another, by one law.  Shapes are mappings of shape "
+        f"({', '.join(PLANAR)}; {', '.join(kind for kind in SHAPE_FIELDS if kind not in PLANAR)}), "
+        "on (a marker or a list of markers) and sizes.  Shapes of one body do not meet.",
+        {
+            "first": Field("shapes", _SHAPES + "first group", required=True, dimension=LENGTH),
+            "second": Field(
+                "shapes",
+                _SHAPES + "second group; without it those of the first meet among themselves",
+                dimension=LENGTH,
+            ),
+            "law": Field("law", "the keys that follow as a mapping, instead of one by one"),
+            **CURVED,
+            **SOIL,
+            **LATERAL,
+        },
+        _contact_groups,
+        states=_states,
+    )
+)

@@ -1,0 +1,167 @@
+"""Force elements, contact with closed outlines in the plane: corners, a smooth curve, a sprocket -> their pieces.
+
+Pieces are those of :mod:`.contact_profiles`, one after the other clockwise, so that the solid lies inside.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from functools import reduce
+from typing import NamedTuple
+
+from ..graph.core import Expr, cos, sin, sqrt
+from ..limits.contacts import SHARED
+from .contact_profiles import Point, ProfilePart, arc, biarcs, edge, length, minus, tangent, times, unit
+
+Pair = tuple[float, float]
+
+
+def straight_ring(points: Sequence[Point]) -> list[ProfilePart]:
+    """Edges from point to point, clockwise."""
+    width = _width(points)
+    edges = [minus(b, a) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
+    ways = [unit(one) for one in edges]
+    n = len(points)
+    return [edge(points[k], edges[k], ways[k - 1], ways[(k + 1) % n], width) for k in range(n)]
+
+
+def smooth_ring(points: Sequence[Point]) -> list[ProfilePart]:
+    """Two circular arcs of one tangent from point to point, clockwise."""
+    width, n = _width(points), len(points)
+    ways = [tangent(points[k - 1], points[k], points[(k + 1) % n]) for k in range(n)]
+    found: list[ProfilePart] = []
+    for k in range(n):
+        found += biarcs(points[k], points[(k + 1) % n], ways[k], ways[(k + 1) % n], width)
+    return found
+
+
+class Tooth(NamedTuple):
+    """A seat of a sprocket on the x axis: where its arc ends on the side of y, its flank, and the corner of its tip."""
+
+    seat_end: Point
+    flank: Point
+    length: Expr
+    tip: Point
+
+
+def _tooth(teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr) -> Tooth:
+    c, s = cos(0.5 * angle), sin(0.5 * angle)
+    x, y = _pitch_radius(teeth, pitch) - seat * c, seat * s
+    along = x * s + y * c
+    flank = sqrt(along * along + tip * tip - (x * x + y * y)) - along
+    return Tooth((x, y), (s, c), flank, (x + flank * s, y + flank * c))
+
+
+def half_tip(teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr) -> Expr:
+    """Half of the width of the tips of a sprocket."""
+    corner, half = _tooth(teeth, pitch, seat, tip, angle).tip, math.pi / teeth
+    return corner[0] * math.sin(half) - corner[1] * math.cos(half)
+
+
+def sprocket_ring(
+    teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr
+) -> tuple[list[ProfilePart], list[Point], list[Point]]:
+    """A wheel for a chain of pins: its pieces, its outer corners and points of its outline, all clockwise.
+
+    A seat is an arc about the place of a pin on the pitch circle, whose radius is pitch / (2 sin(pi / teeth)); straight
+    flanks go on from its ends to the tip circle (ISO 606, with the flank in place of its large arc).  The first seat
+    lies on the x axis.
+
+    Parameters
+    ----------
+    teeth : int
+    pitch : Expr
+        The straight distance between neighbouring pins (m).
+    seat : Expr
+        The radius of the seats (m).
+    tip : Expr
+        The radius of the tip circle (m).
+    angle : Expr
+        The seating angle, over which the arc of a seat goes (rad).
+    """
+    graph = pitch.graph
+    (x, y), (s, c), flank, end = _tooth(teeth, pitch, seat, tip, angle)
+    turns = [(math.cos(2.0 * math.pi * k / teeth), math.sin(2.0 * math.pi * k / teeth)) for k in range(teeth)]
+    step = (graph.constant(turns[1][0]), graph.constant(-turns[1][1]))
+    low, low_end = (x, -y), (end[0], -end[1])
+    across = minus(end, _turned(low_end, (step[0], -step[1])))  # along the tip before the first flank
+    over, down, up = unit(across), (-s, -c), (s, -c)
+    width = SHARED * (teeth * pitch)
+    tooth = [
+        edge(end, times(down, flank), over, down, width),
+        arc((x, y), low, down, width),
+        edge(low, times(up, flank), up, _turned(over, step), width),
+        edge(low_end, _turned(across, step), up, _turned(down, step), width),
+    ]
+    line = [end, (x, y), (_pitch_radius(teeth, pitch) - seat, graph.zero), low, low_end]
+    pieces: list[ProfilePart] = []
+    places: list[Point] = []
+    for a, b in reversed(turns):
+        turn = (graph.constant(a), graph.constant(b))
+        pieces += [one._replace(origin=_turned(one.origin, turn), along=_turned(one.along, turn)) for one in tooth]
+        places += [_turned(point, turn) for point in line]
+    return pieces, [point for k, point in enumerate(places) if k % len(line) in (0, len(line) - 1)], places
+
+
+def _pitch_radius(teeth: int, pitch: Expr) -> Expr:
+    return pitch / (2.0 * math.sin(math.pi / teeth))
+
+
+def sprocket_fault(teeth: int, pitch: float, seat: float, tip: float, angle: float) -> tuple[str, str, str] | None:
+    """The key, message and remedy of what is wrong with sizes of a sprocket, in numbers; None where nothing is."""
+    if not 0.0 < angle < math.pi:
+        return "seat_angle", f"is {angle:g} rad", "give more than 0 and less than pi, such as 130 deg"
+    if 2.0 * seat >= pitch:
+        return "seat", f"is {seat:g}, so that seats overlap", f"give less than half of the pitch, {0.5 * pitch:g}"
+    reach = pitch / (2.0 * math.sin(math.pi / teeth))
+    c, s = math.cos(0.5 * angle), math.sin(0.5 * angle)
+    x, y = reach - seat * c, seat * s
+    if seat >= reach:
+        return "seat", f"is {seat:g}, which reaches the axis", f"give less than the pitch radius, {reach:g}"
+    if math.hypot(x, y) >= tip:
+        return "tip_radius", f"is {tip:g}, inside the ends of the seats", f"give more than {math.hypot(x, y):g}"
+    along = x * s + y * c
+    flank = math.sqrt(along * along + tip * tip - x * x - y * y) - along
+    if math.atan2(y + flank * c, x + flank * s) >= math.pi / teeth:
+        # the flanks of neighbouring seats meet on the line between them, at the angle pi / teeth
+        a, b = math.cos(math.pi / teeth), math.sin(math.pi / teeth)
+        run = (x * b - y * a) / (c * a - s * b)
+        most = math.hypot(x + run * s, y + run * c)
+        return "tip_radius", f"is {tip:g}, beyond the points of the teeth", f"give less than {most:g}"
+    return None
+
+
+def half_gap(points: Sequence[Pair]) -> float:
+    """Half of the least distance between edges of a closed outline that are no neighbours."""
+    n, least = len(points), math.inf
+    edges = [(points[k], points[(k + 1) % n]) for k in range(n)]
+    for i, j in itertools.combinations(range(n), 2):
+        if j - i in (1, n - 1):
+            continue
+        for one, (start, end) in ((edges[i], edges[j]), (edges[j], edges[i])):
+            least = min(least, *(_away(point, start, end) for point in one))
+    if n == 3:  # all are neighbours: the smallest height
+        least = min(_away(points[k - 1], *edges[k]) for k in range(3))
+    return 0.5 * least
+
+
+def _away(point: Pair, start: Pair, end: Pair) -> float:
+    """The distance of a point from a straight line between two others."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    run = ((point[0] - start[0]) * dx + (point[1] - start[1]) * dy) / (dx * dx + dy * dy)
+    run = min(1.0, max(0.0, run))
+    return math.hypot(point[0] - start[0] - run * dx, point[1] - start[1] - run * dy)
+
+
+def _width(points: Sequence[Point]) -> Expr:
+    """Over which neighbouring pieces share a circle."""
+    around = [length(minus(b, a)) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
+    return SHARED * reduce(lambda a, b: a + b, around)
+
+
+def _turned(point: Point, turn: Point) -> Point:
+    """Turned by an angle whose cosine and sine are given."""
+    c, s = turn
+    return c * point[0] - s * point[1], s * point[0] + c * point[1]

@@ -1,0 +1,130 @@
+"""Force elements, states of contacts between groups: kinds of shapes -> the states that pairs of them have.
+
+A pair is a shape with a surface, or a round one, beside a part of another shape that meets it: a circle, a corner, a
+point of a plate.  The pieces of a profile share the states of their shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+PLATE = 2  #: points of a plate unless given
+POINTS = 8  #: most points of a plate
+#: Parts that meet surfaces, in the order in which their states stand.
+PARTS = ("round", "corner", "end", "ellipsoid", "rod", "pad")
+_ROUND = ("round", "rod")
+#: Kind of shape -> what it is where it is the first of a pair.
+_FIRST = {
+    "circle": "round", "sphere": "round", "capsule": "rod", "segment": "flat", "box": "flat", "polygon": "flat",
+    "profile": "ground", "smooth_profile": "ground", "outline": "ground", "smooth_outline": "ground",
+    "sprocket": "ground", "half_plane": "half", "half_space": "half",
+}  # fmt: skip
+#: What is met by each of these.
+_MET = {
+    "round": ("round",),
+    "rod": ("round", "rod"),
+    "flat": ("round", "corner"),
+    "ground": ("round", "corner", "pad"),
+    "half": ("round", "corner", "end", "ellipsoid", "pad"),
+}
+
+
+class ShapeParts(NamedTuple):
+    """A shape: its kind and how many parts of each class it has."""
+
+    kind: str
+    parts: Mapping[str, int]
+
+
+class PairStates(NamedTuple):
+    """Where the pairs of some first shapes with parts of one class stand among all pairs."""
+
+    start: int
+    columns: int
+    rows: Mapping[int, int]  #: number of the first shape in its group -> row
+    once: bool  #: whether the parts meet among themselves, each two once
+
+    def of_first(self, shape: int, row: int) -> int:
+        """The number of a first part: of its shape, or where parts meet among themselves of its row in the table."""
+        if self.once:
+            return self.start + row * self.columns - row * (row + 1) // 2 - row - 1
+        return self.start + self.rows[shape] * self.columns
+
+
+def parts_of(kind: str, points: int = 0) -> ShapeParts:
+    """The parts of a shape; ``points`` counts the points of an outline, profile or plate, or the teeth of a wheel."""
+    found = {
+        "circle": {"round": 1}, "sphere": {"round": 1}, "segment": {"corner": 2}, "box": {"corner": 4},
+        "capsule": {"rod": 1, "end": 2}, "ellipsoid": {"ellipsoid": 1}, "cuboid": {"end": 8},
+        "polygon": {"corner": points}, "outline": {"corner": points}, "smooth_outline": {"corner": points},
+        "sprocket": {"corner": 2 * points}, "plate": {"pad": points},
+        "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2},
+    }  # fmt: skip
+    return ShapeParts(kind, found.get(kind, {}))
+
+
+def pair_states(groups: Sequence[Sequence[ShapeParts]]) -> tuple[dict[tuple[int, int, str, str], PairStates], int]:
+    """Blocks of pairs by (group of the first, of the second, class of the first, class of the second); all pairs."""
+    found: dict[tuple[int, int, str, str], PairStates] = {}
+    start = 0
+    for g, h in [(0, 0)] if len(groups) == 1 else [(0, 1), (1, 0)]:
+        for first in (*_ROUND, "surface"):
+            for second in PARTS:
+                if first == second and g > h:  # met already
+                    continue
+                columns = sum(shape.parts.get(second, 0) for shape in groups[h])
+                own = [k for k, shape in enumerate(groups[g]) if _meets(shape.kind, first, second)]
+                if not own or not columns:
+                    continue
+                once = first == second and g == h
+                count = sum(groups[g][k].parts[second] for k in own) if first == second else len(own)
+                block = PairStates(start, columns, {shape: row for row, shape in enumerate(own)}, once)
+                found[g, h, first, second] = block
+                start += count * (count - 1) // 2 if once else len(own) * columns
+    return found, start
+
+
+def class_of(feature: str) -> str:
+    """The class of a first part."""
+    return feature if feature in _ROUND else "surface"
+
+
+def _meets(kind: str, first: str, second: str) -> bool:
+    own = _FIRST.get(kind, "")
+    return own != "" and (own if own in _ROUND else "surface") == first and second in _MET[own]
+
+
+# -- from what the user gave ------------------------------------------------------------------------------------------
+def points_of_plate(given: Mapping[str, Any]) -> int | None:
+    """At how many points a plate is felt; None where that is no number."""
+    count = given.get("points", PLATE)
+    whole = isinstance(count, int | float) and not isinstance(count, bool) and float(count).is_integer()
+    return int(count) if whole and 1 <= count <= POINTS else None
+
+
+def given_groups(values: Mapping[str, Any]) -> list[list[ShapeParts]]:
+    """The shapes of an entry's groups, as far as they can be read."""
+    return [_given_shapes(values[key]) for key in ("first", "second") if key in values]
+
+
+def _listed(value: Any) -> list[Any]:
+    if isinstance(value, list | tuple):
+        return list(value)
+    return value.tolist() if hasattr(value, "tolist") else [value]
+
+
+def _given_shapes(value: Any) -> list[ShapeParts]:
+    found: list[ShapeParts] = []
+    for shape in _listed(value):
+        if not isinstance(shape, Mapping):
+            continue
+        kind = str(shape.get("shape"))
+        if kind == "plate":
+            count = points_of_plate(shape) or 0
+        elif kind == "sprocket":
+            count = shape["teeth"] if isinstance(shape.get("teeth"), int) else 0
+        else:
+            count = len(_listed(shape.get("points", ())))
+        found += [parts_of(kind, count)] * len(_listed(shape.get("on")))
+    return found

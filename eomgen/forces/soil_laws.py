@@ -1,0 +1,282 @@
+"""Force elements, laws of soil under plates: sinkage with unloading, and shear that builds up with displacement.
+
+Each point of a plate remembers its greatest sinkage and its shear displacement as states, as long as it is in the
+ground.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import ClassVar
+
+from ..elements.dimensions import FORCE, LENGTH, NONE, REACH, TIME
+from ..elements.entry import Entry
+from ..elements.field import Field, Fields
+from ..graph import vectors as vec
+from ..graph.core import Expr, sqrt
+from ..graph.vectors import Vec3
+from ..records import dataclass
+from .branches import beyond_zero, where
+from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip
+from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, NormalLaw
+from .soils import RECOVERY, SOILS
+
+OWN = "own"  #: the soil whose numbers are all given
+REBOUND = 0.1  #: part of the sinkage that unloading gives back, where nothing is said
+
+
+@dataclass(frozen=True)
+class SoilPressure(NormalLaw):
+    """Pressure p of a point of a plate at a sinkage z, whose greatest so far is z_m, times the area that it stands for.
+
+        p = k z^n, k = k_c / b + k_phi                         at the greatest sinkage (Bekker)
+        p = k z_m^n - k_u (z_m - z), k_u = k_0 + A_u z_m       below it, never less than 0
+
+    after Wong, Theory of Ground Vehicles (2008), section 2.4 (pressure and sinkage, response to repetitive loading).
+    Without k_0 and A_u unloading gives back a part of the sinkage, k_u = k z_m^n / (rebound z_m).  No point pulls, and
+    unloading is at least as steep as the line to z = 0.  With dissipation p is multiplied by max(0, 1 + lambda z').
+    """
+
+    formula: ClassVar[str] = (
+        r"p = (\frac{k_c}{b} + k_\phi) z^n, \quad p = p_m - k_u (z_m - z) \text{ for } z < z_m, \quad F_n = p A"
+    )
+    count: ClassVar[int] = 1
+    cohesive: Expr
+    frictional: Expr
+    exponent: Expr
+    rebound: Expr | None
+    unloading: tuple[Expr, Expr] | None
+    dissipation: Expr
+    recovery: Expr
+    area: Expr | None = None
+    width: Expr | None = None
+    deepest: Expr | None = None
+
+    def on_pad(self, area: Expr, width: Expr) -> SoilPressure:
+        return replace(self, area=area, width=width if self.width is None else self.width)
+
+    def holding(self, states: tuple[Expr, ...]) -> SoilPressure:
+        return replace(self, deepest=states[0])
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> SoilPressure:
+        numbers = {
+            name: own(getattr(self, name))
+            for name in ("cohesive", "frictional", "exponent", "dissipation", "recovery", "rebound", "width")
+            if getattr(self, name) is not None
+        }
+        pair = None if self.unloading is None else (own(self.unloading[0]), own(self.unloading[1]))
+        return replace(self, **numbers, unloading=pair)
+
+    def force(self, depth: Expr, rate: Expr) -> Expr:
+        assert self.deepest is not None
+        assert self.area is not None
+        assert self.width is not None
+        graph, deepest, area = depth.graph, self.deepest, self.area
+        stiffness = self.cohesive / self.width + self.frictional
+
+        def pressure(z: Expr) -> Expr:
+            most = graph.apply("max", z, deepest)
+            top = stiffness * most**self.exponent
+            if self.unloading is None:
+                assert self.rebound is not None
+                slope = top / (self.rebound * most)
+            else:
+                slope = graph.apply("max", self.unloading[0] + self.unloading[1] * most, top / most)
+            gain = graph.apply("max", 0.0, 1.0 + self.dissipation * rate)
+            return area * gain * graph.apply("max", 0.0, top - slope * (most - z))
+
+        return beyond_zero(depth, pressure)
+
+    def elastic(self, depth: Expr) -> Expr:
+        return depth.graph.zero
+
+    def energy(self, depth: Expr) -> Expr:
+        return depth.graph.zero
+
+    def rates(self, depth: Expr, rate: Expr) -> tuple[Expr, ...]:
+        """z_m' = z' while the sinkage grows beyond z_m; above the ground z_m fades."""
+        assert self.deepest is not None
+        graph = depth.graph
+        grows = where(graph.apply("le", self.deepest, depth), graph.apply("max", 0.0, rate), 0.0)
+        return (where(graph.apply("lt", 0.0, depth), grows, self.rates_apart()[0]),)
+
+    def rates_apart(self) -> tuple[Expr, ...]:
+        assert self.deepest is not None
+        return (-self.deepest / self.recovery,)
+
+
+@dataclass(frozen=True)
+class SoilShear(DryFriction):
+    """Shear stress against the sliding, tau = (c + p tan phi) s, |s| = 1 - exp(-j / K) of the shear displacement j.
+
+    The state is the recoverable displacement d = K s, with d' = v - |v| d / K: at a sliding of one direction this is
+    the law of Janosi and Hanamoto (1961); where sliding turns back, stress falls and rises again the other way.
+    """
+
+    formula: ClassVar[str] = (
+        r"\tau = (c + p \tan\varphi) \frac{d}{K}, \quad \dot{d} = v - \frac{|v|}{K} d, \quad F_t = -\tau A"
+    )
+    joint_formula: ClassVar[str] = ""
+    cohesion: Expr
+    slope: Expr  #: tan phi
+    modulus: Expr
+    recovery: Expr
+    area: Expr | None = None
+    shears: tuple[Expr, ...] = ()
+    lateral: Vec3 | None = None
+
+    def along(self, rate: Expr) -> Expr:
+        raise NotImplementedError("soil lies under plates")
+
+    def in_plane(self, slip: Slip) -> Vec3:
+        """Of a normal force without cohesion."""
+        return vec.scale(self.slope / self.modulus, slip.across(self.shears, self.lateral))
+
+    def drag(self, push: Expr, slip: Slip) -> Vec3:
+        assert self.area is not None
+        strength = where(push.graph.apply("lt", 0.0, push), self.cohesion * self.area + push * self.slope, 0.0)
+        return vec.scale(-strength / self.modulus, slip.across(self.shears, self.lateral))
+
+    def on_pad(self, area: Expr) -> SoilShear:
+        return replace(self, area=area)
+
+    def holding(self, states: tuple[Expr, ...], lateral: Vec3 | None) -> SoilShear:
+        return replace(self, shears=states, lateral=lateral)
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> SoilShear:
+        return SoilShear(own(self.cohesion), own(self.slope), own(self.modulus), own(self.recovery))
+
+    def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
+        speed = beyond_zero(vec.dot(slip.velocity, slip.velocity), sqrt)  # the root has no slope at rest
+        velocity = vec.transpose_times(slip.axes_of_states(self.lateral), slip.velocity)
+        pressed = slip.push.graph.apply("lt", 0.0, slip.push)
+        return tuple(
+            where(pressed, v - speed / self.modulus * d, back)
+            for v, d, back in zip(velocity, self.shears, self.rates_apart(), strict=False)
+        )
+
+    def rates_apart(self) -> tuple[Expr, ...]:
+        return tuple(-d / self.recovery for d in self.shears)
+
+
+# -- reading ----------------------------------------------------------------------------------------------------------
+_PRESSURE = FORCE.times(LENGTH, -2)
+_RISE = FORCE.times(REACH, -1)
+SOIL: Fields = {
+    "soil": Field(
+        "choice",
+        "soil under plates, instead of the laws of the normal force and of friction: the name of a published one, or "
+        f"{OWN} with all numbers given; numbers that are given replace those of a named soil",
+        choices=(OWN, *SOILS),
+    ),
+    "cohesive_modulus": Field(
+        "expression", "k_c (N/m^(n+1)) of the pressure (k_c / b + k_phi) z^n", dimension=_RISE,
+        exponent="sinkage_exponent",
+    ),
+    "frictional_modulus": Field(
+        "expression", "k_phi (N/m^(n+2))", dimension=_RISE.times(REACH, -1), exponent="sinkage_exponent"
+    ),
+    "sinkage_exponent": Field("expression", "n of the sinkage", dimension=NONE),
+    "cohesion": Field("expression", "cohesion c (Pa)", dimension=_PRESSURE),
+    "friction_angle": Field("expression", "angle of internal shearing resistance phi (rad)", dimension=NONE),
+    "shear_modulus": Field("expression", "K (m): shear displacement in which stress builds up", dimension=LENGTH),
+    "contact_width": Field(
+        "expression", "b (m), the smaller side of the area in contact; the width of the plate unless given",
+        dimension=LENGTH,
+    ),
+    "rebound": Field(
+        "expression", f"part of the sinkage that unloading gives back; {REBOUND} unless given", dimension=NONE
+    ),
+    "unloading_stiffness": Field(
+        "expression", "k_0 (N/m^3) of the slope k_0 + A_u z_m of unloading, instead of rebound",
+        dimension=_PRESSURE.times(LENGTH, -1),
+    ),
+    "unloading_rise": Field("expression", "A_u (N/m^4)", dimension=_PRESSURE.times(LENGTH, -2)),
+    "recovery": Field(
+        "expression",
+        "time (s) in which a plate above the ground forgets sinkage and shear; of published soils "
+        f"{RECOVERY} unless given",
+        dimension=TIME,
+    ),
+}  # fmt: skip
+#: Of contacts with friction that has states.
+LATERAL: Fields = {
+    "lateral": Field(
+        "flag",
+        "whether sliding across the plane of planar shapes has states too; mechanisms of the plane need none (false)",
+        default=True,
+    ),
+}
+_OF_OTHERS = (*NORMAL, *NORMAL_CHOICE, *ELASTIC, *FRICTION, *FRICTION_CHOICE)
+
+
+def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
+    """The two laws of the keys :data:`SOIL`; None where there are faults, which are noted."""
+    name = e.choice("soil")
+    for key in _OF_OTHERS:
+        if key != "dissipation":
+            e.refuse(key, "is of another law than soil")
+    if e.at_fault():
+        return None
+    soil = SOILS.get(name)
+
+    def number(key: str, published: float | None) -> Expr:
+        if key in e.values:
+            return e.law(key)
+        if published is None:
+            why = f"is missing of soil: {name}"
+            where_from = "K is 0.01 m in firm sand, 0.025 m in loose sand, 0.006 m in firm clay (Wong, 2008)"
+            e.fault(key, why, where_from if key == "shear_modulus" else "give it, or the name of a published soil")
+            return e.stand_in
+        return e.graph.constant(published)
+
+    cohesive = number("cohesive_modulus", soil and soil.cohesive)
+    frictional = number("frictional_modulus", soil and soil.frictional)
+    exponent = number("sinkage_exponent", soil and soil.exponent)
+    cohesion = number("cohesion", soil and soil.cohesion)
+    angle = number("friction_angle", soil and math.radians(soil.angle))
+    modulus = number("shear_modulus", soil and soil.shear)
+    for key, value in (("cohesive_modulus", cohesive), ("frictional_modulus", frictional), ("cohesion", cohesion)):
+        e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
+    for key, value in (("sinkage_exponent", exponent), ("shear_modulus", modulus)):
+        e.require(key, value, lambda x: x > 0, "must be greater than 0")
+    e.require("friction_angle", angle, lambda x: 0 <= x < math.pi / 2, "is 0 or greater and below pi/2; it is in rad")
+    if "frictional_modulus" not in e.values or not frictional.is_zero:
+        pass
+    elif cohesive.is_zero:
+        e.fault("frictional_modulus", "is 0 as cohesive_modulus is", "give one that is greater than 0")
+    width = e.positive("contact_width") if "contact_width" in e.values else None
+    recovery = number("recovery", soil and RECOVERY)
+    e.require("recovery", recovery, lambda x: x > 0, "must be greater than 0")
+    dissipation = e.given("dissipation")
+    if dissipation is not None:
+        e.require("dissipation", dissipation, lambda x: x >= 0, "must be 0 or greater")
+    unloading = _unloading(e)
+    if e.at_fault():
+        return None
+    pressure = SoilPressure(
+        cohesive, frictional, exponent, *unloading, e.graph.zero if dissipation is None else dissipation, recovery,
+        None, width,
+    )  # fmt: skip
+    return pressure, SoilShear(cohesion, angle.graph.apply("tan", angle), modulus, recovery)
+
+
+def _unloading(e: Entry) -> tuple[Expr | None, tuple[Expr, Expr] | None]:
+    """The part of the sinkage that is given back, or two numbers of the slope."""
+    keys = ("unloading_stiffness", "unloading_rise")
+    if not any(key in e.values for key in keys):
+        part = e.law("rebound") if "rebound" in e.values else e.graph.constant(REBOUND)
+        e.require("rebound", part, lambda x: 0 < x <= 1, "is above 0 and at most 1")
+        return part, None
+    e.refuse("rebound", f"follows from {' and '.join(keys)}")
+    found = [e.law(key) if key in e.values else e.graph.zero for key in keys]
+    for key, value in zip(keys, found, strict=True):
+        e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
+    return None, (found[0], found[1])
+
+
+def states_of_soil(axes: tuple[str, ...]) -> tuple[str, ...]:
+    """What the states of a point are called."""
+    return (*(f"shear{axis}" for axis in axes), "sinkage")
