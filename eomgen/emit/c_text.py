@@ -16,7 +16,7 @@ from ..operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operation
 from ..program import Block, Program
 from .angles import CIRCULAR, gather_angles, print_angles
 from .c_functions import each_lane, each_name
-from .pair_statements import PairLists
+from .pair_statements import CopiedRun, PairLists, copied_runs
 from .straight import Pieces, PrintedFunction, cut, references
 
 SIGNATURE = (
@@ -173,12 +173,19 @@ class Printed(NamedTuple):
 
 def print_block(program: Program, block: Block) -> Printed:
     """The C functions of a block, ``<name>_block`` and its pieces."""
-    pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
-    return print_pieces(program, f"{block.name}_block", pieces, references(program, block.inputs))
+    graph, outputs = program.graph, list(block.outputs)
+    runs = copied_runs(graph, outputs)
+    for run in runs:
+        outputs[run.first : run.first + run.length] = [graph.zero] * run.length
+    lists = [Expr(graph, made) for made in dict.fromkeys(run.made for run in runs)]
+    pieces = cut(graph, outputs, block.checks, program.parameter_only, program.limits.statements, lists)
+    return print_pieces(program, f"{block.name}_block", pieces, references(program, block.inputs), runs)
 
 
-def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, str]) -> Printed:
-    """Print cut statements as one function, or as several and one that calls them."""
+def print_pieces(
+    program: Program, name: str, pieces: Pieces, texts: dict[int, str], runs: Sequence[CopiedRun] = ()
+) -> Printed:
+    """Print cut statements as one function, or as several and one that calls them; ``runs`` are copied at the end."""
     printer = BlockPrinter(program, texts, pieces)
     main = direct_results(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
     used = {*printer.used, *(["out"] if pieces.direct else [])}
@@ -194,6 +201,8 @@ def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, s
             part = f"{program.name}_{name}_{k}"
             functions.append((part, function_text(f"flag {part}", printer.used, lines)))
             main.append(f"EOMGEN_REJECT({part}(t, x, u, c, out, w))")
+    main += printer.lists.copies(runs)
+    used |= {"out", "w"} if runs else set()
     return Printed(function_text(f"static flag {name}", used, main), tuple(functions), printer.lists.end)
 
 

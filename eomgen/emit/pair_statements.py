@@ -3,10 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
-from ..graph.core import Graph
+from ..graph.core import Expr, Graph
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
 from ..numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST
+
+COPIED = 16  #: entries of a list that are results one after the other, from which they are copied in a loop
+
+
+class CopiedRun(NamedTuple):
+    """Results that are entries of a list, one after the other."""
+
+    first: int  #: place in the result
+    made: int  #: the list
+    start: int  #: number of the entry
+    length: int
+
+
+def copied_runs(graph: Graph, outputs: Sequence[Expr]) -> list[CopiedRun]:
+    """Long runs of entries of lists among results."""
+    runs: list[CopiedRun] = []
+    for k, y in enumerate(outputs):
+        node = graph.nodes[y.id]
+        call = pair_call(graph, node[0])
+        if call is None or call.part != "item":
+            continue
+        made, number = node[1], call.numbers[0]
+        if runs and runs[-1][:2] == (k - runs[-1].length, made) and runs[-1].start + runs[-1].length == number:
+            runs[-1] = runs[-1]._replace(length=runs[-1].length + 1)
+        else:
+            runs.append(CopiedRun(k, made, number, 1))
+    return [run for run in runs if run.length >= COPIED]
 
 
 def work_of(function: PairFunction) -> int:
@@ -65,6 +93,14 @@ class PairLists:
     def every(self) -> Sequence[int]:
         """All lists."""
         return list(self._places)
+
+    def copies(self, runs: Sequence[CopiedRun]) -> list[str]:
+        """Statements that copy entries into the result."""
+        return [
+            f"for (int i = 0; i < {run.length}; i++) {{ out[{run.first} + i] = "
+            f"w[{self._places[run.made] + run.start} + i]; }}"
+            for run in runs
+        ]
 
     def place(self, i: int) -> int:
         """Where in the work an entry of a list stands."""

@@ -54,7 +54,12 @@ class Pieces:
 
 
 def cut(
-    graph: Graph, outputs: Sequence[Expr], checks: Sequence[Expr], skipped: frozenset[int], statements: int
+    graph: Graph,
+    outputs: Sequence[Expr],
+    checks: Sequence[Expr],
+    skipped: frozenset[int],
+    statements: int,
+    lists: Sequence[Expr] = (),
 ) -> Pieces:
     """Order the statements behind outputs and checks and cut them into pieces.
 
@@ -64,12 +69,14 @@ def cut(
         Operations that are not evaluated here (hoisted values and what they are made of).
     statements : int
         Most statements in one piece; what is longer is cut into pieces of at most half of that, which compile faster.
+    lists : sequence of Expr
+        What is made too, for its own sake.
     """
     nodes = graph.nodes
     places: dict[int, list[int]] = {}
     for k, y in enumerate(outputs):
         places.setdefault(y.id, []).append(k)
-    wanted = [*outputs, *checks]
+    wanted = [*outputs, *checks, *lists]
     sequence = _pair(graph, [i for i in order(wanted) if i not in skipped])
     chunks = chunk(sequence, wanted, statements if len(sequence) <= statements else max(1, statements // 2))
     last_use = {i: k for k, c in enumerate(chunks) for i in c.imports}
