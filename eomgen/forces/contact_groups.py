@@ -159,8 +159,7 @@ class ContactGroups(Force):
 
     def meeting(self, view: MovingView) -> list[Expr]:
         markers, function, operands = self._operands(view, "")
-        accelerations = [x for m in markers for x in (*view.acceleration(m), *view.angular_acceleration(m))]
-        return pair_meeting(view.graph, function, operands, accelerations)
+        return pair_meeting(view.graph, function, operands, view.accelerations(markers))
 
     def near(self, view: View) -> list[Expr]:
         if isinstance(self.normal_law, SoilPressure):

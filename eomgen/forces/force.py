@@ -6,6 +6,7 @@ A force element sees the mechanism's motion through a :class:`View`, which the k
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from ..elements.looks import Seen
@@ -37,8 +38,9 @@ class View(Protocol):
 class MovingView(View, Protocol):
     """Motion of markers up to accelerations."""
 
-    def acceleration(self, marker: Marker) -> Vec3: ...
-    def angular_acceleration(self, marker: Marker) -> Vec3: ...
+    def accelerations(self, markers: Sequence[Marker]) -> list[Expr]:
+        """Acceleration and angular acceleration of each marker, ground axes."""
+        ...
 
 
 class MarkerLoad(NamedTuple):

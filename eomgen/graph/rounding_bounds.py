@@ -42,13 +42,6 @@ def with_bounds(outputs: Sequence[Expr], values: Mapping[str, Value]) -> tuple[n
     bounds : (n,) or (n, k) array
         In units of eps; infinite or NaN where nothing is known, as of a square root at 0.
     """
-    return _spread(outputs, values, {})
-
-
-def _spread(
-    outputs: Sequence[Expr], values: Mapping[str, Value], given: Mapping[str, float]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Values of expressions, and what the bounds of some symbols make of theirs; of rounding, if none is given."""
     graph = common_graph(outputs)
     if graph is None:
         return np.empty(0), np.empty(0)
@@ -60,16 +53,16 @@ def _spread(
         for i in order:
             operation, *operands = nodes[i]
             if operation == "sym":
-                bounds[i] = given.get(operands[0], 0.0)
+                bounds[i] = 0.0
                 continue
             if operation == "const":
-                bounds[i] = 0.0 if given else abs(found[i])
+                bounds[i] = abs(found[i])
                 continue
             y, row = found[i], OPERATIONS.get(operation)
             if isinstance(y, list):  # of a sum over pairs, whose entries are nodes of their own
                 bounds[i] = 0.0
                 continue
-            bound = 0.0 if given or (row is not None and row.exact) else abs(y)
+            bound = 0.0 if row is not None and row.exact else abs(y)
             if row is not None and row.rates:  # a table or a function in C knows its value
                 try:
                     x = [found[k] for k in operands]
@@ -117,8 +110,32 @@ def _is_flat(x: Expr, values: Mapping[str, float]) -> bool:
     """Whether the slope by each symbol is rounding, also of the terms' own slopes, which folded constants hide."""
     names = sorted(symbols_of([x]))
     slopes, bounds = with_bounds(gradient(x, [x.graph.symbol(name) for name in names]), values)
-    terms = [_spread([x], values, {name: 1.0})[1][0] for name in names]
+    terms = _slopes_of_terms(x, names, values)
     return bool(is_rounding(slopes, np.maximum(bounds, terms)).all())
+
+
+def _slopes_of_terms(x: Expr, names: Sequence[str], values: Mapping[str, float]) -> np.ndarray:
+    """Of each symbol, the sum of the magnitudes of the slopes of all terms by it: (n,), from the result backwards."""
+    graph = x.graph
+    order, nodes = reachable(graph, [x.id]), graph.nodes
+    known = [nodes[i][1] for i in order if nodes[i][0] == "sym"]
+    evaluate = Evaluator([Expr(graph, i) for i in order], known)
+    found = dict(zip(order, evaluate([values[n] for n in known]), strict=True))
+    weights = dict.fromkeys(order, 0.0)
+    weights[x.id] = 1.0
+    with np.errstate(all="ignore"):
+        for i in reversed(order):
+            operation, *operands = nodes[i]
+            weight, y, row = weights[i], found[i], OPERATIONS.get(operation)
+            if not weight or isinstance(y, list) or row is None or not row.rates:
+                continue
+            try:
+                at = [found[k] for k in operands]
+                for rate, k in zip(row.rates, operands, strict=True):
+                    weights[k] += weight if rate is unit else float(rate(y, *at)) * weight
+            except (ValueError, ArithmeticError):
+                weights.update((k, math.inf) for k in operands)
+    return np.array([weights.get(graph.symbol(name).id, 0.0) for name in names])
 
 
 def is_rounding(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:

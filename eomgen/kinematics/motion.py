@@ -95,9 +95,19 @@ class MarkerMotion:
         x, y, z = jvp(list(self.velocity(marker)), self.state.along)
         return (x, y, z)
 
-    def angular_acceleration(self, marker: Marker) -> Vec3:
-        """Angular acceleration of the marker's body, ground axes (rad/s^2)."""
-        return self.turning_of(marker, own_axes=False, rate=True)
+    def accelerations(self, markers: Sequence[Marker]) -> list[Expr]:
+        """Acceleration and angular acceleration of each marker, ground axes: six for each, differentiated together."""
+        moving = [marker for marker in markers if marker.body != GROUND]
+        links = [self.poses.link_of[marker.body] for marker in moving]
+        rates = jvp(
+            [x for m, link in zip(moving, links, strict=True) for x in (*self.velocity(m), *self.twists[link][0])],
+            self.state.along,
+        )
+        found: dict[int, list[Expr]] = {}
+        for k, (marker, link) in enumerate(zip(moving, links, strict=True)):
+            x, y, z = rates[6 * k + 3 : 6 * k + 6]
+            found[id(marker)] = [*rates[6 * k : 6 * k + 3], *vec.times(self.poses.link(link).rotation, (x, y, z))]
+        return [x for marker in markers for x in found.get(id(marker), [self.graph.zero] * 6)]
 
     def turning_of(self, marker: Marker, own_axes: bool, rate: bool) -> Vec3:
         """Angular velocity (rad/s) of the marker's body or, with ``rate``, its angular acceleration (rad/s^2).
