@@ -274,7 +274,8 @@ def build(track: Track | None = None, ground: Any = None, soil: str = "") -> eg.
     It moves in the plane of its tracks: what the slewing upper structure exerts across is carried by the frame.
     """
     track = track or Track()
-    m = eg.Model("tracked_excavator", gravity=("-g*sin(slope)", "-g*cos(slope)", 0))
+    doc = "Excavator of the 22 t class on chains of 49 links (sizes of a Cat 320, the rest plausible)."
+    m = eg.Model("tracked_excavator", gravity=("-g*sin(slope)", "-g*cos(slope)", 0), doc=doc)
     m.parameter("g", 9.81)
     m.parameter("slope", 0.0, doc="angle of the ground (rad)")
     frame = undercarriage(m, track, 3900, (2500, 7000, 5500), ground, soil)
