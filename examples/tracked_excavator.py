@@ -1,6 +1,7 @@
 """Tracked excavator of the 22 t class in the plane of its tracks (sizes of a Cat 320).
 
-Run python tracked_excavator.py [seconds] [FILE.yaml]: it drives so many seconds, 3 unless given, and says how fast; the model is written to a file if one is named.
+Run python tracked_excavator.py [seconds] [FILE.yaml]: it drives so many seconds, 3 unless given, and says how fast;
+the model is written to a file if one is named.
 """
 
 from __future__ import annotations
