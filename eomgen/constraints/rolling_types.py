@@ -18,6 +18,7 @@ _OWN = {
     "semi_axes": ("ellipsoid",),
     "support": ("convex",),
 }
+_NAMES = {"disc": "discs", "sphere": "spheres", "ellipsoid": "ellipsoids", "convex": "convex shapes"}
 _NEEDED = {"disc": "radius", "sphere": "radius", "ellipsoid": "semi_axes", "convex": "support"}
 
 
@@ -25,7 +26,7 @@ def _rolling(e: Entry) -> Constraint | None:
     shape, wheel, plane = e.choice("shape"), e.marker("wheel"), e.marker("plane")
     for key, shapes in _OWN.items():
         if shape in _NEEDED and shape not in shapes:
-            e.refuse(key, f"only shape {' and '.join(shapes)} has it")
+            e.refuse(key, f"only {' and '.join(_NAMES[one] for one in shapes)} have it")
     needed = _NEEDED.get(shape)
     if needed is not None and needed not in e.values:
         e.fault(needed, "is missing", f"needed where shape is {shape}")

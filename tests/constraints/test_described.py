@@ -135,6 +135,8 @@ def test_the_schema_knows_every_type() -> None:
     concrete = {found for found in vars(constraints).values() if hasattr(found, "type_name")}
     made = {type(c) for c in from_python().mechanism().constraints}
     made |= {type(c) for c in load_knife_edge().mechanism().constraints}
+    held = load_held().mechanism()
+    made |= {type(c) for c in held.constraints} | {type(one.constraint) for one in held.switched}
     assert made >= concrete - {FlatContact}
     for old, new in (
         ("type: rack", "type: rak"),
@@ -154,6 +156,15 @@ def load_knife_edge() -> eg.Model:
     m.revolute("A", m.ground, cam)
     m.prismatic("B", m.ground, follower, axis="y")
     m.cam_contact("touch", cam, follower, "knife_edge", contour="0.1 + 0.01*cos(theta)")
+    return m
+
+
+def load_held() -> eg.Model:
+    m = eg.Model("held")
+    egg = m.body("egg", mass=1, inertia=(1, 1, 1))
+    m.free("fly", m.ground, egg)
+    m.rolling("roll", egg, shape="ellipsoid", semi_axes=(0.3, 0.2, 0.1))
+    m.hold("grasp", m.ground, egg, closes="1 - t")
     return m
 
 
@@ -197,7 +208,7 @@ BROKEN = [
     ("shape: roller", "shape: rollr", 26, "c8.shape", "'rollr' is not known", "roller"),
     ("shape: flat_face, supp", "shape: knife_edge, supp", 27, "c9.support", "only a flat face", "contour"),
     ("follower: bar, shape: flat", "follower: one, shape: flat", 27, "c9.follower", "on the same body", "another"),
-    ("shape: sphere, no_spin", "shape: disc, no_spin", 28, "d1.no_spin", "only a sphere", "leave it out"),
+    ("shape: sphere, no_spin", "shape: disc, no_spin", 28, "d1.no_spin", "only spheres", "leave it out"),
     ("wheel: ball, plane: ground", "wheel: ball, plane: ball", 28, "d1.plane", "on the same body", "another body"),
     ("axis: x, on", "axis: w, on", 30, "d3.axis", "not an axis", "allowed"),
     ("k*sin(n*t) + t**2", "k*s", 32, "e1.value", "the coordinate 's' cannot be used", "a coupling relates"),
