@@ -18,6 +18,7 @@ from ..graph.differentiate import jvp
 from ..graph.pair_calls import LOSSES, PairFunction, PairKind, pair_meeting, pair_spots, pair_sum
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
+from ..limits.contacts import NOWHERE
 from ..numeric.pair_sums import POSE
 from ..records import dataclass
 from .branches import where
@@ -278,11 +279,14 @@ class ContactGroups(Force):
         seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
         slopes = jvp(results, seeds)
         across, depth, arm, _ = contact.touch(view)
-        if share is not None:  # beside a piece of ground nothing is in it
-            depth = where(graph.apply("lt", 0.0, share), depth, graph.apply("min", depth, 0.0))
+        own_depth = depth
+        if share is not None:  # beside a piece of ground nothing is in it, and its neighbour is what is near
+            owned = graph.apply("lt", 0.0, share)
+            own_depth = where(owned, depth, -NOWHERE)
+            depth = where(owned, depth, graph.apply("min", depth, 0.0))
         touch = [*across, depth, turning_radius(kinds[1], given[1], graph)]
         out = vec.transpose(view.rotation(markers[kinds[0] == "half"]))[2] if planar else vec.zero(graph)
-        spot = [*touch[:4], *vec.add(view.position(markers[0]), arm), *out, *rigid]
+        spot = [*across, own_depth, *vec.add(view.position(markers[0]), arm), *out, *rigid]
         nodes, renamed = _kept(graph, [*results, *slopes, *touch, *spot])
         ids, seen, place = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch, spot))
         return PairKind(

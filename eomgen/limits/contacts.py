@@ -14,3 +14,5 @@ PARALLEL = 1e-12
 #: Slip of a tyre that counts as none, and part of the velocity below which a wheel counts as locked: a brush adheres up
 #: to slips of 3 mu F_z / C, hundredths, beside which it is nothing, and its square, 1e-18, is a number.
 NO_SLIP = 1e-9
+#: (m) How far a shape is from a piece of a profile that is not its nearest, for those who look for what is near.
+NOWHERE = 1e100
