@@ -101,7 +101,7 @@ def test_no_steady_slip_gains_energy(law: dict[str, Any], camber: float) -> None
         for _ in range(150):
             load, forward = random.uniform(800.0, 7000.0), random.choice([-1, 1]) * random.uniform(2.0, 40.0)
             kappa, tangent = random.choice([-1, 1], 2) * 10.0 ** random.uniform(-4.0, -0.1, 2)
-            most = 6.0 * MU * load / C if law is BRUSH else 3.0
+            most = (1 + 1e-9) * 6.0 * MU * load / C if law is BRUSH else 3.0  # where they end
             x = at_slip(mod, forward, kappa, tangent, load, camber=camber, rolling=radius, most=most)
             np.testing.assert_allclose(mod.rhs(0.0, x)[rates], 0.0, atol=1e-9)  # steady
             forces = -mod.bias(0.0, x)[:5]
@@ -111,7 +111,7 @@ def test_no_steady_slip_gains_energy(law: dict[str, Any], camber: float) -> None
         assert lost > 100
 
 
-@pytest.mark.parametrize("law", [BRUSH, MAGIC, SYMMETRIC], ids=["brush", "magic_formula", "symmetric"])
+@LAWS
 def test_passive_car_never_gains_energy(law: dict[str, Any]) -> None:
     """Two wheels of different loads whose gear lets them slip against each other."""
     m = eg.Model("car", gravity=(0, 0, 0))
@@ -127,7 +127,9 @@ def test_passive_car_never_gains_energy(law: dict[str, Any]) -> None:
         traj = mod.simulate((0, 1.5), {"x_dot": 10.0 * way, "spin_front_dot": 10.0 * way / R / 1.015}, method="Radau")
         turns = np.square(traj["spin_front_dot"]) + np.square(traj["spin_rear_dot"])
         kinetic = 0.5 * 240.0 * np.square(traj["x_dot"]) + 0.45 * turns
-        assert kinetic.max() <= kinetic[0] * (1 + 1e-6)
+        settled = traj.t > 0.25  # before, deflections take up the forces at no slip: 0.05 J
+        assert kinetic.max() <= kinetic[0] + 0.05
+        assert np.diff(kinetic[settled]).max() <= 0.0
         assert kinetic[-1] < 0.999 * kinetic[0]
 
 
@@ -176,7 +178,7 @@ def test_aligning_moment_restores_both_ways() -> None:
                 mod, (0.0, tangent * RELAXATION[1]), z=R - 0.02, x_dot=forward, steer=angle,
                 spin_dot=forward * math.cos(angle) / R,
             )  # fmt: skip
-            assert mod.bias(0.0, x)[3] * angle > 1.0
+            assert mod.bias(0.0, x)[3] * math.copysign(1.0, angle) > 10.0
 
 
 @LAWS
