@@ -120,9 +120,9 @@ class MagicFormula(TyreLaw):
     """The Magic Formula in its version of 2002, forces of combined slip with camber, without moments.
 
     Pacejka, Tyre and Vehicle Dynamics (2nd edition, 2006), section 4.3.2, equations 4.E9 to 4.E30 and 4.E50 to 4.E67
-    with all scaling factors but that of friction 1, slips as tangents.  What tells driving from braking changes its sign
-    with the way of the wheel.  A thrust of camber or conicity would do work where it pushes along a small slip; the
-    wheel pays for it by its drag, max(0, F_x kappa + F_y tan alpha), some 1e-4 of the load.
+    with all scaling factors but that of friction 1, slips as tangents.  What tells driving from braking changes its
+    sign with the way of the wheel.  A thrust of camber or conicity would do work where it pushes along a small slip;
+    the wheel pays for it by its drag, max(0, F_x kappa + F_y tan alpha), 5e-4 of the load at a camber of 0.1.
     """
 
     formula: ClassVar[str] = (

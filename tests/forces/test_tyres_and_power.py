@@ -42,7 +42,7 @@ def state(mod: Any, deflections: tuple[float, float], **values: float) -> np.nda
 
 
 def at_slip(mod: Any, forward: float, kappa: float, tangent: float, load: float, **at: float) -> np.ndarray:
-    """The state of a steady slip kappa = V_sx / |V_x|, tan alpha = V_sy / |V_x|; deflections end at what they may be."""
+    """The state of a steady slip kappa = V_sx / |V_x|, tan alpha = V_sy / |V_x|; deflections end at their bound."""
     camber, radius, most = at.get("camber", 0.0), at.get("rolling", R), at.get("most", math.inf)
     speed = abs(forward)
     held = [s * max(-most, min(slip, most)) for s, slip in zip(RELAXATION, (kappa, tangent), strict=True)]
@@ -55,7 +55,7 @@ def at_slip(mod: Any, forward: float, kappa: float, tangent: float, load: float,
 def bristles(forward: float, rolling: float, sideways: float, load: float) -> tuple[float, float, float]:
     """F_x, F_y, M_z of a bristle that is carried through the patch: friction bounds it where it stands.
 
-    Its root moves over the patch with the tread, its tip stays on the road as long as stiffness times deflection is less
+    Its root moves over the patch with the tread, its tip stays on the road while stiffness times deflection is less
     than friction times the parabolic pressure, and else slides there.
     """
     steps = 20000
