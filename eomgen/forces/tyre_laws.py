@@ -93,8 +93,8 @@ class Brush(TyreLaw):
             return TyreForces(along, across, graph.zero, graph.zero)
         rest = 1.0 - s
         trail = self.half / 3.0 * rest * rest * rest / (rest + s * s / 3.0)
-        backwards = where(graph.apply("lt", rolling, 0.0), -slips.way, slips.way)  # the tread's, not the wheel's
-        return TyreForces(along, across, -backwards * trail * across, graph.zero)
+        onwards = where(graph.apply("lt", rolling, 0.0), -slips.way, slips.way)  # the tread's, not the wheel's
+        return TyreForces(along, across, -onwards * trail * across, graph.zero)
 
 
 #: The car tyre 205/60R15 91V at 2.2 bar of Pacejka, Tyre and Vehicle Dynamics (2nd edition, 2006), appendix 3.

@@ -58,8 +58,7 @@ class Tyre(Force):
     The longitudinal force turns the wheel by the rolling radius R_e, at which it slips, not by the arm h of the patch:
     its power is F_x V_sx, so that no slip gains energy.  The difference F_x (h - R_e) is a moment about the lateral
     axis of the road, as that of rolling resistance; it takes the work of the aligning moment on a cambered wheel's
-    spin, too.
-    The way of the wheel, tanh(V_x / reversal), tells the laws whether it rolls forwards or backwards.
+    spin, too.  The way of the wheel, tanh(V_x / reversal), tells the laws whether it rolls forwards or backwards.
     """
 
     sentence: ClassVar[str] = (

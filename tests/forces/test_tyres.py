@@ -251,6 +251,7 @@ def test_turned_road_energy_and_verify() -> None:
         ({**BRUSH, "relaxation": (0.2, 0)}, "relaxation[1]", "is 0"),
         ({**BRUSH, "damping": -5}, "damping", "is -5"),
         ({**BRUSH, "settling": -1}, "settling", "is -1"),
+        ({**BRUSH, "reversal": 0}, "reversal", "is 0"),
         ({**BRUSH, "shifts": False}, "shifts", "belongs to law: magic_formula"),
         ({"law": "magic_formula", "half_length": 0.1}, "half_length", "belongs to law: brush"),
     ],
