@@ -207,7 +207,7 @@ class ElementMethods(Described):
         normal: Value = None, friction: Value = None) -> ForceHandle:
         """Add creep forces of a rolling wheel on its track (Kalker; Vermeulen and Johnson; Polach)."""
     def tyre(self, name: str, road: Any, wheel: Any, radius: Value, stiffness: Value, relaxation: Sequence[Value],
-        damping: Value = 0, settling: Value = 0, axis: str | Sequence[float] | None = None,
+        damping: Value = 0, settling: Value = 0, reversal: Value = 0.1, axis: str | Sequence[float] | None = None,
         rolling_radius: Value = None, law: str | None = None, slip_stiffness: Value = None, friction: Value = None,
         half_length: Value = None, shifts: bool | None = None) -> ForceHandle:
         """Add a tyre on a plane road: the first marker is the road (z out of it), the second the centre of the

@@ -1,6 +1,7 @@
 """Force elements, laws of tyres: slips and a load -> forces along and across the wheel, and a moment about the normal.
 
-Slips have the sign of the motion of the tread over the road: forces oppose them.
+Slips have the sign of the motion of the tread over the road: forces oppose them.  A tyre rolls backwards as its mirror
+image, fore and aft exchanged, rolls forwards; a way between -1 and 1 blends both around a standstill.
 """
 
 from __future__ import annotations
@@ -17,11 +18,21 @@ MOST = 3.0  #: slip up to which measured curves are followed, that of an angle o
 
 
 class Slips(NamedTuple):
-    """Longitudinal slip V_sx / |V_x|, tangent of the slip angle V_sy / |V_x|, camber (rad)."""
+    """Longitudinal slip V_sx / |V_x|, tangent of the slip angle V_sy / |V_x|, camber (rad), way of the wheel."""
 
     along: Expr
     across: Expr
     camber: Expr
+    way: Expr  #: 1 forwards, -1 backwards, 0 at rest
+
+
+class TyreForces(NamedTuple):
+    """What a law gives."""
+
+    along: Expr  #: at the radius of rolling about the axle (N)
+    across: Expr  #: (N)
+    aligning: Expr  #: moment about the normal (N m)
+    drag: Expr  #: along the wheel as well, of rolling resistance: without a moment about the axle (N)
 
 
 class TyreLaw(ABC):
@@ -34,20 +45,22 @@ class TyreLaw(ABC):
         """The slip up to which deflections grow, at which the tyre slides as a whole."""
 
     @abstractmethod
-    def forces(self, slips: Slips, load: Expr) -> tuple[Expr, Expr, Expr]:
-        """Forces (N) along and across the wheel and the moment about the normal (N m) at a load above 0."""
+    def forces(self, slips: Slips, load: Expr) -> TyreForces:
+        """Forces along and across the wheel and the moment about the normal at a load above 0."""
 
 
 @dataclass(frozen=True)
 class Brush(TyreLaw):
     """The brush model of one stiffness in all directions.
 
-    With theoretical slips s = (kappa, tan alpha) / (1 + kappa), here of the opposite sign, and theta = C / (3 mu F_z)
+    With theoretical slips s = V_s / |Omega R|, here (kappa, tan alpha) / |1 - w kappa|, and theta = C / (3 mu F_z)
 
-        F = mu F_z (1 - (1 - theta |s|)^3) s / |s| for theta |s| < 1, else mu F_z s / |s|
-        M_z = -t F_y,  t = (a / 3) (1 - r)^3 / (1 - r + r^2 / 3), r = theta |s|
+        F = -mu F_z (1 - (1 - theta |s|)^3) s / |s| for theta |s| < 1, else -mu F_z s / |s|
+        M_z = -w t F_y,  t = (a / 3) (1 - r)^3 / (1 - r + r^2 / 3), r = theta |s|
 
-    after Pacejka, Tyre and Vehicle Dynamics (2nd edition, 2006), section 3.2, where C = 2 c_p a^2.
+    w the way of the wheel: the longest bristles are behind, so that the moment turns the wheel into its motion.
+
+    After Pacejka, Tyre and Vehicle Dynamics (2nd edition, 2006), section 3.2, where C = 2 c_p a^2.
     """
 
     formula: ClassVar[str] = (
@@ -61,13 +74,14 @@ class Brush(TyreLaw):
         """Beyond |s| = 1 / theta nothing changes; while driving, kappa = -s / (1 - s) is a little more."""
         return 2.0 * 3.0 * self.friction * load / self.stiffness
 
-    def forces(self, slips: Slips, load: Expr) -> tuple[Expr, Expr, Expr]:
+    def forces(self, slips: Slips, load: Expr) -> TyreForces:
         graph = load.graph
         kappa, tangent = slips.along, slips.across
         square = kappa * kappa + tangent * tangent
         sliding = graph.apply("lt", NO_SLIP * NO_SLIP, square)
         size = where(sliding, sqrt(where(sliding, square, 1.0)), 0.0)
-        turning = graph.apply("max", NO_SLIP, graph.apply("abs", 1.0 - kappa))  # |Omega| R / |V_x|
+        rolling = 1.0 - slips.way * kappa  # Omega R / V_x
+        turning = graph.apply("max", NO_SLIP, graph.apply("abs", rolling))
         most = self.friction * load
         theta = self.stiffness / (3.0 * most)
         r = theta * size / turning
@@ -76,10 +90,11 @@ class Brush(TyreLaw):
         slope = where(adheres, most * theta * (3.0 - 3.0 * s + s * s) / turning, most / where(sliding, size, 1.0))
         along, across = -slope * kappa, -slope * tangent
         if self.half is None:
-            return along, across, graph.zero
+            return TyreForces(along, across, graph.zero, graph.zero)
         rest = 1.0 - s
         trail = self.half / 3.0 * rest * rest * rest / (rest + s * s / 3.0)
-        return along, across, -trail * across
+        onwards = where(graph.apply("lt", rolling, 0.0), -slips.way, slips.way)  # the tread's, not the wheel's
+        return TyreForces(along, across, -onwards * trail * across, graph.zero)
 
 
 #: The car tyre 205/60R15 91V at 2.2 bar of Pacejka, Tyre and Vehicle Dynamics (2nd edition, 2006), appendix 3.
@@ -94,8 +109,10 @@ CAR_205_60R15 = {
     "rVy3": 0.517, "rVy4": 35.44, "rVy5": 1.9, "rVy6": -10.71,
 }  # fmt: skip
 NOMINAL = 4000.0  #: its nominal load (N)
-#: Its coefficients of forces at no slip, from conicity, ply steer and the asymmetry of combined slip.
-SHIFTS = ("pHx1", "pHx2", "pVx1", "pVx2", "rHx1", "pHy1", "pHy2", "pVy1", "pVy2", "rHy1", "rVy1", "rVy2")
+#: Its coefficients of forces at no slip, from conicity and ply steer, and of other differences of left and right.
+SHIFTS = (
+    "pHx1", "pHx2", "pVx1", "pVx2", "rHx1", "pEy3", "pHy1", "pHy2", "pVy1", "pVy2", "rBy3", "rHy1", "rVy1", "rVy2",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -103,7 +120,9 @@ class MagicFormula(TyreLaw):
     """The Magic Formula in its version of 2002, forces of combined slip with camber, without moments.
 
     Pacejka, Tyre and Vehicle Dynamics (2nd edition, 2006), section 4.3.2, equations 4.E9 to 4.E30 and 4.E50 to 4.E67
-    with all scaling factors but that of friction 1, slips as tangents.
+    with all scaling factors but that of friction 1, slips as tangents.  What tells driving from braking changes its
+    sign with the way of the wheel.  A thrust of camber or conicity would do work where it pushes along a small slip;
+    the wheel pays for it by its drag, max(0, F_x kappa + F_y tan alpha), 5e-4 of the load at a camber of 0.1.
     """
 
     formula: ClassVar[str] = (
@@ -118,9 +137,9 @@ class MagicFormula(TyreLaw):
     def _of(self, name: str) -> float:
         return 0.0 if not self.shifts and name in SHIFTS else CAR_205_60R15[name]
 
-    def forces(self, slips: Slips, load: Expr) -> tuple[Expr, Expr, Expr]:
+    def forces(self, slips: Slips, load: Expr) -> TyreForces:
         graph, p = load.graph, self._of
-        kappa, tangent, camber = -slips.along, slips.across, slips.camber
+        kappa, tangent, camber, way = -slips.along, slips.across, slips.camber, slips.way
         excess = (load - NOMINAL) / NOMINAL
 
         def atan(x: Expr) -> Expr:
@@ -136,12 +155,12 @@ class MagicFormula(TyreLaw):
             return where(graph.apply("lt", x, 0.0), -1.0, 1.0)
 
         # along the wheel
-        x = kappa + p("pHx1") + p("pHx2") * excess
+        x = kappa + way * (p("pHx1") + p("pHx2") * excess)
         D = self.friction * (p("pDx1") + p("pDx2") * excess) * load
-        E = (p("pEx1") + p("pEx2") * excess + p("pEx3") * excess * excess) * (1.0 - p("pEx4") * sign(x))
+        E = (p("pEx1") + p("pEx2") * excess + p("pEx3") * excess * excess) * (1.0 - p("pEx4") * way * sign(x))
         K = load * (p("pKx1") + p("pKx2") * excess) * graph.apply("exp", p("pKx3") * excess)
         pure = sine(K / (p("pCx1") * D), p("pCx1"), D, graph.apply("min", E, 1.0), x)
-        pure = pure + load * (p("pVx1") + p("pVx2") * excess)
+        pure = pure + way * load * (p("pVx1") + p("pVx2") * excess)
         B = p("rBx1") * cosine(1.0, p("rBx2") * kappa)
         along = pure * cosine(p("rCx1"), B * (tangent + p("rHx1"))) / cosine(p("rCx1"), B * p("rHx1"))
 
@@ -155,8 +174,9 @@ class MagicFormula(TyreLaw):
         lift = p("pVy1") + p("pVy2") * excess + (p("pVy3") + p("pVy4") * excess) * camber
         pure = sine(K / (p("pCy1") * D), p("pCy1"), D, graph.apply("min", E, 1.0), y) + load * lift
         B = p("rBy1") * cosine(1.0, p("rBy2") * (tangent - p("rBy3")))
-        shift = p("rHy1")
+        shift = way * p("rHy1")
         across = pure * cosine(p("rCy1"), B * (kappa + shift)) / cosine(p("rCy1"), B * shift)
         sway = D * (p("rVy1") + p("rVy2") * excess + p("rVy3") * camber) * cosine(1.0, p("rVy4") * tangent)
-        across = across + sway * graph.apply("sin", p("rVy5") * atan(p("rVy6") * kappa))
-        return along, across, graph.zero
+        across = across + way * sway * graph.apply("sin", p("rVy5") * atan(p("rVy6") * kappa))
+        gain = graph.apply("max", 0.0, along * slips.along + across * tangent)
+        return TyreForces(along, across, graph.zero, -way * gain)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, NamedTuple
 
-from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, STIFFNESS, TIME
+from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, SPEED, STIFFNESS, TIME
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field
@@ -17,7 +17,7 @@ from ..records import dataclass
 from .branches import where
 from .force import Force, Load, MarkerLoad, Measured, View
 from .normal_laws import DampedLinear
-from .tyre_laws import Brush, MagicFormula, Slips, TyreLaw
+from .tyre_laws import Brush, MagicFormula, Slips, TyreForces, TyreLaw
 
 LAWS = ("brush", "magic_formula")
 
@@ -28,8 +28,11 @@ class _WheelMotion(NamedTuple):
     normal: Vec3
     along: Vec3
     across: Vec3
+    tilt: Expr  #: sine and
+    upright: Expr  #: cosine of the camber
     lowest: Vec3  #: from the wheel's centre, of the tyre without load
     patch: Vec3  #: from the wheel's centre, on the road
+    arm: Expr  #: length of the patch's vector
     depth: Expr
     rate: Expr
     camber: Expr
@@ -51,6 +54,11 @@ class Tyre(Force):
     with slip velocities V_s and relaxation lengths s (Pacejka, Tyre and Vehicle Dynamics (2nd edition, 2006), section
     7.2, where tau is 0).  The time tau_0 damps a wheel at rest and does not change steady slips.  A wheel in the air
     rolls its deflections off.
+
+    The longitudinal force turns the wheel by the rolling radius R_e, at which it slips, not by the arm h of the patch:
+    its power is F_x V_sx, so that no slip gains energy.  The difference F_x (h - R_e) is a moment about the lateral
+    axis of the road, as that of rolling resistance; it takes the work of the aligning moment on a cambered wheel's
+    spin, too.  The way of the wheel, tanh(V_x / reversal), tells the laws whether it rolls forwards or backwards.
     """
 
     sentence: ClassVar[str] = (
@@ -66,6 +74,7 @@ class Tyre(Force):
     law: TyreLaw
     relaxation: tuple[Expr, Expr]
     settling: Expr
+    reversal: Expr
     deflections: tuple[Expr, Expr]
 
     @property
@@ -94,12 +103,13 @@ class Tyre(Force):
         across = vec.cross(normal, along)
         spin = view.angular_velocity(self.wheel)
         turning = vec.sub(spin, vec.scale(vec.dot(spin, axis), axis))  # of the carcass, which does not spin
-        lowest, patch = vec.scale(-self.radius, up), vec.scale(-height / upright, up)
+        arm = height / upright
+        lowest, patch = vec.scale(-self.radius, up), vec.scale(-arm, up)
         whirl = view.angular_velocity(self.road)
 
-        def over_road(arm: Vec3) -> Vec3:
-            own = vec.add(view.velocity(self.wheel), vec.cross(turning, arm))
-            return vec.sub(own, vec.add(view.velocity(self.road), vec.cross(whirl, vec.add(reach, arm))))
+        def over_road(place: Vec3) -> Vec3:
+            own = vec.add(view.velocity(self.wheel), vec.cross(turning, place))
+            return vec.sub(own, vec.add(view.velocity(self.road), vec.cross(whirl, vec.add(reach, place))))
 
         velocity = over_road(patch)
         omega = vec.dot(vec.sub(spin, whirl), axis)
@@ -107,8 +117,11 @@ class Tyre(Force):
             normal,
             along,
             across,
+            tilt,
+            upright,
             lowest,
             patch,
+            arm,
             self.radius * upright - height,
             -vec.dot(normal, over_road(lowest)),
             view.graph.apply("asin", tilt),
@@ -140,12 +153,14 @@ class Tyre(Force):
         way = self._rolling(view)
         load = self.load_law.force(way.depth, way.rate)
         push = load if whole else load - self.load_law.elastic(way.depth)
-        slips = Slips(*self._slips(way), way.camber)
+        slips = Slips(*self._slips(way), way.camber, view.graph.apply("tanh", way.forward / self.reversal))
         bears = view.graph.apply("lt", 0.0, load)
         found = self.law.forces(slips, where(bears, load, 1.0))
-        along, across, moment = (where(bears, one, 0.0) for one in found)
-        sliding = vec.add(vec.scale(along, way.along), vec.scale(across, way.across))
-        pressing, turn = vec.scale(push, way.normal), vec.scale(moment, way.normal)
+        along, across, moment, drag = TyreForces(*(where(bears, one, 0.0) for one in found))
+        sliding = vec.add(vec.scale(along + drag, way.along), vec.scale(across, way.across))
+        lag = along * (way.arm - self.rolling_radius) + drag * way.arm - moment * way.tilt  # about the axle
+        pressing = vec.scale(push, way.normal)
+        turn = vec.add(vec.scale(moment, way.normal), vec.scale(lag / way.upright, way.across))
         force = vec.add(pressing, sliding)
         torque = vec.add(vec.add(vec.cross(way.lowest, pressing), vec.cross(way.patch, sliding)), turn)
         reach = vec.sub(view.position(self.wheel), view.position(self.road))
@@ -180,6 +195,7 @@ def _tyre(e: Entry) -> Tyre | None:
     pair, axis, radius = e.pair(), e.axis("axis"), e.positive("radius")
     rolling = e.positive("rolling_radius") if "rolling_radius" in e.values else radius
     damping, settling, relaxation = e.law("damping"), e.law("settling"), e.several("relaxation", 2)
+    reversal = e.positive("reversal")
     e.require("settling", settling, lambda x: x >= 0, "must be 0 or greater")
     e.require("damping", damping, lambda c: c >= 0, "must be 0 or greater")
     for k, length in enumerate(relaxation or ()):
@@ -189,7 +205,7 @@ def _tyre(e: Entry) -> Tyre | None:
         return None
     u, v = e.states()
     lengths = (relaxation[0], relaxation[1])
-    return Tyre(e.name, *pair, axis, radius, rolling, load_law, law, lengths, settling, (u, v))
+    return Tyre(e.name, *pair, axis, radius, rolling, load_law, law, lengths, settling, reversal, (u, v))
 
 
 def _law(e: Entry) -> TyreLaw | None:
@@ -224,6 +240,10 @@ TYPES = table(
             "settling": Field(
                 "expression", "time (s) that damps the deflections at rest; steady slips do not depend on it",
                 default=0, dimension=TIME,
+            ),
+            "reversal": Field(
+                "expression", "velocity (m/s) around 0 over which rolling forwards becomes rolling backwards",
+                default=0.1, dimension=SPEED,
             ),
             "axis": Field("axis", "axis of the wheel to its left, in its marker", default="y"),
             "rolling_radius": Field(
