@@ -355,8 +355,8 @@ def test_a_plate_that_starts_sunk_has_its_memory() -> None:
     deep = 1.5 * (400.0 * G / (0.3 * k)) ** (1 / n)
     rise = 2 * (1 - 1.5**-n) * 0.1 * deep
     traj = mod.simulate((0, 0.5), initial={"j_y": -deep}, rtol=1e-9, atol=1e-11)
-    assert traj["j_y"].max() + deep == pytest.approx(rise, rel=0.015)  # it forgets a thousandth of the sinkage
-    assert traj["sand_sinkage_1"][-1] == pytest.approx(deep, rel=1e-3)
+    assert traj["j_y"].max() + deep == pytest.approx(rise, rel=0.005)  # the sinkage it remembers is 1e-4 less
+    assert traj["sand_sinkage_1"][-1] == pytest.approx(deep, rel=2e-4)
     assert traj["sand_sinkage_1"].max() <= deep * (1 + 1e-9)
 
 
