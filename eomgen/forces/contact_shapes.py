@@ -35,7 +35,7 @@ from .contact_profiles import (
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_shape_fields import GROUNDS
 from .contact_solids import EllipsoidPlane, RodRod
-from .contact_states import ShapeParts, parts_of
+from .contact_states import MET, ShapeParts, parts_of
 
 #: Shapes whose pieces are edges and arcs.
 PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
@@ -264,17 +264,10 @@ def _turned(frame: Frame, columns: tuple[int, int, int]) -> Frame:
     return Frame((rows[0], rows[1], rows[2]), frame.position)
 
 
-_FLAT = ("segment", "polygon", "edge", "arc")
+#: Features of the first shapes of :data:`~.contact_states.MET` that have several.
+_SURFACES = {"flat": ("segment", "polygon"), "ground": ("edge", "arc")}
 #: Classes of features that meet: the first is a surface, or round beside round.
-MEETINGS = (
-    ("round", "round"),
-    *((surface, soft) for surface in ("half", *_FLAT) for soft in ("round", "corner")),
-    *((surface, "pad") for surface in ("half", "edge", "arc")),
-    ("half", "end"),
-    ("half", "ellipsoid"),
-    ("rod", "round"),
-    ("rod", "rod"),
-)
+MEETINGS = tuple((one, soft) for own, met in MET.items() for one in _SURFACES.get(own, (own,)) for soft in met)
 
 
 def meet(kinds: tuple[str, str]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from operator import index
 from typing import Any
 
@@ -34,3 +35,10 @@ def as_count(given: Any) -> int | None:
         return index(given)
     except Exception:  # of an object's own __index__ too
         return None
+
+
+def as_whole(given: Any) -> int | None:
+    """A whole number as :func:`as_count` reads it, or one that is written as a number with decimals, such as 2.0."""
+    if isinstance(given, Real) and not isinstance(given, bool) and float(given).is_integer():
+        return int(given)
+    return as_count(given)

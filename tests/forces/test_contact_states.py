@@ -14,6 +14,10 @@ from contact_scenes import PLANAR, on
 import eomgen as eg
 from eomgen.errors import ModelError
 from eomgen.forces.contact_groups import _SharedData
+from eomgen.forces.contact_shape_fields import GROUNDS, SHAPE_FIELDS
+from eomgen.forces.contact_shape_fields import PLANAR as PLANE
+from eomgen.forces.contact_shapes import MEETINGS, meet
+from eomgen.forces.contact_states import PARTS, ShapeParts, class_of, given_groups, pair_states
 from eomgen.generation import generate
 
 LUGRE = {
@@ -203,6 +207,66 @@ def test_derivatives_between_two_sides(target: str) -> None:
         x[6] = z
         wanted = differences(mod, x)
         np.testing.assert_allclose(mod.jacobian(0.0, x), wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_a_roller_on_both_flanks_of_a_seat(target: str) -> None:
+    """Wider than the seat it lies on both flanks, 65 degrees from the radius: across it z' = v cos 65 degrees."""
+    m, (a,) = scenes.planar("seat", 1, (0, 0, 0))
+    wheel = {"shape": "sprocket", "teeth": 8, "pitch": 0.1, "seat": 0.02, "tip_radius": 0.15, "on": m.ground}
+    m.contacts("touch", wheel, {"shape": "circle", "on": a, "radius": 0.03}, {**LUGRE, "lateral": False})
+    mod = m.compile(target=target)
+    reach = 0.05 / np.sin(np.pi / 8)
+    x = mod.x0(j0_x=reach + 0.01, j0_y_dot=0.3)
+    assert abs(mod.rhs(0.0, x)[6]) == pytest.approx(0.3 * np.cos(np.radians(65)), rel=1e-9)
+    x = mod.x0(j0_x=reach + 0.01, j0_y=0.001, j0_x_dot=0.1, j0_y_dot=0.3, j0_3_dot=-4.0, touch_bristle_1=3e-5)
+    wanted = differences(mod, x)
+    np.testing.assert_allclose(mod.jacobian(0.0, x), wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())
+
+
+SIZES: dict[str, dict[str, Any]] = {
+    "circle": {"radius": 0.1},
+    "segment": {"length": 0.3, "radius": 0.03},
+    "box": {"size": (0.2, 0.1)},
+    "polygon": {"points": [[0, 0], [1, 0], [1, 1], [0.5, 1.2], [0, 1]]},
+    "plate": {"length": 1, "width": 0.3, "points": 3},
+    "half_plane": {},
+    "profile": {"points": [[-1, 0], [-0.3, 0.2], [0, 0.3], [0.4, 0.2], [1, 0]]},
+    "smooth_profile": {"points": [[-1, 0], [-0.3, 0.2], [0, 0.3], [0.4, 0.2], [1, 0]]},
+    "outline": {"points": [[0, 0], [1, 0], [1, 1], [0.5, 1.2], [0, 1]]},
+    "smooth_outline": {"points": [[0, 0], [1, 0], [1, 1], [0.5, 1.2], [0, 1]]},
+    "sprocket": {"teeth": 7, "pitch": 0.05, "seat": 0.01, "tip_radius": 0.06},
+    "sphere": {"radius": 0.1},
+    "capsule": {"length": 0.4, "radius": 0.1},
+    "half_space": {},
+    "ellipsoid": {"semi_axes": (0.1, 0.2, 0.3)},
+    "cuboid": {"size": (0.1, 0.2, 0.3)},
+}
+
+
+@pytest.mark.parametrize("kind", SHAPE_FIELDS)
+def test_states_count_the_parts_that_shapes_have(kind: str) -> None:
+    """What is told of a kind of shape is what its features are: whom it meets, and how many parts of each class."""
+    m, (body,) = scenes.planar("one", 1)
+    other = {"shape": "half_plane" if kind in PLANE else "half_space", "on": m.ground}
+    if kind in GROUNDS:
+        other = {"shape": "circle" if kind in PLANE else "sphere", "radius": 0.1, "on": m.ground}
+    m.contacts("touch", {"shape": kind, "on": body, **SIZES[kind]}, other, {"stiffness": 1e4})
+    (force,) = m.mechanism().forces
+    shape, features = force.first[0], force.first[0].features()
+    given = given_groups({"first": {"shape": kind, "on": "b0", **SIZES[kind]}})[0][0]
+    assert given == shape.parts()
+    classes = [one.kind.rstrip("0123456789") for one in features]
+    surfaces = {name for name in classes if any(name == a for a, _ in MEETINGS)}
+    parts = {name: classes.count(name) for name in classes if any(name == b for _, b in MEETINGS)}
+    assert parts == dict(given.parts)
+    for name, count in parts.items():
+        assert sorted(one.slot for one in features if one.kind == name) == list(range(count))
+    for second in PARTS:
+        met = {first for first in surfaces if meet((first, second))}
+        found = {k[2] for k in pair_states([[given], [ShapeParts("", {second: 1})]])[0] if k[0] == 0}
+        assert found == {class_of(first) for first in met}, second
+    assert set(PARTS) == {b for _, b in MEETINGS}
 
 
 def test_bodies_on_a_slope_stay_and_batches_agree() -> None:
