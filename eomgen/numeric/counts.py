@@ -39,6 +39,8 @@ def as_count(given: Any) -> int | None:
 
 def as_whole(given: Any) -> int | None:
     """A whole number as :func:`as_count` reads it, or one that is written as a number with decimals, such as 2.0."""
-    if isinstance(given, Real) and not isinstance(given, bool) and float(given).is_integer():
-        return int(given)
-    return as_count(given)
+    found = as_count(given)
+    if found is None and isinstance(given, Real) and not isinstance(given, bool):
+        value = float(given)
+        return int(value) if value.is_integer() else None
+    return found
