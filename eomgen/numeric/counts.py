@@ -40,7 +40,7 @@ def as_count(given: Any) -> int | None:
 def as_whole(given: Any) -> int | None:
     """A whole number as :func:`as_count` reads it, or one that is written as a number with decimals, such as 2.0."""
     found = as_count(given)
-    if found is None and isinstance(given, Real) and not isinstance(given, bool):
-        value = float(given)
-        return int(value) if value.is_integer() else None
-    return found
+    if found is not None or isinstance(given, bool) or not isinstance(given, Real):
+        return found
+    value = float(given)
+    return int(value) if value.is_integer() else None
