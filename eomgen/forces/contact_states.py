@@ -7,9 +7,10 @@ point of a plate.  The pieces of a profile share the states of their shape.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any, NamedTuple
 
-from ..numeric.counts import as_whole
+from ..numeric.counts import as_count
 
 MOST_PAIRS = 2000  #: pairs that may have states: equations grow with states, and circles among themselves with squares
 PLATE = 2  #: points of a plate unless given
@@ -100,15 +101,24 @@ def _meets(kind: str, first: str, second: str) -> bool:
 
 
 # -- from what the user gave ------------------------------------------------------------------------------------------
+def _whole(given: Any) -> int | None:
+    """A whole number, also one that is written with decimals, such as 2.0; None if it is none."""
+    found = as_count(given)
+    if found is not None or isinstance(given, bool) or not isinstance(given, Real):
+        return found
+    value = float(given)
+    return int(value) if value.is_integer() else None
+
+
 def points_of_plate(given: Mapping[str, Any]) -> int | None:
     """At how many points a plate is felt; None where that is no number."""
-    count = as_whole(given.get("points", PLATE))
+    count = _whole(given.get("points", PLATE))
     return count if count is not None and 1 <= count <= POINTS else None
 
 
 def teeth_of_sprocket(given: Mapping[str, Any]) -> int | None:
     """How many teeth a sprocket has; None where that is no number."""
-    count = as_whole(given.get("teeth"))
+    count = _whole(given.get("teeth"))
     return count if count is not None and count >= TEETH else None
 
 

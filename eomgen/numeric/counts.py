@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from numbers import Real
 from operator import index
 from typing import Any
 
@@ -35,12 +34,3 @@ def as_count(given: Any) -> int | None:
         return index(given)
     except Exception:  # of an object's own __index__ too
         return None
-
-
-def as_whole(given: Any) -> int | None:
-    """A whole number as :func:`as_count` reads it, or one that is written as a number with decimals, such as 2.0."""
-    found = as_count(given)
-    if found is not None or isinstance(given, bool) or not isinstance(given, Real):
-        return found
-    value = float(given)
-    return int(value) if value.is_integer() else None
