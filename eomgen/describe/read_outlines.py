@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..forces.contact_outlines import half_gap, half_tip, sprocket_fault
+from ..forces.contact_states import TEETH, teeth_of_sprocket
 from ..graph.core import Expr
 from ..graph.shown import shown
 from .values import Reader
@@ -39,9 +40,9 @@ def outline_sizes(reader: Reader, path: str, given: Mapping[str, Any], corners: 
 
 def sprocket_sizes(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
     """Depth, number of teeth, pitch, radii of seats and tips, angle of a seat."""
-    teeth = given["teeth"]
-    if isinstance(teeth, bool) or not isinstance(teeth, int) or teeth < 3:
-        reader.faults.add(f"{path}.teeth", f"is {shown(teeth)}", "give a whole number of 3 or more")
+    teeth = teeth_of_sprocket(given)
+    if teeth is None:
+        reader.faults.add(f"{path}.teeth", f"is {shown(given['teeth'])}", f"give a whole number of {TEETH} or more")
         return ()
     keys = ("pitch", "seat", "tip_radius")
     sizes = [reader.expression(f"{path}.{key}", given[key]) for key in keys]

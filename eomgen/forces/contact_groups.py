@@ -26,6 +26,7 @@ from .contact import SpherePlane
 from .contact_rounds import AtHeight
 from .contact_shape_fields import PLANAR
 from .contact_shapes import (
+    PIECED,
     ContactShape,
     Feature,
     ShapeMotion,
@@ -119,7 +120,18 @@ class ContactGroups(Force):
         if not self.states:
             return ()
         markers, results = self._results(view, "")
-        return tuple(map(Expr.__add__, self._rates_apart(), results[6 * len(markers) + 1 :]))
+        found = results[6 * len(markers) + 1 :]
+        if self._slots > self._each:
+            found = self._shared_out(found)
+        return tuple(map(Expr.__add__, self._rates_apart(), found))
+
+    def _shared_out(self, sums: list[Expr]) -> list[Expr]:
+        """What pieces add to the rates of the states that they share, which is its mean where several touch."""
+        found: list[Expr] = []
+        for k in range(0, len(sums), self._slots):
+            *added, touching = sums[k : k + self._slots]
+            found += [x / x.graph.apply("max", 1.0, touching) for x in added]
+        return found
 
     def _rates_apart(self) -> list[Expr]:
         """Rates of all states where no shapes meet."""
@@ -133,6 +145,11 @@ class ContactGroups(Force):
     def _each(self) -> int:
         """How many states a pair has."""
         return self.axes + self.normal_law.count
+
+    @property
+    def _slots(self) -> int:
+        """How many numbers a pair has in the sum: its states, and where shapes have pieces how many of them touch."""
+        return self._each + any(shape.kind in PIECED for shape in (*self.first, *self.second))
 
     def _holding(
         self, normal: NormalLaw, friction: DryFriction | None, states: tuple[Expr, ...], lateral: Vec3 | None
@@ -166,8 +183,8 @@ class ContactGroups(Force):
         if isinstance(self.normal_law, SoilPressure):
             return []  # soil yields
         _, function, operands = self._operands(view, "", still=True)
-        placed = operands[: len(operands) - len(self.states)]
-        return pair_spots(view.graph, function, [*placed, *(view.graph.zero for _ in self.states)])
+        placed = operands[: function.first_state]
+        return pair_spots(view.graph, function, [*placed, *(view.graph.zero for _ in range(function.states))])
 
     @property
     def met_bodies(self) -> list[int]:
@@ -198,7 +215,14 @@ class ContactGroups(Force):
             operands += [graph.zero if still else x for v in moving for x in v]
         data = _SharedData(len(operands), graph)
         function = self._function(f"{part}{self.name}", bodies, data, bool(part))
-        return markers, function, [*operands, *data.values, *self.states]
+        return markers, function, [*operands, *data.values, *self._held(graph)]
+
+    def _held(self, graph: Graph) -> list[Expr]:
+        """The states of all pairs; the number of pieces that touch is found, so 0 stands in its place."""
+        found: list[Expr] = []
+        for k in range(0, len(self.states), self._each or 1):
+            found += [*self.states[k : k + self._each], *[graph.zero] * (self._slots - self._each)]
+        return found
 
     def _function(self, name: str, bodies: Sequence[int], data: _SharedData, lost: bool) -> PairFunction:
         shapes = [self.first, self.second] if self.second else [self.first]
@@ -219,12 +243,13 @@ class ContactGroups(Force):
                     kind = self._kind((first, second), (i, j), (sizes[0], sizes[1]), flat, planar, data, lost)
                     if self.states:
                         block = blocks[g, h, class_of(first), second]
-                        rows = tuple(self._each * block.of_first(x.number, k) for k, x in enumerate(groups[g][first]))
-                        columns = tuple(self._each * one.column for one in groups[h][second])
-                        kind = replace(kind, held=(rows, columns), states=self._each)
+                        rows = tuple(self._slots * block.of_first(x.number, k) for k, x in enumerate(groups[g][first]))
+                        columns = tuple(self._slots * one.column for one in groups[h][second])
+                        kind = replace(kind, held=(rows, columns), states=self._slots)
                     kinds.append(kind)
-        numbers = (*(x.value for x in data.values), *(None for _ in self.states))
-        return PairFunction(name, len(bodies), numbers, tuple(tables), tuple(kinds), len(self.states))
+        held = [x.value for x in self._held(data.graph)]
+        numbers = (*(x.value for x in data.values), *held)
+        return PairFunction(name, len(bodies), numbers, tuple(tables), tuple(kinds), len(held))
 
     def _kind(
         self,
@@ -252,10 +277,10 @@ class ContactGroups(Force):
         dry, rigid = self.friction, [graph.zero if x is None else own(x) for x in (self.coefficient, self.restitution)]
         friction = None if dry is None else dry.mapped(own)
         markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
-        held = tuple(graph.symbol(f"s{k}") for k in range(self._each if self.states else 0))
+        held = tuple(graph.symbol(f"s{k}") for k in range(self._slots if self.states else 0))
         if held:
             lateral = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2] if planar else None
-            friction, normal = self._holding(normal, friction, held, lateral)
+            friction, normal = self._holding(normal, friction, held[: self._each], lateral)
         given = [
             tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
         ]
@@ -272,7 +297,10 @@ class ContactGroups(Force):
         share = contact.share(view)
         if held and not lost:
             rates = zip(contact.state_rates(view), contact.rates_apart(), strict=True)
-            results += [(x - apart) * (1.0 if share is None else share) for x, apart in rates]
+            part = graph.one if share is None else share
+            results += [(x - apart) * part for x, apart in rates]
+            if self._slots > self._each:
+                results.append(where(graph.apply("lt", 0.0, contact.touch(view)[1]), part, 0.0))
         results += [graph.zero] * (len(held) if lost else 0)
         names = [f"a{k}" for k in range(POSE + sizes[0])] + [f"b{k}" for k in range(POSE + sizes[1])]
         names += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]

@@ -35,10 +35,10 @@ from .contact_profiles import (
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_shape_fields import GROUNDS
 from .contact_solids import EllipsoidPlane, RodRod
-from .contact_states import ShapeParts, parts_of
+from .contact_states import MET, ShapeParts, parts_of
 
 #: Shapes whose pieces are edges and arcs.
-_PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
+PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
 _SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
 _BOTH = (-1.0, 1.0)
 _STEPS = 24  #: lines of which the picture of an ellipse is made
@@ -96,7 +96,7 @@ class ContactShape:
             return [Feature("round", frame, self.sizes, self.sizes[0], 2.0 * self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
             return [Feature("half", self._facing(frame), (), None, zero)]
-        if self.kind in _PIECED:
+        if self.kind in PIECED:
             return self._pieces(frame)
         if self.kind == "ellipsoid":
             return [Feature("ellipsoid", frame, self.sizes, _most(self.sizes), 2.0 * _least(self.sizes))]
@@ -209,7 +209,7 @@ class ContactShape:
             return [Wheel(marker, self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
             return [Drawn((Marker(marker.body, self._facing(marker.frame), marker.label),), about=PLANE)]
-        if self.kind in _PIECED:
+        if self.kind in PIECED:
             zero, points = self.sizes[0].graph.zero, self._points()
             line = points if self.kind in GROUNDS else [*points, points[0]]
             places = [_moved(marker.frame, (x, y, zero)) for x, y in line]
@@ -264,17 +264,10 @@ def _turned(frame: Frame, columns: tuple[int, int, int]) -> Frame:
     return Frame((rows[0], rows[1], rows[2]), frame.position)
 
 
-_FLAT = ("segment", "polygon", "edge", "arc")
+#: Features of the first shapes of :data:`~.contact_states.MET` that have several.
+_SURFACES = {"flat": ("segment", "polygon"), "ground": ("edge", "arc")}
 #: Classes of features that meet: the first is a surface, or round beside round.
-MEETINGS = (
-    ("round", "round"),
-    *((surface, soft) for surface in ("half", *_FLAT) for soft in ("round", "corner")),
-    *((surface, "pad") for surface in ("half", "edge", "arc")),
-    ("half", "end"),
-    ("half", "ellipsoid"),
-    ("rod", "round"),
-    ("rod", "rod"),
-)
+MEETINGS = tuple((one, soft) for own, met in MET.items() for one in _SURFACES.get(own, (own,)) for soft in met)
 
 
 def meet(kinds: tuple[str, str]) -> bool:

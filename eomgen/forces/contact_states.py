@@ -7,11 +7,15 @@ point of a plate.  The pieces of a profile share the states of their shape.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any, NamedTuple
+
+from ..numeric.counts import as_count
 
 MOST_PAIRS = 2000  #: pairs that may have states: equations grow with states, and circles among themselves with squares
 PLATE = 2  #: points of a plate unless given
 POINTS = 8  #: most points of a plate
+TEETH = 3  #: fewest teeth of a sprocket
 #: Parts that meet surfaces, in the order in which their states stand.
 PARTS = ("round", "corner", "end", "ellipsoid", "rod", "pad")
 _ROUND = ("round", "rod")
@@ -22,7 +26,7 @@ _FIRST = {
     "sprocket": "ground", "half_plane": "half", "half_space": "half",
 }  # fmt: skip
 #: What is met by each of these.
-_MET = {
+MET = {
     "round": ("round",),
     "rod": ("round", "rod"),
     "flat": ("round", "corner"),
@@ -93,15 +97,29 @@ def class_of(feature: str) -> str:
 
 def _meets(kind: str, first: str, second: str) -> bool:
     own = _FIRST.get(kind, "")
-    return own != "" and (own if own in _ROUND else "surface") == first and second in _MET[own]
+    return own != "" and (own if own in _ROUND else "surface") == first and second in MET[own]
 
 
 # -- from what the user gave ------------------------------------------------------------------------------------------
+def _whole(given: Any) -> int | None:
+    """A whole number, also one that is written with decimals, such as 2.0; None if it is none."""
+    found = as_count(given)
+    if found is not None or isinstance(given, bool) or not isinstance(given, Real):
+        return found
+    value = float(given)
+    return int(value) if value.is_integer() else None
+
+
 def points_of_plate(given: Mapping[str, Any]) -> int | None:
     """At how many points a plate is felt; None where that is no number."""
-    count = given.get("points", PLATE)
-    whole = isinstance(count, int | float) and not isinstance(count, bool) and float(count).is_integer()
-    return int(count) if whole and 1 <= count <= POINTS else None
+    count = _whole(given.get("points", PLATE))
+    return count if count is not None and 1 <= count <= POINTS else None
+
+
+def teeth_of_sprocket(given: Mapping[str, Any]) -> int | None:
+    """How many teeth a sprocket has; None where that is no number."""
+    count = _whole(given.get("teeth"))
+    return count if count is not None and count >= TEETH else None
 
 
 def given_groups(values: Mapping[str, Any]) -> list[list[ShapeParts]]:
@@ -124,7 +142,7 @@ def _given_shapes(value: Any) -> list[ShapeParts]:
         if kind == "plate":
             count = points_of_plate(shape) or 0
         elif kind == "sprocket":
-            count = shape["teeth"] if isinstance(shape.get("teeth"), int) else 0
+            count = teeth_of_sprocket(shape) or 0
         else:
             count = len(_listed(shape.get("points", ())))
         found += [parts_of(kind, count)] * len(_listed(shape.get("on")))

@@ -17,6 +17,7 @@ from ..elements.field import Field, Fields
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
+from ..limits.contacts import CAUGHT_UP
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip
@@ -96,10 +97,15 @@ class SoilPressure(NormalLaw):
         return depth.graph.zero
 
     def rates(self, depth: Expr, rate: Expr) -> tuple[Expr, ...]:
-        """z_m' = z' while the sinkage grows beyond z_m; above the ground z_m fades."""
+        """z_m' = z' while the sinkage grows beyond z_m; above the ground z_m fades.
+
+        Where a plate that has begun deeper than z_m rises, z_m catches up with z: dz_m / d|z| = (z - z_m) / (part z).
+        """
         assert self.deepest is not None
-        graph = depth.graph
-        grows = where(graph.apply("le", self.deepest, depth), graph.apply("max", 0.0, rate), 0.0)
+        graph, deepest = depth.graph, self.deepest
+        over = beyond_zero(depth, lambda z: 1.0 - deepest / z)
+        change = where(graph.apply("lt", rate, 0.0), -over / CAUGHT_UP * rate, rate)
+        grows = where(graph.apply("le", deepest, depth), change, 0.0)
         return (where(graph.apply("lt", 0.0, depth), grows, self.rates_apart()[0]),)
 
     def rates_apart(self) -> tuple[Expr, ...]:

@@ -56,7 +56,9 @@ class PairKind:
         Of each row of the first table and of each of the second a number: their sum is the place of the pair's states
         among all states of the sum.  Empty without states.
     states : int
-        How many states a pair has.  What it adds to their rates stands behind the results.
+        How many states a pair has.  What it adds to their rates stands behind the results.  A number that is only
+        summed, such as how many pieces of a shape touch, is one of them: 0 is given for it, and its sum stands in the
+        place of its rate.
     """
 
     name: str

@@ -8,6 +8,9 @@ AT_REST = 1e-8
 #: Part of a profile's length over which neighbouring pieces share a circle: beside rounding, 1e-16 of the length, it is
 #: wide, so that their shares add up to 1 within 1e-8, and beside the lengths of pieces it is nothing.
 SHARED = 1e-8
+#: Part of a sinkage by which a plate rises until soil that it was put into remembers that sinkage: after 12 such parts
+#: z_m is z, so that a thousandth of a rebound of a tenth of the sinkage is lost.
+CAUGHT_UP = 1e-5
 #: Squared sine of the angle of two rods below which they count as parallel: nearest points of skew rods lose
 #: 1e-16 / sine^2 of their place, which moves them along the rods, where the distance changes by the sine of that.
 PARALLEL = 1e-12

@@ -9,6 +9,7 @@ from typing import Any
 import contact_scenes as scenes
 import numpy as np
 import pytest
+import sympy
 from contact_scenes import ELASTIC, LAW, PLANAR, on
 
 import eomgen as eg
@@ -225,6 +226,23 @@ def test_what_is_wrong_with_an_outline_is_told() -> None:
             m.mechanism()
         found = {p.path: f"{p.message}; {p.remedy}" for p in error.value.problems}
         assert told in found.get(f"forces.mesh.second[0].{place}", f"nothing there: {found}"), found
+
+
+@pytest.mark.parametrize("kind", [float, np.int64, np.float32, sympy.Integer])
+def test_whole_numbers_of_shapes_in_any_form(kind: Any) -> None:
+    """Teeth of a sprocket and points of a plate, with as many states."""
+    bristles = {"friction": 0.3, "friction_law": "lugre", "bristle_stiffness": 1e3, "bristle_damping": 30.0}
+    found = []
+    for make in (int, kind):
+        m, (wheel, sole) = scenes.planar("whole", 2)
+        teeth = {"shape": "sprocket", "on": wheel, **SPROCKET, "teeth": make(9)}
+        plate = {"shape": "plate", "on": sole, "length": 0.3, "width": 0.1, "points": make(3)}
+        ground = {"shape": "half_plane", "on": m.ground}
+        m.contacts("mesh", [teeth, plate], ground, {**ELASTIC, **bristles, "lateral": False})
+        found.append(m.compile(target="numpy"))
+    assert found[1].n_x == found[0].n_x == 12 + 18 + 3
+    x = found[0].x0(j0_y=0.15, j1_y=-0.01, j0_x_dot=0.1)
+    np.testing.assert_array_equal(found[1].rhs(0.0, x), found[0].rhs(0.0, x))
 
 
 @pytest.mark.parametrize("shape", [{"shape": "sprocket", **SPROCKET}, {"shape": "smooth_outline", "points": BLOB}])

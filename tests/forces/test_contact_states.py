@@ -14,6 +14,10 @@ from contact_scenes import PLANAR, on
 import eomgen as eg
 from eomgen.errors import ModelError
 from eomgen.forces.contact_groups import _SharedData
+from eomgen.forces.contact_shape_fields import GROUNDS, SHAPE_FIELDS
+from eomgen.forces.contact_shape_fields import PLANAR as PLANE
+from eomgen.forces.contact_shapes import MEETINGS, meet
+from eomgen.forces.contact_states import PARTS, ShapeParts, class_of, given_groups, pair_states
 from eomgen.generation import generate
 
 LUGRE = {
@@ -132,6 +136,139 @@ def test_a_profile_shares_the_states_of_its_pieces() -> None:
             np.testing.assert_allclose(other, values[0], rtol=1e-7, atol=1e-10)
 
 
+TROUGH = np.array([[-1.0, 1.0], [-0.05, 0.0], [0.05, 0.0], [1.0, 0.7]])
+WHEEL = 0.2
+
+
+def in_trough() -> eg.Model:
+    m, (a,) = scenes.planar("trough", 1, (0, 0, 0))
+    valley = {"shape": "profile", "points": TROUGH.tolist(), "on": m.ground}
+    m.contacts("touch", valley, {"shape": "circle", "on": a, "radius": WHEEL}, {**LUGRE, "lateral": False})
+    return m
+
+
+def flanks(place: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, float]]:
+    """Direction, normal and penetration of a circle at both sides of the trough."""
+    found = []
+    for a, b in ((TROUGH[0], TROUGH[1]), (TROUGH[2], TROUGH[3])):
+        t = (b - a) / np.linalg.norm(b - a)
+        n = np.array([-t[1], t[0]])
+        found.append((t, n, WHEEL - n @ (place - a)))
+    return found
+
+
+def test_a_wheel_between_two_sides_has_the_mean_of_both_as_rate() -> None:
+    """A wheel that bridges the floor: z' is the mean of both laws, and the forces are those of each side."""
+    mod = in_trough().compile(target="numpy")
+    rng, both = np.random.default_rng(2), 0
+    mass = np.linalg.inv(mod.mass_matrix(np.array([0.0, 2.0, 0.0])))
+    for _ in range(200):
+        place = np.array([rng.uniform(-0.01, 0.03), rng.uniform(0.2, 0.22)])
+        sides = flanks(place)
+        if min(depth for *_, depth in sides) <= 0 or place[1] < WHEEL:
+            continue
+        both += 1
+        v, turn, z = rng.standard_normal(2), rng.standard_normal(), 1e-4 * rng.standard_normal()
+        x = mod.x0(j0_x=place[0], j0_y=place[1], j0_x_dot=v[0], j0_y_dot=v[1], j0_3_dot=turn)
+        x[6] = z
+        force, rates = np.zeros(3), []
+        for t, n, depth in sides:
+            arm = -(WHEEL - 0.5 * depth)
+            slip = t @ v - arm * turn
+            rates.append(slip - 1e3 * abs(slip) / 0.3 * z)
+            drag = -1e5 * depth * (1e3 * z + 30.0 * rates[-1])
+            force += [*(1e5 * depth * n + drag * t), -arm * drag]
+        found = mod.rhs(0.0, x)
+        assert found[6] == pytest.approx(np.mean(rates), rel=1e-9, abs=1e-12)
+        np.testing.assert_allclose(found[3:6], mass @ force, rtol=1e-9, atol=1e-8 * np.abs(force).max())
+    assert both > 20
+
+
+def test_bristles_between_two_sides_stay_small() -> None:
+    """A wheel pressed into a valley with a deflection of 1e-6 m: it does not grow, by any method."""
+    m = eg.Model("v", gravity=(0, -9.81, 0))
+    body = m.body("b", mass=1.0, inertia={"zz": 0.02})
+    m.prismatic("j", m.ground, body, axis="y")
+    valley = {"shape": "profile", "points": [[-1, 1], [-0.05, 0], [0.05, 0], [1, 1]], "on": m.ground}
+    law = {**LUGRE, "dissipation": 1.0, "lateral": False}
+    m.contacts("c", {"shape": "circle", "radius": 0.2, "on": body}, valley, law)
+    mod = m.compile(target="numpy")
+    for method in ("Radau", "DOP853"):
+        traj = mod.simulate((0, 0.2), {"j": 0.2355, "c_bristle_1": 1e-6}, method=method)
+        assert np.abs(traj["c_bristle_1"]).max() <= 1e-6
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_derivatives_between_two_sides(target: str) -> None:
+    mod = in_trough().compile(target=target)
+    for z in (2e-5, -1e-4):
+        x = mod.x0(j0_x=0.012, j0_y=0.21, j0_3=0.2, j0_x_dot=0.3, j0_y_dot=-0.1, j0_3_dot=2.0)
+        assert min(depth for *_, depth in flanks(x[:2])) > 1e-3
+        x[6] = z
+        wanted = differences(mod, x)
+        np.testing.assert_allclose(mod.jacobian(0.0, x), wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_a_roller_on_both_flanks_of_a_seat(target: str) -> None:
+    """Wider than the seat it lies on both flanks, 65 degrees from the radius: across it z' = v cos 65 degrees."""
+    m, (a,) = scenes.planar("seat", 1, (0, 0, 0))
+    wheel = {"shape": "sprocket", "teeth": 8, "pitch": 0.1, "seat": 0.02, "tip_radius": 0.15, "on": m.ground}
+    m.contacts("touch", wheel, {"shape": "circle", "on": a, "radius": 0.03}, {**LUGRE, "lateral": False})
+    mod = m.compile(target=target)
+    reach = 0.05 / np.sin(np.pi / 8)
+    x = mod.x0(j0_x=reach + 0.01, j0_y_dot=0.3)
+    assert abs(mod.rhs(0.0, x)[6]) == pytest.approx(0.3 * np.cos(np.radians(65)), rel=1e-9)
+    x = mod.x0(j0_x=reach + 0.01, j0_y=0.001, j0_x_dot=0.1, j0_y_dot=0.3, j0_3_dot=-4.0, touch_bristle_1=3e-5)
+    wanted = differences(mod, x)
+    np.testing.assert_allclose(mod.jacobian(0.0, x), wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())
+
+
+SIZES: dict[str, dict[str, Any]] = {
+    "circle": {"radius": 0.1},
+    "segment": {"length": 0.3, "radius": 0.03},
+    "box": {"size": (0.2, 0.1)},
+    "polygon": {"points": [[0, 0], [1, 0], [1, 1], [0.5, 1.2], [0, 1]]},
+    "plate": {"length": 1, "width": 0.3, "points": 3},
+    "half_plane": {},
+    "profile": {"points": [[-1, 0], [-0.3, 0.25], [0, 0.3], [0.4, 0.2], [1, 0]]},
+    "smooth_profile": {"points": [[-1, 0], [-0.3, 0.25], [0, 0.3], [0.4, 0.2], [1, 0]]},
+    "outline": {"points": [[0, 0], [1, 0], [1, 1], [0.5, 1.2], [0, 1]]},
+    "smooth_outline": {"points": [[0, 0], [1, 0], [1, 1], [0.5, 1.2], [0, 1]]},
+    "sprocket": {"teeth": 7, "pitch": 0.05, "seat": 0.01, "tip_radius": 0.06},
+    "sphere": {"radius": 0.1},
+    "capsule": {"length": 0.4, "radius": 0.1},
+    "half_space": {},
+    "ellipsoid": {"semi_axes": (0.1, 0.2, 0.3)},
+    "cuboid": {"size": (0.1, 0.2, 0.3)},
+}
+
+
+@pytest.mark.parametrize("kind", SHAPE_FIELDS)
+def test_states_count_the_parts_that_shapes_have(kind: str) -> None:
+    """What is told of a kind of shape is what its features are: whom it meets, and how many parts of each class."""
+    m, (body,) = scenes.planar("one", 1)
+    other = {"shape": "half_plane" if kind in PLANE else "half_space", "on": m.ground}
+    if kind in GROUNDS:
+        other = {"shape": "circle" if kind in PLANE else "sphere", "radius": 0.1, "on": m.ground}
+    m.contacts("touch", {"shape": kind, "on": body, **SIZES[kind]}, other, {"stiffness": 1e4})
+    (force,) = m.mechanism().forces
+    shape, features = force.first[0], force.first[0].features()
+    given = given_groups({"first": {"shape": kind, "on": "b0", **SIZES[kind]}})[0][0]
+    assert given == shape.parts()
+    classes = [one.kind.rstrip("0123456789") for one in features]
+    surfaces = {name for name in classes if any(name == a for a, _ in MEETINGS)}
+    parts = {name: classes.count(name) for name in classes if any(name == b for _, b in MEETINGS)}
+    assert parts == dict(given.parts)
+    for name, count in parts.items():
+        assert sorted(one.slot for one in features if one.kind == name) == list(range(count))
+    for second in PARTS:
+        met = {first for first in surfaces if meet((first, second))}
+        found = {k[2] for k in pair_states([[given], [ShapeParts("", {second: 1})]])[0] if k[0] == 0}
+        assert found == {class_of(first) for first in met}, second
+    assert set(PARTS) == {b for _, b in MEETINGS}
+
+
 def test_bodies_on_a_slope_stay_and_batches_agree() -> None:
     """Ten boxes on a slope of 0.2 below friction 0.3: none creeps in 20 s; columns are as single states."""
     m = eg.Model("boxes", gravity=(9.81 * np.sin(0.2), -9.81 * np.cos(0.2), 0))
@@ -204,7 +341,8 @@ def test_numbers_of_states_are_those_of_the_parts() -> None:
     mechanism = m.mechanism()
     for force in mechanism.forces:
         function = force._function(force.name, range(-1, len(bodies)), _SharedData(0, mechanism.graph), False)
-        assert function.states == len(force.states)
+        pairs = len(force.states) // 2
+        assert function.states == 3 * pairs  # beside two states how many pieces touch
         taken = [k for k, bodies_of in enumerate(function.holders) if bodies_of]
         assert taken
         assert all(len(bodies_of) in (0, 2) for bodies_of in function.holders)
@@ -214,6 +352,7 @@ def test_numbers_of_states_are_those_of_the_parts() -> None:
                     if row[0] != other[0] and (kind.first != kind.second or i < j):
                         at = kind.held[0][i] + kind.held[1][j]
                         assert 0 <= at < function.states
+                        assert at % 3 == 0
                         assert {row[0], other[0]} == function.holders[at]
 
 

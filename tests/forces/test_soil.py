@@ -341,3 +341,57 @@ def test_momentum_is_kept_and_no_plate_pulls() -> None:
         up = x[2] + math.pi / 2  # y of the ground
         assert force[3] * math.cos(up) + force[4] * math.sin(up) > -0.6 * np.hypot(force[3], force[4])
     assert pressed > 30
+
+
+def test_a_plate_that_starts_sunk_has_its_memory() -> None:
+    """From 1.5 times the depth at which it stands it rises as on the line of unloading: by 2 (F - W) / (k_u A)."""
+    m = eg.Model("sunk", gravity=(0, -G, 0))
+    body = m.body("sole", mass=400.0, inertia={"zz": 30.0})
+    m.planar("j", m.ground, body)
+    shape = {"shape": "plate", "on": body, "length": 1.0, "width": 0.3}
+    m.contacts("sand", shape, {"shape": "half_plane", "on": m.ground}, {"soil": "dry_sand", "lateral": False})
+    mod = m.compile(target="numpy")
+    k, n = 0.99e3 / 0.3 + 1528.43e3, 1.1
+    deep = 1.5 * (400.0 * G / (0.3 * k)) ** (1 / n)
+    rise = 2 * (1 - 1.5**-n) * 0.1 * deep
+    traj = mod.simulate((0, 0.5), initial={"j_y": -deep}, rtol=1e-9, atol=1e-11)
+    assert traj["j_y"].max() + deep == pytest.approx(rise, rel=0.005)  # the sinkage it remembers is 1e-4 less
+    assert traj["sand_sinkage_1"][-1] == pytest.approx(deep, rel=2e-4)
+    assert traj["sand_sinkage_1"].max() <= deep * (1 + 1e-9)
+
+
+RIDGE = [[-1, -1], [-0.02, 0], [0.02, 0], [1, -1]]
+
+
+def test_a_point_below_both_sides_of_a_ridge_remembers_once() -> None:
+    """Both flanks sink by z' = v cos(turn); the point remembers that, and not twice as much."""
+    m = eg.Model("ridge", gravity=(0, 0, 0))
+    body = m.body("sole", mass=10.0, inertia={"zz": 2.0})
+    m.planar("j", m.ground, body)
+    shape = {"shape": "plate", "on": body, "length": 0.02, "width": 0.3, "points": 1}
+    ridge = {"shape": "profile", "points": RIDGE, "on": m.ground, "depth": 0.3}
+    m.contacts("soil", shape, ridge, {**EXAMPLE, "lateral": False})
+    mod = m.compile(target="numpy")
+    x = mod.x0(j_y=-0.1, j_y_dot=-0.2)
+    slope = 1 / 0.98
+    assert mod.rhs(0.0, x)[7] == pytest.approx(0.2 / math.hypot(1, slope), rel=1e-12)
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_exact_derivatives_below_a_ridge(target: str) -> None:
+    m = eg.Model("ridge", gravity=(0, -G, 0))
+    body = m.body("sole", mass=10.0, inertia={"zz": 2.0})
+    m.planar("j", m.ground, body)
+    shape = {"shape": "plate", "on": body, "length": 0.04, "width": 0.3}
+    ridge = {"shape": "profile", "points": RIDGE, "on": m.ground, "depth": 0.3}
+    m.contacts("soil", shape, ridge, {"soil": "dry_sand", "dissipation": 0.5, "lateral": False})
+    mod = m.compile(target=target)
+    units = np.eye(mod.n_x)
+    for rate in (-0.1, 0.1):  # sinking, and rising from where it began
+        x = mod.x0(j_x=0.003, j_y=-0.1, j_3=0.05, j_x_dot=0.01, j_y_dot=rate, j_3_dot=0.02)
+        x[6:] = [0.004, 0.0449, -0.003, 0.0449]
+        step = 1e-7 * np.array([1, 1, 1, 1, 1, 1, 1, 1e-1, 1, 1e-1])
+        wanted = np.array(
+            [(mod.rhs(0.0, x + h * e) - mod.rhs(0.0, x - h * e)) / (2 * h) for e, h in zip(units, step, strict=True)]
+        ).T
+        np.testing.assert_allclose(mod.jacobian(0.0, x), wanted, rtol=1e-6, atol=1e-8 * np.abs(wanted).max())
