@@ -8,6 +8,7 @@ from ..elements.entry import Entry
 from ..elements.field import Field
 from .constraint import Constraint, on_two_bodies
 from .convex_rolling import NORMAL, RollingConvex, ellipsoid_support
+from .convex_support import require_convex
 from .rolling import KnifeEdge, RollingDisc, RollingSphere
 
 #: Key -> the shapes that have it.
@@ -39,7 +40,10 @@ def _rolling(e: Entry) -> Constraint | None:
     symbols = {name: e.graph.symbol(f"{name} of {e.name}") for name in NORMAL}
     local = (symbols["nx"], symbols["ny"], symbols["nz"])
     if shape == "convex":
-        return RollingConvex(e.name, wheel, plane, e.law("support", symbols), local)
+        support = e.law("support", symbols)
+        if not e.at_fault():
+            require_convex(e, support, local)
+        return RollingConvex(e.name, wheel, plane, support, local)
     a, b, c = e.vector("semi_axes")
     for k, x in enumerate((a, b, c)):
         e.require(f"semi_axes[{k}]", x, lambda x: x > 0, "must be greater than 0")

@@ -13,6 +13,7 @@ from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from ..graph.vectors import Vec3
+from ..numeric.scales import Array
 from .build_cam_points import Contacts
 from .build_joints import Declared
 from .checks import check_keys
@@ -112,6 +113,9 @@ class ElementEntry:
         number = self.reader.known(value)
         if number is not None and not right(number):
             self.fault(key, f"is {number:g}", rule)
+
+    def at(self, values: Sequence[Expr], local: Mapping[str, Array]) -> Array | None:
+        return self.reader.known_at(values, local)
 
     # -- values ---------------------------------------------------------------------------------------------------
     def law(self, key: str, local: Mapping[str, Expr] | None = None, exclusive: bool = True) -> Expr:

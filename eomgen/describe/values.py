@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import numbers
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
 from ..limits.descriptions import PERPENDICULAR
 from ..numeric.rigid_inertia import word_of_check
+from ..numeric.scales import Array
 from ..suggestions import hint
 from ..texts import WHOLE, join_surrogates, lone_surrogate
 from .checks import check_keys
@@ -104,6 +105,15 @@ class Reader:
             return None
         value = float(evaluate([expression], self.numbers)[0])
         return value if math.isfinite(value) else None
+
+    def known_at(self, expressions: Sequence[Expr], points: Mapping[str, Array]) -> Array | None:
+        """Values at points of more symbols and the declared values of parameters, None if they do not tell."""
+        values = {**self.numbers, **points}
+        if not symbols_of(expressions) <= values.keys():
+            return None
+        with np.errstate(all="ignore"):
+            found = evaluate(expressions, values)
+        return np.array(np.broadcast_arrays(*found, *points.values())[: len(found)], dtype=float)
 
     def wrong(self, path: str, value: object, kind: str) -> None:
         """Note that a value is not of a kind."""

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Protocol
 from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from ..numeric.space import Array
 from .field import Fields
 
 
@@ -72,6 +73,9 @@ class Entry(Protocol):
 
     def require(self, key: str, value: Expr, right: Callable[[float], bool], rule: str) -> None:
         """Note an expression whose number, as far as the declared values of parameters tell, breaks a rule."""
+
+    def at(self, values: Sequence[Expr], local: Mapping[str, Array]) -> Array | None:
+        """Expressions, a row each, at points of their local names, as far as declared values of parameters tell."""
 
     # -- values ---------------------------------------------------------------------------------------------------
     def law(self, key: str, local: Mapping[str, Expr] | None = None, exclusive: bool = True) -> Expr:

@@ -84,6 +84,7 @@ class Force(ABC):
     uses_value: ClassVar[bool] = False  #: whether its law looks at the value of its path, not at the rate alone
     by_reaction: ClassVar[bool] = False  #: whether its law speaks of the reactions of joints
     by_power: ClassVar[bool] = False  #: whether its forces enter by virtual power, though it has a potential
+    not_finite_where: ClassVar[str] = ""  #: where its loads are not finite, and what to do, for messages
     name: str
 
     @abstractmethod

@@ -38,3 +38,5 @@ NO_LENGTH = 1e-9
 SHOWN_COMPLEX = 1e-12
 #: By which powers of a dimension may differ: 1/3 + 1/3 + 1/3 misses 1 by less.
 POWERS = 1e-9
+#: Part of a body's size below which a radius of curvature counts as 0: second derivatives lose half of the digits.
+SHARP = 1e-8

@@ -32,7 +32,7 @@ from .event_terms import describe_events, resets
 from .factor import has_long_paths
 from .given_multipliers import multiplier_values
 from .rolling_discs import describe_discs
-from .soundness import flag_forces
+from .soundness import flag_forces, not_finite_where
 from .state_terms import with_states
 from .terms import SystemTerms
 
@@ -244,6 +244,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "constraint_scales": list(mobility.row_scales),
         "alignment_labels": list(c.aligned_joints),
         "fragile_forces": [name for name, _ in flag_forces(kinematics)],
+        **({"not_finite_where": where} if (where := not_finite_where(kinematics)) else {}),
         **({"reaction_laws": list(kinematics.reaction_laws)} if kinematics.reaction_laws else {}),
         "p_values": [p.value for p in m.parameters],
         "u_values": [u.value for u in m.inputs],

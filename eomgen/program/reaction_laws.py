@@ -33,7 +33,8 @@ from ..kinematics.wrenches import JointWrenches
 from ..limits.systems import UNTOUCHED
 from .factor import factorize, solve
 from .held_constraints import LinearValues, hold, plastic_impacts
-from .reaction_users import Users, refuse_joints, refuse_redundant, require_inertia_of_tree
+from .law_pieces import pieces_of
+from .reaction_users import Users, refuse_joints, refuse_redundant, require_inertia_of_tree, too_many_pieces
 from .solve_laws import laws_in, solve_laws
 
 PROBES = 3  #: states at which components are looked at
@@ -45,13 +46,15 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     Raises
     ------
     ModelError
-        A reaction that rigid bodies do not determine, or of a joint that has none.
+        A reaction that rigid bodies do not determine, or of a joint that has none; a law of too many pieces.
     """
     refuse_joints(kinematics)
     graph, mechanism, motion = kinematics.graph, kinematics.mechanism, kinematics.motion
     laws, speaking = dict[Expr, None](), []
     for terms in kinematics.forces:
         own = [law for load in _loads(terms) for law in laws_in(entries_of(load), is_carried)]
+        if any(pieces_of(law, is_carried) is None for law in own):
+            raise ModelError([too_many_pieces(mechanism, terms.force.name)])
         laws |= dict.fromkeys(own)
         speaking += [terms.force.name] if own else []
     asked = [graph.symbol(name) for name in mechanism.reaction_quantities]
@@ -74,6 +77,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
         inner = [row[len(laws) :] for row in found.gain[len(reactions) :]]
         plastic = plastic_impacts(kinematics, rows, inner, columns[len(laws) :])
         still, gain = hold(found, rows, len(laws))
+        gain = _asked_at_states(kinematics, gain) if laws else gain
         symbols += [row.multiplier for row in rows]
         values, known = solve_laws(list(laws), symbols, still, gain)
     else:  # outputs of a tree: they may speak of accelerations
@@ -83,6 +87,15 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     whole = replace(kinematics, forces=(*kinematics.forces, *held))
     solved = _replaced(whole, known | dict(zip(symbols, values, strict=True)))
     return replace(solved, motion=motion, reaction_laws=tuple(speaking), plastic=plastic)
+
+
+def _asked_at_states(kinematics: Kinematics, gain: Matrix) -> Matrix:
+    """A gain of parameters alone as one of the state, so that it fails with a state, as others do, not before."""
+    if not kinematics.names or not symbols_of([k for row in gain for k in row]) <= {*kinematics.parameter_names}:
+        return gain
+    q = kinematics.graph.symbol(kinematics.names[0])
+    true = kinematics.graph.apply("le", 0.0, q * q)
+    return [[k * true for k in row] for row in gain]
 
 
 def _before_accelerations(mechanism: Mechanism) -> bool:

@@ -18,6 +18,7 @@ from ..kinematics.mobility import Mobility
 from ..limits.inertia import SINGULAR
 from ..numeric import algebra
 from ..numeric.definite import correlated
+from .law_pieces import MANY
 
 
 class Users(NamedTuple):
@@ -47,6 +48,13 @@ class Users(NamedTuple):
         asked = [q.path for q in self.mechanism.reaction_quantities.values() if q.of == joint]
         place = f"forces.{laws[0]}" if laws else asked[0] if asked else f"joints.{joint}"
         return self.mechanism.problem(place, message, remedy)
+
+
+def too_many_pieces(mechanism: Mechanism, force: str) -> Problem:
+    """A law whose choices make so many pieces that it is not judged whether it has one solution."""
+    message = f"its law of a reaction has more than {MANY} pieces, made by abs, max, min, conditions and their products"
+    remedy = "write it as a sum of terms with fewer of them, which are judged one by one, or as a smooth function"
+    return mechanism.problem(f"forces.{force}", message, remedy)
 
 
 def refuse_joints(kinematics: Kinematics) -> None:

@@ -4,14 +4,14 @@ A law is what an entry of a load depends on reactions by: the smallest parts of 
 reactions themselves.  Laws that are reactions themselves are eliminated first, as a linear system.  The others are met
 by Newton's method, a fixed number of steps, with the exact slopes of g.
 
-A law is taken to have slopes of any sign up to their size, as that of |N| has, in each of its pieces, as max(0, N) has
-two.  It has one solution for every N0 if
-I - B is an M-matrix, B[i, j] = |dg_i/dN| |K[., j]|: then g is a contraction in a weighted maximum norm (A. Berman,
-R. J. Plemmons, Nonnegative Matrices in the Mathematical Sciences (1994), ch. 6).  For one law this is |mu K| < 1, the
-limit beyond which Painleve's examples have two solutions or none (P. Painleve, Sur les lois du frottement de
-glissement, C. R. Acad. Sci. Paris 121 (1895), 112-115).  Of laws that are reactions themselves the pivots of I - K are
-to be positive: the solution then follows from the one without these forces as they grow from 0.  Where it fails, the
-forces are no numbers, and what is asked ends with an error that names the elements.
+A law is taken to have slopes of any sign up to their size, as that of |N| has, in each of its pieces
+(:mod:`.law_pieces`), as max(0, N) has two.  It has one solution for every N0 if I - B is an M-matrix, B[i, j] =
+|dg_i/dN| |K[., j]|: then g is a contraction in a weighted maximum norm (A. Berman, R. J. Plemmons, Nonnegative Matrices
+in the Mathematical Sciences (1994), ch. 6).  For one law this is |mu K| < 1, the limit beyond which Painleve's examples
+have two solutions or none (P. Painleve, Sur les lois du frottement de glissement, C. R. Acad. Sci. Paris 121 (1895),
+112-115).  Of laws that are reactions themselves the solution is to
+follow from the one without these forces as they grow from 0 (:mod:`.linear_laws`).  Where it fails, the forces are no
+numbers, and what is asked ends with an error that names the elements.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ from collections.abc import Callable, Mapping, Sequence
 from ..graph.core import Expr, sqrt
 from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
-from ..graph.traverse import reachable
 from ..kinematics.eliminate import Matrix, eliminate, total
 from ..limits.systems import FIXED
+from .law_pieces import dependent_on, pieces_of
+from .linear_laws import grows_from_zero, solve_by_largest_pivots
 
 #: Of Newton's method from f = 0.  Random laws of 1 to 8 forces (|N| in space, spectral radius of B up to 0.99) were met
 #: to 3e-12 by then, to 1e-15 where that is 0.9.
@@ -32,24 +33,14 @@ STEPS = 7
 
 def laws_in(entries: Sequence[Expr], speaks: Callable[[str], bool]) -> list[Expr]:
     """The laws in the entries of one load: parts in which it is linear, or the entries where they are fewer."""
-    dependent = _dependent(entries, speaks)
+    dependent = dependent_on(entries, speaks)
     found: dict[Expr, None] = {}
     for entry in entries:
         _parts(entry, dependent, found)
     spoken = [entry for entry in dict.fromkeys(entries) if entry.id in dependent]
-    return list(found) if len(found) <= len(spoken) or all(_is_symbol(x) for x in found) else spoken
-
-
-def _dependent(entries: Sequence[Expr], speaks: Callable[[str], bool]) -> set[int]:
-    """Ids of all nodes that depend on such symbols."""
-    found: set[int] = set()
-    for graph in {entry.graph for entry in entries}:
-        for i in reachable(graph, [entry.id for entry in entries]):
-            node = graph.nodes[i]
-            inner = speaks(node[1]) if node[0] == "sym" else node[0] != "const" and not found.isdisjoint(node[1:])
-            if inner:
-                found.add(i)
-    return found
+    if len(found) <= len(spoken) or any(pieces_of(entry, speaks) is None for entry in spoken):
+        return list(found)
+    return list(found) if all(_is_symbol(x) for x in found) else spoken
 
 
 def _parts(x: Expr, dependent: set[int], found: dict[Expr, None]) -> None:
@@ -89,19 +80,20 @@ def solve_laws(
     else:
         gain = [list(row) for row in gain]
     if not curved:
-        return [N / certain for N in still] if linear else list(still), {}
+        return [_if(certain, N) for N in still] if linear else list(still), {}
     return _newton([laws[j] for j in curved], symbols, still, gain, certain)
 
 
 def _eliminated(
     places: Sequence[int], linear: Sequence[int], curved: Sequence[int], still: Sequence[Expr], gain: Matrix
 ) -> tuple[list[Expr], Matrix, Expr]:
-    """N0 and K of the other laws, those that are N[places] being solved for; and 1 where all pivots are positive."""
+    """N0 and K of the other laws, those that are N[places] being solved for; and 1 where these are certain."""
     one = still[0].graph.one
     A = [[-gain[i][j] + (one if k == m else 0.0) for m, j in enumerate(linear)] for k, i in enumerate(places)]
-    certain = _positive_pivots(A, one)
-    columns = [eliminate(A, [column[i] for i in places]) for column in (still, *zip(*gain, strict=True))]
-    rest, by = columns[0], columns[1:]
+    certain = grows_from_zero(A, one)
+    rest, *by = solve_by_largest_pivots(
+        A, [[column[i] for i in places] for column in (still, *zip(*gain, strict=True))]
+    )
     base = [
         total([N, *(row[j] * f for j, f in zip(linear, rest, strict=True))]) for N, row in zip(still, gain, strict=True)
     ]
@@ -127,15 +119,21 @@ def _newton(
         left = [g - f for g, f in zip(values[:n], force, strict=True)]
         force = [f + x for f, x in zip(force, eliminate(matrix, left), strict=True)]
     here = _at(still, gain, force)
-    pieces = [(i, piece) for i, law in enumerate(laws) for piece in _pieces(law)]
+    names = {symbol.node[1] for symbol in symbols}
+    pieces = [(i, piece) for i, law in enumerate(laws) for piece in pieces_of(law, names.__contains__) or [law]]
     bounds = jacobian([piece for _, piece in pieces], list(symbols))
     values = substitute([*laws, *bounds.values()], dict(zip(symbols, here, strict=True)))
     certain = certain * _certain([i for i, _ in pieces], dict(zip(bounds, values[n:], strict=True)), gain, n, graph.one)
     apart = total([graph.apply("abs", g - f) for g, f in zip(values[:n], force, strict=True)])
     size = total([graph.apply("abs", g) for g in values[:n]])
     certain = certain * graph.apply("le", apart, size * FIXED)
-    found = {law: g / certain for law, g in zip(laws, values[:n], strict=True)}
-    return _at(still, gain, [f / certain for f in force]), found
+    found = {law: _if(certain, g) for law, g in zip(laws, values[:n], strict=True)}
+    return _at(still, gain, [_if(certain, f) for f in force]), found
+
+
+def _if(certain: Expr, x: Expr) -> Expr:
+    """A value; no number where it is not certain, also if it vanishes whatever the state is."""
+    return certain.graph.apply("select", certain, x, 1.0 / certain) if x.is_zero else x / certain
 
 
 def _at(still: Sequence[Expr], gain: Matrix, force: Sequence[Expr]) -> list[Expr]:
@@ -146,21 +144,6 @@ def _slope(D: Mapping[tuple[int, int], Expr], gain: Matrix, i: int, j: int) -> E
     """An entry of I - D K."""
     graph = gain[0][0].graph
     return total([graph.one if i == j else graph.zero, *(-(d * gain[m][j]) for (k, m), d in D.items() if k == i)])
-
-
-def _pieces(law: Expr) -> list[Expr]:
-    """The smooth pieces of a law such as |N| or max(0, N), whose slopes it may have at another N."""
-    graph, found, waiting = law.graph, [], [law.id]
-    while waiting:
-        operation, *operands = graph.nodes[waiting[-1]]
-        i = waiting.pop()
-        if operation in ("abs", "max", "min"):
-            waiting += operands
-        elif operation == "select":
-            waiting += operands[1:]
-        elif operation != "const":
-            found.append(Expr(graph, i))
-    return found
 
 
 def _certain(of: Sequence[int], D: Mapping[tuple[int, int], Expr], gain: Matrix, n: int, one: Expr) -> Expr:

@@ -22,6 +22,11 @@ def flag_forces(kinematics: Kinematics) -> list[tuple[str, Expr]]:
     return found
 
 
+def not_finite_where(kinematics: Kinematics) -> dict[str, str]:
+    """Elements whose types know where their loads are not finite, and where that is."""
+    return {x.force.name: x.force.not_finite_where for x in kinematics.forces if x.force.not_finite_where}
+
+
 def _size(terms: ForceTerms) -> Expr | None:
     """Sum of the sizes of all entries, None if it is finite wherever the state is."""
     entries: list[Expr] = []

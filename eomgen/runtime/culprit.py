@@ -69,15 +69,19 @@ def _not_finite(kernels: Evaluates, t: float, x: Array, p: Array | None, u: Arra
     if layout.n_finite_forces and "finite_forces" in kernels.core.names and x.size >= layout.n_x:
         finite = kernels.state("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
         bad = [name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0]
+        known = layout.metadata.get("not_finite_where", {})
+        own = {known[name]: None for name in bad if name in known}
         if bad and set(bad) <= set(layout.reaction_laws):
             return (
                 f"the forces of {' and '.join(bad)} depend on reactions which they change so strongly that the motion "
                 "may have several solutions or none (Painleve's paradox); give smaller coefficients"
+                f"{''.join(f'; or {why}' for why in own)}"
             )
-        loads = " and ".join(name for name in bad if name not in layout.reaction_laws)
+        loads = [name for name in bad if name not in layout.reaction_laws]
         if loads:
-            why = "its ends meet or lie inside the cylinder, or its law is outside its domain"
-            return f"the loads of {loads} are not ({why})"
+            ends = [] if known.keys() >= {*loads} else ["its ends meet or lie inside the cylinder"]
+            why = ", or ".join([*own, *ends, "its law is outside its domain"])
+            return f"the loads of {' and '.join(loads)} are not ({why})"
     if "mass_matrix" in kernels.core.names and x.size >= layout.n_q:
         M = kernels.state("mass_matrix", nan=True)(x[: layout.n_q], t=t, p=p, u=u)
         if not np.isfinite(M).all():

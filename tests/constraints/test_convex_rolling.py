@@ -166,6 +166,15 @@ def test_the_ellipsoid_rolls_on_a_plane_that_moves() -> None:
         ({"shape": "sphere", "radius": 1, "support": "nx"}, "support", "only convex shapes have it"),
         ({"shape": "convex", "support": "0.1 + n_x"}, "support", "n_x"),
         ({"shape": "cube", "radius": 1}, "shape", "cube"),
+        (
+            {"shape": "convex", "support": "-0.1"},
+            "support",
+            "is not of a convex body: its radius of curvature is -0.1 ",
+        ),
+        ({"shape": "convex", "support": "0.1*nx"}, "support", "a corner: both radii of curvature are 0 where"),
+        ({"shape": "convex", "support": "0.1*(abs(nx) + abs(ny) + abs(nz))"}, "support", "a corner"),
+        ({"shape": "convex", "support": "0.1 + 0.11*nz**2"}, "support", "is not of a convex body"),
+        ({"shape": "convex", "support": "log(-1 - nx**2)"}, "support", "is not a number"),
     ],
 )
 def test_what_is_wrong_is_told(keys: dict[str, Any], place: str, told: str) -> None:
@@ -177,3 +186,44 @@ def test_what_is_wrong_is_told(keys: dict[str, Any], place: str, told: str) -> N
         m.mechanism()
     assert told in str(error.value)
     assert place in str(error.value)
+
+
+@pytest.mark.parametrize("c", [-0.06, -0.04, 0.09, 0.11])
+def test_convex_where_a_meridian_is(c: float) -> None:
+    """h = 0.1 + c nz^2 has along a meridian, nz = sin(s), the radius h + h'': which at the equator is 0.1 + 2 c."""
+    s = np.linspace(-math.pi / 2, math.pi / 2, 2001)
+    along = 0.1 + c * np.sin(s) ** 2 + 2 * c * np.cos(2 * s)
+    across = 0.1 + c * np.sin(s) ** 2 - 2 * c * np.sin(s) ** 2  # h - h' tan(s)
+    m = ball(shape="convex", support=f"0.1 + {c}*nz**2")
+    if min(along.min(), across.min()) > 0:
+        m.derive()
+    else:
+        with pytest.raises(ModelError, match="roll.support: is not of a convex body"):
+            m.derive()
+    late = ball(shape="convex", support="0.1 + c*nz**2")
+    late.parameter("c")
+    late.derive()  # it is not known yet
+
+
+def test_a_marker_may_lie_outside_the_body() -> None:
+    """A ball about a point 0.3 from the marker: that of a marker at its centre."""
+    m = eg.Model("aside", gravity=(0, 0.5, -9.81))
+    body = m.body("body", mass=MASS, inertia=INERTIA)
+    m.free("fly", m.ground, body, sequence="zxy")
+    other = eg.Model("centre", gravity=(0, 0.5, -9.81))
+    twin = other.body("body", mass=MASS, inertia=INERTIA)
+    other.free("fly", other.ground, twin, sequence="zxy")
+    m.rolling("roll", body, shape="convex", support="0.1 + 0.3*nx")
+    other.rolling("roll", twin.at(0.3, 0, 0), shape="sphere", radius=0.1)
+    mod, same = m.compile(target="numpy"), other.compile(target="numpy")
+    x = same.project(np.array([0.1, 0.2, 0.15, 0.3, 0.2, -0.4, *np.random.default_rng(4).standard_normal(6)]))
+    np.testing.assert_allclose(mod.rhs(0.0, x), same.rhs(0.0, x), rtol=1e-10, atol=1e-10)
+    assert np.abs(mod.rhs(0.0, x)).max() > 1
+
+
+def test_a_sharp_edge_rolls_as_a_disc() -> None:
+    mod, same = (ball(**keys).compile(target="numpy") for keys in (
+        {"shape": "convex", "support": "0.1*sqrt(nx**2 + ny**2)"}, {"radius": 0.1}
+    ))  # fmt: skip
+    x = same.project(np.array([0.1, 0.2, 0.4, 0.3, 0.2, -0.4, *np.random.default_rng(4).standard_normal(6)]))
+    np.testing.assert_allclose(mod.rhs(0.0, x), same.rhs(0.0, x), rtol=1e-9, atol=1e-9)

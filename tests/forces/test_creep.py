@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 import eomgen as eg
-from eomgen.errors import ModelError
+from eomgen.errors import ModelError, NonFiniteError
 
 G = 9.81
 #: Of a wheelset: mass, yaw inertia, half the gauge, rolling radius, conicity, creep coefficients, suspension.
@@ -154,3 +154,13 @@ def test_what_is_wrong_is_told(keys: dict[str, object], told: str) -> None:
     m.creep("rail", m.ground, wheel, radius=0.3, **{"longitudinal": 1.0, "lateral": 1.0, **keys})
     with pytest.raises(ModelError, match=told):
         m.check()
+
+
+@pytest.mark.parametrize(("law", "told"), [("linear", "the loads of left and right are not"), ("polach", "; or its")])
+def test_rest_is_told_by_the_speed_of_rolling(law: str, told: str) -> None:
+    """Creepages are divided by the speed of the axle along the track; the ends of a spring have no part in it."""
+    mod = wheelset(law).compile(target="numpy").bind(p={"V": 0.0})
+    with pytest.raises(NonFiniteError, match=told) as error:
+        mod.rhs(0.0, np.zeros(mod.n_x))
+    assert "its speed of rolling is 0: give it a speed that does not vanish at rest" in str(error.value)
+    assert "cylinder" not in str(error.value)
