@@ -22,8 +22,8 @@ from .substitute import substitute
 from .traverse import reachable
 
 PairPart = Literal["outputs", "slopes", "touch", "spot"]
-#: Pairs that a list of near ones has room for: so many, and so many for each part of a shape, in the plane (heaps of discs
-#: have 3 that touch, as edges of a planar graph are fewer than three for each node) and in space (heaps of equal
+#: Pairs that a list of near ones has room for: so many, and so many for each part of a shape, in the plane (heaps of
+#: discs have 3 that touch, as edges of a planar graph are fewer than three for each node) and in space (heaps of equal
 #: spheres have 6, of unequal ones 7).
 SPARE, IN_PLANE, IN_SPACE = 16, 5, 12
 LOSSES = "0"  #: begins the name of a sum of losses, as no name of a model does

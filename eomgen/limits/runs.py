@@ -22,7 +22,7 @@ SLOPE, SIZE = 1.5e-8, 1e-3  #: part of a variable over which its slope is differ
 #: In a body that is passed through there are then at least 1 / WITHIN steps, each with some ten stages.
 UP_TO, BEYOND, WITHIN = 0.75, 2.0, 0.0625
 #: Part of their thicknesses up to which two shapes that are apart are listed as near each other: twice WITHIN, so that
-#: motions that go at most that part, or UP_TO of the distance, from where they are not listed do not touch; and the same
+#: motions of at most that part, or of UP_TO of the distance, from where they are not listed do not touch; and the same
 #: where a shape has no far side.  Second neighbours in heaps of equal discs (apart by 0.37 of both) and spheres (0.21)
 #: are not listed.
 NEAR, OUTSIDE = 2.0 * WITHIN, 0.5

@@ -169,8 +169,8 @@ class PairSum:
     def spots(self, given: Sequence[Any]) -> list[Any]:
         """How many pairs of shapes are near each other, and where: 1 + ``RECORD`` ``room`` numbers or arrays.
 
-        Near are pairs that are apart by at most ``NEAR`` times the sum of their thicknesses, ``OUTSIDE`` times where one
-        has no far side.  Records that are not used are 0.
+        Near are pairs that are apart by at most ``NEAR`` times the sum of their thicknesses, ``OUTSIDE`` times where
+        one has no far side.  Records that are not used are 0.
         """
         data = _stacked(given)
         out = np.zeros((1 + RECORD * self.room, *data.shape[1:]), dtype=data.dtype)

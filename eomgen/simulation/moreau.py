@@ -121,8 +121,8 @@ def step_rigidly(
             watch.close()
     if steps.missed and not is_told_by_the_caller():
         warnings.warn(
-            f"{steps.missed} of {steps.taken} steps leave a residual of the contact laws of up to {steps.residual:.3g} m/s, "
-            f"more than contact_tolerance = {tolerance:.3g} of their velocities, after contact_iterations = "
+            f"{steps.missed} of {steps.taken} steps leave a residual of the contact laws of up to {steps.residual:.3g} "
+            f"m/s, more than contact_tolerance = {tolerance:.3g} of their velocities, after contact_iterations = "
             f"{iterations}: allow more iterations, or a larger tolerance",
             ContactWarning,
             stacklevel=calls_within() + 1,

@@ -91,14 +91,14 @@ class RigidSteps:
         self.residual, self.missed, self.iterations, self.most, self.depth = known
         if not left:
             raise SimulationError(
-                f"shapes move so fast that they may pass through each other even in steps of {h:.3g} s; take a smaller "
-                "step, and see whether the velocities are meant"
+                f"moreau stopped at t = {t:.6g} s: shapes move so fast that they may pass through each other even in steps "
+                f"of {h:.3g} s; take a smaller step, and see whether the velocities are meant"
             )
         q, v = self._whole_or_halves(t, q, v, 0.5 * h, left - 1)
         return self._whole_or_halves(t + 0.5 * h, q, v, 0.5 * h, left - 1)
 
     def _passes(self, t: float, q: Array, v: Array, u: Any, h: float) -> bool:
-        """Whether shapes that are apart may meet within a time h at constant velocities, or go far beside their size."""
+        """Whether shapes that are apart may meet within a time h at constant velocities, or go far by their size."""
         if self._meeting is None:
             return False
         return bool(self._meeting(q, v, np.zeros_like(v), u=u, t=t)[0] < h)
