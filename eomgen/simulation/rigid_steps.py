@@ -91,8 +91,8 @@ class RigidSteps:
         self.residual, self.missed, self.iterations, self.most, self.depth = known
         if not left:
             raise SimulationError(
-                f"moreau stopped at t = {t:.6g} s: shapes move so fast that they may pass through each other even in steps "
-                f"of {h:.3g} s; take a smaller step, and see whether the velocities are meant"
+                f"moreau stopped at t = {t:.6g} s: shapes move so fast that they may pass through each other even in "
+                f"steps of {h:.3g} s; take a smaller step, and see whether the velocities are meant"
             )
         q, v = self._whole_or_halves(t, q, v, 0.5 * h, left - 1)
         return self._whole_or_halves(t + 0.5 * h, q, v, 0.5 * h, left - 1)
