@@ -62,7 +62,8 @@ def write_fmu(
     Raises
     ------
     ModelError
-        A parameter has no value, or the model has impacts (events with ``restitution``).
+        A parameter has no value, or the model has impacts: events with ``restitution``, or contacts with
+        ``normal_law: rigid``.
     UsageError
         An unknown version, or a file name that does not end in ``.fmu``.
     ToolchainError

@@ -13,7 +13,7 @@ from ..numeric.scales import Array
 from ..runtime.assembled import initial_of
 from ..runtime.initial import Initial
 from ..runtime.near_names import read_names, unknown
-from ..runtime.refusals import refuse_sampled, require_velocities
+from ..runtime.refusals import refuse_rigid, refuse_sampled, require_velocities
 from ..runtime.room import read_number, read_numbers
 from .balance_search import find_balance
 from .balanced import Equilibrium, describe, read_coordinates
@@ -69,6 +69,7 @@ def equilibrium(
         A name is unknown, or there are too few unknowns.
     """
     require_velocities(module.layout)
+    refuse_rigid(module.layout, "equilibrium")
     refuse_sampled(module.layout, "equilibrium")
     module = module if p is None and u is None else module.bind(p, u)
     time = read_number("t", t)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from ..runtime.refusals import refuse_sampled
+from ..runtime.refusals import refuse_rigid, refuse_sampled
 from ..runtime.room import read_number, read_numbers
 from .eigenvalue_rounding import own_accelerations
 from .linear_given import find_given_tangent, refuse_inputs
@@ -73,6 +73,7 @@ def linearize(
         refuse_inputs(module.layout)
     if not isinstance(form, str) or form not in FORMS:
         raise UsageError(f"form must be one of {', '.join(FORMS)}, not {form!r}")
+    refuse_rigid(module.layout, "linearize")
     refuse_sampled(module.layout, "linearize")
     module = module if p is None and u is None else module.bind(p, u)
     layout, time = module.layout, read_number("t", t)

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..graph.pair_calls import PairFunction, PairKind, PairPart
-from ..limits.runs import APART, BEYOND, NEAR, UP_TO, WITHIN
+from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
 from ..program import Program
 from .c_text import print_pieces, used_helpers
@@ -100,6 +100,7 @@ def _file(program: Program, used: UsedSum) -> str:
         "record": RECORD,
         "room": function.room,
         "near": repr(NEAR),
+        "outside": repr(OUTSIDE),
         "turns": any(kind["turns"] for kind in kinds),
         "never": repr(NEVER),
         "meeting": MEETING,

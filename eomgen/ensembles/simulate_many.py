@@ -15,6 +15,7 @@ from ..errors import UsageError
 from ..numeric.counts import read_count
 from ..runtime.given_start import Span
 from ..runtime.near_names import check_names, without_dots
+from ..runtime.refusals import refuse_rigid
 from ..runtime.room import require_room, require_steps
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
@@ -125,6 +126,7 @@ def simulate_many(
     MissingDependencyError
         dask.distributed is not installed.
     """
+    refuse_rigid(module.layout, "simulate_many")
     check_names("option of simulate_many", options, OPTIONS)
     if grid is not None:
         initial, parameters, inputs = spread_grid(module, grid, (initial, parameters, inputs))

@@ -22,8 +22,10 @@ from .substitute import substitute
 from .traverse import reachable
 
 PairPart = Literal["outputs", "slopes", "touch", "spot"]
-#: Pairs that a list of near ones has room for: so many, and so many for each part of a shape.
-SPARE, EACH = 16, 3
+#: Pairs that a list of near ones has room for: so many, and so many for each part of a shape, in the plane (heaps of
+#: discs have 3 that touch, as edges of a planar graph are fewer than three for each node) and in space (heaps of equal
+#: spheres have 6, of unequal ones 7).
+SPARE, IN_PLANE, IN_SPACE = 16, 5, 12
 LOSSES = "0"  #: begins the name of a sum of losses, as no name of a model does
 
 
@@ -160,7 +162,8 @@ class PairFunction:
     def room(self) -> int:
         """How many pairs a list of near ones has room for: all, or some for each shape."""
         pairs = sum(len(self.tables[kind.first]) * len(self.tables[kind.second]) for kind in self.kinds)
-        return min(pairs, SPARE + EACH * sum(map(len, self.tables)))
+        each = IN_PLANE if any(kind.planar for kind in self.kinds) else IN_SPACE
+        return min(pairs, SPARE + each * sum(map(len, self.tables)))
 
     @property
     def spots(self) -> int:

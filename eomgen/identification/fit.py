@@ -17,6 +17,7 @@ from ..limits.identification import MEASURED, ROUNDS
 from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array
 from ..runtime.near_names import check_names, read_names, require, require_mapping, unknown
+from ..runtime.refusals import refuse_rigid
 from ..runtime.room import read_number
 from .experiments import Experiment, read_experiments, read_sigma
 from .fit_result import Fit
@@ -85,6 +86,7 @@ def fit(
     MissingDependencyError
         SciPy is not installed.
     """
+    refuse_rigid(module.layout, "fit")
     least_squares: Any = require("scipy.optimize", "scipy", "fit").least_squares
     check_names("option of fit", options, ("loss", "f_scale", "ftol", "xtol", "gtol", "max_nfev"), ("derivatives",))
     if derivatives not in DERIVATIVES:

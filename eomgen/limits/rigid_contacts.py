@@ -22,5 +22,7 @@ RESTING = 2.0
 REMOVED = 0.2
 YIELDING = 1e-3  #: part of its compliance by which a contact is softer where penetrations are removed: jams have an end
 GROWN = 1e-12  #: part of the energy that impacts move by which their sum may grow by rounding
+#: Halvings of one step until no shapes pass each other in its halves: speeds of 65,000 times what the step suits.
+HALVINGS = 16
 #: Halvings of the restitution of one instant until impacts with friction take energy: below, it is 0.
 GENTLER = 4

@@ -21,7 +21,11 @@ SLOPE, SIZE = 1.5e-8, 1e-3  #: part of a variable over which its slope is differ
 #: where its far side is near; the same where there is no far side; and part of their thicknesses that it may always go.
 #: In a body that is passed through there are then at least 1 / WITHIN steps, each with some ten stages.
 UP_TO, BEYOND, WITHIN = 0.75, 2.0, 0.0625
-NEAR = 0.5  #: part of their thicknesses up to which two shapes that are apart are listed as near each other
+#: Part of their thicknesses up to which two shapes that are apart are listed as near each other: twice WITHIN, so that
+#: motions of at most that part, or of UP_TO of the distance, from where they are not listed do not touch; and the same
+#: where a shape has no far side.  Second neighbours in heaps of equal discs (apart by 0.37 of both) and spheres (0.21)
+#: are not listed.
+NEAR, OUTSIDE = 2.0 * WITHIN, 0.5
 #: Part of distances from the ground's origin by which shapes count as nearer while they are sorted out: rounding of
 #: their places moves none across it, and the distance itself is tested after.
 APART = 1e-12

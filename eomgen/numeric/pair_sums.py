@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.runs import APART, BEYOND, NEAR, UP_TO, WITHIN
+from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from .pair_vectors import across, cross, dot, flat, parts, product, times
 
 #: Numbers that say how a body or a shape stands and moves: position, rotation by rows, velocity, angular velocity.
@@ -169,7 +169,8 @@ class PairSum:
     def spots(self, given: Sequence[Any]) -> list[Any]:
         """How many pairs of shapes are near each other, and where: 1 + ``RECORD`` ``room`` numbers or arrays.
 
-        Near are pairs that are apart by at most half the sum of their thicknesses.  Records that are not used are 0.
+        Near are pairs that are apart by at most ``NEAR`` times the sum of their thicknesses, ``OUTSIDE`` times where
+        one has no far side.  Records that are not used are 0.
         """
         data = _stacked(given)
         out = np.zeros((1 + RECORD * self.room, *data.shape[1:]), dtype=data.dtype)
@@ -192,7 +193,8 @@ class PairSum:
             if not len(i):
                 continue
             i, j = self._candidates(a, b, planar, (first, second), data, NEAR * (thick[0] + thick[1].max())) or (i, j)
-            margin = NEAR * (thick[0][i] + thick[1][j])
+            free = (tables[0][i, -REST] < 0) | (tables[1][j, -REST] < 0)
+            margin = np.where(free, OUTSIDE, NEAR) * (thick[0][i] + thick[1][j])
             near = self._near(a, b, planar, i, j, tables, data, margin)
             i, j, margin = i[near], j[near], margin[near]
             if not len(i):

@@ -73,6 +73,22 @@ def refuse_sampled(layout: Layout, what: str) -> None:
         )
 
 
+def refuse_rigid(layout: Layout, what: str) -> None:
+    """Refuse a model with contacts that exert impulses alone, which its equations in continuous time do not have.
+
+    Raises
+    ------
+    UnavailableError
+    """
+    names = layout.metadata.get("rigid_only")
+    if names:
+        raise UnavailableError(
+            f"{what} is not available for models with rigid contacts, and contacts {', '.join(map(repr, names))} of "
+            f"{layout.name!r} have normal_law: rigid, which exerts impulses, not forces: shapes would pass through "
+            "each other; run by simulate with method='moreau' and step=, or choose another normal_law"
+        )
+
+
 def require_projection(layout: Layout) -> None:
     """Refuse a model whose right-hand side holds constraints by Baumgarte's stabilisation.
 

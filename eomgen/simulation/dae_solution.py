@@ -19,6 +19,7 @@ from ..numeric.scales import Array
 from ..runtime.dae import DaeForm
 from ..runtime.given_start import Span, Start
 from ..runtime.near_names import require
+from ..runtime.refusals import refuse_rigid
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
 from .event_values import EventValues
@@ -101,6 +102,7 @@ def integrate_dae(
     options: Mapping[str, Any],
 ) -> Trajectory:
     """One run; see :meth:`Dae.solve`."""
+    refuse_rigid(module.layout, "dae.solve")
     ida = require("sksundae.ida", "scikit-sundae", "dae.solve")
     for name in OWN:
         if name in options:

@@ -17,6 +17,7 @@ from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of
 from ..runtime.given_start import Span, Start
+from ..runtime.refusals import refuse_rigid
 from ..runtime.run_parts import Residuals
 from ..runtime.signals import Forcing
 from ..runtime.trajectory import Trajectory
@@ -72,6 +73,7 @@ def simulate_impacts(
     SimulationError, AssemblyError, MissingDependencyError
         As for ``simulate``; also where a gap is found negative without an impact before.
     """
+    refuse_rigid(module.layout, "simulate_impacts")
     for key in ("events", "t_eval", "dense_output"):
         if key in options:
             raise UsageError(

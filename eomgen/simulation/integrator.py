@@ -14,6 +14,7 @@ from ..numeric.scales import Array
 from ..runtime.argument_names import both_names
 from ..runtime.late import eager
 from ..runtime.near_names import check_names
+from ..runtime.refusals import refuse_rigid
 from ..runtime.room import read_plain, read_vector, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run
@@ -221,6 +222,7 @@ def integrator(
     Integrator
         ``integrator(t, x, h)`` -> the state at t + h; see :class:`~.integrator.Integrator`.
     """
+    refuse_rigid(module.layout, "integrator")
     check_names("option of integrator", options, OPTIONS)
     declared = declare(module)
     method, step = own_step(module, method, options.pop("step", None))

@@ -121,13 +121,13 @@ def step_rigidly(
             watch.close()
     if steps.missed and not is_told_by_the_caller():
         warnings.warn(
-            f"{steps.missed} of {count} steps leave a residual of the contact laws of up to {steps.residual:.3g} m/s, "
-            f"more than contact_tolerance = {tolerance:.3g} of their velocities, after contact_iterations = "
+            f"{steps.missed} of {steps.taken} steps leave a residual of the contact laws of up to {steps.residual:.3g} "
+            f"m/s, more than contact_tolerance = {tolerance:.3g} of their velocities, after contact_iterations = "
             f"{iterations}: allow more iterations, or a larger tolerance",
             ContactWarning,
             stacklevel=calls_within() + 1,
         )
-    counts: dict[str, Any] = {"nfev": 2 * count, "steps": count}
+    counts: dict[str, Any] = {"nfev": 2 * steps.taken, "steps": steps.taken}
     counts |= {"contact_iterations": steps.iterations, "contacts": steps.most, "missed_steps": steps.missed}
     counts |= {"contact_residual": steps.residual, "penetration": steps.depth}
     ends = (start, end)

@@ -70,7 +70,8 @@ class RigidContacts:
             if listed > room:
                 raise SimulationError(
                     f"contacts {name!r}: {listed} pairs of shapes are near each other at t = {t:.6g} s, and there is "
-                    f"room for {room}; split the groups into several contacts"
+                    f"room for {room}; leave out shapes that overlap others of their body, or put shapes that "
+                    "never meet into contacts of their own"
                 )
             rows = every[start + 1 : start + 1 + RECORD * listed].reshape(listed, RECORD).copy()
             rows[:, :2] += shapes

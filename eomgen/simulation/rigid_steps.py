@@ -12,6 +12,10 @@ each other (D. E. Stewart, J. C. Trinkle, An implicit time-stepping scheme for r
 collisions and Coulomb friction, Int. J. Numer. Methods Eng. 39 (1996), 2673-2691).  What is left of penetrations and of
 open loops is removed from the positions alone (V. Acary, Projected event-capturing time-stepping schemes, Comput.
 Methods Appl. Mech. Eng. 256 (2013), 224-250).
+
+Contacts are those that are near at q_m.  Before and after it bodies move at constant velocities, v and v+, and
+``meeting_time`` says how long no two shapes that are apart meet, or go far beside their thickness.  A step whose halves
+are longer is done in two.
 """
 
 from __future__ import annotations
@@ -20,7 +24,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..limits.rigid_contacts import GENTLER, GROWN, REMOVED, RESTING, YIELDING
+from ..errors import SimulationError
+from ..limits.rigid_contacts import GENTLER, GROWN, HALVINGS, REMOVED, RESTING, YIELDING
 from ..numeric import algebra
 from ..numeric.contact_impulses import ContactImpulses, ContactProblem, solve_contacts
 from ..numeric.scales import Array
@@ -44,6 +49,8 @@ class RigidSteps:
         The most that a step took, and the most contacts that acted at once.
     depth : float
         The deepest penetration (m).
+    taken : int
+        Steps, those among them that others were divided into.
     """
 
     def __init__(self, module: BoundModel, forcing: Forcing, tolerance: float, iterations: int) -> None:
@@ -52,7 +59,11 @@ class RigidSteps:
         self.contacts = RigidContacts(module)
         self.bias = module.kernels.timed("bias_apart")
         self.residual, self.missed, self.iterations, self.most, self.depth = 0.0, 0, 0, 0, 0.0
+        self.taken = 0
         self._misses = False
+        self._begins = True
+        names = module.kernels.core.names
+        self._meeting = module.kernels.motion("meeting_time") if "meeting_time" in names else None
         self._last: dict[tuple[int, int], Array] = {}
 
     def move(self, q: Array, d: Array) -> Array:
@@ -61,12 +72,48 @@ class RigidSteps:
         return q + d if space is None else space.normalised(space.move(q, d))
 
     def step(self, t: float, q: Array, v: Array, h: float) -> tuple[Array, Array]:
-        """Position and velocities (n_q,), (n_v,) a time h later."""
+        """Position and velocities (n_q,), (n_v,) a time h later.
+
+        Raises
+        ------
+        SimulationError
+            Shapes pass each other in steps that are much shorter.
+        """
+        return self._whole_or_halves(t, q, v, h, HALVINGS)
+
+    def _whole_or_halves(self, t: float, q: Array, v: Array, h: float, left: int) -> tuple[Array, Array]:
+        known = self.residual, self.missed, self.iterations, self.most, self.depth
+        found = self._one(t, q, v, h)
+        if found is not None:
+            self.taken += 1
+            self._begins = False
+            return found
+        self.residual, self.missed, self.iterations, self.most, self.depth = known
+        if not left:
+            raise SimulationError(
+                f"moreau stopped at t = {t:.6g} s: shapes move so fast that they may pass through each other even in "
+                f"steps of {h:.3g} s; take a smaller step, and see whether the velocities are meant"
+            )
+        q, v = self._whole_or_halves(t, q, v, 0.5 * h, left - 1)
+        return self._whole_or_halves(t + 0.5 * h, q, v, 0.5 * h, left - 1)
+
+    def _passes(self, t: float, q: Array, v: Array, u: Any, h: float) -> bool:
+        """Whether shapes that are apart may meet within a time h at constant velocities, or go far by their size."""
+        if self._meeting is None:
+            return False
+        return bool(self._meeting(q, v, np.zeros_like(v), u=u, t=t)[0] < h)
+
+    def _one(self, t: float, q: Array, v: Array, h: float) -> tuple[Array, Array] | None:
+        """One step, or None where shapes may pass each other in one of its halves."""
         middle, n_q = t + 0.5 * h, len(q)
         self._misses = False
         q_m = self.move(q, 0.5 * h * v)
         x = np.concatenate([q_m, v])
         u = self.forcing(middle, x) if self.forcing else None
+        if self._passes(t, q, v, u, 0.5 * h):
+            return None
+        if self._begins and self._passes(t, self.move(q, -0.5 * h * v), v, u, 0.5 * h):
+            return None  # shapes that touch at the start and approach: later steps end with velocities that part them
         held = _Held(self.module, middle, q_m, u)
         bias = self.bias(middle, x, u=u)
         free = held.free(v - h * (held.inverse @ bias))
@@ -77,9 +124,12 @@ class RigidSteps:
         if not np.array_equal(again, bias):
             free = held.free(v - h * (held.inverse @ again))
             new, P = self._contact(held, rows, v, free, h)
+        if self._passes(middle, q_m, new, u, 0.5 * h):
+            return None
         position = self.move(q_m, 0.5 * h * new)
         self.missed += self._misses
-        away = held.closing(position, t + h)
+        end = self.forcing(t + h, np.concatenate([position, new])) if self.forcing else None
+        away = held.closing(position, t + h, end)
         if rows.gaps.size:
             away = away + self._out(held, rows, P, new)
         return (self.move(position, away) if away.any() else position), new
@@ -154,7 +204,7 @@ class _Held:
 
     def __init__(self, module: BoundModel, t: float, q: Array, u: Any) -> None:
         kernels = module.kernels
-        self.module, self.t, self.u = module, t, u
+        self.module = module
         M = kernels.mass_matrix(q, u=u, t=t)
         self.rows: Array | None = None
         if not module.layout.n_c:
@@ -175,9 +225,9 @@ class _Held:
         """Velocities that obey the constraints, from what forces alone would make of them."""
         return v if self.rows is None else v - self.back @ (self.rows @ v + self.drift)
 
-    def closing(self, q: Array, t: float) -> Array:
+    def closing(self, q: Array, t: float, u: Any) -> Array:
         """A displacement (n_v,) that closes the loops: a Newton step."""
         if self.rows is None or not self.module.layout.n_h:
             return np.zeros(self.inverse.shape[0])
-        found = self.module.kernels.constraints(q, u=self.u, t=t)
+        found = self.module.kernels.constraints(q, u=u, t=t)
         return np.asarray(-self.back[:, : len(found)] @ found)

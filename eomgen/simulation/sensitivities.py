@@ -20,7 +20,7 @@ from ..runtime.change_points import singular_values
 from ..runtime.failure import place
 from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names, read_names, unknown
-from ..runtime.refusals import require_projection, require_velocities
+from ..runtime.refusals import refuse_rigid, require_projection, require_velocities
 from ..runtime.room import read_number, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run
@@ -98,6 +98,7 @@ def sensitivities(
     """
     require_velocities(module.layout)
     require_projection(module.layout)
+    refuse_rigid(module.layout, "sensitivities")
     check_names("option of sensitivities", options, OPTIONS, ("method", "rtol", "atol", "t_eval", "events"))
     forcing = Forcing(module.layout, inputs)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module

@@ -14,6 +14,7 @@ from ..numeric.scales import Array
 from ..runtime.kernels import fitting
 from ..runtime.late import eager
 from ..runtime.near_names import require
+from ..runtime.refusals import refuse_rigid
 from ..runtime.room import read_plain, read_vector
 from .compiled import no_series, stepper_options
 from .events import Events
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 def find_solver(module: BoundModel, name: str) -> Any:
     """The compiled stepper of a module by name; SciPy's own where the module was made without a compiler."""
+    refuse_rigid(module.layout, f"method {name}")
     core = eager(module.core)
     if name in getattr(core, "methods", ()):
         return solver_class(core, name)
@@ -163,6 +165,7 @@ def step(
     EvaluationError
         An evaluation of the equations failed.
     """
+    refuse_rigid(module.layout, "step")
     if module.layout.n_events and Events(module.layout, None).resets:
         raise UsageError(
             f"events of {module.name} reset its state, and a single step finds no events; simulate over (t, t + h)"

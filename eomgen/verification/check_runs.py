@@ -69,6 +69,8 @@ def check(bench: Bench) -> list[Finding]:
 def _inapplicable(bench: Bench) -> str:
     if not bench.module.layout.n_dof:
         return "drivers move the whole mechanism, so nothing is integrated"
+    if bench.layout.metadata.get("rigid_only"):
+        return "its rigid contacts exert impulses, which only method moreau solves for"
     if Events(bench.layout, None).resets:
         return "events reset its state, and an integrator finds no events"
     if not bench.layout.projects:

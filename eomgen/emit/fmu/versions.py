@@ -27,7 +27,7 @@ def check_version(version: str) -> str:
 
 
 def refuse_impacts(program: Program) -> None:
-    """Refuse events whose impacts the generated code leaves to Python.
+    """Refuse events and contacts whose impacts the generated code leaves to Python.
 
     Raises
     ------
@@ -38,6 +38,14 @@ def refuse_impacts(program: Program) -> None:
         Problem(f"events.{event['name']}.restitution", "an FMU cannot hold an impact", remedy)
         for event in program.metadata.get("events", ())
         if event["restitution"] is not None
+    ]
+    problems += [
+        Problem(
+            f"contacts.{name}.normal_law",
+            "rigid contacts exert impulses, which an FMU cannot hold",
+            "choose another normal_law",
+        )
+        for name in program.metadata.get("rigid_only", ())
     ]
     if problems:
         raise ModelError(problems)
