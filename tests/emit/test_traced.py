@@ -58,9 +58,13 @@ def compare(functions: Any, module: Any, found: dict[str, Any], x: np.ndarray, a
     q, v = x[: module.n_q], x[module.n_q :]
     for name, result in found.items():
         arguments, shape, _ = functions.EQUATIONS[name]
-        call = getattr(module.kernels, name, None) or getattr(module, name)  # v is [v; s] with first-order states
+        call = getattr(module.kernels, name, None)  # v is [v; s] with first-order states
+        if name == "events":
+            call = module.kernels.timed(name)
+        call = call or getattr(module, name)
         call = call.every if name in ROWS else call
         given = [{"x": x, "q": q, "v": v, "a": a}[label] for label in arguments]
+        given = [x] if name == "events" else given
         expected = np.ravel(call(0.0, *given) if name in TIMED else call(*given))
         np.testing.assert_allclose(
             np.asarray(result).reshape(shape).ravel(),
