@@ -228,10 +228,21 @@ def test_verify_file_and_component(tmp_path: Path) -> None:
         ({"closes": "x1_ddot"}, "constraints.latch.closes: the acceleration 'x1_ddot'"),
         ({"closes": "x1", "releases": ["lach"]}, r"constraints.latch.releases\[0\]: 'lach' is no other constraint"),
         ({"closes": "x1", "closed": 2}, "constraints.latch.closed"),
+        ({"closes": "x1", "releases": "lach"}, "constraints.latch.releases: 'lach' is no other constraint"),
+        ({"closes": "x1", "releases": "latch"}, "constraints.latch.releases: 'latch' is no other constraint"),
+        ({"closes": "x1", "releases": {"a": 1}}, "constraints.latch.releases: .* is not a list of names"),
+        ({"closes": "t > 1"}, "constraints.latch.closes: 't > 1' is a comparison.*1 - t for"),
+        ({"opens": "t > 1 and x1 > 2"}, "constraints.latch.opens: .* is a comparison"),
+        ({"closes": "0"}, "constraints.latch.closes: '0' is constant"),
+        ({"closes": "2*size - 1"}, "constraints.latch.closes: .* is constant"),
+        ({"closes": "x1", "stabilisation": -3}, "constraints.latch.stabilisation: is -3; must be greater than 0"),
+        ({"closes": "x1", "stabilisation": "size - 2"}, "constraints.latch.stabilisation: is 0; must be greater"),
+        ({"closes": "x1", "stabilisation": "x1"}, "constraints.latch.stabilisation: .*'x1'"),
     ],
 )
 def test_what_is_wrong_is_told(keys: dict[str, object], told: str) -> None:
     m = eg.Model("carts")
+    m.parameter("size", 2.0)
     a, b = m.body("a", mass=2.0), m.body("b", mass=3.0)
     m.prismatic("x1", m.ground, a, axis="x")
     m.prismatic("x2", m.ground, b, axis="x")
@@ -247,3 +258,22 @@ def test_a_hold_that_never_changes_is_refused() -> None:
     m.hold("grip", m.ground, a)
     with pytest.raises(ModelError, match="is neither closed nor opened; give closes, opens or closed"):
         m.check()
+
+
+def test_one_name_is_released_as_a_list_of_one() -> None:
+    """The second disc is held by the first clutch until the second closes; only then momenta add up anew."""
+
+    def discs(releases: object) -> eg.Trajectory:
+        m = eg.Model("discs")
+        for name, size in (("a", 0.3), ("b", 0.5)):
+            m.revolute(name, m.ground, m.body(f"disc_{name}", mass=1.0, inertia={"zz": size}))
+        m.coupling("first", equation="a_dot + 0.1*b_dot", closed=True, opens="5 - t")
+        m.coupling("second", equation="a_dot - b_dot", closes="1 - t", releases=releases)
+        m.initial(a_dot=4.0, b_dot=-40.0)
+        whole = eg.Model("whole")
+        whole.add(m, prefix="left_")
+        return whole.compile(target="numpy").simulate(2.0)
+
+    plain, listed = discs("first"), discs(["first"])
+    assert plain["left_a_dot"][-1] == pytest.approx((0.3 * 4.0 - 0.5 * 40.0) / 0.8, rel=1e-9)
+    assert np.array_equal(plain.x, listed.x)
