@@ -312,9 +312,9 @@ def test_a_leaning_disc_closes_as_the_impact_of_numpy(target: str) -> None:
     i, j = np.flatnonzero(np.abs(run.t - time) < 1e-12)[[0, -1]]
 
     def motion(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        pose, step = mod.poses(x[: mod.n_q])[1], 1e-6
+        pose, step = mod.poses(x[: mod.n_q])[0], 1e-6
         rates = x[mod.n_q : 2 * mod.n_q]
-        up, down = (mod.poses(x[: mod.n_q] + s * rates)[1] for s in (step, -step))
+        up, down = (mod.poses(x[: mod.n_q] + s * rates)[0] for s in (step, -step))
         spin = (up - down)[:3, :3] / (2 * step) @ pose[:3, :3].T
         return pose[:3, :3], np.array([*(up - down)[:3, 3] / (2 * step), spin[2, 1], spin[0, 2], spin[1, 0]])
 
