@@ -9,11 +9,13 @@ from collections.abc import Sequence
 
 from ..constraints import Constraint
 from ..graph.core import Expr, Graph
+from ..graph.shown import quoted
+from ..graph.substitute import symbols_of
 from .build_events import instant
 from .description import DescribedEntry, items
-from .fields import LAW
 from .mechanism import Event, FirstOrderState, Switched
 from .names import nearest
+from .read_outlines import positive
 from .values import Reader
 
 CLOSED, CLOSES, OPENS = "_closed", "_closes", "_opens"  #: what follows the constraint's name: its state and events
@@ -46,18 +48,32 @@ def build_switches(
     for entry in entries:
         path, values = entry.path, entry.values
         closed = values.get("closed", "closes" not in values)
-        releases = items(values.get("releases", ())) or ()
-        for k, name in enumerate(releases):
-            if name not in names or name == entry.name:
-                remedy = nearest(str(name), [n for n in names if n != entry.name], "that close and open")
-                reader.faults.add(f"{path}.releases[{k}]", f"{name!r} is no other constraint that opens", remedy)
-        rate = reader.expression(f"{path}.stabilisation", values.get("stabilisation", 10), LAW)
+        releases = _released(reader, entry, names)
+        rate = reader.expression(f"{path}.stabilisation", values.get("stabilisation", 10))
+        positive(reader, f"{path}.stabilisation", rate)
         switch = Switched(
             made.get(str(entry.name)), f"{entry.name}{CLOSED}", reader.flag(f"{path}.closed", closed), rate,
             tuple(f"{name}{CLOSED}" for name in releases),
         )  # fmt: skip
         found.append(switch)
     return tuple(found)
+
+
+def _released(reader: Reader, entry: DescribedEntry, names: Sequence[str]) -> list[str]:
+    """The constraints that let go; one name counts as a list of one."""
+    path, given = f"{entry.path}.releases", entry.values.get("releases")
+    if given is None:
+        return []
+    listed = [given] if isinstance(given, str) else items(given)
+    if listed is None:
+        reader.wrong(path, given, "names")
+        return []
+    for k, name in enumerate(listed):
+        if name not in names or name == entry.name:
+            remedy = nearest(str(name), [n for n in names if n != entry.name], "that close and open")
+            place = path if isinstance(given, str) else f"{path}[{k}]"
+            reader.faults.add(place, f"{name!r} is no other constraint that opens", remedy)
+    return [str(name) for name in listed]
 
 
 def states_of_switches(reader: Reader, switched: Sequence[Switched]) -> tuple[FirstOrderState, ...]:
@@ -80,14 +96,28 @@ def events_of_switches(
         state = graph.symbol(switch.state)
         holds = graph.apply("lt", 0.5, state)
         if "closes" in entry.values:
-            gap = instant(reader, f"{entry.path}.closes", entry.values["closes"])
+            gap = _falling(reader, f"{entry.path}.closes", entry.values["closes"])
             reset: list[tuple[str, Expr]] = [(name, graph.zero) for name in switch.releases]
             reset.append((switch.state, graph.one))
             gap = graph.apply("select", holds, graph.one, gap)
             events.append(Event(f"{entry.name}{CLOSES}", gap, 0, -1, tuple(reset), None, f"{entry.name} closes"))
         if "opens" in entry.values:
-            left = instant(reader, f"{entry.path}.opens", entry.values["opens"])
+            left = _falling(reader, f"{entry.path}.opens", entry.values["opens"])
             left = graph.apply("select", holds, left, graph.one)
             reset = [(switch.state, graph.zero)]
             events.append(Event(f"{entry.name}{OPENS}", left, 0, -1, tuple(reset), None, f"{entry.name} opens"))
     return tuple(events)
+
+
+def _falling(reader: Reader, path: str, value: object) -> Expr:
+    """An expression that can fall to 0."""
+    before = len(reader.faults.problems)
+    found = instant(reader, path, value)
+    if len(reader.faults.problems) > before:
+        return found
+    remedy = "write an expression that falls to 0 there: 1 - t for the time t = 1"
+    if found.node[0] in ("lt", "le", "eq", "not", "and", "or"):
+        reader.faults.add(path, f"{quoted(value, 80)} is a comparison, which does not fall to 0 but jumps", remedy)
+    elif symbols_of([found]) <= {*reader.names.of("parameter")}:
+        reader.faults.add(path, f"{quoted(value, 80)} is constant, so that it never falls to 0", remedy)
+    return found

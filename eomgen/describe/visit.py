@@ -146,8 +146,11 @@ def _value(value: Any, kind: str, slot: Slot, visitor: Visitor) -> Any:
     if kind == "joints" or (kind == "names" and slot.key in ("coordinates", "velocities")):
         names = [value] if isinstance(value, str) else value if listed else None
         return value if names is None else [_named(part, visitor.coordinate) for part in names]
-    if kind == "names" and slot.key == "releases" and listed:  # constraints, by the names of their states
-        return [_named(f"{part}_closed", visitor.coordinate).removesuffix("_closed") for part in value]
+    if (
+        kind == "names" and slot.key == "releases" and (listed or isinstance(value, str))
+    ):  # by the names of their states
+        names = value if listed else [value]
+        return [_named(f"{part}_closed", visitor.coordinate).removesuffix("_closed") for part in names]
     if kind in ("factors", "rates", "forces") and isinstance(value, Mapping):
         return {_named(name, visitor.coordinate): visitor.scalar(part, slot.at(name)) for name, part in value.items()}
     if kind in ("wheels", "inertia") and isinstance(value, Mapping):

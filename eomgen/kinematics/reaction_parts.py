@@ -31,7 +31,8 @@ class Placed(Protocol):
 
 def part_of_reaction(motion: Placed, spec: JointSpec, quantity: CarriedQuantity) -> Expr:
     """The part, in symbols of the joint's wrench along the axes of S."""
-    force, moment = _reaction(motion, spec)
+    wrench = [reaction_symbol(motion.graph, spec.name, k) for k in range(6)]
+    force, moment = force_and_moment(motion, spec, wrench)
     if quantity.part == "size":
         return beyond_zero(vec.dot(force, force), sqrt)
     if quantity.part == "normal":  # across the z axis of the joint
@@ -42,10 +43,9 @@ def part_of_reaction(motion: Placed, spec: JointSpec, quantity: CarriedQuantity)
     return found["xyz".index(quantity.part[-1])]
 
 
-def _reaction(motion: Placed, spec: JointSpec) -> tuple[Vec3, Vec3]:
-    """Force and moment that do no work in the motions that the joint allows."""
-    graph = motion.graph
-    x = [reaction_symbol(graph, spec.name, k) for k in range(6)]
+def force_and_moment(motion: Placed, spec: JointSpec, wrench: Sequence[Expr]) -> tuple[Vec3, Vec3]:
+    """Force and moment that do no work in the motions that the joint allows, of the wrench that passes through it."""
+    graph, x = motion.graph, wrench
     force, moment = (x[0], x[1], x[2]), (x[3], x[4], x[5])
     if spec.joint.role == "loop":
         return force, moment

@@ -12,18 +12,23 @@ from typing import NamedTuple
 
 from ..describe.mechanism import Switched
 from ..forces import CoordinateLoad, MarkerLoad
+from ..forces.branches import where
 from ..forces.force import Force, Load, View
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.rounding_bounds import vanishing
+from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..records import dataclass
 from .constraint_equations import couple
 from .kinematics import ForceTerms, Kinematics
 from .loops import differentiate_constraints
 from .wrenches import JointWrenches, Row6
+
+#: Operations whose results are numbers whatever numbers they are given.
+FINITE = {"sym", "const", "add", "sub", "mul", "neg", "sin", "cos", "abs", "min", "max", "lt", "le", "eq", "select"}
 
 
 class SwitchedRow(NamedTuple):
@@ -72,14 +77,23 @@ def _of_one(kinematics: Kinematics, switch: Switched) -> tuple[list[SwitchedRow]
             rest = found.gamma[i] + 2.0 * rate * speed + rate * rate * found.values[i]
         else:
             rest = found.gamma[i] + rate * speed
-        rows.append(SwitchedRow(label, switch.state, J, speed, rest, multiplier))
-        markers += [_load(kinematics, body, D, multiplier) for body, D in on_bodies[label].items()]
+        row = [_while_closed(switch, x) for x in (*J, speed, rest)]
+        rows.append(SwitchedRow(label, switch.state, tuple(row[:-2]), row[-2], row[-1], multiplier))
+        for body, D in on_bodies[label].items():
+            markers.append(_load(kinematics, body, tuple(_while_closed(switch, d) for d in D), multiplier))
         for name, part in zip(kinematics.velocity_labels, _left(kinematics, J, on_bodies[label]), strict=True):
             if not part.is_zero:
-                along[name] = along.get(name, graph.zero) - part * multiplier
+                along[name] = along.get(name, graph.zero) - _while_closed(switch, part) * multiplier
     loads = [CoordinateLoad(name, value) for name, value in along.items()]
     force = HeldBy(switch.constraint.name)
     return rows, ForceTerms(force, tuple(markers), tuple(loads), None, tuple(markers), tuple(loads))
+
+
+def _while_closed(switch: Switched, x: Expr) -> Expr:
+    """x, or 0 while the constraint is open and x may be no number: a disc that lies flat, far from its plane."""
+    if {x.graph.nodes[i][0] for i in reachable(x.graph, [x.id])} <= FINITE:
+        return x
+    return where(x.graph.apply("lt", 0.5, x.graph.symbol(switch.state)), x, 0.0)
 
 
 def _origin(kinematics: Kinematics, body: int) -> Marker:

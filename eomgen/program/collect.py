@@ -246,6 +246,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "fragile_forces": [name for name, _ in flag_forces(kinematics)],
         **({"not_finite_where": where} if (where := not_finite_where(kinematics)) else {}),
         **({"reaction_laws": list(kinematics.reaction_laws)} if kinematics.reaction_laws else {}),
+        **({"switched": [s.constraint.name for s in m.switched if s.constraint is not None]} if m.switched else {}),
         "p_values": [p.value for p in m.parameters],
         "u_values": [u.value for u in m.inputs],
         "units": units,

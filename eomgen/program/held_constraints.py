@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from ..forces.branches import where
 from ..graph.core import Expr
+from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.eliminate import Matrix, total
 from ..kinematics.switched import SwitchedRow
@@ -70,7 +71,10 @@ def plastic_impacts(
         for j, (name, v) in enumerate(zip(kinematics.velocity_names, kinematics.v, strict=True)):
             change = [column[j] * i for column, i in zip(columns, impulses, strict=True)]
             after.append((name, total([v, *change])))
-        found[event.name] = tuple(after)
+        # equations that may be no numbers while they are open: those of what closes now
+        now = {graph.symbol(s.state): set_to[s.state] for s in kinematics.mechanism.switched if s.state in set_to}
+        values = substitute([v for _, v in after], now)
+        found[event.name] = tuple((name, v) for (name, _), v in zip(after, values, strict=True))
     return found
 
 

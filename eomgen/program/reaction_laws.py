@@ -11,8 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
-import numpy as np
-
 from ..describe.mechanism import Mechanism
 from ..equations import METHODS
 from ..errors import ModelError
@@ -20,7 +18,6 @@ from ..forces import CoordinateLoad, MarkerLoad
 from ..forces.joint_reactions import is_carried, multiplier_of, reaction_of
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
-from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute, symbols_of
 from ..kinematics import Kinematics
 from ..kinematics.carried_reactions import carried_reactions
@@ -30,14 +27,12 @@ from ..kinematics.mobility import Mobility
 from ..kinematics.resolved_loads import AnyLoad, entries_of, with_entries
 from ..kinematics.switched import SwitchedRow, switched_rows
 from ..kinematics.wrenches import JointWrenches
-from ..limits.systems import UNTOUCHED
 from .factor import factorize, solve
 from .held_constraints import LinearValues, hold, plastic_impacts
 from .law_pieces import pieces_of
 from .reaction_users import Users, refuse_joints, refuse_redundant, require_inertia_of_tree, too_many_pieces
 from .solve_laws import laws_in, solve_laws
-
-PROBES = 3  #: states at which components are looked at
+from .undetermined_reactions import refuse_undetermined
 
 
 def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
@@ -50,23 +45,26 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     """
     refuse_joints(kinematics)
     graph, mechanism, motion = kinematics.graph, kinematics.mechanism, kinematics.motion
-    laws, speaking = dict[Expr, None](), []
+    laws, speaking = dict[Expr, None](), dict[str, list[Expr]]()
     for terms in kinematics.forces:
         own = [law for load in _loads(terms) for law in laws_in(entries_of(load), is_carried)]
         if any(pieces_of(law, is_carried) is None for law in own):
             raise ModelError([too_many_pieces(mechanism, terms.force.name)])
         laws |= dict.fromkeys(own)
-        speaking += [terms.force.name] if own else []
+        speaking |= {terms.force.name: own} if own else {}
     asked = [graph.symbol(name) for name in mechanism.reaction_quantities]
     seen = substitute(asked, motion.derived_symbols(mechanism, {*mechanism.reaction_quantities}))
     names = sorted(name for name in symbols_of([*laws, *seen]) if is_carried(name))
     forces = [graph.symbol(f"law[{k}]") for k in range(len(laws))]
-    users = Users(mechanism, tuple(speaking))
+    users = Users(mechanism, speaking)
     rows, held = switched_rows(kinematics)
     linear = _replaced(kinematics, dict(zip(laws, forces, strict=True)))
     linear = replace(linear, forces=(*linear.forces, *held))
     symbols = [graph.symbol(name) for name in names]
-    if laws or rows or kinematics.constraints.labels or _before_accelerations(mechanism):
+    values, known, plastic = list[Expr](), dict[Expr, Expr](), dict[str, tuple[tuple[str, Expr], ...]]()
+    if not (names or laws or rows):  # what is asked for is 0 in every state: the moment about a hinge
+        pass
+    elif laws or rows or kinematics.constraints.labels or _before_accelerations(mechanism):
         reactions, multipliers = _reactions(
             linear, mobility, [*names, *(r.multiplier.node[1] for r in rows)], rows, users
         )
@@ -81,7 +79,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
         symbols += [row.multiplier for row in rows]
         values, known = solve_laws(list(laws), symbols, still, gain)
     else:  # outputs of a tree: they may speak of accelerations
-        values, known, plastic = _reactions(linear, mobility, names, (), users)[0], {}, {}
+        values = _reactions(linear, mobility, names, (), users)[0]
     motion = copy(motion)
     motion.carried = dict(zip(names, values, strict=False))
     whole = replace(kinematics, forces=(*kinematics.forces, *held))
@@ -202,18 +200,10 @@ def _reactions(
             reactions.append(every[place[0]][place[1]])
         else:
             reactions.append(graph.symbol(name) if row is None else known[_row(kinematics, row, list(known), users)])
-    slopes = jacobian(reactions, list(idle.values())) if idle else {}
-    reactions = substitute(reactions, dict.fromkeys(idle.values(), graph.zero)) if idle else reactions
-    for i, place in enumerate(where):
-        if not _is_zero([x for (row, _), x in slopes.items() if row == i]):
-            if not _is_zero([reactions[i]]):
-                message = "rigid bodies do not determine how this joint shares a force with others of its loop"
-                remedy = (
-                    "let the forces act in the plane of the loop, or give a joint of the loop more freedom "
-                    "(cylindrical, spherical)"
-                )
-                raise ModelError([users.problem(message, remedy, place[0] if place else "")])
-            reactions[i] = graph.zero
+    if idle:
+        stands = {graph.symbol(name): value for name, value in zip(names, reactions, strict=True)}
+        refuse_undetermined(kinematics, every, list(idle.values()), stands, users)
+        reactions = substitute(reactions, dict.fromkeys(idle.values(), graph.zero))
     return reactions, [own[label] for label in labels]
 
 
@@ -234,16 +224,3 @@ def _row(kinematics: Kinematics, name: str, labels: Sequence[str], users: Users)
     path = next(q.path for q in quantities.values() if not q.part and q.of == name)
     remedy = f"there are: {', '.join(own or labels) or 'none'}; joints have equations where they close a loop"
     raise ModelError([users.mechanism.problem(path, message, remedy)])
-
-
-def _is_zero(expressions: Sequence[Expr]) -> bool:
-    """Whether expressions vanish whatever their symbols are."""
-    left = [x for x in expressions if not x.is_zero]
-    if not left:
-        return True
-    names = sorted(symbols_of(left))
-    values = np.random.default_rng(2).uniform(0.5, 1.5, (PROBES, len(names)))
-    with np.errstate(all="ignore"):
-        evaluate = compile_evaluator(left, names)
-        sizes = np.array([evaluate(row.tolist()) for row in values])
-    return bool((np.abs(sizes) < UNTOUCHED).all())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,10 +22,15 @@ from .law_pieces import MANY
 
 
 class Users(NamedTuple):
-    """The force elements whose laws speak of reactions; and, through the mechanism, all other expressions that do."""
+    """The laws that speak of reactions, by force element; and, through the mechanism, all other expressions that do."""
 
     mechanism: Mechanism
-    forces: tuple[str, ...]
+    laws: Mapping[str, Sequence[Expr]]
+
+    @property
+    def forces(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self.laws)
 
     @property
     def paths(self) -> list[str]:
@@ -40,13 +45,6 @@ class Users(NamedTuple):
     def together(self, message: str, remedy: str) -> Problem:
         """A problem of all laws, or of the first expression that speaks of reactions."""
         place = f"forces.{' and '.join(self.forces)}" if self.forces else self.paths[0]
-        return self.mechanism.problem(place, message, remedy)
-
-    def problem(self, message: str, remedy: str, joint: str) -> Problem:
-        """A problem of what speaks of a joint's reaction."""
-        laws = [f.name for f in self.mechanism.forces if getattr(f, "joint", None) == joint and f.by_reaction]
-        asked = [q.path for q in self.mechanism.reaction_quantities.values() if q.of == joint]
-        place = f"forces.{laws[0]}" if laws else asked[0] if asked else f"joints.{joint}"
         return self.mechanism.problem(place, message, remedy)
 
 

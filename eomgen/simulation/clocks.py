@@ -31,10 +31,10 @@ def at_next_samples(module: BoundModel, t: float, x: Array, span: tuple[float, f
         A period is not positive, a counter not whole, or the `span` of the run goes backwards.
     """
     clocks: list[dict[str, Any]] = module.metadata.get("clocks", [])
-    if not clocks:
-        return x
     if span is not None:
         require_forward(module, *span)
+    if not clocks:
+        return x
     values = module.kernels.timed("events")
     found = np.array(x, dtype=float)
     for clock in clocks:
@@ -68,7 +68,9 @@ def _lateness(values: Any, t: float, x: Array, event: int, place: int) -> tuple[
 
 
 def require_forward(module: BoundModel, start: float, end: float) -> None:
-    """Refuse a run backwards in time of a model with sampled states: what they were before a sample is not known.
+    """Refuse a run backwards in time of a model with sampled states, or with constraints that close and open.
+
+    What they were before a sample, and the velocities before an impact, are not known.
 
     Raises
     ------
@@ -79,4 +81,10 @@ def require_forward(module: BoundModel, start: float, end: float) -> None:
         raise UsageError(
             f"a run of sampled states ({', '.join(clocks[0]['states'])}) goes forward in time, not from {start:.6g} s "
             f"to {end:.6g} s"
+        )
+    switched: list[str] = module.metadata.get("switched", [])
+    if switched and end < start:
+        raise UsageError(
+            f"a run of constraints that close and open ({', '.join(switched)}) goes forward in time, not from "
+            f"{start:.6g} s to {end:.6g} s"
         )

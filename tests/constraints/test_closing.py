@@ -228,10 +228,21 @@ def test_verify_file_and_component(tmp_path: Path) -> None:
         ({"closes": "x1_ddot"}, "constraints.latch.closes: the acceleration 'x1_ddot'"),
         ({"closes": "x1", "releases": ["lach"]}, r"constraints.latch.releases\[0\]: 'lach' is no other constraint"),
         ({"closes": "x1", "closed": 2}, "constraints.latch.closed"),
+        ({"closes": "x1", "releases": "lach"}, "constraints.latch.releases: 'lach' is no other constraint"),
+        ({"closes": "x1", "releases": "latch"}, "constraints.latch.releases: 'latch' is no other constraint"),
+        ({"closes": "x1", "releases": {"a": 1}}, "constraints.latch.releases: .* is not a list of names"),
+        ({"closes": "t > 1"}, "constraints.latch.closes: 't > 1' is a comparison.*1 - t for"),
+        ({"opens": "t > 1 and x1 > 2"}, "constraints.latch.opens: .* is a comparison"),
+        ({"closes": "0"}, "constraints.latch.closes: '0' is constant"),
+        ({"closes": "2*size - 1"}, "constraints.latch.closes: .* is constant"),
+        ({"closes": "x1", "stabilisation": -3}, "constraints.latch.stabilisation: is -3; must be greater than 0"),
+        ({"closes": "x1", "stabilisation": "size - 2"}, "constraints.latch.stabilisation: is 0; must be greater"),
+        ({"closes": "x1", "stabilisation": "x1"}, "constraints.latch.stabilisation: .*'x1'"),
     ],
 )
 def test_what_is_wrong_is_told(keys: dict[str, object], told: str) -> None:
     m = eg.Model("carts")
+    m.parameter("size", 2.0)
     a, b = m.body("a", mass=2.0), m.body("b", mass=3.0)
     m.prismatic("x1", m.ground, a, axis="x")
     m.prismatic("x2", m.ground, b, axis="x")
@@ -247,3 +258,82 @@ def test_a_hold_that_never_changes_is_refused() -> None:
     m.hold("grip", m.ground, a)
     with pytest.raises(ModelError, match="is neither closed nor opened; give closes, opens or closed"):
         m.check()
+
+
+def test_one_name_is_released_as_a_list_of_one() -> None:
+    """The second disc is held by the first clutch until the second closes; only then momenta add up anew."""
+
+    def discs(releases: object) -> eg.Trajectory:
+        m = eg.Model("discs")
+        for name, size in (("a", 0.3), ("b", 0.5)):
+            m.revolute(name, m.ground, m.body(f"disc_{name}", mass=1.0, inertia={"zz": size}))
+        m.coupling("first", equation="a_dot + 0.1*b_dot", closed=True, opens="5 - t")
+        m.coupling("second", equation="a_dot - b_dot", closes="1 - t", releases=releases)
+        m.initial(a_dot=4.0, b_dot=-40.0)
+        whole = eg.Model("whole")
+        whole.add(m, prefix="left_")
+        return whole.compile(target="numpy").simulate(2.0)
+
+    plain, listed = discs("first"), discs(["first"])
+    assert plain["left_a_dot"][-1] == pytest.approx((0.3 * 4.0 - 0.5 * 40.0) / 0.8, rel=1e-9)
+    assert np.array_equal(plain.x, listed.x)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("rotation", ["euler_parameters", "euler_angles"])
+def test_a_coin_lies_flat_before_it_rolls(target: str, rotation: str) -> None:
+    """Rolling has no direction of contact for a disc that lies flat: it falls freely, with numbers for its slopes."""
+    m = eg.Model("coin", gravity=(0, 0, -G))
+    coin = m.body("coin", mass=1.0, inertia=(0.01, 0.01, 0.018))
+    m.free("f", m.ground, coin, rotation=rotation)
+    m.rolling("roll", "coin", radius=0.2, closes="z(coin) - 0.2")
+    m.initial(f_z=2.0, f_x_dot=0.7)
+    mod = m.compile(target=target)
+    run = mod.simulate(0.3)
+    assert [run["f_z"][-1], run["f_x"][-1]] == pytest.approx([2.0 - G * 0.045, 0.21], rel=1e-9)
+    x = mod.x0()
+    assert np.isfinite(mod.jacobian(0.0, x)).all()
+    step, z = 1e-6 * np.eye(len(x)), slice(mod.n_q, None)
+    slopes = np.array([(mod.rhs(0.0, x + d) - mod.rhs(0.0, x - d)) / 2e-6 for d in step[mod.n_q :]]).T
+    assert mod.jacobian(0.0, x)[:, z] == pytest.approx(slopes, abs=1e-6)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_leaning_disc_closes_as_the_impact_of_numpy(target: str) -> None:
+    """v+ = v - M^-1 C^T (C M^-1 C^T)^-1 C v; C by hand: the lowest point of the disc has no velocity."""
+    m = eg.Model("disc", gravity=(0, 0, -G))
+    disc, r, mass, I = m.body("disc", mass=1.3, inertia=(0.01, 0.01, 0.018)), 0.2, 1.3, np.diag([0.01, 0.01, 0.018])
+    m.free("f", m.ground, disc)
+    m.rolling("roll", "disc", radius=r, closes="z(disc) - 0.16")
+    m.initial(f_1=1.1, f_z=0.5, f_x_dot=0.7, f_y_dot=-0.3, f_3_dot=2.0, f_1_dot=0.4)
+    mod = m.compile(target=target)
+    run = mod.simulate(0.5)
+    time = run.t_events["roll_closes"][0]
+    i, j = np.flatnonzero(np.abs(run.t - time) < 1e-12)[[0, -1]]
+
+    def motion(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        pose, step = mod.poses(x[: mod.n_q])[0], 1e-6
+        rates = x[mod.n_q : 2 * mod.n_q]
+        up, down = (mod.poses(x[: mod.n_q] + s * rates)[0] for s in (step, -step))
+        spin = (up - down)[:3, :3] / (2 * step) @ pose[:3, :3].T
+        return pose[:3, :3], np.array([*(up - down)[:3, 3] / (2 * step), spin[2, 1], spin[0, 2], spin[1, 0]])
+
+    (R, before), (_, after) = motion(run.x[:, i]), motion(run.x[:, j])
+    down = -np.array([0, 0, 1.0]) + R[2, 2] * R[:, 2]
+    a = r * down / np.linalg.norm(down)
+    cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+    C, M = np.hstack([np.eye(3), -cross]), np.zeros((6, 6))
+    M[:3, :3], M[3:, 3:] = mass * np.eye(3), R @ I @ R.T
+    Y = np.linalg.solve(M, C.T)
+    assert after == pytest.approx(before - Y @ np.linalg.solve(C @ Y, C @ before), abs=1e-7)
+    assert np.abs(C @ before).max() > 0.1
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_runs_backwards_are_refused(target: str) -> None:
+    mod = carts().compile(target=target)
+    told = r"constraints that close and open \(latch\) goes forward in time, not from 1 s to 0 s"
+    with pytest.raises(eg.UsageError, match=told):
+        mod.simulate((1.0, 0.0))
+    with pytest.raises(eg.UsageError, match=told):
+        mod.simulate_many((1.0, 0.0), {"x1_dot": [1.0, 2.0]})

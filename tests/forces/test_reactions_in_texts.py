@@ -297,3 +297,81 @@ def test_a_force_that_can_let_go_is_judged_while_it_has_let_go() -> None:
     assert mod.rhs(0.0, np.zeros(4))[2] == pytest.approx(-0.5, rel=1e-14)
     with pytest.raises(NonFiniteError, match="Painleve"):
         mod.rhs(0.0, np.array([1.5, 0.0, 0.0, 0.0]))
+
+
+def door() -> eg.Model:
+    """Two hinges on one axis: how they share each load but the moment about it is not determined."""
+    m = eg.Model("door", gravity=(0, 0, -G))
+    leaf = m.body("leaf", mass=5, com=(0.4, 0, 0.5), inertia=(0.5, 0.6, 0.3))
+    m.revolute("h1", m.ground, leaf)
+    m.revolute("h2", m.ground.at(0, 0, 1), leaf.at(0, 0, 1))
+    m.initial(h1=0.3, h1_dot=2.0)
+    return m
+
+
+@pytest.mark.parametrize("joint", ["h1", "h2"])  # in the tree, and cut
+def test_what_two_hinges_share_is_refused_by_name(joint: str) -> None:
+    for part in ("x", "y", "z", "mx", "my", "size", "normal"):
+        m = door()
+        m.output("o", f"reaction({joint}).{part}")
+        with pytest.raises(ModelError, match=rf"outputs\.o.*reaction\({joint}\)\.{part} is undetermined.*spherical"):
+            m.compile(target="numpy")
+    m = door()
+    m.output("o", f"reaction({joint}).mz")
+    assert m.compile(target="numpy").outputs(0.0, [0.3, 2.0]) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("place", ["friction", "law", "event", "state"])
+def test_laws_refuse_what_two_hinges_share(place: str) -> None:
+    m, load = door(), "reaction(h2).size"
+    if place == "friction":
+        m.friction("rub", joint="h2", coefficient=0.1, radius=0.02, smoothing=1e-3)
+    elif place == "law":
+        m.torque("rub", "h1", f"-0.01*{load}*tanh(h1_dot/1e-3)")
+    elif place == "event":
+        m.event("breaks", f"{load} - 30")
+    else:
+        m.state("wear", load)
+    with pytest.raises(ModelError, match="h2.*undetermined"):
+        m.compile(target="numpy")
+
+
+@pytest.mark.parametrize("gravity", [(0.5, -G, 0), (0.5, -G, 2.0)])
+@pytest.mark.parametrize("tilt", [0.0, 0.6])
+def test_four_bar_whose_masses_leave_its_plane(gravity: tuple[float, float, float], tilt: float) -> None:
+    """What ``undetermined_reactions`` marks is refused, all else is what ``reactions`` gives; in turned axes too."""
+
+    def bar() -> eg.Model:
+        m = eg.Model("bar", gravity=gravity)
+        made = [
+            m.body(name, mass=mass, com=com, inertia=(0.03, 0.03, 0.05), markers={"e": (end, 0, 0)})
+            for name, mass, com, end in (
+                ("a", 1.2, (0.2, 0.03, 0.05), 0.4), ("b", 1.7, (0.3, 0.1, 0), 0.7), ("c", 0.9, (0.25, 0, 0), 0.6),
+            )
+        ]  # fmt: skip
+        m.revolute("A", m.ground, made[0], coordinate="qa")
+        m.revolute("B", "a.e", made[1], coordinate="qb")
+        m.revolute("C", "b.e", "c.e")
+        m.revolute("D", m.ground.at(0.8, 0.1, 0), made[2], coordinate="qd")
+        made[2].marker("tilted", at=(0, 0, 0), rpy=(0, 0, tilt))
+        m.guess(qa=0.9, qb=-0.6, qd=1.5)
+        m.initial(qa=0.9, qa_dot=2.0)
+        return m
+
+    plain = bar().compile(target="numpy")
+    x = plain.x0()
+    expected, undetermined = plain.reactions(0.0, x), plain.undetermined_reactions(0.0, x)
+    assert undetermined[:, 2:5].all()
+    assert not undetermined[:, [0, 1, 5]].any()
+    for k, joint in enumerate("ABCD"):
+        for part in ("z", "mx", "my"):
+            m = bar()
+            m.output("o", f"reaction({joint}).{part}")
+            with pytest.raises(ModelError, match="undetermined"):
+                m.compile(target="numpy")
+        m = bar()
+        for part in ("x", "y", "mz"):
+            m.output(part, f"reaction({joint}).{part}")
+        m.output("turned", f"reaction({joint}, in=c.tilted).mz")
+        found = m.compile(target="numpy").outputs(0.0, x)
+        assert found == pytest.approx([*expected[k, [0, 1, 5]], expected[k, 5]], abs=1e-9)
