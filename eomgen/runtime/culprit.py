@@ -74,6 +74,9 @@ def _not_finite(kernels: Evaluates, t: float, x: Array, p: Array | None, u: Arra
                 f"the forces of {' and '.join(bad)} depend on reactions which they change so strongly that the motion "
                 "may have several solutions or none (Painleve's paradox); give smaller coefficients"
             )
+        held = [name for name in bad if f"{name}_closed" in layout.x]
+        if held:
+            return f"the equations of {' and '.join(held)} are not (outside their domain, or a wheel lies flat)"
         loads = " and ".join(name for name in bad if name not in layout.reaction_laws)
         if loads:
             why = "its ends meet or lie inside the cylinder, or its law is outside its domain"
