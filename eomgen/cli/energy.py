@@ -29,7 +29,8 @@ class EnergyBalance(NamedTuple):
     final: float
     work: float | None  #: of everything without a potential; None where it is not known
     drift: float  #: max |E - E(0)| / max T
-    power_balance: float | None  #: max |E - E(0) - work so far| / max T
+    power_balance: float | None  #: max |E - E(0) - work so far - jumps so far| / max T
+    jumps: float  #: what impacts and other resets added to it at their instants, losses negative
 
 
 def balance_energy(equations: Equations, trajectory: Trajectory) -> EnergyBalance | None:
@@ -51,15 +52,18 @@ def balance_energy(equations: Equations, trajectory: Trajectory) -> EnergyBalanc
     T, _, energy = trajectory.energies
     largest = float(np.abs(T).max())
     work = _work(equations.kinematics, trajectory)
+    at_once = np.where(np.diff(trajectory.t) == 0.0, np.diff(energy), 0.0)  # before and after a reset
+    jumps = np.concatenate([[0.0], np.cumsum(at_once)])
     balance = None
     if work is not None and largest:
-        balance = float(np.abs(energy - energy[0] - work).max()) / largest
+        balance = float(np.abs(energy - energy[0] - work - jumps).max()) / largest
     return EnergyBalance(
         float(energy[0]),
         float(energy[-1]),
         None if work is None else float(work[-1]),
         trajectory.energy_drift,
         balance,
+        float(jumps[-1]),
     )
 
 

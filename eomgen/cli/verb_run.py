@@ -259,10 +259,12 @@ def _energy_rows(energy: EnergyBalance | None, uncounted: Sequence[str]) -> list
     change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
     if energy.work is not None and energy.power_balance not in (None, energy.drift):
         work = without_noise([energy.work, energy.initial, energy.final])[0]
-        return [
-            ("energy", f"{change}; work of forces and inputs {work:.9g} J"),
-            ("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"),
-        ]
+        rows = [("energy", f"{change}; work of forces and inputs {work:.9g} J")]
+        left_out = ""
+        if energy.jumps:
+            rows.append(("impacts, resets", f"added {energy.jumps:.9g} J at their instants"))
+            left_out = ", impacts and resets left out"
+        return [*rows, ("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy{left_out}")]
     kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
     rows = [("energy", f"{change}{kept}")]
     if uncounted:

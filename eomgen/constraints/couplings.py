@@ -68,9 +68,10 @@ def _equation(e: Entry) -> Equation | None:
             what = "acceleration" if meant.kind == "marker" else meant.kind
             remedy = "a constraint can contain t, inputs, coordinates and velocities"
             e.fault("equation", f"the {what} {name!r} cannot be used here", remedy)
-        if meant.kind == "energy":
-            remedy = "a constraint can contain t, inputs, coordinates and velocities, not energies"
-            e.fault("equation", f"the energy {name!r} cannot be used here", remedy)
+        if meant.kind in ("energy", "reaction", "multiplier"):
+            plural = "energies" if meant.kind == "energy" else f"{meant.kind}s"
+            remedy = f"a constraint can contain t, inputs, coordinates and velocities, not {plural}"
+            e.fault("equation", f"the {meant.kind} {name!r} cannot be used here", remedy)
     moving = [meant for meant in used.values() if meant.level is not None]
     rates = [name for name, meant in used.items() if meant.level == 1]
     if not moving and not e.at_fault("equation"):

@@ -25,14 +25,14 @@ class Planetary(Constraint):
 
     Sun and planet mesh outside, ring and planet inside (Willis; Norton, Design of Machinery, sec. 9.9):
 
-        r_s (sun - carrier) + r_p planet = 0,    r_r (ring - carrier) - r_p planet = 0,
+        r_s / r_p (sun - carrier) + planet = phase,    r_r / r_p (ring - carrier) - planet = 0,
 
-    and, without the planet, their sum r_s sun + r_r ring = (r_s + r_r) carrier.  A wheel that is fixed to the frame has
-    the angle 0; one whose radius is None is not there.
+    and, without the planet, (r_s sun + r_r ring) / (r_s + r_r) = carrier + phase.  A wheel that is fixed to the frame
+    has the angle 0; one whose radius is None is not there.
     """
 
     sentence: ClassVar[str] = "The angles of sun, ring and carrier of a planetary set with the radii $r_s$ and $r_r$."
-    formula: ClassVar[str] = r"r_s \varphi_s + r_r \varphi_r = (r_s + r_r) \varphi_c"
+    formula: ClassVar[str] = r"\frac{r_s \varphi_s + r_r \varphi_r}{r_s + r_r} = \varphi_c"
     type_name: ClassVar[str] = "planetary"
     written: ClassVar[bool] = True
     sun: Expr
@@ -154,7 +154,7 @@ TYPES = table(
             "teeth": Field("wheels", "numbers of teeth of the wheels that exist: sun, planet, ring", dimension=NONE),
             "phase": Field(
                 "expression",
-                "phase in r_s sun + r_r ring = (r_s + r_r) (carrier + phase) (rad); with a planet, that of its mesh "
+                "phase in (r_s sun + r_r ring) / (r_s + r_r) = carrier + phase (rad); with a planet, that of its mesh "
                 "with the sun",
                 default=0,
                 dimension=NONE,

@@ -21,6 +21,7 @@ from .coordinates import find_coordinate
 from .description import DescribedEntry, items
 from .element_states import states_of
 from .fields import CYLINDER
+from .marker_quantities import element_quantity
 from .mechanism import Body, JointSpec
 from .names import nearest
 from .read_shapes import read_shapes
@@ -354,6 +355,8 @@ class ElementEntry:
             return Meaning("marker", place.level, "angle" if place.axis == 3 else "length")
         if name in (f"{energy}()" for energy in ENERGIES):
             return Meaning("energy")
+        if (asked := element_quantity(name)) is not None and asked.carried:
+            return Meaning("reaction" if asked.part else "multiplier")
         if kind not in _LEVELS:
             return Meaning(kind)
         level = _LEVELS.index(kind)

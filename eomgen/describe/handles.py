@@ -348,6 +348,9 @@ class Settings(dict[str, Any]):
             if not isinstance(given, Mapping):
                 told = f"values are given by name, as in initial(theta=0.3) or a mapping, not as {shown(given)} alone"
                 raise UsageError(told)
+        named = [str(name) for given in (*mappings, values) for name in given]
+        if twice := sorted({name for name in named if named.count(name) > 1}):
+            raise UsageError(f"{', '.join(twice)}: given twice in one call; give each name once")
         for given in mappings:
             self.update(given)
         self.update(values)

@@ -64,6 +64,9 @@ def wrench_in(node: ast.expr) -> ElementQuantity:
     call = node.value
     element = _label(call.args[0]) if len(call.args) == 1 else ""
     given = {keyword.arg: _label(keyword.value) for keyword in call.keywords}
+    if element and "." not in element and given.keys() <= {"_n"} and node.attr in WRENCH_PARTS:
+        message = f"{WRENCH}({element}).{node.attr} does not say on which body the element acts"
+        raise ExpressionError(message, 0, f"add on=marker: {WRENCH}({element}, on=marker).{node.attr}")
     if not element or "." in element or not given.get("on") or not given.keys() <= {"on", "_n"} or "" in given.values():
         raise ExpressionError("what an element exerts on a body is that of one element", 0, _WRITE_WRENCH)
     if node.attr not in WRENCH_PARTS:

@@ -26,8 +26,9 @@ class Found(NamedTuple):
 class Meaning(NamedTuple):
     """What a name in an expression stands for.
 
-    ``kind`` is a word such as coordinate, velocity, parameter, time, marker (its motion) or energy; ``level`` counts
-    derivatives of motions, None of other things; ``measure`` is 'length' or 'angle' of motions.
+    ``kind`` is a word such as coordinate, velocity, parameter, time, marker (its motion), energy, reaction or
+    multiplier; ``level`` counts derivatives of motions, None of other things; ``measure`` is 'length' or 'angle' of
+    motions.
     """
 
     kind: str

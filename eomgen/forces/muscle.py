@@ -17,7 +17,8 @@ from .paths import BETWEEN, Path
 from .routes import VIA, read_path
 
 # Constants of the curves: De Groote, Kinney, Rao and Fregly (2016), Evaluation of direct collocation optimal control
-# problem formulations for solving the muscle redundancy problem, Ann. Biomed. Eng. 44, 2922-2936, supplement.
+# problem formulations for solving the muscle redundancy problem, Ann. Biomed. Eng. 44, 2922-2936, supplement,
+# rounded as there (docs/forces.md compares them with those of OpenSim).
 _ACTIVE = (
     (0.814, 1.06, 0.162, 0.0633),
     (0.433, 0.717, -0.0299, 0.2),

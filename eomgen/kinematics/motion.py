@@ -242,6 +242,10 @@ class MarkerMotion:
 
     def _exerted(self, mechanism: Mechanism, force: Force, quantity: WrenchQuantity) -> Expr:
         found = part_exerted(self, force, quantity)
+        if force.is_rigid:
+            told = f"the contacts {force.name!r} have normal_law: rigid, which exerts impulses, not forces"
+            remedy = "a run by method moreau tells them as impacts; or give a normal law with a stiffness"
+            raise ModelError([mechanism.problem(quantity.path, told, remedy)])
         if isinstance(found, str):
             remedy = f"give a body on which it acts; power({force.name}) is known of every element"
             raise ModelError([mechanism.problem(quantity.path, f"the element {force.name!r} {found}", remedy)])

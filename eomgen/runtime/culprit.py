@@ -77,6 +77,9 @@ def _not_finite(kernels: Evaluates, t: float, x: Array, p: Array | None, u: Arra
                 "may have several solutions or none (Painleve's paradox); give smaller coefficients"
                 f"{''.join(f'; or {why}' for why in own)}"
             )
+        held = [name for name in bad if f"{name}_closed" in layout.x]
+        if held:
+            return f"the equations of {' and '.join(held)} are not (outside their domain, or a wheel lies flat)"
         loads = [name for name in bad if name not in layout.reaction_laws]
         if loads:
             ends = [] if known.keys() >= {*loads} else ["its ends meet or lie inside the cylinder"]

@@ -10,7 +10,10 @@ from .near_names import unknown
 
 
 class Named(list[Array]):
-    """What belongs to each event, by its place or its name."""
+    """What belongs to each event, by its place or its name.
+
+    It is a list, so that a loop over it meets the arrays; ``in``, ``keys()``, ``items()`` and ``get`` go by name.
+    """
 
     def __init__(self, values: Sequence[Array], names: Sequence[str]) -> None:
         super().__init__(values)
@@ -26,6 +29,28 @@ class Named(list[Array]):
                 raise unknown("event", key, self.names)
             key = self.names.index(key)
         return super().__getitem__(key)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether an event has this name; an array is in it if it is one of those here."""
+        if isinstance(name, str):
+            return name in self.names
+        return any(name is values for values in self)
+
+    def keys(self) -> tuple[str, ...]:
+        """Names of the events."""
+        return self.names
+
+    def values(self) -> list[Array]:
+        """What belongs to each event."""
+        return list(self)
+
+    def items(self) -> list[tuple[str, Array]]:
+        """Names, and what belongs to them."""
+        return list(zip(self.names, self, strict=True))
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """What belongs to the event of a name, ``default`` if there is none."""
+        return self[name] if name in self.names else default
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Named, (list(self), self.names)

@@ -49,7 +49,7 @@ class Trajectory:
     residuals : Residuals
         How well the loops were kept, raw and projected.
     t_events : list of (k,) arrays
-        Times of each event, also by name: ``t_events["floor"]``.
+        Times of each event, also by name: ``t_events["floor"]``, ``"floor" in t_events``, ``t_events.items()``.
     x_events : list of (n_x, k) arrays
         Projected states at the events, before a reset.
     nfev, njev, nlu, status : int

@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 import eomgen
+import eomgen as eg
+from eomgen.cli.energy import balance_energy
+from eomgen.cli.verb_run import _energy_rows
 
 from .conftest import EXAMPLES, Call
 
@@ -39,7 +42,7 @@ def test_json(call: Call) -> None:
     assert set(run["loop_residual"]) == {
         f"{what}{level}" for what in ("raw", "projected", "correction") for level in ("", "_velocity")
     }
-    assert set(run["energy"]) == {"initial", "final", "work", "drift", "power_balance"}
+    assert set(run["energy"]) == {"initial", "final", "work", "drift", "power_balance", "jumps"}
     assert set(run["origin"]) == {"model_digest", "target", "versions"}
     assert set(run["origin"]["versions"]) == {"eomgen", "python", "numpy", "compiler"}
     assert run["parameters"]["r"] == 0.1
@@ -176,3 +179,23 @@ def test_what_rests_is_told_as_resting(call: Call, model_file: Callable[[str], P
     assert any(line.split() == ["a_dot", "0", "rad/s"] for line in lines)
     assert any(line.split() == ["h_dot", "-4.905", "m/s"] for line in lines)
     assert any(line.endswith("work of forces and inputs 0 J") or "kept to" in line for line in lines)
+
+
+def test_the_loss_of_a_plastic_impact_is_told_and_left_out_of_the_balance() -> None:
+    """Two wheels that couple lose J_1 J_2 / (J_1 + J_2) / 2 of the square of the slip."""
+    m = eg.Model("clutch")
+    for name, inertia in (("a", 0.3), ("b", 0.5)):
+        m.revolute(name, m.ground, m.body(f"wheel_{name}", mass=1, inertia={"zz": inertia}))
+    m.coupling("clutch", equation="a_dot - b_dot", closes="1 - t")
+    m.initial(a_dot=4)
+    equations = m.derive()
+    run = equations.compile(target="numpy").simulate(2.0, dense_output=True)
+    found = balance_energy(equations, run)
+    assert found is not None
+    assert found.jumps == pytest.approx(-0.3 * 0.5 / 0.8 / 2 * 4**2, rel=1e-12)
+    assert found.power_balance is not None
+    assert found.power_balance < 1e-10
+    assert found.drift > 0.5
+    told = dict(_energy_rows(found, ()))
+    assert told["impacts, resets"] == "added -1.5 J at their instants"
+    assert told["power balance"].endswith("impacts and resets left out")

@@ -198,6 +198,7 @@ BROKEN = [
     ("- 0.01*t", "- beta_dot**2", 20, "c2.equation", "the equation is not linear in beta_dot", "linear"),
     ("equation: s - r*sin(alpha) - 0.01*t", "equation: r - k", 20, "c2.equation", "contains no coordinate", "alpha"),
     ("- 0.01*t", "- kinetic_energy", 20, "c2.equation", "energy", "not energies"),
+    ("- 0.01*t", "- 0.01*multiplier(c1)", 20, "c2.equation", "the multiplier 'multiplier(c1)'", "not multipliers"),
     ("radii: {sun: r, ring: n*r}", "radii: {sun: 2}", 22, "c4.radii", "the ring has a joint but no size", "ring"),
     ("radii: {sun: r, ring: n*r}", "radii: {sun: 1, ring: 3, planet: 2}", 22, "c4.radii", "ring 3 is not", "fit"),
     ("radii: {sun: r, ring: n*r}", "radii: {sun: 1, rim: 3}", 22, "c4.radii.rim", "unknown key", "ring"),

@@ -160,6 +160,38 @@ def test_meshing_points_of_a_differential_have_the_same_velocity() -> None:
         assert np.linalg.norm(meeting[0]) > 0.01
 
 
+@pytest.mark.parametrize("planets", [False, True])
+def test_multipliers_of_a_planetary_set_belong_to_the_equations_in_the_documentation(planets: bool) -> None:
+    """The equations of motion of the shafts and of the planet, solved by hand with the rows that the page prints."""
+    m, names = eg.Model("set"), ["sun", "ring", "carrier"]
+    for name in names:
+        m.revolute(f"of_{name}", m.ground, m.body(name, mass=1, inertia={"zz": 0.2}), coordinate=name)
+    joints = {name: name for name in names}
+    a = np.array([[0.25, 0.75, -1.0]])
+    inertia = 0.2 * np.eye(3)
+    if planets:
+        wheel = m.body("wheel", mass=0, inertia={"zz": 0.05})
+        m.revolute("of_planet", m.bodies["carrier"], wheel, coordinate="planet")
+        joints["planet"] = "planet"
+        a = np.array([[1.0, 0, -1, 1], [0, 3, -3, -1]])  # (r_s / r_p) (s - c) + p, (r_r / r_p) (r - c) - p
+        inertia = np.diag([0.2, 0.2, 0.25, 0.05])
+        inertia[2, 3] = inertia[3, 2] = 0.05  # the planet turns with the carrier
+    m.planetary("set", **joints, radii={"sun": 0.1, "ring": 0.3})
+    m.torque("T", "sun", 1.0)
+    m.torque("U", "ring", 0.4)
+    rows = ["set.sun_mesh", "set.ring_mesh"] if planets else ["set"]
+    for k, row in enumerate(rows):
+        m.output(f"l{k}", f"multiplier({row})")
+    f = np.array([1.0, 0.4, 0, 0])[: len(inertia)]
+    free = np.linalg.solve(inertia, np.column_stack([f, a.T]))
+    expected = np.linalg.solve(a @ free[:, 1:], a @ free[:, 0])
+    for method in ("embedding", "augmented"):
+        mod = m.compile(method, target="numpy")
+        x = mod.x0()
+        np.testing.assert_allclose(mod.outputs(0.0, x), expected, rtol=1e-12)
+        np.testing.assert_allclose(mod.multipliers(0.0, x), expected, rtol=1e-12)
+
+
 def test_counts_of_a_planetary_set() -> None:
     """Four bodies, four hinges, two meshes: 3*4 - 2*4 - 2 = 2 in the plane."""
     report = gearbox("").check()

@@ -195,6 +195,10 @@ def test_initial_values_are_given_as_a_mapping_too() -> None:
     assert m.compile(target="numpy").x0().tolist() == [0.3, 2.0]
     with pytest.raises(UsageError, match=r"as in initial\(theta=0.3\) or a mapping, not as 3 alone"):
         m.initial(3)
+    with pytest.raises(UsageError, match="^theta: given twice in one call; give each name once"):
+        m.initial({"theta": 0.4}, theta=0.3)
+    with pytest.raises(UsageError, match="theta: given twice"):
+        m.initial({"theta": 0.4}, {"theta": 0.3})
 
 
 def test_an_output_may_repeat_its_coordinate() -> None:
@@ -251,7 +255,7 @@ def test_editors_read_the_same_methods() -> None:
 
 
 def test_every_force_has_a_method_with_the_keys_of_the_table() -> None:
-    places = {"between", "joint", "body", "marker", "on", "a", "b"}
+    places = {"between", "joint", "body", "marker", "on", "a", "b", "track", "wheel"}
     for name, found in FORCES.items():
         fields = found.keys
         given = arguments(getattr(Model, name))

@@ -131,6 +131,22 @@ def test_the_curves_of_the_muscle() -> None:
         )
 
 
+def test_the_active_curve_differs_from_that_of_opensim_as_the_page_says() -> None:
+    """DeGrooteFregly2016Muscle: constants of the authors' programs, the first height raised until the curve meets 1."""
+    bells = (
+        (0.8150671134243542, 1.055033428970575, 0.162384573599574, 0.063303448465465),
+        (0.433004984392647, 0.716775413397760, -0.029947116970696, 0.200356847296188),
+        (0.1, 1.0, 0.5 * np.sqrt(0.5), 0.0),
+    )
+    l = np.linspace(0.5, 1.5, 1001)
+    theirs = sum(b1 * np.exp(-0.5 * ((l - b2) / (b3 + b4 * l)) ** 2) for b1, b2, b3, b4 in bells)
+    assert theirs[500] == pytest.approx(1.0, abs=1e-15)
+    x = Graph().symbol("x")
+    ours = evaluate([active_force_length(x)], {"x": l})[0]
+    assert ours[500] == pytest.approx(0.994, abs=5e-4)
+    assert np.abs(ours - theirs).max() == pytest.approx(0.013, abs=5e-4)
+
+
 def test_an_angle_between_axes_that_do_not_stay_in_line_is_refused() -> None:
     m = eg.Model("skew")
     b = m.body("b", mass=1, inertia=(1, 1, 1))

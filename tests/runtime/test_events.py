@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,24 @@ def test_a_ball_bounces_as_in_closed_form(bouncing: Any, method: str) -> None:
     height = np.where(last < 0, 1.0, 0.0) + up * after - G * after**2 / 2
     np.testing.assert_allclose(asked["h"], height, atol=1e-8)
     np.testing.assert_allclose(run.at(times)["h"], height, atol=1e-8)
+
+
+def test_events_are_a_mapping_by_name_and_a_list_by_number(bouncing: Any) -> None:
+    run = bouncing.simulate((0, 1.0))
+    for found in (run.t_events, run.x_events):
+        assert "floor" in found
+        assert "ceiling" not in found
+        assert tuple(found.keys()) == ("floor", "apex")
+        for k, (name, values) in enumerate(found.items()):
+            assert values is found[name] is found[k] is found.values()[k]
+            assert values in found
+        assert np.zeros(3) not in found
+        assert list(dict(found)) == ["floor", "apex"]
+        assert dict(found)["apex"] is found[-1]
+        assert found.get("ceiling") is None
+        assert found.get("floor") is found[0]
+        assert [len(values) for values in found] == [len(found[0]), len(found[1])]
+    assert "floor" in pickle.loads(pickle.dumps(run.t_events))
 
 
 @pytest.mark.parametrize("method", ["DOP853", "LSODA"])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
+from eomgen.errors import NonFiniteError
 
 
 def four_bar() -> eg.Model:
@@ -76,3 +77,14 @@ def test_momenta_at_a_singularity_of_angles_name_the_angles() -> None:
     z = np.array([0.1, np.pi / 2, 0.2, 0, 0, 0])
     with pytest.raises(eg.EvaluationError, match="the Euler angles of joint 's' are singular here"):
         canonical.expand(z)
+
+
+def test_an_equation_that_closes_and_is_no_number_is_no_rope() -> None:
+    m = eg.Model("roots")
+    for name in "ab":
+        m.revolute(f"q{name}", m.ground, m.body(name, mass=1, inertia={"zz": 0.2}))
+    m.coupling("c", equation="qa_dot*sqrt(qa) - qb_dot", closes="t - 9", closed=True)
+    m.initial(qa=0.3)
+    with pytest.raises(NonFiniteError, match=r"the equations of c are not \(outside their domain") as error:
+        m.compile(target="numpy").rhs(0.0, [-1.0, 0.2, 1.0, 1.0, 1.0])
+    assert "cylinder" not in str(error.value)

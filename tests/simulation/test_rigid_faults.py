@@ -56,6 +56,13 @@ def test_deep_start(ball: Any) -> None:
         ball.simulate(0.2, {"j_y": 0.05}, method="moreau", step=1e-3)
 
 
+def test_a_rigid_contact_has_no_force_to_be_told() -> None:
+    m = pile(["circle", "box"])
+    m.output("push", "force(walls, on=b0).y")
+    with pytest.raises(ModelError, match=r"outputs.push.*normal_law: rigid, which exerts impulses, not forces"):
+        m.compile(target="numpy")
+
+
 @pytest.mark.parametrize("method", [None, "Radau", "RK45"])
 def test_other_methods_have_no_force_for_it(ball: Any, method: str | None) -> None:
     with pytest.raises(UsageError, match="have normal_law: rigid, which exerts impulses"):

@@ -97,6 +97,28 @@ def test_angular_momentum_turns_with_ground() -> None:
         assert found.ok, found
 
 
+@pytest.mark.parametrize(
+    "text",
+    ["momentum_x", "2*momentum_y - momentum_z*A", "inertia_xy(ground)", "inertia_yz(com)*momentum_x + inertia_xx(a)"],
+)
+def test_sums_over_all_bodies_turn_with_ground(text: str) -> None:
+    model = rotor()
+    model.output("p", text)
+    for change in ("ground turned", "all at once"):
+        (found,) = variant_findings(model, only=change)
+        assert not found.left_out, found
+        assert found.ok, found
+
+
+def test_a_parameter_with_the_name_of_a_momentum_does_not_turn() -> None:
+    model = rotor()
+    model.parameter("momentum_x", 3.0)
+    model.output("p", "momentum_x + A")
+    (found,) = variant_findings(model, only="ground turned")
+    assert not found.left_out, found
+    assert found.ok, found
+
+
 def test_values_in_other_units_are_no_breach() -> None:
     """A length in mm is declared as 200 and given at run time as 0.2."""
     model = eg.Model("rod", gravity=(0, -9.81, 0))

@@ -6,7 +6,7 @@ The old frame of a body stays as a marker of it, so that references keep their m
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from ...describe.rewritten_texts import is_zero, motions_of, number_of, product,
 from ...describe.visit import Slot, Visitor, bodies_of, copied, visit
 from ...numeric.rotation_matrices import from_quaternion, from_roll_pitch_yaw, roll_pitch_yaw
 from .plain import values_of
-from .variant import NotApplicable, Variant
+from .variant import NotApplicable, Variant, kinds_of
 
 WAS = "old_frame"  #: the marker that a body's former frame becomes
 _PAIRS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -27,6 +27,8 @@ _KINDS = (
     *(("wx", "wy", "wz"), ("wx_dot", "wy_dot", "wz_dot")),
     ("angular_momentum_x", "angular_momentum_y", "angular_momentum_z"),
 )
+_MOMENTA = ("momentum_x", "momentum_y", "momentum_z")
+_TENSOR = "inertia_"  #: of all bodies, in ground axes: inertia_xx, ...
 
 
 def random_turn(random: Any) -> Any:
@@ -175,7 +177,8 @@ def turn_ground(description: Description, random: Any) -> Variant:
     angles = any(q.name in ("angle", "angle_rate") and not q.origin for q in texts)
     turn = np.eye(3) if angles else random_turn(random)
     place = MovedBodyFrame(turn, length_of(description) * random.uniform(-0.5, 0.5, 3), values_of(description))
-    made = visit(copied(description), _Ground(place))
+    declared = {entry.name for entries in description.sections.values() for entry in entries} | {*kinds_of(description)}
+    made = visit(copied(description), _Ground(place, declared))
     ground = next((entry for entry in made.sections["bodies"] if entry.name == GROUND_NAME), None)
     if ground is not None:
         ground.values["markers"][WAS] = {"at": place.point([0, 0, 0]), "rpy": place.angles([0, 0, 0])}
@@ -185,9 +188,10 @@ def turn_ground(description: Description, random: Any) -> Variant:
 class _Ground(_Moved):
     """What refers to ground, or is written in its axes."""
 
-    def __init__(self, place: MovedBodyFrame) -> None:
+    def __init__(self, place: MovedBodyFrame, declared: Collection[str]) -> None:
         super().__init__({GROUND_NAME: place})
         self.place = place
+        self.declared = declared  #: names of the model's own, which come before the words for sums over all bodies
 
     def vector(self, value: Any, slot: Slot) -> Any:
         result = super().vector(value, slot)
@@ -212,9 +216,23 @@ class _Ground(_Moved):
                         for name, c in zip(names, column, strict=True)
                     ]
                     return "(" + " + ".join([*parts, repr(-float(column @ shift))]) + ")"
-            return str(quantity)
+            return self._tensor_entry(quantity) if quantity.name.startswith(_TENSOR) else str(quantity)
 
-        return rewritten(value, str, locate, self.element)
+        return rewritten(value, self._momentum, locate, self.element)
+
+    def _momentum(self, name: str) -> str:
+        """The linear momentum along an old axis; other names stay."""
+        if name not in _MOMENTA or name in self.declared:
+            return name
+        return f"({total(self.place.turn[:, _MOMENTA.index(name)].tolist(), _MOMENTA)})"
+
+    def _tensor_entry(self, quantity: MarkerQuantity) -> str:
+        """The inertia of all bodies about old axes: a^T I b of their directions a, b."""
+        i, j = _PAIRS[quantity.name.removeprefix(_TENSOR)]
+        products = np.outer(self.place.turn[:, i], self.place.turn[:, j])
+        factors = [products[k, l] + (products[l, k] if k != l else 0.0) for k, l in _PAIRS.values()]
+        entries = [str(quantity._replace(name=_TENSOR + pair)) for pair in _PAIRS]
+        return f"({total([float(x) for x in factors], entries)})"
 
     def element(self, quantity: ElementQuantity) -> str:
         if quantity.part and not quantity.axes and quantity.part not in ("size", "normal"):
