@@ -255,7 +255,7 @@ def test_editors_read_the_same_methods() -> None:
 
 
 def test_every_force_has_a_method_with_the_keys_of_the_table() -> None:
-    places = {"between", "joint", "body", "marker", "on", "a", "b", "track", "wheel"}
+    places = {"between", "joint", "body", "marker", "on", "a", "b", "track", "road", "wheel"}
     for name, found in FORCES.items():
         fields = found.keys
         given = arguments(getattr(Model, name))
