@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
+import mujoco
 import numpy as np
 import pytest
 
 import eomgen as eg
 
-mujoco = pytest.importorskip("mujoco")
 G = 9.81
 LAW = {"stiffness": 1e6, "exponent": 1, "dissipation": 0.5, "smoothing": 1e-4}
 
