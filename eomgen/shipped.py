@@ -17,7 +17,7 @@ def shipped(name: str) -> Path:
 def example_files() -> dict[str, Path]:
     """Every example by what to call it: a model file by its name alone, others with their suffix.
 
-    Those in the folder ``large`` take seconds to compile.
+    Those in the folder ``large`` take seconds to compile, or move far where a centimetre is much.
     """
     found = {}
     folder = shipped("examples")
