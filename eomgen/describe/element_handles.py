@@ -7,18 +7,22 @@ from typing import Any, NamedTuple, Protocol
 from .described import Described
 from .description import DescribedEntry
 from .marker_quantities import ElementQuantity
-from .names import MULTIPLIER, REACTION, WRENCH
+from .names import MULTIPLIER, WRENCH
 from .sympy_face import symbol
 
 
-class JointReaction(NamedTuple):
-    """What the predecessor of a joint exerts on the successor, at the successor's marker, as SymPy symbols.
+class Wrench(NamedTuple):
+    """Force and moment of an element, as SymPy symbols.
 
-    ``axes`` is the label of the marker along whose axes the components are, empty for ground.
+    Of a joint they are what its predecessor exerts on its successor, at the successor's marker; of a force element what
+    it exerts on the body of the marker ``on``, about that marker's origin. ``axes`` is the label of the marker along
+    whose axes the components are, empty for ground.
     """
 
-    joint: str
+    function: str
+    element: str
     axes: str = ""
+    on: str = ""
 
     @property
     def force(self) -> tuple[Any, Any, Any]:
@@ -33,44 +37,21 @@ class JointReaction(NamedTuple):
     @property
     def size(self) -> Any:
         """Size of the force (N)."""
-        return symbol(str(ElementQuantity(REACTION, self.joint, "size")))
+        return self._replace(axes="")._part("size")
+
+    def _part(self, part: str) -> Any:
+        return symbol(str(ElementQuantity(self.function, self.element, part, self.axes, self.on)))
+
+
+class JointReaction(Wrench):
+    """What the predecessor of a joint exerts on the successor, at the successor's marker, as SymPy symbols."""
+
+    __slots__ = ()
 
     @property
     def normal(self) -> Any:
         """Size of the force across the axis of the joint (N)."""
-        return symbol(str(ElementQuantity(REACTION, self.joint, "normal")))
-
-    def _part(self, part: str) -> Any:
-        return symbol(str(ElementQuantity(REACTION, self.joint, part, self.axes)))
-
-
-class ExertedForce(NamedTuple):
-    """What a force element exerts on the body of a marker, as SymPy symbols; moments are about the marker's origin.
-
-    ``axes`` is the label of the marker along whose axes the components are, empty for ground.
-    """
-
-    element: str
-    on: str
-    axes: str = ""
-
-    @property
-    def force(self) -> tuple[Any, Any, Any]:
-        """Components of the force (N)."""
-        return (self._part("x"), self._part("y"), self._part("z"))
-
-    @property
-    def moment(self) -> tuple[Any, Any, Any]:
-        """Components of the moment (N m)."""
-        return (self._part("mx"), self._part("my"), self._part("mz"))
-
-    @property
-    def size(self) -> Any:
-        """Size of the force (N)."""
-        return symbol(str(ElementQuantity(WRENCH, self.element, "size", on=self.on)))
-
-    def _part(self, part: str) -> Any:
-        return symbol(str(ElementQuantity(WRENCH, self.element, part, self.axes, self.on)))
+        return self._replace(axes="")._part("normal")
 
 
 class Labelled(Protocol):
@@ -118,7 +99,7 @@ class ForceHandle:
         """Power of everything that it exerts (W): positive where it drives the mechanism."""
         return symbol(f"power({self.name})")
 
-    def on(self, marker: Labelled, axes: Labelled | None = None) -> ExertedForce:
+    def on(self, marker: Labelled, axes: Labelled | None = None) -> Wrench:
         """Force and moment that it exerts on the body of a marker, in ground axes or along those of another marker.
 
         Parameters
@@ -131,7 +112,7 @@ class ForceHandle:
         for one in (marker, axes):
             if one is not None:
                 one.note()
-        return ExertedForce(self.name, marker.label, "" if axes is None else axes.label)
+        return Wrench(WRENCH, self.name, "" if axes is None else axes.label, marker.label)
 
 
 class ConstraintHandle:

@@ -14,6 +14,7 @@ from .description import GROUND_NAME, DescribedEntry, is_zero, items, label_of
 from .element_handles import JointReaction
 from .marker_quantities import MarkerQuantity
 from .mechanism import velocity_names
+from .names import REACTION
 from .scope import RATES
 from .sympy_face import symbol
 
@@ -324,12 +325,12 @@ class JointHandle:
     @property
     def reaction(self) -> JointReaction:
         """What the joint carries, in ground axes; as ``reactions`` of a module gives it."""
-        return JointReaction(self.name)
+        return JointReaction(REACTION, self.name)
 
     def reaction_in(self, axes: MarkerHandle) -> JointReaction:
         """What the joint carries, along the axes of a marker."""
         axes.note()
-        return JointReaction(self.name, axes.label)
+        return JointReaction(REACTION, self.name, axes.label)
 
     def _only(self) -> str:
         names = self.coordinate_names

@@ -25,18 +25,10 @@ def reaction_in(node: ast.expr) -> ElementQuantity:
     ------
     ExpressionError
     """
-    if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Call):
-        raise ExpressionError("a reaction has several parts", 0, _WRITE_REACTION)
-    call = node.value
-    joint = _label(call.args[0]) if len(call.args) == 1 else ""
-    axes = [_label(keyword.value) for keyword in call.keywords if keyword.arg == "_n"]
-    if not joint or "." in joint or len(axes) != len(call.keywords) or len(axes) > 1 or not all(axes):
+    joint, given, part = _parts_of(node, "a reaction", _WRITE_REACTION)
+    if not joint or not given.keys() <= {"_n"}:
         raise ExpressionError("a reaction is that of one joint", 0, _WRITE_REACTION)
-    if node.attr not in REACTION_PARTS:
-        raise ExpressionError(f"a reaction has no part {node.attr!r}", 0, _WRITE_REACTION)
-    if axes and node.attr in ("size", "normal"):
-        raise ExpressionError(f"the part {node.attr} does not depend on axes", 0, "leave in= out")
-    return ElementQuantity(REACTION, joint, node.attr, axes[0] if axes else "")
+    return _quantity(REACTION, joint, given, part, "a reaction", (REACTION_PARTS, _WRITE_REACTION))
 
 
 def multiplier_in(node: ast.expr) -> ElementQuantity:
@@ -59,21 +51,38 @@ def wrench_in(node: ast.expr) -> ElementQuantity:
     ------
     ExpressionError
     """
+    element, given, part = _parts_of(node, "what an element exerts on a body", _WRITE_WRENCH)
+    if element and given.keys() <= {"_n"} and part in WRENCH_PARTS:
+        message = f"{WRENCH}({element}).{part} does not say on which body the element acts"
+        raise ExpressionError(message, 0, f"add on=marker: {WRENCH}({element}, on=marker).{part}")
+    if not element or "on" not in given or not given.keys() <= {"on", "_n"}:
+        raise ExpressionError("what an element exerts on a body is that of one element", 0, _WRITE_WRENCH)
+    return _quantity(WRENCH, element, given, part, "what an element exerts", (WRENCH_PARTS, _WRITE_WRENCH))
+
+
+def _parts_of(node: ast.expr, what: str, write: str) -> tuple[str, dict[str | None, str], str]:
+    """The element, the markers by keyword and the part of ``function(element, keyword=marker).part``.
+
+    The element is empty if the text names none, or if a keyword has no marker.
+    """
     if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Call):
-        raise ExpressionError("what an element exerts on a body has several parts", 0, _WRITE_WRENCH)
+        raise ExpressionError(f"{what} has several parts", 0, write)
     call = node.value
     element = _label(call.args[0]) if len(call.args) == 1 else ""
     given = {keyword.arg: _label(keyword.value) for keyword in call.keywords}
-    if element and "." not in element and given.keys() <= {"_n"} and node.attr in WRENCH_PARTS:
-        message = f"{WRENCH}({element}).{node.attr} does not say on which body the element acts"
-        raise ExpressionError(message, 0, f"add on=marker: {WRENCH}({element}, on=marker).{node.attr}")
-    if not element or "." in element or not given.get("on") or not given.keys() <= {"on", "_n"} or "" in given.values():
-        raise ExpressionError("what an element exerts on a body is that of one element", 0, _WRITE_WRENCH)
-    if node.attr not in WRENCH_PARTS:
-        raise ExpressionError(f"what an element exerts has no part {node.attr!r}", 0, _WRITE_WRENCH)
-    if "_n" in given and node.attr == "size":
-        raise ExpressionError("the part size does not depend on axes", 0, "leave in= out")
-    return ElementQuantity(WRENCH, element, node.attr, given.get("_n", ""), given["on"])
+    whole = "." not in element and "" not in given.values() and len(given) == len(call.keywords)
+    return element if whole else "", given, node.attr
+
+
+def _quantity(
+    function: str, element: str, given: dict[str | None, str], part: str, what: str, known: tuple[tuple[str, ...], str]
+) -> ElementQuantity:
+    parts, write = known
+    if part not in parts:
+        raise ExpressionError(f"{what} has no part {part!r}", 0, write)
+    if "_n" in given and part in ("size", "normal"):
+        raise ExpressionError(f"the part {part} does not depend on axes", 0, "leave in= out")
+    return ElementQuantity(function, element, part, given.get("_n", ""), given.get("on", ""))
 
 
 def _label(node: ast.expr) -> str:

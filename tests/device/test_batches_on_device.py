@@ -48,11 +48,13 @@ def named(device: DeviceModule, name: str, given: list[np.ndarray]) -> dict[str,
 
 
 def expected(module: Any, name: str, given: list[np.ndarray], t: float, k: int) -> np.ndarray:
+    columns = [array[:, k] for array in given]
+    if name == "resets":
+        return np.array(module.kernels.timed(name)(t, np.concatenate(columns)))
     of_states = name in ("bias", "mass_matrix", "embedded_mass_matrix", "inverse_dynamics", "constraint_jacobian")
     call = getattr(module.kernels if of_states else module, name, None)  # velocities on the device are [v; s]
     call = module.kernels.timed("events", nan=True) if name == "events" else call
     call = call.every if name in ("constraints", "constraint_jacobian", "velocity_constraints") else call
-    columns = [array[:, k] for array in given]
     found = call(t, *columns) if name in TIMED_ON_DEVICE else call(*columns, t=t)
     return np.array(found)
 

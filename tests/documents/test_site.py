@@ -59,7 +59,7 @@ CLASSES = (
     "eomgen.identification.fit_result.Fit",
     "eomgen.describe.handles.BodyHandle",
     "eomgen.describe.handles.SeenMotion",
-    "eomgen.describe.handles.ForceHandle",
+    "eomgen.describe.element_handles.ForceHandle",
     "eomgen.describe.handles.MarkerHandle",
     "eomgen.describe.handles.JointHandle",
     "eomgen.describe.element_handles.JointReaction",
