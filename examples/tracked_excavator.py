@@ -129,7 +129,7 @@ STEEL = {"stiffness": "k_wheels", "dissipation": 0.5, "friction": "mu_wheels", "
 def undercarriage(m: eg.Model, track: Track, mass: float, inertia: Any, ground: Any = None, soil: str = "") -> Any:
     """Add frame, wheels and chain to a model, and the contacts between them; the frame is returned.
 
-    The ground, a flat one unless given, is hard but for the named soil.
+    The ground, a flat one unless a shape is given, is hard but for the named soil.
     """
     m.parameter("k_ground", 1e8, doc="of a corner of a shoe on the ground (N/m^1.5)")
     m.parameter("mu_ground", 0.7)
@@ -194,7 +194,7 @@ def undercarriage(m: eg.Model, track: Track, mass: float, inertia: Any, ground: 
         under = [link.at(track.pitch / 2, -track.shoe, 0) for link in links]
         shoes = {"shape": "plate", "on": under, "length": track.pitch, "width": 1.2}
         law = {"soil": soil, "contact_width": 0.6, "dissipation": 1.0, "lateral": False}
-    m.contacts("ground", shoes, ground or {"shape": "half_plane", "on": m.ground}, law)
+    m.contacts("ground", shoes, {"shape": "half_plane", "on": m.ground, **(ground or {})}, law)
     m.contacts("wheels", rails, wheels, STEEL)
     m.contacts("mesh", {"shape": "circle", "on": links, "radius": track.bushing}, teeth, STEEL)
     m.torque("motor", "sprocket", "max(-relief, min(relief, gain*(speed - sprocket_dot)))")
