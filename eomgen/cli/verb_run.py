@@ -285,14 +285,11 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None, uncou
     header, residuals = trajectory.metadata, trajectory.residuals
     print_heading(f"simulation from {trajectory.t[0]:g} to {trajectory.t[-1]:g} s")
     if header["method"] == "moreau":
+        missed = header["missed_steps"]
         rows = [
             ("integrator", f"moreau, {header['steps']} steps of {header['options']['step']:g} s"),
             ("contacts", f"{header['contacts']} at most in one step, {header['penetration']:.1e} m deep at most"),
-            (
-                "laws of contact",
-                f"residual {header['contact_residual']:.1e} m/s at most; {header['missed_steps']} steps miss the "
-                "tolerance",
-            ),
+            ("laws of contact", f"residual {header['contact_residual']:.1e} m/s; {missed} steps miss the tolerance"),
         ]
     elif header["rtol"] is None:
         rows = [("moved by drivers", f"{len(trajectory)} positions, solved one by one")]
