@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,9 @@ if TYPE_CHECKING:
     from ..api.equations import Equations
     from ..kinematics import Kinematics
     from ..runtime import Trajectory
+    from ..runtime.bound_model import BoundModel
 
+MOREAU = "moreau"
 POINTS = 8  #: of Gauss's quadrature in each step of the integrator
 
 
@@ -51,7 +54,7 @@ def balance_energy(equations: Equations, trajectory: Trajectory) -> EnergyBalanc
         return None
     T, _, energy = trajectory.energies
     largest = float(np.abs(T).max())
-    work = _work(equations.kinematics, trajectory)
+    work = None if trajectory.metadata["method"] == MOREAU else _work(equations.kinematics, trajectory)
     at_once = np.where(np.diff(trajectory.t) == 0.0, np.diff(energy), 0.0)  # before and after a reset
     jumps = np.concatenate([[0.0], np.cumsum(at_once)])
     balance = None
@@ -86,6 +89,11 @@ def _work(kinematics: Kinematics, trajectory: Trajectory) -> NDArray[np.float64]
     values |= {"t": times, **dict(zip(trajectory.x_names, between.x, strict=True)), **{u: between[u] for u in names}}
     watts = np.broadcast_to(evaluate([power], values)[0], times.shape).reshape(-1, POINTS)
     return np.concatenate([[0.0], np.cumsum((watts * weights).sum(axis=1) * step[:, 0] / 2.0)])
+
+
+def takes_impulses(module: BoundModel, options: Mapping[str, Any]) -> bool:
+    """Whether a run is one of method moreau, in which impulses of contacts do work at their instants."""
+    return bool(options.get("method", module.metadata["simulation"]["method"]) == MOREAU)
 
 
 def counts_work(equations: Equations) -> bool:

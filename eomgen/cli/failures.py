@@ -27,6 +27,7 @@ OPTIONS = {
     "limits=True": "--within-limits",
     "; give limits={name: ..}": "",
     "method='embedding'": "--method embedding",
+    "method='moreau'": "--solver moreau",
     "leave dense_output out and give t_eval, or take DOP853, RK45, RK23 or Radau in compiled code": "leave --plot out, "
     "or take --solver DOP853, RK45, RK23 or Radau with --target cython",
 }

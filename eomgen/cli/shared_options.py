@@ -75,9 +75,9 @@ _SOLVER = (
         "--solver",
         metavar="NAME",
         callback=_find_solver,
-        help="Integrator: DOP853, RK45, RK23, Radau, Taylor, BDF, LSODA, or RK4 with --step.",
+        help="Integrator: DOP853, RK45, RK23, Radau, Taylor, BDF, LSODA; with --step RK4, moreau (rigid contact).",
     ),
-    shared_option(INTEGRATION, "--step", type=_TOLERANCE, metavar="H", help="Step size of RK4 in s."),
+    shared_option(INTEGRATION, "--step", type=_TOLERANCE, metavar="H", help="Step size of RK4 and of moreau in s."),
     shared_option(INTEGRATION, "--rtol", type=_TOLERANCE, metavar="X", help="Relative tolerance of the integrator."),
     shared_option(INTEGRATION, "--atol", type=_TOLERANCE, metavar="X", help="Absolute tolerance of the integrator."),
 )

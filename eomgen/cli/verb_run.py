@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 
 
 POINTS = 5  #: change points listed
+#: What a run with rigid contacts tells of them.
+CONTACT = ("contacts", "contact_iterations", "contact_residual", "missed_steps", "penetration")
 
 
 @verb_command()
@@ -150,7 +152,7 @@ def run(
         parts |= {part: seconds for part, seconds in equations.seconds.items() if part not in before}
     initial, parameters, inputs = sort_settings(module, chosen)
     check_columns(module, picture)
-    from .energy import balance_energy, counts_work, uncounted_functions
+    from .energy import balance_energy, counts_work, takes_impulses, uncounted_functions
 
     start = perf_counter()
     with stage("simulate"):
@@ -159,7 +161,8 @@ def run(
             initial=initial or None,
             parameters=parameters or None,
             inputs=inputs or None,
-            dense_output=plot is not None or animate is not None or counts_work(equations),
+            dense_output=not takes_impulses(module, solver)
+            and (plot is not None or animate is not None or counts_work(equations)),
             **kept,
             **solver,
         )
@@ -235,6 +238,7 @@ def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance 
             "calls": trajectory.nfev,
             "jacobians": trajectory.njev,
             "options": header.get("options", {}),
+            **({"contact": {name: header[name] for name in CONTACT}} if header["method"] == "moreau" else {}),
         },
         "origin": header["origin"],
         "parameters": header["parameters"],
@@ -280,7 +284,14 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None, uncou
     """
     header, residuals = trajectory.metadata, trajectory.residuals
     print_heading(f"simulation from {trajectory.t[0]:g} to {trajectory.t[-1]:g} s")
-    if header["rtol"] is None:
+    if header["method"] == "moreau":
+        missed = header["missed_steps"]
+        rows = [
+            ("integrator", f"moreau, {header['steps']} steps of {header['options']['step']:g} s"),
+            ("contacts", f"{header['contacts']} at most in one step, {header['penetration']:.1e} m deep at most"),
+            ("laws of contact", f"residual {header['contact_residual']:.1e} m/s; {missed} steps miss the tolerance"),
+        ]
+    elif header["rtol"] is None:
         rows = [("moved by drivers", f"{len(trajectory)} positions, solved one by one")]
     else:
         rows = [

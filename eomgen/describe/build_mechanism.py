@@ -31,7 +31,7 @@ from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
 from .dotted_names import undotted
 from .element_entry import Surroundings
 from .element_states import own_states
-from .fields import BODY, MODEL, SIMULATION
+from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
 from .joint_data import check_display
@@ -342,7 +342,8 @@ def _simulation(reader: Reader, given: Any) -> Simulation:
             settings[key] = reader.choice(path, given[key], field)
         else:
             settings[key] = reader.number(path, given[key], positive=True)
-    if (settings.get("method") == "RK4") != ("step" in settings):
-        remedy = "give step, in s" if "step" not in settings else "remove it, or set method to RK4"
-        reader.faults.add("simulation.step", "only method RK4 takes steps of one size, and it needs their size", remedy)
+    if (settings.get("method") in FIXED_STEP) != ("step" in settings):
+        remedy = "give step, in s" if "step" not in settings else "remove it, or set method to RK4 or moreau"
+        told = "only methods RK4 and moreau take steps of one size, and they need their size"
+        reader.faults.add("simulation.step", told, remedy)
     return Simulation(**settings)

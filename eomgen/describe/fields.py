@@ -31,7 +31,8 @@ from .mechanism import Simulation
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 AXES = ("x", "y", "z", "-x", "-y", "-z")
-SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4")
+SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4", "moreau")
+FIXED_STEP = ("RK4", "moreau")  #: methods whose steps are of one size
 
 _UNIT = Field("unit", "unit of the value, such as mm or N*m/rad; the value is converted to SI", default="")
 _DOC = Field("text", "one sentence, shown in reports", default="")
@@ -251,7 +252,7 @@ SIMULATION: Fields = {
     "method": Field("choice", "integrator", default=Simulation.method, choices=SOLVERS),
     "rtol": Field("positive", "relative tolerance", default=Simulation.rtol),
     "atol": Field("positive", "absolute tolerance", default=Simulation.atol),
-    "step": Field("positive", "step size (s), for RK4 only"),
+    "step": Field("positive", "step size (s), for RK4 and moreau only"),
 }
 MODEL: Fields = {
     "name": _NAME,

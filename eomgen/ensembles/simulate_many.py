@@ -15,7 +15,7 @@ from ..errors import UsageError
 from ..numeric.counts import read_count
 from ..runtime.given_start import Span
 from ..runtime.near_names import check_names, without_dots
-from ..runtime.refusals import refuse_rigid
+from ..runtime.refusals import refuse_moreau, refuse_rigid
 from ..runtime.room import require_room, require_steps
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
@@ -217,6 +217,7 @@ def _plan(
     start, end = find_span(span, float(declared["end"]))
     require_forward(module, start, end)
     method, step = own_step(module, declared["method"] if method is None else method, step)
+    refuse_moreau(method, "simulate_many")
     if not isinstance(method, str):
         raise UsageError(f"method of simulate_many must be the name of a method, not {method!r}")
     forcing = Forcing(module.layout, tables)

@@ -89,6 +89,20 @@ def refuse_rigid(layout: Layout, what: str) -> None:
         )
 
 
+def refuse_moreau(method: object, what: str) -> None:
+    """Refuse the method for rigid contact where only integrators run.
+
+    Raises
+    ------
+    UnavailableError
+    """
+    if isinstance(method, str) and method == "moreau":
+        raise UnavailableError(
+            f"{what} has no method moreau, which takes contacts as rigid: run by simulate with method='moreau' and "
+            "step=, or give the name of an integrator as method="
+        )
+
+
 def require_projection(layout: Layout) -> None:
     """Refuse a model whose right-hand side holds constraints by Baumgarte's stabilisation.
 

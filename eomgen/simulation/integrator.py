@@ -14,7 +14,7 @@ from ..numeric.scales import Array
 from ..runtime.argument_names import both_names
 from ..runtime.late import eager
 from ..runtime.near_names import check_names
-from ..runtime.refusals import refuse_rigid
+from ..runtime.refusals import refuse_moreau, refuse_rigid
 from ..runtime.room import read_plain, read_vector, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run
@@ -227,6 +227,7 @@ def integrator(
     declared = declare(module)
     method, step = own_step(module, method, options.pop("step", None))
     options |= {"method": method, "step": step}
+    refuse_moreau(method, "integrator")
     given = {name: declared[name] for name in ("method", "rtol", "atol")}
     given.update({name: value for name, value in options.items() if value is not None})
     return Integrator(module if parameters is None and inputs is None else module.bind(parameters, inputs), **given)

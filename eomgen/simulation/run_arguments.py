@@ -47,11 +47,12 @@ def declare(module: BoundModel) -> dict[str, Any]:
 
 
 def own_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:
-    """Method and step of a run: RK4 with the model's own step where it has one and nothing else is given."""
-    own = module.metadata.get("simulation", {}).get("step")
-    if own is None or not module.layout.n_dof or method not in (None, "RK4"):
+    """Method and step of a run: the model's own where it has steps of one size and nothing else is given."""
+    declared = module.metadata.get("simulation", {})
+    own, named = declared.get("step"), declared.get("method")
+    if own is None or not module.layout.n_dof or not (method is None or (isinstance(method, str) and method == named)):
         return method, step
-    return "RK4", own if step is None else step
+    return named, own if step is None else step
 
 
 def check_method(method: Any, step: Any) -> float | None:

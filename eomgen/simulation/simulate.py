@@ -136,6 +136,7 @@ def simulate(
     """
     settings: dict[str, Any] = {**options}
     kept = pause = None
+    method, step = own_step(module, method, step)
     if checkpoint is not None:
         from .checkpoint import Checkpoint, identify
         from .solver_state import Pause
@@ -156,7 +157,6 @@ def simulate(
         others: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
         others |= {"dense_output": dense_output, "checkpoint": checkpoint, "controllers": controllers, **settings}
         return step_rigidly(module, span, initial, parameters, inputs, method, step, t_eval, events, progress, others)
-    method, step = own_step(module, method, step)
     step, dense_output = check_method(method, step), read_flag("dense_output", dense_output)
     declared = declare(module)
     method = declared["method"] if method is None else method

@@ -14,7 +14,8 @@ import pytest
 import eomgen as eg
 from eomgen import pipeline
 from eomgen.compilation import Cache, Options, shortcut
-from eomgen.program.fingerprint import fingerprint
+from eomgen.describe.mechanism import Simulation
+from eomgen.program.fingerprint import _spell, fingerprint
 from eomgen.runtime.late import eager
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "two_link_manipulator.yaml"
@@ -165,3 +166,23 @@ def test_templates_are_compiled_once(tmp_path: Path, fresh_cache: Cache) -> None
     folder.write_text("in the way")
     blocked = subprocess.run([sys.executable, "-c", code, str(folder)], capture_output=True, text=True, check=True)
     assert blocked.stdout == first.stdout
+
+
+def test_objects_that_others_share_are_spelled_once() -> None:
+    """Each of 60 holds the one before twice: 2^60 ways lead to the first, and equal ones spell equally."""
+
+    def nested(end: float, shared: bool) -> Any:
+        found: Any = Simulation(end=end)
+        for depth in range(60):
+            twin = found if shared or depth > 3 else nested_copy(found)
+            found = Simulation(end=found, method=twin)
+        return found
+
+    def nested_copy(value: Any) -> Any:
+        if not isinstance(value, Simulation):
+            return value
+        return Simulation(nested_copy(value.end), nested_copy(value.method))
+
+    first = _spell(nested(1.0, True), {})
+    assert first == _spell(nested(1.0, True), {}) == _spell(nested(1.0, False), {})
+    assert first != _spell(nested(1.5, True), {})

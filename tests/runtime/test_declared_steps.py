@@ -67,7 +67,7 @@ def test_a_file_says_the_same(path: Path, tmp_path: Path) -> None:
 def test_method_and_step_belong_together(path: Path, settings: dict[str, Any]) -> None:
     model = eg.load(path)
     model.simulation = settings
-    with pytest.raises(eg.ModelError, match=r"simulation\.step: only method RK4 takes steps of one size"):
+    with pytest.raises(eg.ModelError, match=r"simulation\.step: only methods RK4 and moreau take steps of one size"):
         model.mechanism()
 
 
