@@ -63,8 +63,41 @@ def corners_of(kind: str) -> np.ndarray:
     return np.array(TRIANGLE) if kind == "polygon" else np.array([(-0.15, 0.0), (0.15, 0.0)])
 
 
+def facing(first: np.ndarray, second: np.ndarray) -> list[float]:
+    """How deep two convex outlines are in each other at both ends of the edges that face each other.
+
+    Heights of both edges along the mean of their normals, as functions of the place across it.
+    """
+
+    def edges(corners: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        ends = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+        return [(p, q, np.array([(q - p)[1], (p - q)[0]]) / np.linalg.norm(q - p)) for p, q in ends]
+
+    sides = [edges(first), edges(second)]
+    overlaps = [[max(n @ (p - c) for c, _, _ in sides[1 - k]) for p, _, n in sides[k]] for k in (0, 1)]
+    k = int(np.argmin([min(one) for one in overlaps]))
+    own = sides[k][int(np.argmin(overlaps[k]))]
+    other = sides[1 - k][int(np.argmin([n @ own[2] for _, _, n in sides[1 - k]]))]
+    normal = own[2] - other[2]
+    cosine = np.linalg.norm(normal) / 2
+    normal /= np.linalg.norm(normal)
+    across = np.array([normal[1], -normal[0]])
+    spans = [sorted((across @ one[0], across @ one[1])) for one in (own, other)]
+    low, high = max(spans[0][0], spans[1][0]), min(spans[0][1], spans[1][1])
+    if low >= high:
+        return [-1e100, -1e100]
+
+    def height(one: tuple[np.ndarray, np.ndarray, np.ndarray], x: float) -> float:
+        (x0, x1), (y0, y1) = (across @ one[0], across @ one[1]), (normal @ one[0], normal @ one[1])
+        return float(y0 + (y1 - y0) * (x - x0) / (x1 - x0))
+
+    return [cosine * (height(own, x) - height(other, x)) for x in (low, high)]
+
+
 def depths(first: str, second: str, q1: Sequence[float], q2: Sequence[float]) -> list[float]:
-    """How deep the round parts of two shapes are in the other shape."""
+    """How deep the round parts of two shapes are in the other shape, or how deep two polygons are in each other."""
+    if {first, second} <= {"box", "polygon"}:
+        return facing(placed(q1, corners_of(first)), placed(q2, corners_of(second)))
     found = []
     for (a, qa), (b, qb) in (((first, q1), (second, q2)), ((second, q2), (first, q1))):
         if a == "circle" == b:

@@ -70,6 +70,7 @@ def _file(program: Program, used: UsedSum) -> str:
                 "planar": int(kind.planar),
                 "law": kind.law,
                 "states": kind.states,
+                "places": len(kind.spot) // SPOT,
                 "held": kind.held,
             }
         )

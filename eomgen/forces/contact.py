@@ -50,6 +50,11 @@ class Contact(Force):
     def touch(self, view: View) -> Touch:
         """Where the surfaces meet."""
 
+    def nearness(self, view: View) -> tuple[Vec3, Expr]:
+        """The normal and the penetration from which it is told when surfaces that are apart can meet."""
+        normal, depth, _, _ = self.touch(view)
+        return normal, depth
+
     def share(self, view: View) -> Expr | None:
         """The part of the law that counts here, of a surface made of pieces; None means all."""
         return None

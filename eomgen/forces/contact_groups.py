@@ -14,69 +14,17 @@ from ..elements.looks import Seen
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
-from ..graph.differentiate import jvp
-from ..graph.pair_calls import LOSSES, PairFunction, PairKind, pair_meeting, pair_spots, pair_sum
-from ..graph.traverse import reachable
+from ..graph.pair_calls import LOSSES, PairFunction, pair_meeting, pair_spots, pair_sum
 from ..graph.vectors import Vec3
-from ..limits.contacts import NOWHERE
-from ..numeric.pair_sums import POSE
 from ..records import dataclass
-from .branches import where
-from .contact import SpherePlane
-from .contact_rounds import AtHeight
+from .contact_pair_laws import PairLaw, pair_kind
 from .contact_shape_fields import PLANAR
-from .contact_shapes import (
-    PIECED,
-    ContactShape,
-    Feature,
-    ShapeMotion,
-    meet,
-    touching,
-    turning_radius,
-)
-from .contact_states import class_of, pair_states
+from .contact_shapes import PIECED, ContactShape, Feature, meet
+from .contact_states import POLYGON, alike, class_of, pair_states, part_of
 from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw, RigidLaw
 from .soil_laws import SoilPressure
-
-
-class _PairView:
-    """The motion of two shapes, as symbols of the graph of their law."""
-
-    def __init__(self, graph: Graph, planar: bool) -> None:
-        self.graph, self._planar = graph, planar
-        self._poses = [self._pose(letter) for letter in "ab"]
-
-    def _pose(self, letter: str) -> ShapeMotion:
-        x = [self.graph.symbol(f"{letter}{k}") for k in range(POSE)]
-        rotation = ((x[3], x[4], x[5]), (x[6], x[7], x[8]), (x[9], x[10], x[11]))
-        return ShapeMotion((x[0], x[1], x[2]), rotation, (x[12], x[13], x[14]), (x[15], x[16], x[17]))
-
-    def height(self) -> Vec3:
-        """From the plane of the first shape, in which shapes of the plane touch, to the second."""
-        first, second = self._poses
-        normal = vec.transpose(first.rotation)[2]
-        return vec.scale(vec.dot(normal, vec.sub(second.position, first.position)), normal)
-
-    def position(self, marker: Marker) -> Vec3:
-        position = self._poses[marker.body].position
-        return vec.sub(position, self.height()) if marker.body and self._planar else position
-
-    def rotation(self, marker: Marker) -> vec.Mat3:
-        return self._poses[marker.body].rotation
-
-    def velocity(self, marker: Marker) -> Vec3:
-        return self._poses[marker.body].velocity
-
-    def angular_velocity(self, marker: Marker) -> Vec3:
-        return self._poses[marker.body].angular_velocity
-
-    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
-        raise NotImplementedError  # no contact asks for it
-
-    def coordinate(self, name: str) -> tuple[Expr, Expr]:
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -136,8 +84,9 @@ class ContactGroups(Force):
     def _rates_apart(self) -> list[Expr]:
         """Rates of all states where no shapes meet."""
         found: list[Expr] = []
+        law = self._pair_law(False)
         for k in range(0, len(self.states), self._each):
-            friction, normal = self._holding(self.normal_law, self.friction, self.states[k : k + self._each], None)
+            friction, normal = law.holding(self.normal_law, self.friction, self.states[k : k + self._each], None)
             found += [*(() if friction is None else friction.rates_apart()), *normal.rates_apart()]
         return found
 
@@ -146,17 +95,15 @@ class ContactGroups(Force):
         """How many states a pair has."""
         return self.axes + self.normal_law.count
 
+    def _pair_law(self, planar: bool) -> PairLaw:
+        rigid = (self.coefficient, self.restitution)
+        slots = self._slots if self.states else 0
+        return PairLaw(self.name, self.normal_law, self.friction, rigid, self.axes, slots, planar)
+
     @property
     def _slots(self) -> int:
         """How many numbers a pair has in the sum: its states, and where shapes have pieces how many of them touch."""
         return self._each + any(shape.kind in PIECED for shape in (*self.first, *self.second))
-
-    def _holding(
-        self, normal: NormalLaw, friction: DryFriction | None, states: tuple[Expr, ...], lateral: Vec3 | None
-    ) -> tuple[DryFriction | None, NormalLaw]:
-        """The laws of a pair with its states."""
-        held = None if friction is None else friction.holding(states[: self.axes], lateral)
-        return held, normal.holding(states[self.axes :])
 
     def remainder(self, view: View) -> list[Load]:
         return self._loads(view, LOSSES)
@@ -232,103 +179,25 @@ class ContactGroups(Force):
         tables = [tuple(data.row(place[one.shape.marker.body], one.feature) for one in groups[g][k]) for g, k in keys]
         planar = any(shape.kind in PLANAR for shape in (*self.first, *self.second))
         blocks, _ = pair_states([[shape.parts() for shape in group] for group in shapes]) if self.states else ({}, 0)
+        law = self._pair_law(planar)
         kinds = []
         for i, (g, first) in enumerate(keys):
             for j, (h, second) in enumerate(keys):
                 apart = g != h or len(groups) == 1
-                twice = first == second and i > j  # round beside round, once
+                twice = alike(first, second) and i > j  # round beside round, once
                 if apart and not twice and meet((first, second)):
-                    sizes = tuple(len(groups[n][kind][0].feature.sizes) for n, kind in ((g, first), (h, second)))
-                    flat = planar and first != "half"  # which has no extent along its normal to leave out
-                    kind = self._kind((first, second), (i, j), (sizes[0], sizes[1]), flat, planar, data, lost)
+                    own, other = groups[g][first], groups[h][second]
+                    sizes = len(own[0].feature.sizes), len(other[0].feature.sizes)
+                    kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost)
                     if self.states:
-                        block = blocks[g, h, class_of(first), second]
-                        rows = tuple(self._slots * block.of_first(x.number, k) for k, x in enumerate(groups[g][first]))
-                        columns = tuple(self._slots * one.column for one in groups[h][second])
-                        kind = replace(kind, held=(rows, columns), states=self._slots)
+                        block = blocks[g, h, class_of(first, second), part_of(second)]
+                        rows = tuple(self._slots * block.of_first(x.number, x.column) for x in own)
+                        columns = tuple(self._slots * block.places * x.column for x in other)
+                        kind = replace(kind, held=(rows, columns))
                     kinds.append(kind)
         held = [x.value for x in self._held(data.graph)]
         numbers = (*(x.value for x in data.values), *held)
         return PairFunction(name, len(bodies), numbers, tuple(tables), tuple(kinds), len(held))
-
-    def _kind(
-        self,
-        kinds: tuple[str, str],
-        tables: tuple[int, int],
-        sizes: tuple[int, int],
-        flat: bool,
-        planar: bool,
-        data: _SharedData,
-        lost: bool,
-    ) -> PairKind:
-        """The law of one kind of pair in a graph of its own, with its derivative."""
-        graph = Graph()
-        view = _PairView(graph, flat)
-        places: list[int] = []
-
-        def own(x: Expr) -> Expr:
-            if x.value is not None:
-                return graph.constant(x.value)
-            places.append(data.place(x))
-            return graph.symbol(f"l{len(places) - 1}")
-
-        frame = Frame(vec.identity(graph), vec.zero(graph))
-        normal = self.normal_law.mapped(own)
-        dry, rigid = self.friction, [graph.zero if x is None else own(x) for x in (self.coefficient, self.restitution)]
-        friction = None if dry is None else dry.mapped(own)
-        markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
-        held = tuple(graph.symbol(f"s{k}") for k in range(self._slots if self.states else 0))
-        if held:
-            lateral = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2] if planar else None
-            friction, normal = self._holding(normal, friction, held[: self._each], lateral)
-        given = [
-            tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
-        ]
-        bare = SpherePlane(self.name, *markers, normal, friction, graph.zero)
-        contact = touching(kinds, markers, (given[0], given[1]), bare)
-        if flat:
-            contact = AtHeight(self.name, *markers, contact.normal_law, contact.friction, contact, view.height())
-        on_second, on_first = contact.remainder(view) if lost else contact.loads(view)
-        assert isinstance(on_second, MarkerLoad)
-        assert isinstance(on_first, MarkerLoad)
-        energy = graph.zero if lost else contact.potential(view)
-        assert energy is not None
-        results = [*on_second.force, *on_first.torque, *on_second.torque, energy]
-        share = contact.share(view)
-        if held and not lost:
-            rates = zip(contact.state_rates(view), contact.rates_apart(), strict=True)
-            part = graph.one if share is None else share
-            results += [(x - apart) * part for x, apart in rates]
-            if self._slots > self._each:
-                results.append(where(graph.apply("lt", 0.0, contact.touch(view)[1]), part, 0.0))
-        results += [graph.zero] * (len(held) if lost else 0)
-        names = [f"a{k}" for k in range(POSE + sizes[0])] + [f"b{k}" for k in range(POSE + sizes[1])]
-        names += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]
-        seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
-        slopes = jvp(results, seeds)
-        across, depth, arm, _ = contact.touch(view)
-        own_depth = depth
-        if share is not None:  # beside a piece of ground nothing is in it, and its neighbour is what is near
-            owned = graph.apply("lt", 0.0, share)
-            own_depth = where(owned, depth, -NOWHERE)
-            depth = where(owned, depth, graph.apply("min", depth, 0.0))
-        touch = [*across, depth, turning_radius(kinds[1], given[1], graph)]
-        out = vec.transpose(view.rotation(markers[kinds[0] == "half"]))[2] if planar else vec.zero(graph)
-        spot = [*across, own_depth, *vec.add(view.position(markers[0]), arm), *out, *rigid]
-        nodes, renamed = _kept(graph, [*results, *slopes, *touch, *spot])
-        ids, seen, place = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch, spot))
-        return PairKind(
-            f"{kinds[0]}_{kinds[1]}_{tables[0]}_{tables[1]}",
-            *tables,
-            flat,
-            tuple(places),
-            nodes,
-            (*names, *(f"d_{name}" for name in names)),
-            tuple(ids[: len(results)]),
-            tuple(ids[len(results) :]),
-            tuple(seen),
-            tuple(place),
-        )
 
 
 class _SharedData:
@@ -362,7 +231,7 @@ class _Part(NamedTuple):
 
 
 def _features(shapes: Sequence[ContactShape]) -> dict[str, list[_Part]]:
-    """Features of shapes, by class."""
+    """Features of shapes, by class; parts are numbered in this order."""
     found: dict[str, list[_Part]] = {}
     before: dict[str, int] = {}
     for number, shape in enumerate(shapes):
@@ -371,18 +240,12 @@ def _features(shapes: Sequence[ContactShape]) -> dict[str, list[_Part]]:
             found.setdefault(feature.kind, []).append(_Part(shape, feature, number, column))
         for kind, count in shape.parts().parts.items():
             before[kind] = before.get(kind, 0) + count
+    polygons = 0  # which are of one class, whatever the number of their corners
+    for kind, parts in found.items():
+        if part_of(kind) == POLYGON:
+            found[kind] = [part._replace(column=polygons + k) for k, part in enumerate(parts)]
+            polygons += len(parts)
     return found
-
-
-def _kept(graph: Graph, results: Sequence[Expr]) -> tuple[tuple[tuple[object, ...], ...], dict[int, int]]:
-    """The nodes of some results alone, the numbers 0 and 1 first as in every graph; their ids by the old ones."""
-    order = sorted({graph.zero.id, graph.one.id, *reachable(graph, (x.id for x in results))})
-    renamed = {old: new for new, old in enumerate(order)}
-    nodes = []
-    for i in order:
-        operation, *rest = graph.nodes[i]
-        nodes.append((operation, *(rest if operation in ("const", "sym") else (renamed[k] for k in rest))))
-    return tuple(nodes), renamed
 
 
 def _vector(x: Sequence[Expr]) -> Vec3:

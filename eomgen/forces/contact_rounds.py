@@ -109,5 +109,8 @@ class AtHeight(Contact):
         normal, depth, first, second = self.flat.touch(view)
         return normal, depth, vec.add(first, self.height), second
 
+    def nearness(self, view: View) -> tuple[Vec3, Expr]:
+        return self.flat.nearness(view)
+
     def share(self, view: View) -> Expr | None:
         return self.flat.share(view)

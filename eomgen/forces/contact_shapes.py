@@ -22,6 +22,7 @@ from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .contact import Contact, SpherePlane, joint_radius
 from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
+from .contact_polygons import PolygonPolygon, most_reach
 from .contact_profiles import (
     ArcRound,
     EdgeRound,
@@ -35,7 +36,7 @@ from .contact_profiles import (
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_shape_fields import GROUNDS
 from .contact_solids import EllipsoidPlane, RodRod
-from .contact_states import MET, ShapeParts, parts_of
+from .contact_states import MET, POLYGON, ShapeParts, part_of, parts_of
 
 #: Shapes whose pieces are edges and arcs.
 PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
@@ -127,7 +128,7 @@ class ContactShape:
             reach = reach.graph.apply("max", reach, x * x + y * y)
         thick = _width(edges, corners)
         points = [
-            Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, thick, k) for k, (x, y) in enumerate(corners)
+            Feature("vertex", _moved(frame, (x, y, zero)), (zero,), zero, thick, k) for k, (x, y) in enumerate(corners)
         ]
         return [Feature(f"polygon{len(corners)}", frame, tuple(edges), sqrt(reach), thick), *points]
 
@@ -241,6 +242,8 @@ def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
     """How far points of a feature are from its centre that its turning moves along a normal; 0 of what is round."""
     if kind == "ellipsoid":
         return _most(sizes)
+    if part_of(kind) == POLYGON:
+        return most_reach(sizes)
     return sizes[0] + sizes[1] if kind == "rod" else graph.zero
 
 
@@ -265,14 +268,14 @@ def _turned(frame: Frame, columns: tuple[int, int, int]) -> Frame:
 
 
 #: Features of the first shapes of :data:`~.contact_states.MET` that have several.
-_SURFACES = {"flat": ("segment", "polygon"), "ground": ("edge", "arc")}
-#: Classes of features that meet: the first is a surface, or round beside round.
+_SURFACES = {"ground": ("edge", "arc")}
+#: Classes of features that meet: the first is a surface, or both are of one class.
 MEETINGS = tuple((one, soft) for own, met in MET.items() for one in _SURFACES.get(own, (own,)) for soft in met)
 
 
 def meet(kinds: tuple[str, str]) -> bool:
     """Whether features of two classes meet, in this order."""
-    return (kinds[0].rstrip("0123456789"), kinds[1]) in MEETINGS
+    return (part_of(kinds[0]), part_of(kinds[1])) in MEETINGS
 
 
 class ShapeMotion(NamedTuple):
@@ -289,8 +292,9 @@ def touching(
     markers: tuple[Marker, Marker],
     sizes: tuple[tuple[Expr, ...], tuple[Expr, ...]],
     law: Contact,
+    spot: int = 0,
 ) -> Contact:
-    """The contact of one feature with another; ``law`` has the laws."""
+    """The contact of one feature with another at one of its places; ``law`` has the laws."""
     first, radius = sizes[0], sizes[1][0]
     normal = law.normal_law.at(lambda: joint_radius(first[0], radius) if kinds[0] == "round" else radius)
     friction = law.friction
@@ -301,6 +305,8 @@ def touching(
     laws = (law.name, *markers, normal, friction)
     if kinds[0] == "round":
         return RoundRound(*laws, (first[0], radius))
+    if part_of(kinds[1]) == POLYGON:
+        return PolygonPolygon(*laws, first, sizes[1], spot)
     if kinds[1] == "ellipsoid":
         x, y, z = sizes[1]
         return EllipsoidPlane(*laws, (x, y, z))

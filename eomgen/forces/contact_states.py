@@ -17,11 +17,12 @@ PLATE = 2  #: points of a plate unless given
 POINTS = 8  #: most points of a plate
 TEETH = 3  #: fewest teeth of a sprocket
 #: Parts that meet surfaces, in the order in which their states stand.
-PARTS = ("round", "corner", "end", "ellipsoid", "rod", "pad")
-_ROUND = ("round", "rod")
+PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon")
+POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
+_ROUND = ("round", "rod", POLYGON)
 #: Kind of shape -> what it is where it is the first of a pair.
 _FIRST = {
-    "circle": "round", "sphere": "round", "capsule": "rod", "segment": "flat", "box": "flat", "polygon": "flat",
+    "circle": "round", "sphere": "round", "capsule": "rod", "segment": "segment", "box": POLYGON, "polygon": POLYGON,
     "profile": "ground", "smooth_profile": "ground", "outline": "ground", "smooth_outline": "ground",
     "sprocket": "ground", "half_plane": "half", "half_space": "half",
 }  # fmt: skip
@@ -29,9 +30,10 @@ _FIRST = {
 MET = {
     "round": ("round",),
     "rod": ("round", "rod"),
-    "flat": ("round", "corner"),
-    "ground": ("round", "corner", "pad"),
-    "half": ("round", "corner", "end", "ellipsoid", "pad"),
+    "segment": ("round", "corner", "vertex"),
+    POLYGON: ("round", "corner", POLYGON),
+    "ground": ("round", "corner", "vertex", "pad"),
+    "half": ("round", "corner", "vertex", "end", "ellipsoid", "pad"),
 }
 
 
@@ -49,20 +51,22 @@ class PairStates(NamedTuple):
     columns: int
     rows: Mapping[int, int]  #: number of the first shape in its group -> row
     once: bool  #: whether the parts meet among themselves, each two once
+    places: int = 1  #: how many places of contact a pair has
 
     def of_first(self, shape: int, row: int) -> int:
-        """The number of a first part: of its shape, or where parts meet among themselves of its row in the table."""
+        """The number of a first part: of its shape, or where parts meet among themselves of its number among these."""
         if self.once:
-            return self.start + row * self.columns - row * (row + 1) // 2 - row - 1
-        return self.start + self.rows[shape] * self.columns
+            return self.start + self.places * (row * self.columns - row * (row + 1) // 2 - row - 1)
+        return self.start + self.places * self.rows[shape] * self.columns
 
 
 def parts_of(kind: str, points: int = 0) -> ShapeParts:
     """The parts of a shape; ``points`` counts the points of an outline, profile or plate, or the teeth of a wheel."""
     found = {
-        "circle": {"round": 1}, "sphere": {"round": 1}, "segment": {"corner": 2}, "box": {"corner": 4},
+        "circle": {"round": 1}, "sphere": {"round": 1}, "segment": {"corner": 2},
+        "box": {POLYGON: 1, "vertex": 4}, "polygon": {POLYGON: 1, "vertex": points},
         "capsule": {"rod": 1, "end": 2}, "ellipsoid": {"ellipsoid": 1}, "cuboid": {"end": 8},
-        "polygon": {"corner": points}, "outline": {"corner": points}, "smooth_outline": {"corner": points},
+        "outline": {"corner": points}, "smooth_outline": {"corner": points},
         "sprocket": {"corner": 2 * points}, "plate": {"pad": points},
         "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2},
     }  # fmt: skip
@@ -84,20 +88,37 @@ def pair_states(groups: Sequence[Sequence[ShapeParts]]) -> tuple[dict[tuple[int,
                     continue
                 once = first == second and g == h
                 count = sum(groups[g][k].parts[second] for k in own) if first == second else len(own)
-                block = PairStates(start, columns, {shape: row for row, shape in enumerate(own)}, once)
+                places = places_of((first, second))
+                block = PairStates(start, columns, {shape: row for row, shape in enumerate(own)}, once, places)
                 found[g, h, first, second] = block
-                start += count * (count - 1) // 2 if once else len(own) * columns
+                start += places * (count * (count - 1) // 2 if once else len(own) * columns)
     return found, start
 
 
-def class_of(feature: str) -> str:
-    """The class of a first part."""
-    return feature if feature in _ROUND else "surface"
+def class_of(feature: str, met: str) -> str:
+    """The class of a first part: its own where parts of one class meet each other, else that of surfaces."""
+    own, other = part_of(feature), part_of(met)
+    return own if own in _ROUND and (own != POLYGON or other == POLYGON) else "surface"
+
+
+def part_of(feature: str) -> str:
+    """The class of a feature, whatever the number of its corners."""
+    return feature.rstrip("0123456789")
+
+
+def alike(first: str, second: str) -> bool:
+    """Whether two features are of one class, whose parts meet each other once."""
+    return part_of(first) == part_of(second)
+
+
+def places_of(kinds: tuple[str, str]) -> int:
+    """At how many places two features touch."""
+    return 2 if part_of(kinds[0]) == part_of(kinds[1]) == POLYGON else 1
 
 
 def _meets(kind: str, first: str, second: str) -> bool:
     own = _FIRST.get(kind, "")
-    return own != "" and (own if own in _ROUND else "surface") == first and second in MET[own]
+    return own != "" and class_of(own, second) == first and second in MET[own]
 
 
 # -- from what the user gave ------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 from ..errors import UsageError
-from ..numeric.pair_sums import MEETING, MOTION, POSE, RECORD, PairSum, pairs_of_rows
+from ..numeric.pair_sums import MEETING, MOTION, POSE, RECORD, SPOT, PairSum, pairs_of_rows
 from ..records import dataclass
 from .core import Expr, Graph
 from .nodes import Node
@@ -53,7 +53,7 @@ class PairKind:
         Normal (3), from the first shape to the second, penetration, and the radius about the centre of the second shape
         of what its turning moves (0 where it is round).
     spot : tuple of int
-        Where they touch: :data:`~eomgen.numeric.pair_sums.SPOT` nodes.
+        Where they touch: :data:`~eomgen.numeric.pair_sums.SPOT` nodes for each place.
     held : tuple of tuple of int
         Of each row of the first table and of each of the second a number: their sum is the place of the pair's states
         among all states of the sum.  Empty without states.
@@ -161,7 +161,10 @@ class PairFunction:
     @cached_property
     def room(self) -> int:
         """How many pairs a list of near ones has room for: all, or some for each shape."""
-        pairs = sum(len(self.tables[kind.first]) * len(self.tables[kind.second]) for kind in self.kinds)
+        pairs = sum(
+            len(self.tables[kind.first]) * len(self.tables[kind.second]) * (len(kind.spot) // SPOT)
+            for kind in self.kinds
+        )
         each = IN_PLANE if any(kind.planar for kind in self.kinds) else IN_SPACE
         return min(pairs, SPARE + each * sum(map(len, self.tables)))
 
@@ -392,5 +395,5 @@ def _acts(function: PairFunction, moving: PairCall, item: int) -> bool:
         body = item // 6
         return bool(bodies & {body, *function.touching[body]}) or any(body in function.holders[k] for k in held)
     state = item - 6 * function.bodies - 1
-    each = function.kinds[0].states
+    each = min(kind.states for kind in function.kinds)  # a pair that touches at several places has a multiple
     return bool(bodies & function.holders[state]) or any(k // each == state // each for k in held)

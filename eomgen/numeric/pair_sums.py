@@ -201,8 +201,9 @@ class PairSum:
                 continue
             numbers = [*a[i].T, *b[j].T, *data[list(law)][:, None]]
             values = _table(spot(numbers), len(i), data)
-            rows = np.concatenate([[starts[first] + i, starts[second] + j], values]).T
-            found.append(rows[values[3] > -margin])
+            places = [values[k : k + SPOT] for k in range(0, len(values), SPOT)]
+            rows = np.stack([np.concatenate([[starts[first] + i, starts[second] + j], one]).T for one in places], 1)
+            found.append(rows[np.stack([one[3] for one in places], 1) > -margin[:, None]])
         return np.concatenate(found)
 
     def _sum(self, data: np.ndarray, rates: np.ndarray | None) -> list[Any]:

@@ -1,0 +1,224 @@
+"""Force elements, the law of one kind of pair of shapes: two features, their laws -> a graph of its own.
+
+Its results, their directional derivative, what tells when shapes meet, and where they touch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+from operator import add
+from typing import NamedTuple
+
+from ..frames import Frame, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph
+from ..graph.differentiate import jvp
+from ..graph.pair_calls import PairKind
+from ..graph.traverse import reachable
+from ..graph.vectors import Vec3
+from ..limits.contacts import NOWHERE
+from ..numeric.pair_sums import POSE
+from .branches import where
+from .contact import Contact, SpherePlane
+from .contact_rounds import AtHeight
+from .contact_shapes import ShapeMotion, touching, turning_radius
+from .contact_states import places_of
+from .force import MarkerLoad, View
+from .friction_laws import DryFriction
+from .normal_laws import NormalLaw
+
+
+class _PairView:
+    """The motion of two shapes, as symbols of the graph of their law."""
+
+    def __init__(self, graph: Graph, planar: bool) -> None:
+        self.graph, self._planar = graph, planar
+        self._poses = [self._pose(letter) for letter in "ab"]
+
+    def _pose(self, letter: str) -> ShapeMotion:
+        x = [self.graph.symbol(f"{letter}{k}") for k in range(POSE)]
+        rotation = ((x[3], x[4], x[5]), (x[6], x[7], x[8]), (x[9], x[10], x[11]))
+        return ShapeMotion((x[0], x[1], x[2]), rotation, (x[12], x[13], x[14]), (x[15], x[16], x[17]))
+
+    def height(self) -> Vec3:
+        """From the plane of the first shape, in which shapes of the plane touch, to the second."""
+        first, second = self._poses
+        normal = vec.transpose(first.rotation)[2]
+        return vec.scale(vec.dot(normal, vec.sub(second.position, first.position)), normal)
+
+    def position(self, marker: Marker) -> Vec3:
+        position = self._poses[marker.body].position
+        return vec.sub(position, self.height()) if marker.body and self._planar else position
+
+    def rotation(self, marker: Marker) -> vec.Mat3:
+        return self._poses[marker.body].rotation
+
+    def velocity(self, marker: Marker) -> Vec3:
+        return self._poses[marker.body].velocity
+
+    def angular_velocity(self, marker: Marker) -> Vec3:
+        return self._poses[marker.body].angular_velocity
+
+    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
+        raise NotImplementedError  # no contact asks for it
+
+    def coordinate(self, name: str) -> tuple[Expr, Expr]:
+        raise NotImplementedError
+
+
+class PairLaw(NamedTuple):
+    """The law of all pairs of some contacts.
+
+    Attributes
+    ----------
+    name : str
+    normal : NormalLaw
+    friction : DryFriction or None
+    rigid : tuple of two Expr or None
+        Coefficient of friction and restitution of bodies that are rigid.
+    axes : int
+        How many states one place of contact has of friction.
+    slots : int
+        How many numbers it has in the sum: its states, and how many pieces touch; 0 without states.
+    planar : bool
+        Whether the shapes lie in the plane.
+    """
+
+    name: str
+    normal: NormalLaw
+    friction: DryFriction | None
+    rigid: tuple[Expr | None, Expr | None]
+    axes: int
+    slots: int
+    planar: bool
+
+    def holding(
+        self, normal: NormalLaw, friction: DryFriction | None, states: tuple[Expr, ...], lateral: Vec3 | None
+    ) -> tuple[DryFriction | None, NormalLaw]:
+        """The laws of a place of contact with its states."""
+        held = None if friction is None else friction.holding(states[: self.axes], lateral)
+        return held, normal.holding(states[self.axes :])
+
+    @property
+    def each(self) -> int:
+        """How many states a place of contact has."""
+        return self.axes + self.normal.count
+
+
+def pair_kind(
+    law: PairLaw,
+    kinds: tuple[str, str],
+    tables: tuple[int, int],
+    sizes: tuple[int, int],
+    place: Callable[[Expr], int],
+    lost: bool,
+) -> PairKind:
+    """How features of two classes act on each other.
+
+    Parameters
+    ----------
+    law : PairLaw
+    kinds, tables, sizes : tuple of two
+        Classes of the features, the tables in which they stand, how many sizes they have.
+    place : callable
+        Gives an expression of the model a place behind the poses of the bodies.
+    lost : bool
+        Whether only what is taken from the energy counts.
+    """
+    graph = Graph()
+    flat = law.planar and kinds[0] != "half"  # which has no extent along its normal to leave out
+    view = _PairView(graph, flat)
+    places: list[int] = []
+
+    def own(x: Expr) -> Expr:
+        if x.value is not None:
+            return graph.constant(x.value)
+        places.append(place(x))
+        return graph.symbol(f"l{len(places) - 1}")
+
+    frame = Frame(vec.identity(graph), vec.zero(graph))
+    normal = law.normal.mapped(own)
+    rigid = [graph.zero if x is None else own(x) for x in law.rigid]
+    friction = None if law.friction is None else law.friction.mapped(own)
+    markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
+    lateral = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2] if law.planar else None
+    given = [
+        tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
+    ]
+    out = vec.transpose(view.rotation(markers[kinds[0] == "half"]))[2] if law.planar else vec.zero(graph)
+    exerted: list[list[Expr]] = []
+    held: list[Expr] = []
+    rates: list[Expr] = []
+    spots: list[Expr] = []
+    touch: list[Expr] = []
+    for spot in range(places_of(kinds)):
+        states = tuple(graph.symbol(f"s{len(held) + k}") for k in range(law.slots))
+        held += states
+        dry, push = law.holding(normal, friction, states[: law.each], lateral) if states else (friction, normal)
+        bare = SpherePlane(law.name, *markers, push, dry, graph.zero)
+        contact = touching(kinds, markers, (given[0], given[1]), bare, spot)
+        if flat:
+            contact = AtHeight(law.name, *markers, contact.normal_law, contact.friction, contact, view.height())
+        exerted.append(_exerted(contact, view, lost))
+        if states:
+            rates += [graph.zero] * law.slots if lost else _rates(contact, view, law.slots > law.each)
+        normal_of, depth, arm, _ = contact.touch(view)
+        share = contact.share(view)
+        touch = [*(contact.nearness(view)[0]), contact.nearness(view)[1], turning_radius(kinds[1], given[1], graph)]
+        if share is not None:  # beside a piece of ground nothing is in it, and its neighbour is what is near
+            owned = graph.apply("lt", 0.0, share)
+            touch[3] = where(owned, depth, graph.apply("min", depth, 0.0))
+            depth = where(owned, depth, -NOWHERE)
+        spots += [*normal_of, depth, *vec.add(view.position(markers[0]), arm), *out, *rigid]
+    results = [*(reduce(add, found) for found in zip(*exerted, strict=True)), *rates]
+    names = [f"a{k}" for k in range(POSE + sizes[0])] + [f"b{k}" for k in range(POSE + sizes[1])]
+    names += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]
+    seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
+    slopes = jvp(results, seeds)
+    nodes, renamed = _kept(graph, [*results, *slopes, *touch, *spots])
+    ids, seen, met = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch, spots))
+    return PairKind(
+        f"{kinds[0]}_{kinds[1]}_{tables[0]}_{tables[1]}",
+        *tables,
+        flat,
+        tuple(places),
+        nodes,
+        (*names, *(f"d_{name}" for name in names)),
+        tuple(ids[: len(results)]),
+        tuple(ids[len(results) :]),
+        tuple(seen),
+        tuple(met),
+        states=len(held),
+    )
+
+
+def _exerted(contact: Contact, view: View, lost: bool) -> list[Expr]:
+    """Force on the second shape, torques on the first and the second, the energy."""
+    on_second, on_first = contact.remainder(view) if lost else contact.loads(view)
+    assert isinstance(on_second, MarkerLoad)
+    assert isinstance(on_first, MarkerLoad)
+    energy = view.graph.zero if lost else contact.potential(view)
+    assert energy is not None
+    return [*on_second.force, *on_first.torque, *on_second.torque, energy]
+
+
+def _rates(contact: Contact, view: View, counts: bool) -> list[Expr]:
+    """What a place of contact adds to the rates of its states, and to the number of pieces that touch."""
+    graph, share = view.graph, contact.share(view)
+    part = graph.one if share is None else share
+    pairs = zip(contact.state_rates(view), contact.rates_apart(), strict=True)
+    found = [(x - apart) * part for x, apart in pairs]
+    touches = [where(graph.apply("lt", 0.0, contact.touch(view)[1]), part, 0.0)] if counts else []
+    return [*found, *touches]
+
+
+def _kept(graph: Graph, results: Sequence[Expr]) -> tuple[tuple[tuple[object, ...], ...], dict[int, int]]:
+    """The nodes of some results alone, the numbers 0 and 1 first as in every graph; their ids by the old ones."""
+    order = sorted({graph.zero.id, graph.one.id, *reachable(graph, (x.id for x in results))})
+    renamed = {old: new for new, old in enumerate(order)}
+    nodes = []
+    for i in order:
+        operation, *rest = graph.nodes[i]
+        nodes.append((operation, *(rest if operation in ("const", "sym") else (renamed[k] for k in rest))))
+    return tuple(nodes), renamed

@@ -1,0 +1,169 @@
+"""Polygons on polygons in the plane: flush edges, corners, energy, rigid stacks, beside MuJoCo."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import contact_scenes as scenes
+import mujoco
+import numpy as np
+import pytest
+
+import eomgen as eg
+
+G, MASS, HIGH, STIFF = 9.81, 1.5, 0.1, 1e5
+SOFT = {"stiffness": STIFF, "exponent": 1, "dissipation": 5.0, "friction": 0.5, "smoothing": 1e-3}
+RIGID = {"normal_law": "rigid", "friction": 0.5}
+
+
+def box(wide: float, corners: int = 4) -> dict[str, Any]:
+    """A box, or the same as a polygon with more corners on its upper edge, a little higher in the middle."""
+    if corners == 4:
+        return {"shape": "box", "size": (wide, HIGH)}
+    x, y = wide / 2, HIGH / 2
+    return {"shape": "polygon", "points": [(-x, -y), (x, -y), (x, y), (0, y + 1e-3), (-x, y)]}
+
+
+def tower(shapes: Any, law: Any, turn: float = 0.0, swapped: bool = False, target: str = "cython") -> Any:
+    """Bodies on each other on a floor, all turned by an angle, gravity too."""
+    c, s = np.cos(turn), np.sin(turn)
+    m = eg.Model("tower", gravity=(G * s, -G * c, 0))
+    base = m.ground.at(0, 0, 0, rpy=(0, 0, turn))
+    bodies = [m.body(f"b{k}", mass=MASS, inertia={"zz": 0.01}) for k in range(len(shapes))]
+    for k, body in enumerate(bodies):
+        m.planar(f"j{k}", base, body)
+        m.initial({f"j{k}_y": (k + 0.5) * HIGH})
+    group = [{**shape, "on": body} for shape, body in zip(shapes, bodies, strict=True)]
+    m.contacts("floor", group[0], {"shape": "half_plane", "on": base}, law)
+    for k in range(len(group) - 1):
+        pair = group[k : k + 2]
+        m.contacts(f"c{k}", *(pair[::-1] if swapped else pair), law)
+    return m.compile(target=target)
+
+
+WIDTHS = [(0.2, 0.2, 0.2), (0.2, 0.1, 0.1), (0.1, 0.2, 0.05)]
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+@pytest.mark.parametrize("widths", WIDTHS, ids=str)
+def test_flush_stacks_rest(widths: tuple[float, ...], turn: float, swapped: bool) -> None:
+    """Each of two places of contact carries half of what lies above: d = m g / (2 k)."""
+    mod = tower([box(wide) for wide in widths], SOFT, turn, swapped)
+    run = mod.simulate((0, 2), method="Radau", rtol=1e-8, atol=1e-11)
+    heights = np.array([run[f"j{k}_y"][-1] for k in range(3)])
+    sunk = MASS * G * np.array([3, 2, 1]) / (2 * STIFF)
+    wanted = (np.arange(3) + 0.5) * HIGH - np.cumsum(sunk)
+    np.testing.assert_allclose(heights, wanted, atol=1e-8)
+    for k in range(3):
+        assert abs(run[f"j{k}_3"][-1]) < 1e-9
+        assert np.abs(run[f"j{k}_x"]).max() < 1e-8
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("widths", WIDTHS, ids=str)
+def test_flush_stacks_are_held_rigidly(widths: tuple[float, ...], target: str) -> None:
+    mod = tower([box(wide) for wide in widths], RIGID, 0.3, False, target)
+    run = mod.simulate(0.2, method="moreau", step=1e-3)
+    for k in range(3):
+        assert np.abs(run[f"j{k}_y"] - (k + 0.5) * HIGH).max() < 1e-9
+        assert np.abs(run[f"j{k}_x"]).max() < 1e-9
+        assert np.abs(run[f"j{k}_3"]).max() < 1e-9
+
+
+def test_polygons_of_other_numbers_of_corners_stand_on_each_other() -> None:
+    """In one group, of which pairs are met once."""
+    m = eg.Model("mixed", gravity=(0, -G, 0))
+    bodies = [m.body(f"b{k}", mass=MASS, inertia={"zz": 0.01}) for k in range(3)]
+    group = [{**box(0.2, 4 + k % 2), "on": body} for k, body in enumerate(bodies)]
+    group[1]["on"] = bodies[1].at(0, 0, 0, rpy=(0, 0, np.pi))  # the tip hangs down
+    for k, body in enumerate(bodies):
+        m.planar(f"j{k}", m.ground, body)
+        m.initial({f"j{k}_y": (k + 0.5) * HIGH + 1e-3 * (k > 0), f"j{k}_3": 0.0})
+    m.contacts("floor", group, {"shape": "half_plane", "on": m.ground}, SOFT)
+    m.contacts("among", group, law=SOFT)
+    mod = m.compile(target="numpy")
+    x = mod.x0(j0_y=HIGH / 2 - 1e-4, j1_y=1.5 * HIGH + 1e-3 - 2e-4, j2_y=2.5 * HIGH + 1e-3 - 3e-4)
+    force = -mod.bias(0.0, x)
+    weights = np.array([0.0, -MASS * G, 0.0] * 3)
+    pushed = force + 0.0 * weights
+    # floor: two corners; tip in the lower box: one place; flat edges above: two
+    wanted = [2 - 1, 1 - 2, 2]
+    np.testing.assert_allclose(pushed[[1, 4, 7]] + MASS * G, np.multiply(wanted, STIFF * 1e-4), rtol=1e-9)
+
+
+def test_a_corner_stands_on_a_side_and_beside_a_corner() -> None:
+    """k d against the side, at the corner; the same where the side ends just beside."""
+    mod = tower([box(0.2), box(0.1)], {"stiffness": STIFF, "exponent": 1}, target="numpy")
+    half = np.hypot(0.05, 0.05)
+    d = 1e-4
+    for x in (0.0, 0.05, 0.0999, -0.0998):
+        state = mod.x0(j0_y=0.05, j1_x=x, j1_y=0.1 + half - d, j1_3=np.pi / 4)
+        force = -mod.bias(0.0, state) + [0, MASS * G, 0] * 2
+        if abs(x) < 0.09:
+            np.testing.assert_allclose(force[3:6], [0, STIFF * d, 0], atol=1e-7)
+            np.testing.assert_allclose(force[:3], [0, -STIFF * d, -STIFF * d * x], atol=1e-7)
+        assert np.all(np.isfinite(force))
+        assert force[4] > 0.0
+
+
+def test_force_is_continuous_where_corners_change_places() -> None:
+    """A tilted box slides over the end of another: the force jumps by no more than its tilt turns it."""
+    mod = tower([box(0.2), box(0.2)], {"stiffness": STIFF, "exponent": 1.5}, target="numpy")
+    tilt = 1e-3
+    places = np.linspace(-0.02, 0.02, 401)
+    states = np.array([mod.x0(j0_y=0.05, j1_x=x, j1_y=0.15 - 4e-4, j1_3=tilt) for x in places]).T
+    forces = -mod.bias(0.0, np.ascontiguousarray(states))
+    jumps = np.abs(np.diff(forces, axis=1)).max(axis=1)
+    size = np.abs(forces[4]).max()
+    assert jumps[4] < 0.02 * size
+    assert jumps[3] < 1.5 * tilt * size
+    energy = mod.energy(np.ascontiguousarray(states))[1]
+    assert np.abs(np.diff(energy, 2)).max() < 1e-3 * energy.max()
+
+
+def test_energy_is_kept_where_boxes_tumble() -> None:
+    """Without loss, in frames turned against each other: thrown boxes and triangles keep their energy."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        m, bodies = scenes.planar(f"tumble{seed}", 3, (0, 0, 0))
+        group = [
+            {**scenes.PLANAR[kind], "on": body.at(0, 0, 0, rpy=(0, 0, turn))}
+            for kind, body, turn in zip(("box", "polygon", "box"), bodies, rng.uniform(-3, 3, 3), strict=True)
+        ]
+        m.contacts("among", group, law={"stiffness": 1e6, "exponent": 1.5})
+        mod = m.compile()
+        start = {}
+        for k in range(3):
+            way = 2 * np.pi * k / 3
+            start |= {f"j{k}_x": 0.35 * np.cos(way), f"j{k}_y": 0.35 * np.sin(way), f"j{k}_3": rng.uniform(-3, 3)}
+            start |= {f"j{k}_x_dot": -np.cos(way), f"j{k}_y_dot": -np.sin(way), f"j{k}_3_dot": rng.uniform(-5, 5)}
+        run = mod.simulate((0, 1), initial=start, rtol=1e-9, atol=1e-11)
+        energy = np.array([sum(mod.energy(x)) for x in run.x.T])
+        assert max(mod.energy(x)[1] for x in run.x.T) > 0.1
+        assert np.abs(energy / energy[0] - 1).max() < 1e-4, seed
+
+
+def test_a_stack_rests_as_in_mujoco() -> None:
+    """A box on a narrower one beside its middle: heights, and no tilt but what the stiffness gives."""
+    wide, mass = (0.2, 0.1), MASS
+    aside = 0.01
+    xml = f"""<mujoco><option timestep="1e-4" cone="elliptic" iterations="100" tolerance="1e-12"/>
+    <default><geom solref="0.002 1" solimp="0.99 0.999 0.0001" friction="0.5 0 0"/></default><worldbody>
+    <geom type="plane" size="5 5 1"/>
+    <body pos="0 0 0.05"><freejoint/><geom type="box" size="0.1 0.1 0.05" mass="{mass}"/></body>
+    <body pos="{aside} 0 0.15"><freejoint/><geom type="box" size="0.05 0.1 0.05" mass="{mass}"/></body>
+    </worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    for _ in range(5000):
+        mujoco.mj_step(model, data)
+    mod = tower([box(wide[0]), box(wide[1])], SOFT)
+    run = mod.simulate((0, 1), initial={"j1_x": aside}, method="Radau", rtol=1e-8, atol=1e-11)
+    found = [data.qpos[0], data.qpos[2], data.qpos[7], data.qpos[9]]
+    ours = [run[name][-1] for name in ("j0_x", "j0_y", "j1_x", "j1_y")]
+    np.testing.assert_allclose(ours, found, atol=3e-4)
+    # forces of rest: of the upper box its weight, and the moment about the lower one's middle
+    x = run.x[:, -1]
+    force = -mod.bias(0.0, x) + [0, mass * G, 0] * 2
+    np.testing.assert_allclose(force[[1, 4]], [mass * G, mass * G], rtol=1e-5)
