@@ -39,6 +39,7 @@ from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw, RigidLaw
 from .soil_laws import SoilPressure
+from .soil_wheels import SoilWheel
 
 
 class _PairView:
@@ -288,6 +289,9 @@ class ContactGroups(Force):
         contact = touching(kinds, markers, (given[0], given[1]), bare)
         if flat:
             contact = AtHeight(self.name, *markers, contact.normal_law, contact.friction, contact, view.height())
+        if kinds[1] == "rim":
+            across = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2]
+            contact = SoilWheel(self.name, *markers, normal, friction, contact, given[1][0], given[1][1], across)
         on_second, on_first = contact.remainder(view) if lost else contact.loads(view)
         assert isinstance(on_second, MarkerLoad)
         assert isinstance(on_first, MarkerLoad)
