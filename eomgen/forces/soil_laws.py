@@ -187,7 +187,7 @@ _RISE = FORCE.times(REACH, -1)
 SOIL: Fields = {
     "soil": Field(
         "choice",
-        "soil under plates and wheels, instead of laws of the normal force and friction: the name of a published one, or "
+        "soil under plates and wheels, instead of laws of normal force and friction: the name of a published one, or "
         f"{OWN} with all numbers given; numbers that are given replace those of a named soil",
         choices=(OWN, *SOILS),
     ),
