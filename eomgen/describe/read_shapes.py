@@ -86,7 +86,7 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         return None if lengths is None else tuple(lengths)
     if kind == "plate":
         return _plate(reader, path, given)
-    names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius",)
+    names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius", *(["width"] * ("width" in given)))
     sizes = [reader.expression(f"{path}.{name}", given.get(name, 0)) for name in names]
     for name, x in zip(names, sizes, strict=True):
         if name in given:

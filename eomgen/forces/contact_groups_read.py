@@ -31,6 +31,9 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
     _refuse_pairs(e, first, second)
     if soil:
         _refuse_on_soil(e, first, second)
+    for key, shapes in (("first", first), ("second", second)):
+        if not soil and any(shape.is_wheel for shape in shapes):
+            e.fault(key, "has a circle with a width, which belongs to wheels on soil", "leave width out, or give soil")
     if isinstance(law, HertzBodies):
         for key, shapes in (("first", first), ("second", second)):
             if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
@@ -39,7 +42,8 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
     axes = 0
     if soil or has_bristles(e.values):
         groups = given_groups(e.values)
-        axes, pairs = len(_axes(e.values, groups, lateral)), pair_states(groups)[1]
+        pairs = pair_states(groups)[1]
+        axes = len(_axes(e.values, groups, lateral)) if pairs else 0
         if pairs > MOST_PAIRS:
             told = f"has {pairs} pairs with states; at most {MOST_PAIRS} may have them"
             remedy = "put only shapes that stick to each other into the groups, or use friction_law: brown_mcphee"
@@ -79,11 +83,17 @@ def _refuse_on_soil(e: Entry, first: Sequence[ContactShape], second: Sequence[Co
     """Note groups that are not plates on ground."""
     for shapes, others, key in ((first, second, "second"), (second, first, "first")):
         if any(shape.kind in GROUNDS for shape in shapes):
-            wrong = sorted({shape.kind for shape in others if shape.kind != "plate"})
+            wrong = sorted({shape.kind for shape in others if shape.kind != "plate" and not shape.is_wheel})
+            wheels = [shape for shape in others if shape.is_wheel]
             if wrong:
-                e.fault(key, f"a {wrong[0]} does not lie on soil", "give plates: the undersides of links, soles, feet")
+                remedy = "give plates: the undersides of links, soles, feet; or wheels: circles that have a width"
+                e.fault(key, f"a {wrong[0]} does not lie on soil", remedy)
+            elif 0 < len(wheels) < len(others):
+                e.fault(key, "has wheels and plates, which remember differently", "give each contacts of their own")
+            for word in ("recovery", "lateral") if wheels else ("peak_angle", "reversal"):
+                e.refuse(word, f"has no meaning for {'wheels' if wheels else 'plates'}")
             return
-    e.fault("", "has soil, but no ground", "give half_plane or a profile as one group, plates as the other")
+    e.fault("", "has soil, but no ground", "give half_plane or a profile as one group, plates or wheels as the other")
 
 
 def _axes(values: Mapping[str, Any], groups: Sequence[Sequence[ShapeParts]], lateral: bool) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ from .contact_states import places_of
 from .force import MarkerLoad, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw
+from .soil_wheels import SoilWheel
 
 
 class _PairView:
@@ -160,6 +161,9 @@ def pair_kind(
         contact = touching(kinds, markers, (given[0], given[1]), bare, spot)
         if flat:
             contact = AtHeight(law.name, *markers, contact.normal_law, contact.friction, contact, view.height())
+        if kinds[1] == "rim":
+            across = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2]
+            contact = SoilWheel(law.name, *markers, push, dry, contact, given[1][0], given[1][1], across)
         exerted.append(_exerted(contact, view, lost))
         if states:
             rates += [graph.zero] * law.slots if lost else _rates(contact, view, law.slots > law.each)

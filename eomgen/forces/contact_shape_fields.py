@@ -43,7 +43,10 @@ def _outline(how: str) -> Fields:
 
 
 _SIZES: dict[str, Fields] = {
-    "circle": {"radius": _RADIUS},
+    "circle": {
+        "radius": _RADIUS,
+        "width": Field("expression", "width across the plane (m), of wheels on soil", dimension=LENGTH),
+    },
     "segment": {
         "length": Field("expression", _ALONG.format("x"), required=True, dimension=LENGTH),
         "radius": _RADIUS._replace(required=False, default=0),

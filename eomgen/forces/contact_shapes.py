@@ -36,7 +36,7 @@ from .contact_profiles import (
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_shape_fields import GROUNDS
 from .contact_solids import EllipsoidPlane, RodRod
-from .contact_states import MET, POLYGON, ShapeParts, part_of, parts_of
+from .contact_states import MET, POLYGON, WHEEL, ShapeParts, part_of, parts_of
 
 #: Shapes whose pieces are edges and arcs.
 PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
@@ -81,9 +81,10 @@ class ContactShape:
     kind : str
         One of :data:`~.contact_shape_fields.SHAPE_FIELDS`.
     sizes : tuple of Expr
-        radius; length, radius; of a box or polygon x and y of its corners, counterclockwise; of a profile or an outline
-        its depth and x and y of its points, of outlines clockwise; of a sprocket its depth, teeth, pitch, seat, tip
-        radius and angle of a seat; half axes; lengths; of a plate length, width and number of points.
+        radius, and of a wheel on soil its width; length, radius; of a box or polygon x and y of its corners,
+        counterclockwise; of a profile or an outline its depth and x and y of its points, of outlines clockwise; of a
+        sprocket its depth, teeth, pitch, seat, tip radius and angle of a seat; half axes; lengths; of a plate length,
+        width and number of points.
     """
 
     kind: str
@@ -93,6 +94,8 @@ class ContactShape:
     def features(self) -> list[Feature]:
         """Its parts."""
         frame, zero = self.marker.frame, self.marker.frame.position[0].graph.zero
+        if self.is_wheel:
+            return [Feature("rim", frame, self.sizes, self.sizes[0], 2.0 * self.sizes[0])]
         if self.kind in ("circle", "sphere"):
             return [Feature("round", frame, self.sizes, self.sizes[0], 2.0 * self.sizes[0])]
         if self.kind in ("half_plane", "half_space"):
@@ -132,8 +135,15 @@ class ContactShape:
         ]
         return [Feature(f"polygon{len(corners)}", frame, tuple(edges), sqrt(reach), thick), *points]
 
+    @property
+    def is_wheel(self) -> bool:
+        """Whether it is a circle with a width."""
+        return self.kind == "circle" and len(self.sizes) > 1
+
     def parts(self) -> ShapeParts:
         """How many parts of each class it has."""
+        if self.is_wheel:
+            return parts_of(WHEEL)
         counts = {"polygon": len(self.sizes) // 2, "sprocket": self._whole(1), "plate": self._whole(2)}
         return parts_of(self.kind, counts.get(self.kind, (len(self.sizes) - 1) // 2))
 

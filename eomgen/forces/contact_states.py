@@ -15,6 +15,7 @@ from ..numeric.counts import as_count
 MOST_PAIRS = 2000  #: pairs that may have states: equations grow with states, and circles among themselves with squares
 PLATE = 2  #: points of a plate unless given
 POINTS = 8  #: most points of a plate
+WHEEL = "wheel"  #: a circle with a width
 TEETH = 3  #: fewest teeth of a sprocket
 #: Parts that meet surfaces, in the order in which their states stand.
 PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon")
@@ -32,8 +33,8 @@ MET = {
     "rod": ("round", "rod"),
     "segment": ("round", "corner", "vertex"),
     POLYGON: ("round", "corner", POLYGON),
-    "ground": ("round", "corner", "vertex", "pad"),
-    "half": ("round", "corner", "vertex", "end", "ellipsoid", "pad"),
+    "ground": ("round", "corner", "vertex", "pad", "rim"),
+    "half": ("round", "corner", "vertex", "end", "ellipsoid", "pad", "rim"),
 }
 
 
@@ -61,13 +62,16 @@ class PairStates(NamedTuple):
 
 
 def parts_of(kind: str, points: int = 0) -> ShapeParts:
-    """The parts of a shape; ``points`` counts the points of an outline, profile or plate, or the teeth of a wheel."""
+    """The parts of a shape; ``points`` counts the points of an outline, profile or plate, or the teeth of a wheel.
+
+    A wheel, which is a circle with a width, has one part, which has no states.
+    """
     found = {
         "circle": {"round": 1}, "sphere": {"round": 1}, "segment": {"corner": 2},
         "box": {POLYGON: 1, "vertex": 4}, "polygon": {POLYGON: 1, "vertex": points},
         "capsule": {"rod": 1, "end": 2}, "ellipsoid": {"ellipsoid": 1}, "cuboid": {"end": 8},
         "outline": {"corner": points}, "smooth_outline": {"corner": points},
-        "sprocket": {"corner": 2 * points}, "plate": {"pad": points},
+        "sprocket": {"corner": 2 * points}, "plate": {"pad": points}, WHEEL: {"rim": 1},
         "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2},
     }  # fmt: skip
     return ShapeParts(kind, found.get(kind, {}))
@@ -164,6 +168,8 @@ def _given_shapes(value: Any) -> list[ShapeParts]:
             count = points_of_plate(shape) or 0
         elif kind == "sprocket":
             count = teeth_of_sprocket(shape) or 0
+        elif kind == "circle" and "width" in shape:
+            kind, count = WHEEL, 1
         else:
             count = len(_listed(shape.get("points", ())))
         found += [parts_of(kind, count)] * len(_listed(shape.get("on")))

@@ -1,4 +1,4 @@
-"""Force elements, laws of soil under plates: sinkage with unloading, and shear that builds up with displacement.
+"""Force elements, laws of soil: sinkage with unloading, and shear that builds up with displacement.
 
 Each point of a plate remembers its greatest sinkage and its shear displacement as states, as long as it is in the
 ground.
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import ClassVar
 
-from ..elements.dimensions import FORCE, LENGTH, NONE, REACH, TIME
+from ..elements.dimensions import FORCE, LENGTH, NONE, REACH, SPEED, TIME
 from ..elements.entry import Entry
 from ..elements.field import Field, Fields
 from ..graph import vectors as vec
@@ -20,12 +20,15 @@ from ..graph.vectors import Vec3
 from ..limits.contacts import CAUGHT_UP
 from ..records import dataclass
 from .branches import beyond_zero, where
+from .contact_states import WHEEL, given_groups
 from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip
 from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, NormalLaw
 from .soils import RECOVERY, SOILS
 
 OWN = "own"  #: the soil whose numbers are all given
 REBOUND = 0.1  #: part of the sinkage that unloading gives back, where nothing is said
+REVERSAL = 0.01  #: (m/s) of a wheel over the ground, over which its front becomes its rear
+_NUMBERS = ("cohesive", "frictional", "exponent", "dissipation", "recovery", "rebound", "width", "reversal")
 
 
 @dataclass(frozen=True)
@@ -51,9 +54,26 @@ class SoilPressure(NormalLaw):
     unloading: tuple[Expr, Expr] | None
     dissipation: Expr
     recovery: Expr
+    reversal: Expr  #: of wheels, as the next
+    peak: tuple[Expr, Expr] | None = None
     area: Expr | None = None
     width: Expr | None = None
     deepest: Expr | None = None
+
+    def modulus_of(self, width: Expr) -> Expr:
+        """k of what has a width, unless one is given."""
+        return self.cohesive / (width if self.width is None else self.width) + self.frictional
+
+    def greatest(self, depth: Expr, width: Expr) -> Expr:
+        """The pressure at the greatest sinkage so far."""
+        return self.modulus_of(width) * depth**self.exponent
+
+    def unloading_slope(self, deepest: Expr, top: Expr) -> Expr:
+        """k_u below the greatest sinkage so far, at which the pressure was ``top``."""
+        if self.unloading is None:
+            assert self.rebound is not None
+            return top / (self.rebound * deepest)
+        return deepest.graph.apply("max", self.unloading[0] + self.unloading[1] * deepest, top / deepest)
 
     def on_pad(self, area: Expr, width: Expr) -> SoilPressure:
         return replace(self, area=area, width=width if self.width is None else self.width)
@@ -62,29 +82,23 @@ class SoilPressure(NormalLaw):
         return replace(self, deepest=states[0])
 
     def mapped(self, own: Callable[[Expr], Expr]) -> SoilPressure:
-        numbers = {
-            name: own(getattr(self, name))
-            for name in ("cohesive", "frictional", "exponent", "dissipation", "recovery", "rebound", "width")
-            if getattr(self, name) is not None
-        }
-        pair = None if self.unloading is None else (own(self.unloading[0]), own(self.unloading[1]))
-        return replace(self, **numbers, unloading=pair)
+        numbers = {name: own(getattr(self, name)) for name in _NUMBERS if getattr(self, name) is not None}
+
+        def both(pair: tuple[Expr, Expr] | None) -> tuple[Expr, Expr] | None:
+            return None if pair is None else (own(pair[0]), own(pair[1]))
+
+        return replace(self, **numbers, unloading=both(self.unloading), peak=both(self.peak))
 
     def force(self, depth: Expr, rate: Expr) -> Expr:
         assert self.deepest is not None
         assert self.area is not None
         assert self.width is not None
-        graph, deepest, area = depth.graph, self.deepest, self.area
-        stiffness = self.cohesive / self.width + self.frictional
+        graph, deepest, area, width = depth.graph, self.deepest, self.area, self.width
 
         def pressure(z: Expr) -> Expr:
             most = graph.apply("max", z, deepest)
-            top = stiffness * most**self.exponent
-            if self.unloading is None:
-                assert self.rebound is not None
-                slope = top / (self.rebound * most)
-            else:
-                slope = graph.apply("max", self.unloading[0] + self.unloading[1] * most, top / most)
+            top = self.greatest(most, width)
+            slope = self.unloading_slope(most, top)
             gain = graph.apply("max", 0.0, 1.0 + self.dissipation * rate)
             return area * gain * graph.apply("max", 0.0, top - slope * (most - z))
 
@@ -173,7 +187,7 @@ _RISE = FORCE.times(REACH, -1)
 SOIL: Fields = {
     "soil": Field(
         "choice",
-        "soil under plates, instead of the laws of the normal force and of friction: the name of a published one, or "
+        "soil under plates and wheels, instead of laws of normal force and friction: the name of a published one, or "
         f"{OWN} with all numbers given; numbers that are given replace those of a named soil",
         choices=(OWN, *SOILS),
     ),
@@ -200,6 +214,18 @@ SOIL: Fields = {
         dimension=_PRESSURE.times(LENGTH, -1),
     ),
     "unloading_rise": Field("expression", "A_u (N/m^4)", dimension=_PRESSURE.times(LENGTH, -2)),
+    "peak_angle": Field(
+        "radii",
+        "c1 and c2 of wheels, whose pressure is greatest at (c1 + c2 |slip|) times the angle of entry, such as [0.43, "
+        "0.32] of compact and [0.18, 0.32] of loose sand (Wong and Reece, 1967); at the lowest point unless given",
+        dimension=NONE,
+    ),
+    "reversal": Field(
+        "expression",
+        "velocity (m/s) of wheels over the ground over which front and rear change places",
+        default=REVERSAL,
+        dimension=SPEED,
+    ),
     "recovery": Field(
         "expression",
         "time (s) in which a plate above the ground forgets sinkage and shear; of published soils "
@@ -254,18 +280,18 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
     elif cohesive.is_zero:
         e.fault("frictional_modulus", "is 0 as cohesive_modulus is", "give one that is greater than 0")
     width = e.positive("contact_width") if "contact_width" in e.values else None
-    recovery = number("recovery", soil and RECOVERY)
+    rolls = any(shape.kind == WHEEL for group in given_groups(e.values) for shape in group)
+    recovery = e.graph.one if rolls else number("recovery", soil and RECOVERY)
     e.require("recovery", recovery, lambda x: x > 0, "must be greater than 0")
     dissipation = e.given("dissipation")
     if dissipation is not None:
         e.require("dissipation", dissipation, lambda x: x >= 0, "must be 0 or greater")
-    unloading = _unloading(e)
+    unloading, peak = _unloading(e), _peak(e)
+    reversal = e.positive("reversal")
     if e.at_fault():
         return None
-    pressure = SoilPressure(
-        cohesive, frictional, exponent, *unloading, e.graph.zero if dissipation is None else dissipation, recovery,
-        None, width,
-    )  # fmt: skip
+    damped = e.graph.zero if dissipation is None else dissipation
+    pressure = SoilPressure(cohesive, frictional, exponent, *unloading, damped, recovery, reversal, peak, None, width)
     return pressure, SoilShear(cohesion, angle.graph.apply("tan", angle), modulus, recovery)
 
 
@@ -281,6 +307,18 @@ def _unloading(e: Entry) -> tuple[Expr | None, tuple[Expr, Expr] | None]:
     for key, value in zip(keys, found, strict=True):
         e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
     return None, (found[0], found[1])
+
+
+def _peak(e: Entry) -> tuple[Expr, Expr] | None:
+    """The two numbers of the angle of greatest pressure."""
+    pair = e.several("peak_angle", 2) if "peak_angle" in e.values else None
+    if pair is None:
+        return None
+    e.require("peak_angle[0]", pair[0], lambda c: 0 < c <= 1, "is above 0 and at most 1")
+    e.require("peak_angle[1]", pair[1], lambda c: c >= 0, "must be 0 or greater")
+    for key in ("rebound", "unloading_stiffness", "unloading_rise"):
+        e.refuse(key, "is of the rear of wheels without peak_angle, which gives the pressure of the whole arc")
+    return pair[0], pair[1]
 
 
 def states_of_soil(axes: tuple[str, ...]) -> tuple[str, ...]:

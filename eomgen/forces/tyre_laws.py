@@ -25,6 +25,12 @@ class Slips(NamedTuple):
     camber: Expr
     way: Expr  #: 1 forwards, -1 backwards, 0 at rest
 
+    def size(self) -> Expr:
+        """Of both together, 0 where there is next to none."""
+        square = self.along * self.along + self.across * self.across
+        some = square.graph.apply("lt", NO_SLIP * NO_SLIP, square)
+        return where(some, sqrt(where(some, square, 1.0)), 0.0)
+
 
 class TyreForces(NamedTuple):
     """What a law gives."""
@@ -41,8 +47,8 @@ class TyreLaw(ABC):
     formula: ClassVar[str]
 
     @abstractmethod
-    def most(self, load: Expr) -> Expr:
-        """The slip up to which deflections grow, at which the tyre slides as a whole."""
+    def slides(self, slips: Slips, load: Expr) -> Expr:
+        """Whether the tyre slides as a whole, so that its deflections grow no more."""
 
     @abstractmethod
     def forces(self, slips: Slips, load: Expr) -> TyreForces:
@@ -70,16 +76,17 @@ class Brush(TyreLaw):
     friction: Expr
     half: Expr | None
 
-    def most(self, load: Expr) -> Expr:
-        """Beyond |s| = 1 / theta nothing changes; while driving, kappa = -s / (1 - s) is a little more."""
-        return 2.0 * 3.0 * self.friction * load / self.stiffness
+    def slides(self, slips: Slips, load: Expr) -> Expr:
+        """Beyond |s| = 1 / theta; where driving takes more than twice that as kappa = -s / (1 - s), at twice."""
+        theta = self.stiffness / (3.0 * self.friction * load)
+        turning = load.graph.apply("min", 2.0, load.graph.apply("abs", 1.0 - slips.way * slips.along))
+        return load.graph.apply("le", turning, theta * slips.size())
 
     def forces(self, slips: Slips, load: Expr) -> TyreForces:
         graph = load.graph
         kappa, tangent = slips.along, slips.across
-        square = kappa * kappa + tangent * tangent
-        sliding = graph.apply("lt", NO_SLIP * NO_SLIP, square)
-        size = where(sliding, sqrt(where(sliding, square, 1.0)), 0.0)
+        size = slips.size()
+        sliding = graph.apply("lt", 0.0, size)
         rolling = 1.0 - slips.way * kappa  # Omega R / V_x
         turning = graph.apply("max", NO_SLIP, graph.apply("abs", rolling))
         most = self.friction * load
@@ -131,8 +138,8 @@ class MagicFormula(TyreLaw):
     shifts: bool
     friction: Expr  #: scales the peaks
 
-    def most(self, load: Expr) -> Expr:
-        return load.graph.constant(MOST)
+    def slides(self, slips: Slips, load: Expr) -> Expr:
+        return load.graph.apply("le", MOST, slips.size())
 
     def _of(self, name: str) -> float:
         return 0.0 if not self.shifts and name in SHIFTS else CAR_205_60R15[name]

@@ -55,6 +55,10 @@ class Tyre(Force):
     7.2, where tau is 0).  The time tau_0 damps a wheel at rest and does not change steady slips.  A wheel in the air
     rolls its deflections off.
 
+    Where the tyre slides as a whole the deflections have no more to give: u' = V_sx - (|V_x| + l) kappa and v' = V_sy -
+    (|V_x| + l) tan alpha with the l >= 0 that keeps kappa^2 + tan^2 alpha from growing, so that they come to lie along
+    the slip velocity and a wheel that stops has no more energy in its tread than at full grip.
+
     The longitudinal force turns the wheel by the rolling radius R_e, at which it slips, not by the arm h of the patch:
     its power is F_x V_sx, so that no slip gains energy.  The difference F_x (h - R_e) is a moment about the lateral
     axis of the road, as that of rolling resistance; it takes the work of the aligning moment on a cambered wheel's
@@ -174,19 +178,20 @@ class Tyre(Force):
         (u, v), (x, y) = self.deflections, self.relaxation
         speed = graph.apply("abs", way.forward)
         load = self.load_law.force(way.depth, way.rate)
-        bears, most = graph.apply("lt", 0.0, load), self.law.most(load)
+        bears = graph.apply("lt", 0.0, load)
         off = speed + graph.apply("abs", way.rolling)
-        found = []
-        kappa, tangent = self._slips(way)
-        for velocity, slip, deflection, length in (
-            (way.forward - way.rolling, kappa, u, x),
-            (way.sideways, tangent, v, y),
-        ):
-            rate = velocity - speed * slip
-            grows = graph.apply("lt", 0.0, rate * deflection)
-            full = graph.apply("lt", most * length, graph.apply("abs", deflection))
-            held = where(grows, where(full, 0.0, rate), rate)
-            found.append(where(bears, held, -off / length * deflection))
+        slips = self._slips(way)
+        rates = [v - speed * slip for v, slip in zip((way.forward - way.rolling, way.sideways), slips, strict=True)]
+        turned = Slips(*slips, way.camber, graph.apply("tanh", way.forward / self.reversal))
+        slides = self.law.slides(turned, where(bears, load, 1.0))
+        growth = slips[0] * rates[0] / x + slips[1] * rates[1] / y
+        weight = slips[0] * slips[0] / x + slips[1] * slips[1] / y
+        grows = where(graph.apply("lt", 0.0, weight), graph.apply("lt", 0.0, growth), 0.0)
+        lost = where(slides, where(grows, growth / where(grows, weight, 1.0), 0.0), 0.0)
+        found = [
+            where(bears, rate - lost * slip, -off / length * deflection)
+            for rate, slip, deflection, length in zip(rates, slips, (u, v), (x, y), strict=True)
+        ]
         return tuple(found)
 
 

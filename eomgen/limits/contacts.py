@@ -19,3 +19,6 @@ PARALLEL = 1e-12
 NO_SLIP = 1e-9
 #: (m) How far a shape is from a piece of a profile that is not its nearest, for those who look for what is near.
 NOWHERE = 1e100
+#: Shear displacement by K below which (1 - exp(-x)) / x is its series to x^4: the next term, x^5 / 720, is 1e-18, where
+#: the quotient's slope begins to lose 1e-16 / x^2.
+SHORT_WAY = 1e-3

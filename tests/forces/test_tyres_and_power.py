@@ -30,7 +30,7 @@ def corner(law: dict[str, Any], camber: float = 0.0, **more: Any) -> Any:
     m.prismatic("z", "b", "c", axis="z")
     m.revolute("steer", "c", hub, axis="z")
     m.revolute("spin", hub.at(0, 0, 0, rpy=(camber, 0, 0)), wheel, axis="y")
-    m.tyre("tyre", m.ground, wheel, radius=R, stiffness=STIFFNESS, relaxation=RELAXATION, **{**law, **more})
+    m.tyre("tyre", m.ground, wheel, radius=R, stiffness=STIFFNESS, **{"relaxation": RELAXATION, **law, **more})
     return m.compile(target="numpy")
 
 
@@ -42,10 +42,13 @@ def state(mod: Any, deflections: tuple[float, float], **values: float) -> np.nda
 
 
 def at_slip(mod: Any, forward: float, kappa: float, tangent: float, load: float, **at: float) -> np.ndarray:
-    """The state of a steady slip kappa = V_sx / |V_x|, tan alpha = V_sy / |V_x|; deflections end at their bound."""
-    camber, radius, most = at.get("camber", 0.0), at.get("rolling", R), at.get("most", math.inf)
-    speed = abs(forward)
-    held = [s * max(-most, min(slip, most)) for s, slip in zip(RELAXATION, (kappa, tangent), strict=True)]
+    """The state of a steady slip kappa = V_sx / |V_x|, tan alpha = V_sy / |V_x|, up to where a brush slides at grip."""
+    camber, radius, grip = at.get("camber", 0.0), at.get("rolling", R), at.get("grip", math.inf)
+    speed, way = abs(forward), math.copysign(1.0, forward)
+    size = math.hypot(kappa, tangent)
+    reached = max(size / grip + way * kappa, 0.5 * size / grip)  # 1 / c: c size = grip min(2, 1 - w c kappa)
+    part = 1.0 / reached if reached > 1.0 else 1.0
+    held = [s * part * slip for s, slip in zip(RELAXATION, (kappa, tangent), strict=True)]
     return state(
         mod, (held[0], held[1]), z=R * math.cos(camber) - load / STIFFNESS, x_dot=forward, y_dot=tangent * speed,
         spin_dot=(forward - kappa * speed) / radius,
@@ -101,8 +104,8 @@ def test_no_steady_slip_gains_energy(law: dict[str, Any], camber: float) -> None
         for _ in range(150):
             load, forward = random.uniform(800.0, 7000.0), random.choice([-1, 1]) * random.uniform(2.0, 40.0)
             kappa, tangent = random.choice([-1, 1], 2) * 10.0 ** random.uniform(-4.0, -0.1, 2)
-            most = (1 + 1e-9) * 6.0 * MU * load / C if law is BRUSH else 3.0  # where they end
-            x = at_slip(mod, forward, kappa, tangent, load, camber=camber, rolling=radius, most=most)
+            grip = (1 + 1e-9) * 3.0 * MU * load / C if law is BRUSH else math.inf
+            x = at_slip(mod, forward, kappa, tangent, load, camber=camber, rolling=radius, grip=grip)
             np.testing.assert_allclose(mod.rhs(0.0, x)[rates], 0.0, atol=1e-9)  # steady
             forces = -mod.bias(0.0, x)[:5]
             power = forces @ x[speeds]
@@ -131,6 +134,52 @@ def test_passive_car_never_gains_energy(law: dict[str, Any]) -> None:
         assert kinetic.max() <= kinetic[0] + 0.05
         assert np.diff(kinetic[settled]).max() <= 0.0
         assert kinetic[-1] < 0.999 * kinetic[0]
+
+
+def grip_energy(load: float, length: float) -> float:
+    """Of a tread that is deflected up to full grip: the integral of mu F (1 - (1 - theta u / s)^3), 9 mu^2 F^2 s / (4 C)."""
+    return 9.0 * (MU * load) ** 2 * length / (4.0 * C)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.6, 1.5708])
+def test_locked_wheel_that_stops_gives_back_its_grip_alone(turn: float) -> None:
+    """A block on locked wheels, along, across and between: after its stop it has no more than the tread held."""
+    m = eg.Model("locked", gravity=(0, 0, 0))
+    body, load = m.body("block", mass=500.0), 0.02 * STIFFNESS
+    m.prismatic("x", m.ground.at(0, 0, R - 0.02, rpy=(0, 0, turn)), body.at(0, 0, 0, rpy=(0, 0, turn)), axis="x")
+    m.tyre("tyre", m.ground, body, radius=R, stiffness=STIFFNESS, relaxation=(0.3, 0.3), **BRUSH)
+    traj = m.compile().simulate(1.0, initial={"x_dot": 3.0}, rtol=1e-9, atol=1e-10)
+    speed = traj["x_dot"]
+    stop = int(np.argmax(speed < 0.0))
+    back = 0.5 * 500.0 * np.max(np.square(speed[stop:]))
+    assert 0.6 * grip_energy(load, 0.3) < back <= 1.001 * grip_energy(load, 0.3)
+
+
+@pytest.mark.parametrize("settling", [0.0, 0.03])
+def test_brush_of_one_relaxation_length_is_passive(settling: float) -> None:
+    """Of random states that stand or roll: power of the road and what the tread takes up are no gain together.
+
+    The tread holds s times the integral of the force over the size of the slip; at rest that is a function of the
+    deflections alone, and moving slowly enough, V < reversal / 100, it still is.
+    """
+    mod = corner(BRUSH, relaxation=(0.3, 0.3), settling=settling)
+    random, load, lost = np.random.default_rng(12), 3000.0, 0
+    rows = [mod.x_names.index(f"tyre_deflection_{k}") for k in "xy"]
+    speeds = [mod.x_names.index(name) for name in SPEEDS]
+    grip = 3.0 * MU * load / C
+    for _ in range(400):
+        slip = random.uniform(0, 1.2 * grip) * np.array([math.cos(a := random.uniform(0, 7)), math.sin(a)])
+        x = state(
+            mod, tuple(0.3 * slip), z=R - load / STIFFNESS, x_dot=1e-5 * random.standard_normal(),
+            y_dot=1e-4 * random.standard_normal(), spin_dot=1e-4 * random.standard_normal(),
+        )  # fmt: skip
+        part = min(1.0, float(np.hypot(*slip)) / grip)
+        force = MU * load * (1.0 - (1.0 - part) ** 3)
+        taken = force * (slip @ mod.rhs(0.0, x)[rows]) / max(float(np.hypot(*slip)), 1e-300)
+        power = -mod.bias(0.0, x)[:5] @ x[speeds]
+        assert power + taken <= 2e-3 * abs(power)
+        lost += power + taken < -1e-3 * abs(power)
+    assert lost > 50
 
 
 def random_states(mod: Any, number: int = 12) -> list[np.ndarray]:
