@@ -24,6 +24,12 @@ SWITCHING: Fields = {
     ),
 }
 
+#: How a joint that holds for a time is written.
+IN_PLACE_OF_JOINTS = (
+    "joints hold for good; for a time use a constraint of type hold: axes: xyz, turning: xyz holds as a weld, axes: xyz "
+    "alone as a ball joint, axes: xy, turning: z in the plane"
+)
+
 
 def switchable(types: Types) -> Types:
     """The types with these keys too."""
