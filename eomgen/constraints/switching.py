@@ -26,8 +26,8 @@ SWITCHING: Fields = {
 
 #: How a joint that holds for a time is written.
 IN_PLACE_OF_JOINTS = (
-    "joints hold for good; for a time use a constraint of type hold: axes: xyz, turning: xyz holds as a weld, axes: xyz "
-    "alone as a ball joint, axes: xy, turning: z in the plane"
+    "joints hold for good; for a time use a constraint of type hold: axes: xyz, turning: xyz holds as a weld, axes: "
+    "xyz alone as a ball joint, axes: xy, turning: z in the plane"
 )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
 from ..frames import GROUND
 from .description import DescribedEntry, Faults
 from .fields import KINDS, Fields
@@ -17,8 +16,7 @@ def check_keys(path: str, values: Mapping[str, Any], fields: Fields, faults: Fau
     """Note keys that a table does not know, and required ones that are missing."""
     for key in values:
         if key not in fields:
-            timed = path.startswith("joints.") and key in SWITCHING
-            faults.add(f"{path}.{key}", "unknown key", IN_PLACE_OF_JOINTS if timed else unknown_key(key, fields))
+            faults.add(f"{path}.{key}", "unknown key", unknown_key(key, fields))
     for key, field in fields.items():
         if field.required and key not in values:
             faults.add(f"{path}.{key}", "is missing", f"give {KINDS[field.kind]}")

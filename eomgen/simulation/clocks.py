@@ -125,6 +125,6 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
             if not abs(value) <= limit and state not in (initial or ()):
                 name = state.removesuffix("_closed")
                 raise UsageError(
-                    f"constraint {name} is closed at the start, and its equation {label} {what} {value:.6g} {unit}{per} "
-                    f"there (up to {limit:.2g} counts as held); give a start where it holds, or closed: false"
+                    f"constraint {name} is closed at the start, and its equation {label} {what} {value:.6g} "
+                    f"{unit}{per} there (up to {limit:.2g} counts as held); give a start where it holds, or closed: false"
                 )
