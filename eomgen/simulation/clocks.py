@@ -126,5 +126,6 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
                 name = state.removesuffix("_closed")
                 raise UsageError(
                     f"constraint {name} is closed at the start, and its equation {label} {what} {value:.6g} "
-                    f"{unit}{per} there (up to {limit:.2g} counts as held); give a start where it holds, or closed: false"
+                    f"{unit}{per} there (up to {limit:.2g} counts as held); give a start where it holds, or "
+                    "closed: false"
                 )
