@@ -31,6 +31,7 @@ class Sizes(NamedTuple):
     n_wrench_geometry: int = 0  #: numbers of the geometry of joint reactions, 0 without bodies
     n_momenta: int = 0  #: momenta: n_v by method hamilton, else 0
     n_events: int = 0
+    n_held: int = 0  #: errors and their rates of the equations of constraints that close and open
     n_resets: int = 0  #: states that events give new values
     n_strike: int = 0  #: rows of what velocities obey where an event changes them, 0 where they just change
     n_states: int = 0  #: first-order states, the last of the n_v velocities and of the n_dof independent ones
@@ -109,6 +110,7 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("events", ("q", "v"), lambda s: (s.n_events,), "values whose zeros are the model's events"),
     Kernel("resets", ("q", "v"), lambda s: (s.n_resets,),
            "new values of states after events, in the order of `resets`"),
+    Kernel("held_errors", ("q", "v"), lambda s: (s.n_held,), "errors and their rates of equations that are closed now"),
     Kernel("event_slopes", ("q", "v"), lambda s: (s.n_events, s.n_x), "d(events)/dx, row-major", late=True),
     Kernel(
         "event_derivatives", ("q", "v"),

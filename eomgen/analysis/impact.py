@@ -1,13 +1,14 @@
 """Analysis: a state at an impact, or at which coordinates are locked -> the state after it, impulses, energy lost.
 
 M (v+ - v-) + C_q^T i = sum n g, C_q v+ = C_q v-, with the normals n = d(gap)/dt by v; the law that gives the impulses g
-is in :mod:`.impact_law`.  Locked coordinates keep rate 0 (their impulses may pull).
+is in :mod:`.impact_law`, that of gaps with friction in :mod:`.impact_friction`.  Locked coordinates keep rate 0 (their
+impulses may pull).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,8 +24,10 @@ from ..runtime.layout import Layout
 from ..runtime.room import read_flag, read_number, read_numbers
 from ..runtime.signal_rates import drift, moving_inputs
 from .constrained import ProjectedStates, conditioned_motions, prepare, solve_multipliers
+from .impact_friction import Sliding, strike_rough
 from .impact_gaps import Gaps, allowance, by_velocity, check_gaps
 from .impact_law import collide
+from .impact_sliding import Rough, check_friction, find_sliding
 from .tables import as_text
 
 if TYPE_CHECKING:
@@ -51,6 +54,10 @@ class Impact:
         Of all constraint rows, with the sign of ``multipliers``.
     energy_lost : float
         Kinetic energy before less that after (J).  Negative only where a gap that moves in time brings energy in.
+    friction : dict of str to (d,) array
+        By gap with friction, the impulses along its sliding velocities.
+    sliding_before, sliding_after : dicts of str to (d,) array
+        These velocities.
     """
 
     x: Array
@@ -61,6 +68,9 @@ class Impact:
     rates_after: Array
     constraint_impulses: Array
     energy_lost: float
+    friction: dict[str, Array] = field(default_factory=dict)
+    sliding_before: dict[str, Array] = field(default_factory=dict)
+    sliding_after: dict[str, Array] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> float:
         if name not in self.names:
@@ -74,6 +84,10 @@ class Impact:
                 self.names, self.impulses, self.rates_before, self.rates_after, strict=True
             )
         ]
+        for name, impulses in self.friction.items():
+            before, after = self.sliding_before[name], self.sliding_after[name]
+            texts = (", ".join(f"{x:.6g}" for x in row) for row in (impulses, before, after))
+            facts.append((f"friction of {name}", "impulse {}, sliding {} -> {}".format(*texts)))
         return as_text("Impact", [*facts, ("energy lost", f"{self.energy_lost:.6g} J")])
 
 
@@ -87,10 +101,11 @@ def impact(
     *,
     lock: Sequence[str] = (),
     closed: bool = False,
+    friction: Mapping[str, tuple[float, str | Sequence[str]]] | None = None,
     p: Any = None,
     u: Any = None,
 ) -> Impact:
-    """Compute the state after an impact without friction, or after coordinates are locked suddenly.
+    """Compute the state after an impact, or after coordinates are locked suddenly.
 
     Parameters
     ----------
@@ -104,6 +119,9 @@ def impact(
         Coordinates that stop (plastic, whatever the sign of the impulse).
     closed : bool
         Treat the gaps as closed at any value, as for a stop that is placed where a coordinate is now.
+    friction : mapping of str to (float, str or two str), optional
+        Coulomb friction of gaps: the coefficient, and the output or coordinate that is the sliding velocity, linear in
+        the velocities (of a place its rate counts); in space two of them, at right angles.
     p, u : optional
         As for ``bind``.
 
@@ -116,35 +134,45 @@ def impact(
     Raises
     ------
     UsageError
-        A name is unknown; a gap is not 0 (within 1e-6 lengths of the model, or rad); no impulses satisfy the laws; or
-        drivers close a gap.
+        A name is unknown; a gap is not 0 (within 1e-6 lengths of the model, or rad); no impulses satisfy the laws;
+        drivers close a gap; or friction is given beside lock.
 
     Notes
     -----
-    Newton's law of restitution with complementarity, for all gaps at once that close or are at rest: each impulse
-    is 0 or positive, rate+ + e min(rate-, 0) too, and one of the two is 0 (Moreau 1988; Pfeiffer and Glocker,
-    Multibody Dynamics with Unilateral Contacts, ch. 8; Brogliato, Nonsmooth Mechanics, ch. 5).  A gap that was
+    Without friction: Newton's law of restitution with complementarity, for all gaps at once that close or are at
+    rest: each impulse is 0 or positive, rate+ + e min(rate-, 0) too, and one of the two is 0 (Moreau 1988; Pfeiffer and
+    Glocker, Multibody Dynamics with Unilateral Contacts, ch. 8; Brogliato, Nonsmooth Mechanics, ch. 5).  A gap that was
     opening and is closing after that makes a further impact at the same instant.  No energy is ever gained, but
     from gaps that move in time.  Springs, dampers and other finite forces have no part in it.  Velocities after
     the impact are unique; impulses are not where gaps depend on each other, and the law itself is a choice:
     momentum and energy alone do not determine what several bodies that touch do.
+
+    With friction, one gap with one sliding velocity follows Routh's method with Poisson's restitution: sliding,
+    sticking and sliding back within the impact are exact (Wang and Mason 1992).  In space, and where gaps that move
+    each other are closed together, impulses obey Newton's and Coulomb's laws for the velocities after the impact; where
+    that would bring in energy, restitutions are multiplied by the largest factor with which it does not.
     """
     module = module if p is None and u is None else module.bind(p, u)
     found, locked = check_gaps(module.layout, gaps, lock)
+    rough = check_friction(module.layout, friction, found)
+    if rough and locked:
+        raise UsageError(
+            "an impact has friction= or lock=, not both: lock the coordinates in a call before or after it"
+        )
     states = _one_state(module, read_number("t", t), x)
     watched = Gaps(module, tuple(found))
     rows = watched.normals(float(states.t[0]), states.x[:, 0])
     if not read_flag("closed", closed):
         _require_closed(watched, states)
-    return _strike_gaps(states, watched, rows, found, locked)
+    return _strike_gaps(states, watched, rows, found, locked, rough)
 
 
-def strike_run(gaps: Gaps, t: float, x: Array, restitutions: Mapping[str, float]) -> Impact:
+def strike_run(gaps: Gaps, t: float, x: Array, restitutions: Mapping[str, float], rough: Rough) -> Impact:
     """The impact of some gaps of a run, with inputs as they are then."""
     u = gaps.inputs(t, x)
     module = gaps.module if u is None else gaps.module.bind(None, u)
     own, states = Gaps(module, tuple(restitutions), gaps.forcing), _one_state(module, t, x)
-    return _strike_gaps(states, own, own.normals(t, states.x[:, 0]), restitutions, ())
+    return _strike_gaps(states, own, own.normals(t, states.x[:, 0]), restitutions, (), rough)
 
 
 def strike_events(
@@ -204,7 +232,13 @@ def strike_events(
     moved = moving_inputs(layout, u)
     rates = rows @ v + drift(lambda time: kernel(time, x, u=u + (time - t) * moved), t)[[*gaps]]
     names = [str(events[i]["name"]) for i in gaps]
-    return _apply(states, rows, rates, np.array([*gaps.values()]), names).x
+    rough = {
+        str(events[i]["name"]): (float(events[i]["friction"]), tuple(events[i]["slip"]))
+        for i in gaps
+        if events[i].get("friction") is not None
+    }
+    sliding = find_sliding(module, rough, names, t, states.x[:, 0])
+    return _apply(states, rows, rates, np.array([*gaps.values()]), names, sliding).x
 
 
 def _one_state(module: BoundModel, t: float, x: ArrayLike) -> ProjectedStates:
@@ -227,13 +261,20 @@ def _require_closed(gaps: Gaps, states: ProjectedStates) -> None:
 
 
 def _strike_gaps(
-    states: ProjectedStates, gaps: Gaps, rows: Array, restitutions: Mapping[str, float], locked: tuple[str, ...]
+    states: ProjectedStates,
+    gaps: Gaps,
+    rows: Array,
+    restitutions: Mapping[str, float],
+    locked: tuple[str, ...],
+    rough: Rough,
 ) -> Impact:
-    rates = gaps.rates(float(states.t[0]), states.x[:, 0], rows)
+    t, x = float(states.t[0]), states.x[:, 0]
+    rates = gaps.rates(t, x, rows)
+    sliding = find_sliding(gaps.module, rough, gaps.names, t, x, gaps.forcing)
     if locked:
         held = _locks(states, locked)
         rows, rates = np.vstack([rows, held]), np.concatenate([rates, held @ states.v[:, 0]])
-    return _apply(states, rows, rates, np.array([*restitutions.values()]), (*gaps.names, *locked))
+    return _apply(states, rows, rates, np.array([*restitutions.values()]), (*gaps.names, *locked), sliding)
 
 
 def _locks(states: ProjectedStates, names: Sequence[str]) -> Array:
@@ -248,14 +289,18 @@ def _locks(states: ProjectedStates, names: Sequence[str]) -> Array:
     return rows
 
 
-def _apply(states: ProjectedStates, rows: Array, rates: Array, e: Array, names: Sequence[str]) -> Impact:
+def _apply(
+    states: ProjectedStates, rows: Array, rates: Array, e: Array, names: Sequence[str], sliding: Sliding
+) -> Impact:
     layout, v = states.module.layout, states.v[:, 0]
     C_q = states.jacobian()
     M = states.evaluate(states.module.kernels.mass_matrix, states.q)[..., 0]
     B, condition = conditioned_motions(C_q[0], layout.scales)
-    rows, rates = rows.reshape(-1, layout.n_v), read_numbers("rates", rates)
+    count = len(names)
+    rows = np.vstack([rows.reshape(-1, layout.n_v), sliding.rows])
+    rates = np.concatenate([read_numbers("rates", rates), sliding.rates])
     rest, fixed = _rounding(rows, v, B, condition, layout)
-    for i in np.flatnonzero(fixed).tolist():
+    for i in np.flatnonzero(fixed[:count]).tolist():
         if rates[i] < -rest[i] or (i >= len(e) and rates[i] > rest[i]):
             what = f"gap {names[i]} closes" if i < len(e) else f"lock: {names[i]} moves"
             raise UsageError(
@@ -264,7 +309,13 @@ def _apply(states: ProjectedStates, rows: Array, rates: Array, e: Array, names: 
     if B.shape[1]:
         factor = definite_factor(B.T @ M @ B, "an impact")
         H = np.where(fixed, 0.0, algebra.solve(factor, B.T @ rows.T))
-        impulses, z = collide(H, np.where(fixed, 0.0, rates), e, rest, names)
+        free = np.where(fixed[: len(rates)], 0.0, rates)
+        free[count:] = rates[count:]  # a body may slide as a driver or a belt moves it
+        if sliding.names:
+            impulses = strike_rough(H.T @ H, free, e, rest, sliding.coefficients, sliding.owner, names)
+            z = H @ impulses
+        else:
+            impulses, z = collide(H, free, e, rest, names)
         change = B @ algebra.solve(factor.T, z)
     else:
         impulses, change = np.zeros(len(rates)), np.zeros_like(v)
@@ -272,7 +323,11 @@ def _apply(states: ProjectedStates, rows: Array, rates: Array, e: Array, names: 
     held = solve_multipliers(C_q, (M @ change - rows.T @ impulses)[:, None], layout.scales)[:, 0]
     lost = 0.0 - float(change @ M @ (v + 0.5 * change))
     before = np.ascontiguousarray(states.x[:, 0])
-    return Impact(after, before, tuple(names), impulses, rates, rates + rows @ change, held, lost)
+    final = rates + rows @ change
+    rubbed = [
+        {names[i]: x[count:][sliding.owner == i] for i in sliding.owner.tolist()} for x in (impulses, rates, final)
+    ]
+    return Impact(after, before, tuple(names), impulses[:count], rates[:count], final[:count], held, lost, *rubbed)
 
 
 def _rounding(rows: Array, v: Array, B: Array, condition: float, layout: Layout) -> tuple[Array, Array]:

@@ -18,24 +18,49 @@ from .shared_options import parse_settings
 @click.option(
     "--gap", multiple=True, metavar="NAME=E", help="Gap (coordinate or output) that closes, with its restitution."
 )
+@click.option(
+    "--slip",
+    multiple=True,
+    metavar="NAME=MU:SPEED",
+    help="Friction of a gap: its coefficient and the output that is the sliding velocity; in space MU:SPEED:SPEED.",
+)
 @click.option("--stop", multiple=True, metavar="NAME", help="Coordinate that is locked suddenly; repeat it for more.")
 @click.option("--closed", is_flag=True, help="Treat the gaps as closed at any value.")
-def impact(work: Prepared, t: float, gap: tuple[str, ...], stop: tuple[str, ...], closed: bool, as_json: bool) -> None:
-    """Find the state after an impact at the initial state: without friction, by Newton's law of restitution."""
+def impact(
+    work: Prepared,
+    t: float,
+    gap: tuple[str, ...],
+    slip: tuple[str, ...],
+    stop: tuple[str, ...],
+    closed: bool,
+    as_json: bool,
+) -> None:
+    """Find the state after an impact at the initial state, without friction unless it is given."""
     from ..analysis.impact_gaps import check_gaps
+    from ..analysis.impact_sliding import check_friction
 
     if not gap and not stop:
         raise UsageError("give --gap NAME=RESTITUTION for what closes, or --stop NAME for a coordinate that is locked")
     module = work.module
     gaps, locked = check_gaps(module.layout, parse_settings(gap, "--gap", "s=0.5"), stop, ("--gap", "--stop"))
-    found = module.impact(t, module.x0(work.initial or None, t=t), gaps, lock=locked, closed=closed)
+    rough = check_friction(module.layout, dict(map(_read_friction, slip)), gaps, "--slip")
+    if rough and locked:
+        raise UsageError("give --slip or --stop, not both")
+    start = module.x0(work.initial or None, t=t)
+    found = module.impact(t, start, gaps, lock=locked, closed=closed, friction=rough or None)
     after = dict(zip(module.x_names, found.x.tolist(), strict=True))
     if as_json:
+        rubbed = {
+            "friction": found.friction,
+            "sliding_before": found.sliding_before,
+            "sliding_after": found.sliding_after,
+        }
         print_json(
             work.heading(t)
             | {"names": found.names, "impulses": found.impulses, "energy_lost": found.energy_lost, "x": after}
             | {"rates_before": found.rates_before, "rates_after": found.rates_after}
             | {"constraints": module.constraint_labels, "constraint_impulses": found.constraint_impulses}
+            | (rubbed if rough else {})
         )
         return
     say(repr(found))
@@ -44,3 +69,12 @@ def impact(work: Prepared, t: float, gap: tuple[str, ...], stop: tuple[str, ...]
     before = found.before[module.n_q :].tolist()
     rates = without_noise([after[name] for name in module.layout.v], units, before)
     print_rows([(n, f"{x:.6g} {unit}") for n, x, unit in zip(module.layout.v, rates, units, strict=True)])
+
+
+def _read_friction(text: str) -> tuple[str, tuple[str, tuple[str, ...]]]:
+    """The gap, its coefficient and its sliding velocities, from NAME=MU:SPEED."""
+    gap, equals, rest = text.partition("=")
+    mu, *names = rest.split(":")
+    if not equals or not names:
+        raise UsageError(f"--slip: {text!r} is not NAME=MU:SPEED, such as gap=0.3:vx_tip")
+    return gap, (mu, tuple(names))

@@ -7,6 +7,7 @@ from typing import ClassVar
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
+from ..elements.looks import CROSS, Drawn, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..records import dataclass
@@ -29,6 +30,9 @@ class Hold(Constraint):
     marker: Marker
     axes: str
     turning: str
+
+    def drawn(self) -> list[Seen]:
+        return [Drawn((self.marker,), about=CROSS)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         apart = vec.sub(view.position(self.marker), view.position(self.on))

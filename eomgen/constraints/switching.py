@@ -15,7 +15,7 @@ SWITCHING: Fields = {
     ),
     "opens": Field("expression", "where it falls to 0 while the constraint holds, it lets go", level=LAW),
     "closed": Field("flag", "whether it holds at the start of a run; false if closes is given, else true"),
-    "releases": Field("names", "one or several other constraints that let go as it closes, before the impact"),
+    "releases": Field("some_names", "one or several other constraints that let go as it closes, before the impact"),
     "stabilisation": Field(
         "expression",
         "rate (1/s), greater than 0, at which an error of the equation dies away while it holds",
@@ -23,6 +23,12 @@ SWITCHING: Fields = {
         dimension=SPIN,
     ),
 }
+
+#: How a joint that holds for a time is written.
+IN_PLACE_OF_JOINTS = (
+    "joints hold for good; for a time use a constraint of type hold: axes: xyz, turning: xyz holds as a weld, axes: "
+    "xyz alone as a ball joint, axes: xy, turning: z in the plane"
+)
 
 
 def switchable(types: Types) -> Types:

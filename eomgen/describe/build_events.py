@@ -9,7 +9,7 @@ from ..graph.core import Expr
 from ..graph.shown import shown
 from ..graph.substitute import symbols_of
 from .checks import check_keys
-from .description import DescribedEntry
+from .description import DescribedEntry, items
 from .fields import EVENT, OUTPUT
 from .mechanism import Event
 from .names import nearest
@@ -52,7 +52,41 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
         direction = -1
     doc = reader.text(f"{path}.doc", values.get("doc", ""))
     terminal = _times(reader, f"{path}.terminal", values.get("terminal", False))
-    return Event(str(entry.name), expression, terminal, int(direction), reset, restitution, doc)
+    friction, slip = _friction(reader, path, values)
+    return Event(str(entry.name), expression, terminal, int(direction), reset, restitution, doc, friction, slip)
+
+
+def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[float | None, tuple[str, ...]]:
+    """The coefficient of friction of an impact, and the outputs that are its sliding velocities."""
+    given, slip = values.get("friction"), values.get("slip")
+    if given is None and slip is None:
+        return None, ()
+    if values.get("restitution") is None:
+        what = "friction" if given is not None else "slip"
+        remedy = "give the restitution of the impact, from 0 to 1"
+        reader.faults.add(f"{path}.{what}", "is given without a restitution, so that there is no impact", remedy)
+    if given is None or slip is None:
+        missing, there = ("slip", "friction") if slip is None else ("friction", "slip")
+        remedy = "slip: the output that is the sliding velocity" if slip is None else "friction: the coefficient"
+        reader.faults.add(f"{path}.{there}", f"is given without {missing}", f"give {remedy}")
+        return None, ()
+    friction = reader.number(f"{path}.friction", given)
+    if friction is not None and not friction >= 0.0:
+        reader.faults.add(f"{path}.friction", f"{friction:g} is negative", "give 0 or more")
+    names = [slip] if isinstance(slip, str) else items(slip)
+    outputs = [*reader.names.of("output")]
+    if names is None or not 1 <= len(names) <= 2 or not all(isinstance(name, str) for name in names):
+        reader.wrong(f"{path}.slip", slip, "some_names")
+        return None, ()
+    for name in names:
+        if name not in outputs:
+            remedy = nearest(name, outputs, "outputs")
+            reader.faults.add(f"{path}.slip", f"no output {name!r} for the sliding velocity", remedy)
+        elif (unit := reader.units.get(f"outputs.{name}")) is not None and unit.size != 1.0:
+            reader.faults.add(
+                f"{path}.slip", f"the output {name!r} is in {unit.text}", "give it in m/s, without a unit"
+            )
+    return friction, tuple(names)
 
 
 def _times(reader: Reader, path: str, value: Any) -> int:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from ..constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.shown import quoted, shown
@@ -158,7 +159,8 @@ def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
             others = set().union(*map(joint_fields, JOINTS))
             elsewhere = key in others
             message = f"a {type_name} joint has no {key!r}" if elsewhere else "unknown key"
-            reader.faults.add(f"{entry.path}.{key}", message, unknown_key(key, fields))
+            remedy = IN_PLACE_OF_JOINTS if key in SWITCHING else unknown_key(key, fields)
+            reader.faults.add(f"{entry.path}.{key}", message, remedy)
     for key, field in fields.items():
         if field.required and key not in entry.values and key != "type":
             reader.faults.add(f"{entry.path}.{key}", "is missing", f"give {KINDS[field.kind]}")

@@ -66,7 +66,7 @@ def _released(reader: Reader, entry: DescribedEntry, names: Sequence[str]) -> li
         return []
     listed = [given] if isinstance(given, str) else items(given)
     if listed is None:
-        reader.wrong(path, given, "names")
+        reader.wrong(path, given, "some_names")
         return []
     for k, name in enumerate(listed):
         if name not in names or name == entry.name:

@@ -165,6 +165,8 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
         reset: Mapping[Any, Value] | None = None,
         restitution: Value | None = None,
         doc: str = "",
+        friction: Value | None = None,
+        slip: str | Sequence[str] | None = None,
     ) -> None:
         """Declare an event: runs find the time where an expression becomes zero, and can stop or reset the state there.
 
@@ -186,9 +188,14 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
             The expression is a gap between bodies; where it closes an impact opens it again, this much slower (0 to
             1; Newton's law), with impulses that obey all joints.
         doc : str, optional
+        friction : float, optional
+            Beside a restitution: the coefficient of Coulomb friction in the impact.
+        slip : str or sequence of str, optional
+            Beside friction: the output that is the sliding velocity, linear in the velocities; in space two outputs,
+            along directions at right angles.
         """
         given = {"expression": expression, "terminal": terminal, "direction": direction, "reset": reset or None}
-        given |= {"restitution": restitution, "doc": doc}
+        given |= {"restitution": restitution, "doc": doc, "friction": friction, "slip": slip}
         defaults = {"terminal": False, "direction": 0, "doc": ""}
         self._description.add("events", name, without_defaults(given, defaults))
 

@@ -214,25 +214,25 @@ class ElementMethods(Described):
         wheel."""
     def coupling(self, name: str, coordinates: Mapping[Any, Value] | None = None, offset: Value = 0,
         equation: Value = None, closes: Value = None, opens: Value = None, closed: bool | None = None,
-        releases: Sequence[Any] | None = None, stabilisation: Value = 10) -> ConstraintHandle:
+        releases: Any = None, stabilisation: Value = 10) -> ConstraintHandle:
         """Add a relation between coordinates: a linear one, or any equation."""
     def gear(self, name: str, a: Any, b: Any, radii: Sequence[Value] | None = None,
         teeth: Sequence[Value] | None = None, cones: Sequence[Value] | None = None, internal: bool | None = None,
-        phase: Value = 0, closes: Value = None, opens: Value = None, closed: bool | None = None,
-        releases: Sequence[Any] | None = None, stabilisation: Value = 10) -> ConstraintHandle:
+        phase: Value = 0, closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Any = None,
+        stabilisation: Value = 10) -> ConstraintHandle:
         """Add two gears that mesh: r_a a + r_b b = r_a phase, or r_a a - r_b b = r_a phase if one is internal."""
     def rack(self, name: str, pinion: Any, rack: Any, radius: Value, offset: Value = 0, closes: Value = None,
-        opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        opens: Value = None, closed: bool | None = None, releases: Any = None,
         stabilisation: Value = 10) -> ConstraintHandle:
         """Add a pinion that rolls on a rack: s = radius angle + offset (m)."""
     def belt(self, name: str, a: Any, b: Any, radii: Sequence[Value] | None = None,
         teeth: Sequence[Value] | None = None, crossed: bool | None = None, phase: Value = 0, closes: Value = None,
-        opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        opens: Value = None, closed: bool | None = None, releases: Any = None,
         stabilisation: Value = 10) -> ConstraintHandle:
         """Add a belt without slip on two pulleys: r_a (a - phase) = r_b b, or -r_b b if the belt crosses."""
     def planetary(self, name: str, sun: Any = None, ring: Any = None, carrier: Any = None, planet: Any = None,
         radii: Mapping[str, Value] | None = None, teeth: Mapping[str, Value] | None = None, phase: Value = 0,
-        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Any = None,
         stabilisation: Value = 10) -> ConstraintHandle:
         """Add a planetary gear set: its meshing wheels follow Willis' equation."""
     def cam(self, name: str, cam: Any, follower: Any, lift: Value, phase: Value = 0,
@@ -244,11 +244,11 @@ class ElementMethods(Described):
         """Add a follower that stays in contact with the contour of a plane cam."""
     def rolling(self, name: str, wheel: Any, plane: Any = None, radius: Value = None, shape: str | None = None,
         tube: Value = 0, no_spin: bool | None = None, semi_axes: Sequence[Value] | None = None, support: Value = None,
-        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Any = None,
         stabilisation: Value = 10) -> ConstraintHandle:
         """Add a wheel, ball or smooth convex body that rolls on a plane without slip."""
     def knife_edge(self, name: str, marker: Any, axis: str | Sequence[float] | None = None, on: Any = None,
-        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Any = None,
         stabilisation: Value = 10) -> ConstraintHandle:
         """Add a blade: a marker that cannot move sideways, along one of its own axes."""
     def driver(self, name: str, coordinate: Any = None, value: Value = None, between: Sequence[Any] | None = None,
@@ -256,6 +256,6 @@ class ElementMethods(Described):
         on: Any = None) -> ConstraintHandle:
         """Add a motion prescribed over time: of a coordinate, a distance, an angle or the place of a marker."""
     def hold(self, name: str, a: Any, b: Any, axes: str | None = None, turning: str | None = None, closes: Value = None,
-        opens: Value = None, closed: bool | None = None, releases: Sequence[Any] | None = None,
+        opens: Value = None, closed: bool | None = None, releases: Any = None,
         stabilisation: Value = 10) -> ConstraintHandle:
         """Add a marker held where it is on another body while it is closed: a foot on the ground, a grasp, a clutch."""

@@ -94,6 +94,8 @@ EVENT: Fields = {
     "direction": Field("sign", "1: only where it rises, -1: only where it falls, 0: both", default=0),
     "reset": Field("rates", "new coordinates and velocities, from those before the event", default=(), level=OUTPUT),
     "restitution": Field("number", "for an impact where the gap (the expression) closes: Newton's coefficient, 0 to 1"),
+    "friction": Field("number", "beside a restitution: Coulomb's coefficient of friction in the impact"),
+    "slip": Field("some_names", "beside friction: the output that is the sliding velocity; in space two of them"),
     "doc": _DOC,
 }
 FUNCTION: dict[str, Fields] = {

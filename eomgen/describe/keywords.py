@@ -7,7 +7,9 @@ import inspect
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
+from ..constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
 from ..errors import UsageError
+from ..joints import JOINTS
 from .names import nearest
 
 Class = TypeVar("Class", bound=type[Any])
@@ -45,4 +47,6 @@ def check_keywords(name: str, given: Iterable[str], allowed: Sequence[str]) -> N
     """Raise UsageError for the first keyword that a method does not have."""
     for key in given:
         if key not in allowed:
+            if name in JOINTS and key in SWITCHING:
+                raise UsageError(f"{name} has no argument {key!r}: {IN_PLACE_OF_JOINTS}")
             raise UsageError(f"{name} has no argument {key!r}; {nearest(key, allowed, 'it takes')}")

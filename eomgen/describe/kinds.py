@@ -10,6 +10,7 @@ KINDS = {
     "unit": "a unit, such as mm or N*m/rad",
     "name": "a name",
     "names": "a list of names",
+    "some_names": "a list of names, or one name",
     "body": "the name of a body",
     "number": "a number",
     "positive": "a number greater than 0",

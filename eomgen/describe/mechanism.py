@@ -269,6 +269,8 @@ class Event:
     reset: tuple[tuple[str, Expr], ...] = ()  #: new values of coordinates and velocities
     restitution: float | None = None  #: of an impact
     doc: str = ""
+    friction: float | None = None  #: coefficient in the impact
+    slip: tuple[str, ...] = ()  #: outputs that are its sliding velocities
 
 
 class Switched(NamedTuple):

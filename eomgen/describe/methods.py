@@ -29,6 +29,7 @@ ARGUMENTS = {
     "name": ("str or symbol", "Any"),
     "body": ("handle or str", "Any"),
     "names": ("sequence of str", "Sequence[Any]"),
+    "some_names": ("str or sequence of str", "Any"),
     "vector": ("sequence of three", "Sequence[Value]"),
     "value": ("scalar or sequence of three", "Value | Sequence[Value]"),
     "via": ("sequence", "Sequence[Any]"),

@@ -117,6 +117,7 @@ _KINDS: dict[str, Schema] = {
     "body": _ref("reference"),
     "joint": _ref("reference"),
     "names": {"type": "array", "items": _ref("name")},
+    "some_names": {"anyOf": [_ref("name"), {"type": "array", "items": _ref("name")}]},
     "number": {"type": ["number", "string"]},
     "numbers": {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2},
     "grid": {"type": "array", "items": {"type": "array", "items": {"type": ["number", "string"]}}, "minItems": 2},

@@ -146,11 +146,10 @@ def _value(value: Any, kind: str, slot: Slot, visitor: Visitor) -> Any:
     if kind == "joints" or (kind == "names" and slot.key in ("coordinates", "velocities")):
         names = [value] if isinstance(value, str) else value if listed else None
         return value if names is None else [_named(part, visitor.coordinate) for part in names]
-    if (
-        kind == "names" and slot.key == "releases" and (listed or isinstance(value, str))
-    ):  # by the names of their states
+    if kind == "some_names" and (listed or isinstance(value, str)):
+        ending = "_closed" if slot.key == "releases" else ""  # constraints go by the names of their states
         names = value if listed else [value]
-        return [_named(f"{part}_closed", visitor.coordinate).removesuffix("_closed") for part in names]
+        return [_named(f"{part}{ending}", visitor.coordinate).removesuffix(ending) for part in names]
     if kind in ("factors", "rates", "forces") and isinstance(value, Mapping):
         return {_named(name, visitor.coordinate): visitor.scalar(part, slot.at(name)) for name, part in value.items()}
     if kind in ("wheels", "inertia") and isinstance(value, Mapping):

@@ -7,6 +7,8 @@ from typing import Any
 
 import sympy
 
+from ..describe.build_switches import CLOSES, OPENS
+from ..describe.mechanism import Switched
 from ..errors import UnavailableError
 from ..graph.core import Expr
 from .author import Author
@@ -85,6 +87,9 @@ def _work(author: Author, column: Any) -> Any:
 
 def _weight(author: Author, name: str) -> list[Piece]:
     """Gravity, and other parts that are no elements."""
+    for switch in author.mechanism.switched:
+        if switch.constraint is not None and switch.constraint.name == name:
+            return _held(author, name, switch)
     if name != "gravity":
         return [Sentence(f"`{name}` of the model.")]
     gravity = author.write("gravity", list(author.mechanism.gravity)).expressions
@@ -96,6 +101,22 @@ def _weight(author: Author, name: str) -> list[Piece]:
         ),
         FormulaLine((r"\mathbf{g}", sympy.Matrix(3, 1, gravity))),
     ]
+
+
+def _held(author: Author, name: str, switch: Switched) -> list[Piece]:
+    """What a constraint that closes and opens demands, and when."""
+    assert switch.constraint is not None
+    events = {event.name: event for event in author.mechanism.events}
+    told = f"{switch.constraint.sentence} This holds for a time, while `{switch.state}` is 1; else its force is 0."
+    pieces: list[Piece] = [Sentence(told)]
+    for ending, what in ((CLOSES, "It closes by a plastic impact"), (OPENS, "It opens")):
+        if (event := events.get(f"{name}{ending}")) is not None:
+            (value,) = author.write("events", [event.expression]).expressions
+            pieces += [
+                Sentence(f"{what} where this falls to 0:"),
+                FormulaLine((rf"\mathrm{{{what.split()[1]}}}", value)),
+            ]
+    return pieces
 
 
 def _law(author: Author, force: Any) -> list[Piece]:

@@ -25,6 +25,7 @@ from .picture import draw, new_figure
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+TIMED = {"holds": "for a time"}  #: of a constraint that closes and opens
 WIDTH = 110  #: of the lines of a report, at most
 
 
@@ -143,6 +144,8 @@ class MechanismReport:
             say("rank", f"{self.rank}" + (f"; redundant: {_list(self.redundant)}" if self.redundant else ""))
         if len(set(self.ranks)) > 1:
             say("", f"the rank differs between configurations: {sorted(set(self.ranks))}")
+        if timed := [str(element["name"]) for element in self.elements if TIMED.items() <= element.items()]:
+            say("held for a time", f"{_list(timed)}; what follows is without them")
         counts = []
         if self.gruebler_kutzbach is not None:
             counts.append(f"Gruebler-Kutzbach {self.gruebler_kutzbach} in space")
@@ -259,6 +262,11 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
         elements=[
             {"name": e.name, "type": e.type_name, "bodies": [names[k + 1] for k in _touched(kinematics, e)]}
             for e in m.constraints
+        ]
+        + [
+            {"name": e.name, "type": e.type_name, "bodies": [names[k + 1] for k in _touched(kinematics, e)], **TIMED}
+            for e in (s.constraint for s in m.switched)
+            if e is not None
         ],
         guessed={name: [guess, value] for name, guess, value in mobility.guessed},
         guess_distance=mobility.guess_distance,

@@ -40,6 +40,8 @@ class SwitchedRow(NamedTuple):
     rate: Expr  #: C'
     rest: Expr  #: w without the accelerations
     multiplier: Expr
+    errors: tuple[Expr, Expr]  #: C, 0 for an equation of velocities, and C'; both 0 while it is open
+    kind: str  #: 'length' or 'angle'
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,10 @@ def _of_one(kinematics: Kinematics, switch: Switched) -> tuple[list[SwitchedRow]
         else:
             rest = found.gamma[i] + rate * speed
         row = [_while_closed(switch, x) for x in (*J, speed, rest)]
-        rows.append(SwitchedRow(label, switch.state, tuple(row[:-2]), row[-2], row[-1], multiplier))
+        value = found.values[i] if i < len(found.values) else graph.zero
+        errors = (_closed_or_0(switch, value), _closed_or_0(switch, speed))
+        own = (label, switch.state, tuple(row[:-2]), row[-2], row[-1], multiplier, errors, found.kinds[i])
+        rows.append(SwitchedRow(*own))
         for body, D in on_bodies[label].items():
             markers.append(_load(kinematics, body, tuple(_while_closed(switch, d) for d in D), multiplier))
         for name, part in zip(kinematics.velocity_labels, _left(kinematics, J, on_bodies[label]), strict=True):
@@ -93,6 +98,10 @@ def _while_closed(switch: Switched, x: Expr) -> Expr:
     """x, or 0 while the constraint is open and x may be no number: a disc that lies flat, far from its plane."""
     if {x.graph.nodes[i][0] for i in reachable(x.graph, [x.id])} <= FINITE:
         return x
+    return _closed_or_0(switch, x)
+
+
+def _closed_or_0(switch: Switched, x: Expr) -> Expr:
     return where(x.graph.apply("lt", 0.5, x.graph.symbol(switch.state)), x, 0.0)
 
 

@@ -44,3 +44,14 @@ FOUND = 1e-7
 OPENS = 1e-3
 #: Change of a state by which an input is asked whether it depends on it.
 ELSEWHERE = 1e-3
+#: Cosine, in the metric of the mass matrix, up to which impulses of one contact do not move another: rounding of M^-1,
+#: 1e-16 times a condition of 1e4.
+COUPLED = 1e-12
+#: Part of the inverse mass along a normal below which impulses with friction do not open a gap: rounding of it.
+STRUCK = 1e-12
+#: Residual of the laws of impact with friction, relative to the fastest contact, at which Newton's method is done.
+REACHED = 1e-13
+#: Residual of these laws that is accepted where contacts depend on each other: rounding over their softness, 1e-8.
+GIVES = 1e-9
+#: Part of the energy that impulses with friction move by which their sum may grow by rounding.
+GAINS = 1e-12

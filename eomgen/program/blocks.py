@@ -209,6 +209,7 @@ class BlockMaker:
             "motion_axes": lambda: terms.motion_axes,
             "events": lambda: terms.events,
             "resets": lambda: terms.resets,
+            "held_errors": lambda: terms.held_errors,
             "event_slopes": lambda: derivatives(terms, terms.events, (*terms.q, *terms.v)),
             "event_derivatives": lambda: by_everything(terms, [*terms.events, *terms.resets]),
             "strike_derivatives": lambda: by_everything(

@@ -71,6 +71,7 @@ def build_program(
     has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
     has["energy"] = bool(metadata.get("energy_known", True))
     has |= {"events": bool(terms.events), "resets": bool(terms.resets), "meeting_time": bool(terms.meeting_times)}
+    has["held_errors"] = bool(terms.held_errors)
     if terms.given_rates or not terms.projects:  # their derivatives by inputs and parameters are not derived
         has |= dict.fromkeys(SHIFTS, False)
     if terms.given_rates or metadata.get("no_inertia") or metadata.get("indefinite"):
@@ -164,6 +165,7 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_momenta=len(terms.canonical) // 2,
         n_events=len(terms.events),
         n_resets=len(terms.resets),
+        n_held=len(terms.held_errors),
         n_strike=_strike_rows(terms),
         n_states=terms.n_states,
         n_spots=len(terms.near_pairs),

@@ -110,7 +110,8 @@ def describe_picture(mechanism: Mechanism) -> dict[str, Any] | None:
     joints = [_joint(n, spec) for spec in mechanism.joints]
     owners = {name: k for k, spec in enumerate(mechanism.joints) for name in spec.coordinates}
     things = [(f.name, f.drawn(), _push(n, f)) for f in mechanism.forces]
-    things += [(c.name, c.drawn(), {}) for c in mechanism.constraints]
+    switched = [s.constraint for s in mechanism.switched if s.constraint is not None]
+    things += [(c.name, c.drawn(), {}) for c in (*mechanism.constraints, *switched)]
     elements = [
         {"name": name, **found, **(push if len(found.get("stops", ())) > 1 else {})}
         for name, every, push in things

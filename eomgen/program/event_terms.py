@@ -22,6 +22,7 @@ def describe_events(kinematics: Kinematics) -> dict[str, Any]:
             "resets": bool(e.reset),
             "restitution": e.restitution,
             "doc": e.doc,
+            **({} if e.friction is None else {"friction": e.friction, "slip": list(e.slip)}),
         }
         for e in m.events
     ]

@@ -84,7 +84,9 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     motion.carried = dict(zip(names, values, strict=False))
     whole = replace(kinematics, forces=(*kinematics.forces, *held))
     solved = _replaced(whole, known | dict(zip(symbols, values, strict=True)))
-    return replace(solved, motion=motion, reaction_laws=tuple(speaking), plastic=plastic)
+    solved = replace(solved, motion=motion, reaction_laws=tuple(speaking), plastic=plastic)
+    known_rows = tuple((row.label, row.state, row.kind) for row in rows)
+    return replace(solved, held_rows=known_rows, held_errors=tuple(e for row in rows for e in row.errors))
 
 
 def _asked_at_states(kinematics: Kinematics, gain: Matrix) -> Matrix:

@@ -81,6 +81,7 @@ class SystemTerms:
     constrained: Callable[..., TreeMotion] | None = None  #: constraint rows -> a, by articulated bodies; else None
     events: Row = ()  #: of (q, v): their zeros are the events of the model
     resets: Row = ()  #: of (q, v): new values of states after events
+    held_errors: Row = ()  #: of (q, v): of each closed row of constraints that close and open, its error and its rate
     meeting_times: Row = ()  #: (0 or 5,) of (q, v, a): how long a step may be that passes over no contact, and
     #: penetration, thickness and numbers of the deepest two shapes
     near_pairs: Row = ()  #: of q: the lists of pairs of shapes that are near each other

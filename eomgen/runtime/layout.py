@@ -75,10 +75,11 @@ class Layout:
         self.n_dof: int = data.get("n_dof", self.n_v)
         of_outputs = ("n_coordinate_slopes", "n_wrenches", "n_wrench_geometry", "n_com", "n_momenta")
         counts: list[int] = [
-            data.get(name, 0) for name in (*of_outputs, "n_dae", "n_events", "n_resets", "n_strike", "n_spots")
+            data.get(name, 0)
+            for name in (*of_outputs, "n_dae", "n_events", "n_resets", "n_strike", "n_spots", "n_held")
         ]
         self.n_coordinate_slopes, self.n_wrenches, self.n_wrench_geometry, self.n_com, self.n_momenta = counts[:5]
-        self.n_dae, self.n_events, self.n_resets, self.n_strike, self.n_spots = counts[5:]
+        self.n_dae, self.n_events, self.n_resets, self.n_strike, self.n_spots, self.n_held = counts[5:]
         self.n_bodies, self.n_loop_coordinates = len(self.bodies), len(self.loops)
         self.n_alignments = len(self.alignment_labels)
         self.n_finite_forces = len(self.fragile_forces)

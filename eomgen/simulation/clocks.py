@@ -5,12 +5,14 @@ A clock is an event, t - offset - k period, and the state that holds k, the numb
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.constraints import MEASURED
 from ..limits.runs import WHOLE
 from ..numeric.scales import Array
 from .events import instant
@@ -19,7 +21,9 @@ if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
 
-def at_next_samples(module: BoundModel, t: float, x: Array, span: tuple[float, float] | None = None) -> Array:
+def at_next_samples(
+    module: BoundModel, t: float, x: Array, span: tuple[float, float] | None = None, initial: Any = None
+) -> Array:
     """The state x (n_x,) at time t with clocks whose next time is past set to their first one that is not.
 
     A sampling time at t itself happens.  A clock that is ahead by more than its period, as that of a state from the end
@@ -33,6 +37,7 @@ def at_next_samples(module: BoundModel, t: float, x: Array, span: tuple[float, f
     clocks: list[dict[str, Any]] = module.metadata.get("clocks", [])
     if span is not None:
         require_forward(module, *span)
+        require_agreement(module, t, x, initial)
     if not clocks:
         return x
     values = module.kernels.timed("events")
@@ -88,3 +93,39 @@ def require_forward(module: BoundModel, start: float, end: float) -> None:
             f"a run of constraints that close and open ({', '.join(switched)}) goes forward in time, not from "
             f"{start:.6g} s to {end:.6g} s"
         )
+
+
+def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> None:
+    """Refuse a start at which a constraint that the model declares closed does not hold.
+
+    A state from another run, and constraints that are closed by name in `initial`, are taken as they are: an error that
+    was there when a constraint closed dies away in the run.
+
+    Raises
+    ------
+    UsageError
+        Tells the equation, its error and how much of one is allowed.
+    """
+    rows: list[tuple[str, str, str]] = module.metadata.get("held_rows", [])
+    if (
+        not rows
+        or not (initial is None or isinstance(initial, Mapping))
+        or "held_errors" not in module.kernels.core.names
+    ):
+        return
+    layout = module.layout
+    found = module.kernels.timed("held_errors")(t, x)
+    fast = max(1.0, layout.scales.speed(x[layout.n_q :]))
+    for k, (label, state, kind) in enumerate(rows):
+        size, unit = (layout.length, "m") if kind == "length" else (1.0, "rad")
+        for value, limit, what, per in (
+            (found[2 * k], MEASURED * size, "is off by", ""),
+            (found[2 * k + 1], MEASURED * size * fast, "changes by", "/s"),
+        ):
+            if not abs(value) <= limit and state not in (initial or ()):
+                name = state.removesuffix("_closed")
+                raise UsageError(
+                    f"constraint {name} is closed at the start, and its equation {label} {what} {value:.6g} "
+                    f"{unit}{per} there (up to {limit:.2g} counts as held); give a start where it holds, or "
+                    "closed: false"
+                )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..analysis.impact import Impact, strike_run
 from ..analysis.impact_gaps import Gaps, allowance, check_gaps
+from ..analysis.impact_sliding import Rough, check_friction
 from ..errors import SimulationError, UsageError
 from ..limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
 from ..limits.runs import INSTANT
@@ -41,6 +42,7 @@ def simulate_impacts(
     parameters: Any = None,
     inputs: Mapping[str, Any] | None = None,
     *,
+    friction: Mapping[str, tuple[float, str | Sequence[str]]] | None = None,
     most: int = 1000,
     **options: Any,
 ) -> ImpactRun:
@@ -54,6 +56,8 @@ def simulate_impacts(
         As for :meth:`impact`.
     initial, parameters, inputs : optional
         As for ``simulate``.
+    friction : mapping, optional
+        As for :meth:`impact`.
     most : int
         Number of impacts after which the run ends: impacts accumulate as a body comes to rest.
     **options
@@ -81,6 +85,7 @@ def simulate_impacts(
             )
     most = read_count("most, the number of impacts,", most, 1)
     found, _ = check_gaps(module.layout, gaps)
+    rough = check_friction(module.layout, friction, found)
     if not module.layout.n_dof:
         raise UsageError(
             f"{module.name} has no degree of freedom: its drivers determine the motion, and no impact can change it"
@@ -92,7 +97,7 @@ def simulate_impacts(
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
     forcing.begin(start, end)
-    run = _ImpactRun(bound, found, forcing, inputs, end, most, options)
+    run = _ImpactRun(bound, found, rough, forcing, inputs, end, most, options)
     return run.finish(run.travel(start, find_state(bound, initial, start, forcing)))
 
 
@@ -115,6 +120,7 @@ class _ImpactRun:
         self,
         module: BoundModel,
         restitutions: dict[str, float],
+        rough: Rough,
         forcing: Forcing,
         inputs: Mapping[str, Any] | None,
         end: float,
@@ -122,7 +128,7 @@ class _ImpactRun:
         options: dict[str, Any],
     ) -> None:
         self.module, self.forcing, self.inputs, self.end, self.most = module, forcing, inputs, end, most
-        self.options, self.restitutions = options, restitutions
+        self.options, self.restitutions, self.rough = options, restitutions, rough
         self.gaps = Gaps(module, tuple(restitutions), forcing if forcing else None)
         self.limits = allowance(module.layout, self.gaps.names, TOUCHING)
         self.ends = _ending(module)
@@ -175,7 +181,7 @@ class _ImpactRun:
     def _strike(self, t: float, x: Array, closed: NDArray[np.bool_]) -> Array | None:
         """The state after an impact of closed gaps, if one closes."""
         chosen = {name: e for (name, e), one in zip(self.restitutions.items(), closed, strict=True) if one}
-        impact = strike_run(self.gaps, t, x, chosen)
+        impact = strike_run(self.gaps, t, x, chosen, {name: self.rough[name] for name in chosen if name in self.rough})
         if not (impact.impulses > 0.0).any():
             return None
         self.impacts.append((t, impact))

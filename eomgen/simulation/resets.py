@@ -46,6 +46,7 @@ class Resets:
             event = self.events[e]
             came, goes = (self.rate(event, t, state) for state in (before, after))
             stuck = not abs(goes) > TOUCHING * abs(came) or (event.action == WAIT and goes < 0.0)
+            stuck = stuck and abs(event(t, after)) <= TOUCHING * abs(came * self.span)  # not where its value jumped
             again = event.direction * came < 0.0  # the zero it just left
             if event.action in (RESET, WAIT) and (stuck or again):
                 self.crowded = self.most

@@ -90,7 +90,7 @@ def find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | 
         from .clocks import at_next_samples
 
         span = None if forcing is None else forcing.span
-        return at_next_samples(module, t, _find_state(module, initial, t, forcing), span)
+        return at_next_samples(module, t, _find_state(module, initial, t, forcing), span, initial)
     return _find_state(module, initial, t, forcing)
 
 

@@ -134,6 +134,11 @@ class Saltation:
         if touching:
             raise self._at_once(t, [str(declared[index]["name"]), *touching])
         self._refuse_moving(t, x, index)
+        if declared[index].get("friction"):
+            raise NoDerivativeError(
+                f"event {declared[index]['name']} is an impact with friction, whose derivative is not available; leave "
+                "the friction out, or end the run before it"
+            )
         v, e = x[self.module.n_q :], float(declared[index]["restitution"])
         return after_impact(self.run, here, t, v, move, x_after, index, e)
 

@@ -165,7 +165,25 @@ def test_impact(call: Call) -> None:
         (["--gap", "s=2"], "--gap: the restitution of s must be between 0 and 1"),
         (["--stop", "q"], "--stop: no coordinate or output 'q'"),
         (["--gap", "s=0.5"], "(open); an impact needs a gap of 0"),
+        (["--gap", "s=0.5", "--slip", "s"], "--slip: 's' is not NAME=MU:SPEED"),
+        (["--gap", "s=0.5", "--slip", "s=0.3:vv"], "--slip: no coordinate or output 'vv' for the sliding of s"),
+        (["--gap", "s=0.5", "--slip", "s=0.3:theta", "--stop", "s"], "give --slip or --stop, not both"),
     ):
         result = call("impact", CRANK, "--target", "numpy", *option)
         assert result.code == 2
         assert message in " ".join(result.err.split())
+
+
+def test_impact_with_friction(call: Call, tmp_path: Path) -> None:
+    """A ball that slides all along its bounce loses mu (1 + e) of its speed."""
+    file = tmp_path / "ball.yaml"
+    file.write_text(
+        "name: ball\nbodies: {b: {mass: 2, inertia: {zz: 1}}}\njoints: {fly: {type: planar, between: [ground, b]}}\n"
+        "outputs: {gap: y(b), slide: vx(b)}\ninitial: {fly_x_dot: 1, fly_y_dot: -0.5}\n",
+        encoding="utf-8",
+    )
+    words = ("impact", file, "--target", "numpy", "--gap", "gap=0.4", "--slip", "gap=0.3:slide")
+    found = call(*words, "--json").json
+    np.testing.assert_allclose(found["friction"]["gap"], [-0.3 * 1.4 * 0.5 * 2])
+    np.testing.assert_allclose(found["sliding_after"]["gap"], [1 - 0.3 * 1.4 * 0.5])
+    assert "friction of gap  impulse -0.42, sliding 1 -> 0.79" in call(*words).out

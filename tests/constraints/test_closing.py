@@ -337,3 +337,79 @@ def test_runs_backwards_are_refused(target: str) -> None:
         mod.simulate((1.0, 0.0))
     with pytest.raises(eg.UsageError, match=told):
         mod.simulate_many((1.0, 0.0), {"x1_dot": [1.0, 2.0]})
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_start_in_disagreement_is_told_with_numbers(target: str) -> None:
+    """Of an equation of positions its error and its rate; a state of another run is taken as it is."""
+    m = eg.Model("pair")
+    for name in ("x1", "x2"):
+        m.prismatic(name, m.ground, m.body(f"b_{name}", mass=1.0), axis="x")
+    m.coupling("latch", equation="x1 - x2", opens="1 - t")
+    mod = m.compile(target=target)
+    told = r"constraint latch is closed at the start, and its equation latch.equation {} there \(up to 1"
+    for start, what in (({"x2": 0.1}, "is off by -0.1 m"), ({"x1_dot": 1.5}, "changes by 1.5 m/s")):
+        for run in (mod.simulate, mod.dae.solve):
+            with pytest.raises(eg.UsageError, match=told.format(what)):
+                run(2.0, start)
+    assert mod.simulate(2.0, {"x2": 0.1, "latch_closed": 0})["x2"][-1] == pytest.approx(0.1)
+    assert mod.simulate(2.0, mod.x0(x2=0.1))["latch_closed"][-1] == 0.0
+    run = mod.simulate(2.0, {"x1": 0.3, "x2": 0.3, "x1_dot": 1.5, "x2_dot": 1.5})
+    assert run["x1"][-1] == pytest.approx(3.3)
+
+
+@pytest.mark.parametrize("sign", ["", "-"])
+def test_a_multiplier_of_0_opens_by_ida_too(sign: str) -> None:
+    """Two carts that coast side by side carry nothing: the latch opens at once, and the run goes on."""
+    m = eg.Model("coast")
+    for name in ("x1", "x2"):
+        m.prismatic(name, m.ground, m.body(f"b_{name}", mass=1.0), axis="x")
+    m.coupling("latch", equation="x1 - x2", opens=f"{sign}multiplier(latch)")
+    run = m.compile(target="numpy").dae.solve(2.0, {"x1_dot": 1.0, "x2_dot": 1.0})
+    assert run.t_events["latch_opens"] == pytest.approx([0.0])
+    assert run["latch_closed"][-1] == 0.0
+    assert [run["x1"][-1], run["x2"][-1]] == pytest.approx([2.0, 2.0], rel=1e-9)
+
+
+def test_closing_by_ida() -> None:
+    """The same latch as by the steppers: a plastic impact, then both swing together."""
+    mod = carts().compile(target="numpy")
+    run = mod.dae.solve(3.0, rtol=1e-9, atol=1e-11)
+    hit, speed, w = 1.0 / 1.5, 2.0 * 1.5 / 5.0, np.sqrt(10.0 / 5.0)
+    assert run.t_events["latch_closes"] == pytest.approx([hit], rel=1e-8)
+    assert run["x1"][-1] == pytest.approx(speed / w * np.sin(w * (3.0 - hit)), abs=1e-6)
+
+
+def test_reports_and_pictures_tell_what_holds_for_a_time() -> None:
+    """The report, the worked solution and the picture name the hold; a joint that should close is shown the way."""
+    m = eg.Model("grasp")
+    a, b = (m.body(name, mass=1.0, inertia={"zz": 0.1}) for name in "ab")
+    m.planar("f", m.ground, a)
+    m.planar("g", m.ground, b)
+    m.hold("grip", a, b, axes="xy", turning="z", closes="1 - t", opens="2 - t")
+    report = m.check()
+    assert report.elements == [{"name": "grip", "type": "hold", "bodies": ["a", "b"], "holds": "for a time"}]
+    assert "held for a time       grip; what follows is without them" in str(report)
+    eqs = m.derive()
+    told = eqs.explain().markdown
+    assert "The marker does not move on the other body while it is held." in told
+    assert "This holds for a time, while `grip_closed` is 1; else its force is 0." in told
+    assert "It closes by a plastic impact where this falls to 0" in told
+    assert "It opens where this falls to 0" in told
+    mod = eqs.compile(target="numpy")
+    assert [e["name"] for e in mod.metadata["picture"]["elements"]] == ["grip"]
+    with pytest.raises(
+        eg.UsageError, match="revolute has no argument 'closes': joints hold for good; for a time use a"
+    ):
+        m.revolute("hinge", a, b, closes="1 - t")
+
+
+def test_a_joint_in_a_file_that_should_close_is_shown_the_way(tmp_path: Path) -> None:
+    file = tmp_path / "c.yaml"
+    file.write_text(
+        "name: c\nbodies: {a: {mass: 1, inertia: {zz: 1}}}\n"
+        "joints: {A: {type: revolute, between: [ground, a], closes: 1 - t}}\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(ModelError, match="joints.A.closes: unknown key; joints hold for good; for a time use a constr"):
+        eg.load(file).check()
