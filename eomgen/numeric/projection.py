@@ -130,9 +130,7 @@ def project(
     return q, correct_velocity(C_q, rate(q), v, scales)
 
 
-def _is_closed(
-    C: Array, C_q: Array, C_t: Array, q: Array, v: Array, scales: Scales, given: GivenRates | None
-) -> bool:
+def _is_closed(C: Array, C_q: Array, C_t: Array, q: Array, v: Array, scales: Scales, given: GivenRates | None) -> bool:
     """Whether a state is on the constraints to rounding, at both levels; it then stays as it is, to the last bit.
 
     Of n terms each is rounded, and the roundings add up as the root of n.
