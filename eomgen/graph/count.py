@@ -9,7 +9,8 @@ from typing import Any
 
 from ..operations import ARITHMETIC, operations_with
 from ..records import dataclass
-from .core import Expr
+from .core import Expr, Graph
+from .pair_calls import pair_call
 from .traverse import LEAVES, common_graph, reachable
 
 
@@ -22,7 +23,7 @@ class Operations:
     multiplications, additions, divisions, negations : int
         Subtractions are additions.
     functions : mapping of str to int
-        sqrt, sin, pow, ... by name.
+        sqrt, sin, pow, ... by name; a sum over pairs of shapes, its derivatives along a direction, ... once each.
     choices : mapping of str to int
         abs, sign, min, max, comparisons, logic and select by name.
     """
@@ -72,6 +73,7 @@ def count(outputs: Sequence[Expr]) -> Operations:
         return Operations()
     nodes = graph.nodes
     found = Counter(nodes[i][0] for i in reachable(graph, (y.id for y in outputs)))
+    found = _with_pairs(graph, found)
     bends, arithmetic = operations_with(lambda row: row.bends), operations_with(lambda row: row.kind == ARITHMETIC)
     return Operations(
         multiplications=found["mul"],
@@ -81,6 +83,18 @@ def count(outputs: Sequence[Expr]) -> Operations:
         functions={k: found[k] for k in sorted(found.keys() - bends - arithmetic - LEAVES)},
         choices={k: found[k] for k in sorted(found.keys() & bends)},
     )
+
+
+def _with_pairs(graph: Graph, found: Counter[str]) -> Counter[str]:
+    """The same, with sums over pairs of shapes under their names; that results are read from lists is no operation."""
+    calls = {name: call for name in found.keys() & graph.calls.keys() if (call := pair_call(graph, name)) is not None}
+    if not calls:
+        return found
+    rest = Counter({name: n for name, n in found.items() if name not in calls})
+    for name, call in calls.items():
+        if call.part not in ("item", "given"):
+            rest[f"pairs {call.function.element}({call.part})"] += found[name]
+    return rest
 
 
 def critical_path(outputs: Sequence[Expr]) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import NonFiniteError, ProjectionError
 from ..limits.constraints import ACCEPTED, EXACT, GENTLE, HINDERED, NEAR, SETTLED, SHORT
+from ..limits.rounding import EPS, ROUNDED
 from .gram import gram_solver, least, smaller, weakness
 from .scales import Array, GivenRates, Position, Rate, Scales
 
@@ -122,13 +123,24 @@ def project(
     """
     if not scales.c.size:
         return q, v
-    C, C_q = position(q)  # a state that is on the constraints already stays as it is, to the last bit
-    if largest(scales.residual(C)) <= EXACT and largest(scales.residual(C_q @ v + rate(q))) <= EXACT * max(
-        1.0, scales.speed(v)
-    ):
+    C, C_q = position(q)
+    if _is_closed(C, C_q, rate(q), q, v, scales, given):
         return q, v
     q, C_q = correct_position(position, q, scales, given)
     return q, correct_velocity(C_q, rate(q), v, scales)
+
+
+def _is_closed(C: Array, C_q: Array, C_t: Array, q: Array, v: Array, scales: Scales, given: GivenRates | None) -> bool:
+    """Whether a state is on the constraints to rounding, at both levels; it then stays as it is, to the last bit.
+
+    Of n terms each is rounded, and the roundings add up as the root of n.
+    """
+    rounding, J = EPS * len(scales.q) ** 0.5, scales.jacobian(C_q)
+    placed = largest(scales.rounding(q, J[: len(C)])) / ROUNDED if given is None else 0.0
+    moved = largest(np.abs(J) @ np.abs(v / scales.q) + np.abs(scales.residual(C_t)))
+    return largest(scales.residual(C)) <= max(EXACT, rounding * placed) and largest(
+        scales.residual(C_q @ v + C_t)
+    ) <= max(EXACT * max(1.0, scales.speed(v)), rounding * moved)
 
 
 def minimum_norm(C_q: Array, y: Array, scales: Scales, noise: float | None = None, order: int = 1) -> Array:
