@@ -32,9 +32,9 @@ LONG = ("inverse_dynamics_hessian_product", "rhs_hessian_product")
 CURVED = LONG[1]
 #: Why there is none.
 NOT_CURVED = (
-    "second derivatives of the right-hand side of {!r} are not derived: they follow from equations that are solved without "
-    "pivots, by the methods auto, embedding and recursive, where some motion is left and q' = v; take "
-    "inverse_dynamics_hessian_product of its tree, or differences of jacobian"
+    "second derivatives of the right-hand side of {!r} are not derived: they follow from a solution without pivots, "
+    "which the methods augmented, newton_euler and amalgamated do not have, nor mechanisms without a degree of freedom "
+    "or with given rates; derive by another method, or take differences of jacobian"
 )
 
 

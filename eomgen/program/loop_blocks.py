@@ -170,10 +170,8 @@ class LoopBlocks(ABC):
             conditions.append(graph.apply("lt", left, size * LEFT + NOTHING))
         return x
 
-    def nearest(
-        self, x: Sequence[Expr], r: Sequence[Expr], rows: int, factor: SparseFactor, passes: int
-    ) -> list[Expr]:
-        """The nearest x with C_q x + r = 0 of so many rows, r scaled as these are, by passes with a factor of theirs."""
+    def nearest(self, x: Sequence[Expr], r: Sequence[Expr], rows: int, factor: SparseFactor, passes: int) -> list[Expr]:
+        """The nearest x with C_q x + r = 0 of so many rows, r scaled as they are, by passes with their factor."""
         x, J = list(x), self.J[:rows]
         columns = transpose(J, self.terms.n_v)
         for _ in range(passes):

@@ -21,7 +21,7 @@ from ..graph.substitute import substitute
 from .loop_blocks import LoopBlocks
 from .second_order import hessian_product
 
-TURNED = 0.125  #: 1/8: the part of |w|^2 that Euler parameters e lose along themselves in a turn by w, their length kept
+TURNED = 0.125  #: part of |w|^2 that Euler parameters lose along themselves in a turn by w, 1 - cos(|w| / 2)
 
 
 class LoopHessian:

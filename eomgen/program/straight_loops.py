@@ -8,7 +8,6 @@ from .embedded_loops import EmbeddedLoops
 from .loop_blocks import LoopBlocks, estimate
 from .terms import SystemTerms
 
-
 SOLUTIONS = 4  #: that leave no trace of DIFFERENTIATED
 
 
@@ -19,9 +18,7 @@ def curved_loops(terms: SystemTerms, longest: int, usual: LoopBlocks | None) -> 
     return straight_loops(terms, longest, DIFFERENTIATED, SOLUTIONS)
 
 
-def straight_loops(
-    terms: SystemTerms, longest: int, term: float = TIKHONOV, solutions: int = 2
-) -> LoopBlocks | None:
+def straight_loops(terms: SystemTerms, longest: int, term: float = TIKHONOV, solutions: int = 2) -> LoopBlocks | None:
     """The form that takes no pivots, if there is one whose factors take at most so many multiplications.
 
     Redundant rows take a term in so many solutions.

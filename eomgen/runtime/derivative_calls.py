@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import PartitionError, SingularMassMatrixError, UsageError
+from ..errors import NonFiniteError, PartitionError, SingularMassMatrixError, UsageError
 from ..numeric.scales import Array
 from .refusals import refuse_reaction_laws, refuse_states, require_velocities
 from .room import read_numbers
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 UNSOUND = (
     "second derivatives of a right-hand side with constraints are taken from a solution without pivots, which is not "
-    "accurate at this state, such as near a change point or where hardly any inertia is left; take differences of jacobian"
+    "accurate at this state, such as near a change point or where hardly any inertia is left; "
+    "take differences of jacobian"
 )
 
 
@@ -166,10 +167,12 @@ def rhs_hessian_product(
     kernel = _kept(module, "timed", "rhs_hessian_product")
     try:
         found = np.asarray(kernel(t, _stacked(parts), p, u))
-    except SingularMassMatrixError as error:
-        if not layout.n_c:
+    except (SingularMassMatrixError, NonFiniteError) as error:
+        time, here, now = float(error.time or 0.0), np.asarray(error.state)[:n_x], None if u is None else np.asarray(u)
+        alone = now is None or now.ndim == 1
+        if not layout.n_c or (alone and not np.isfinite(module.rhs(time, here, p, now)).all()):
             raise
-        raise PartitionError(f"{UNSOUND}: {error}", error.t, error.x) from error
+        raise PartitionError(f"rhs_hessian_product at t = {time:.6g}: {UNSOUND}", time, here) from error
     return found if whole else found[:n_x]
 
 

@@ -13,7 +13,6 @@ from models import build
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.errors import PartitionError, UnavailableError
 from eomgen.program.collect import collect_terms
 from eomgen.program.terms import SystemTerms
 
@@ -21,16 +20,15 @@ KERNEL = "rhs_hessian_product"
 Vector = Any  #: a column of mpmath
 
 
-def ball_loop(turned: bool = False) -> eg.Model:
+def ball_loop() -> eg.Model:
     """Two bars on ball joints with Euler parameters, held by a rod of given length, a spring and an input."""
     m = eg.Model("ball_loop", gravity=(0.5, -1.0, -9.81))
     force, length = m.input("pull", 0.4), m.parameter("length", 0.9)
     one = m.body("one", mass=1.2, com=(0.1, 0, 0.02), inertia=[[0.01, 0.001, 0], [0.001, 0.02, 0], [0, 0, 0.022]])
     two = m.body("two", mass=0.7, com=(0.3, 0.01, 0), inertia=(0.002, 0.03, 0.031))
-    way = (0.3, -0.2, 0.5) if turned else (0, 0, 0)
-    m.spherical("A", m.ground.at(0, 0, 0, rpy=way), one, rotation="euler_parameters")
+    m.spherical("A", m.ground.at(0, 0, 0, rpy=(0.3, -0.2, 0.5)), one, rotation="euler_parameters")
     m.revolute("B", one.at(0.3, 0, 0), two, axis=(0, "0.6", "0.8"), coordinate="b")
-    m.rod("held", m.ground.at(0.2, 0.7, 0.1), two.at(0.5, 0, 0), length=length)
+    m.distance("held", m.ground.at(0.2, 0.7, 0.1), two.at(0.5, 0, 0), length=length)
     m.force("pull", two.at(0.2, 0.1, 0), (0, force, 0))
     return m
 
@@ -105,21 +103,20 @@ class Judge:
         terms, n, m = self.terms, self.terms.n_v, self.terms.n_c
         q = self.project(x[: len(terms.q)])
         v = self.velocities(q, x[len(terms.q) :])
-        a = [terms.graph.symbol(name) for name in terms.a]
         still = dict.fromkeys(terms.a, mpmath.mpf(0))
         self.given |= still
         h = self.at(terms.inverse_dynamics, q=q, v=v, u=u)
         system, C_q = mpmath.matrix(n + m, n + m), self.rows(q, m)
         for k in range(n):
             self.given |= still | {terms.a[k]: mpmath.mpf(1)}
-            for i, (with_one, without) in enumerate(zip(self.at(terms.inverse_dynamics, q=q, v=v, u=u), h, strict=True)):
+            column = self.at(terms.inverse_dynamics, q=q, v=v, u=u)
+            for i, (with_one, without) in enumerate(zip(column, h, strict=True)):
                 system[i, k] = with_one - without
         for i in range(m):
             for k in range(n):
                 system[n + i, k] = system[k, n + i] = C_q[i, k]
         gamma = self.at(terms.gamma, q=q, v=v)
         found = list(mpmath.lu_solve(system, mpmath.matrix([-x for x in (*h, *gamma)])))[:n]
-        assert len(a) == n
         return [*self.at(terms.rates or [terms.graph.symbol(y) for y in terms.v], q=q, v=v)[: len(q)], *found]
 
 
@@ -136,7 +133,8 @@ def test_products_are_second_differences_in_fifty_digits(name: str, method: str)
     x0 = module.project(module.x0() + 0.02 * np.random.default_rng(1).uniform(-1, 1, n_x), t)
     step = mpmath.mpf(10) ** -10
     with mpmath.workdps(50):
-        given = {p: mpmath.mpf(float(value)) for p, value in zip(terms.p, module.p, strict=True)} | {terms.t: mpmath.mpf(t)}
+        given = {p: mpmath.mpf(float(value)) for p, value in zip(terms.p, module.p, strict=True)}
+        given[terms.t] = mpmath.mpf(t)
         judge = Judge(terms, given)
         w, d, e = (list(drawn([f"x{k}" for k in range(n)], seed).values())
                    for seed, n in ((2, n_x), (3, n_x + len(terms.u)), (4, n_x + len(terms.u))))  # fmt: skip
