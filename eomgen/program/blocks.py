@@ -15,16 +15,17 @@ from .block_groups import ALONG, COMPOSED, RATES, SHIFTS, flat
 from .body_loops import BodyLoops
 from .dae_rows import dae_kinematics
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
-from .embedded_loops import EmbeddedLoops
 from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
 from .inverse_slopes import inverse_slopes
 from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
-from .loop_blocks import LoopBlocks, estimate
+from .loop_blocks import LoopBlocks
 from .loop_slopes import BY_BODIES, LoopSlopes
 from .port_symbols import port_symbols
 from .program import Block, Limits, Port
 from .residuals import acceleration_residual, force_residual
 from .second_order import TreeHessian, hessian_product
+from .second_order_loops import LoopHessian
+from .straight_loops import curved_loops, straight_loops
 from .terms import SystemTerms
 
 
@@ -51,18 +52,12 @@ class BlockMaker:
     @cached_property
     def _loops(self) -> LoopBlocks | None:
         """The straight-line form of a right-hand side with loops, if it is not too long."""
-        terms = self.terms
-        if not self.has_loops or not self.sizes.n_dof or not (terms.mass_matrix or terms.by_columns):
-            return None
-        if terms.given_rates or terms.system is not None or not terms.projects or not self.limits.unrolled_loops:
-            return None
-        bodies = BodyLoops(terms)
-        if bodies.motion is not None or terms.by_columns:
-            return bodies if bodies.motion is not None else None
-        if estimate(terms.constraint_jacobian, terms.n_dof) > self.limits.unrolled_loops:
-            return None
-        loops = EmbeddedLoops(terms)
-        return loops if loops.determined else None
+        return straight_loops(self.terms, self.limits.unrolled_loops) if self.limits.unrolled_loops else None
+
+    @cached_property
+    def curved_loops(self) -> LoopBlocks | None:
+        """The form of a right-hand side with loops that is differentiated twice, also where drivers compute it."""
+        return curved_loops(self.terms, Limits.unrolled_loops, self._loops)
 
     @cached_property
     def _loop_slopes(self) -> LoopSlopes | None:
@@ -151,10 +146,13 @@ class BlockMaker:
         outputs = tuple(jvp(self._dae_residual, seeds))
         return Block("dae_tangent", (*given, along), outputs, (len(outputs),), public=False)
 
-    def _tree_hessian_product(self) -> tuple[list[Expr], list[Expr]]:
+    def _rhs_hessian_product(self) -> tuple[list[Expr], list[Expr]]:
         """Of the right-hand side by q, v, u, and checks of the mass matrix."""
-        accelerations, checks = self._accelerations
         given = self._through("rate_weights"), self._through("dq dv du")
+        if self.curved_loops is not None:
+            outputs, sound = LoopHessian(self.curved_loops, *given).product()
+            return outputs, [*self._turned, *sound]
+        accelerations, checks = self._accelerations
         return TreeHessian(self.terms, accelerations, *given).shortest(), checks
 
     def _through(self, ports: str) -> list[Expr]:
@@ -242,7 +240,7 @@ class BlockMaker:
             accelerations, checks = self._accelerations
             outputs = [*(terms.rates or self._symbols(terms.v)), *accelerations]
         elif name == "rhs_hessian_product":
-            outputs, checks = self._tree_hessian_product()
+            outputs, checks = self._rhs_hessian_product()
         elif (found := self._unrolled_derivative(name)) is not None:
             outputs, checks = found[0], [*self._turned, *found[1]]
         elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:

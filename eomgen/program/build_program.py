@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import UnavailableError, UsageError
 from ..graph.count import count
 from ..graph.pair_calls import has_pair_sums
 from ..graph.substitute import symbols_of
@@ -29,6 +29,13 @@ ABI = 1
 SPARSE = ("jacobian", "input_jacobian", "parameter_jacobian", "mass_matrix", "constraint_jacobian")
 #: Kernels that are left out where they would be long, unless they are named.
 LONG = ("inverse_dynamics_hessian_product", "rhs_hessian_product")
+CURVED = LONG[1]
+#: Why there is none.
+NOT_CURVED = (
+    "second derivatives of the right-hand side of {!r} are not derived: they follow from a solution without pivots, "
+    "which the methods augmented, newton_euler and amalgamated do not have, nor mechanisms without a degree of freedom "
+    "or with given rates; derive by another method, or take differences of jacobian"
+)
 
 
 def build_program(
@@ -60,6 +67,8 @@ def build_program(
     ------
     UsageError
         Sizes contradict each other, an unknown kernel, or a name that is no C identifier.
+    UnavailableError
+        Second derivatives are named, and the equations have none.
     """
     terms.check_shapes()
     name = str(metadata["name"])
@@ -83,6 +92,10 @@ def build_program(
     if kernels is not None and "rhs" in kernels and terms.meeting_times:  # no run goes without
         kernels = [*kernels, "meeting_time"]
     wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]
+    if maker.has_loops and any(k.name == CURVED for k in wanted) and maker.curved_loops is None:
+        if kernels is not None:
+            raise UnavailableError(NOT_CURVED.format(name))
+        wanted = [k for k in wanted if k.name != CURVED]
     blocks: dict[str, Block] = {}
     drivers: list[KernelDriver] = []
     needed: dict[str, None] = {}

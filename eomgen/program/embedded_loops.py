@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..limits.constraints import LOST, VANISHED
+from ..limits.constraints import LOST, TIKHONOV, VANISHED
 from ..limits.crossings import NEAR_SQUARE
 from ..limits.inertia import STILL
 from ..numeric.triangular import DiagonalBlock, diagonal_blocks
@@ -23,8 +23,8 @@ class EmbeddedLoops(LoopBlocks):
 
     passes = 5, 4  # where weak rows keep something, drivers take more
 
-    def __init__(self, terms: SystemTerms) -> None:
-        super().__init__(terms)
+    def __init__(self, terms: SystemTerms, term: float = TIKHONOV, solutions: int = 2) -> None:
+        super().__init__(terms, term, solutions)
         self.lost = VANISHED if self.gentle else LOST
         #: squares of a column of the dependent coordinates, and of its part across those before it
         self._angles: dict[tuple[Expr, Expr], None] = {}

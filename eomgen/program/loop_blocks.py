@@ -80,13 +80,18 @@ class LoopBlocks(ABC):
     ----------
     terms : SystemTerms
         With constraint rows and at least one degree of freedom.
+    term : float
+        What is added to J J^T of redundant rows, relative to its largest diagonal entry.
+    solutions : int
+        How many solutions with that term leave no trace of it, each for what the last one left.
     """
 
     #: Linear corrections with GENTLE of velocities, whose errors gamma squares, and of accelerations.
     passes: tuple[int, int]
 
-    def __init__(self, terms: SystemTerms) -> None:
+    def __init__(self, terms: SystemTerms, term: float = TIKHONOV, solutions: int = 2) -> None:
         self.terms = terms
+        self.term, self.solutions = term, solutions
         self.s = terms.coordinate_scales
         one = terms.graph.one
         alike = len(set(terms.constraint_scales)) == 1
@@ -143,7 +148,7 @@ class LoopBlocks(ABC):
         if self.gentle:
             return self._regularised(self.J, GENTLE)[0], self.passes
         if self.redundant:
-            return self._regularised(self.J, TIKHONOV)[0], (2, 2)
+            return self._regularised(self.J, self.term)[0], (self.solutions, self.solutions)
         return factorize(gram(self.J)), (1, 1)
 
     def _corrected(self, x: list[Expr], r: Sequence[Expr], conditions: list[Expr], order: int = 1) -> list[Expr]:
@@ -164,6 +169,23 @@ class LoopBlocks(ABC):
             size = total_magnitude([a * (1.0 / s) for a, s in zip(x[:moving], self.s, strict=False)])
             conditions.append(graph.apply("lt", left, size * LEFT + NOTHING))
         return x
+
+    def nearest(self, x: Sequence[Expr], r: Sequence[Expr], rows: int, factor: SparseFactor, passes: int) -> list[Expr]:
+        """The nearest x with C_q x + r = 0 of so many rows, r scaled as they are, by passes with their factor."""
+        x, J = list(x), self.J[:rows]
+        columns = transpose(J, self.terms.n_v)
+        for _ in range(passes):
+            e = [a + b for a, b in zip(r, times(self.rows[:rows], x), strict=True)]
+            dz = times(columns, factor.solve(e))
+            x = [a - k * b for a, k, b in in_parts(list(zip(x, self.s, dz, strict=True)), x)]
+        return x
+
+    @cached_property
+    def holonomic(self) -> tuple[SparseFactor, int]:
+        """The factor of the holonomic rows, and passes by it after which a change of position is projected."""
+        if self.h == len(self.J):
+            return self.factor, self.corrections
+        return self.regularised(self.J[: self.h]), self.passes[0]
 
     @property
     def factor(self) -> SparseFactor:

@@ -24,7 +24,7 @@ from ..limits.constraints import TIKHONOV
 from .body_loops import BodyLoops
 from .program import Block, Port
 from .residuals import acceleration_residual, force_residual
-from .sparse import SparseFactor, in_parts, times, transpose
+from .sparse import times
 
 Outputs = list[Expr]
 
@@ -53,16 +53,6 @@ class LoopSlopes:
         return [self.terms.graph.symbol(name) for name in names]
 
     # -- directions -----------------------------------------------------------------------------------------------
-    def _projected(self, x: list[Expr], r: Sequence[Expr], rows: int, factor: SparseFactor, passes: int) -> list[Expr]:
-        """The nearest x with C_q x + r = 0 of so many rows, r scaled as these are."""
-        s, J = self.loops.s, self.loops.J[:rows]
-        columns = transpose(J, self.terms.n_v)
-        for _ in range(passes):
-            e = [a + b for a, b in zip(r, times(self.loops.rows[:rows], x), strict=True)]
-            dz = times(columns, factor.solve(e))
-            x = [a - k * b for a, k, b in in_parts(list(zip(x, s, dz, strict=True)), x)]
-        return x
-
     def _at_rest(self, rows: int) -> list[Expr]:
         return [self.terms.graph.zero] * rows
 
@@ -78,9 +68,7 @@ class LoopSlopes:
             for c in range(3):
                 z[j + c] = _sum(N[i + m, j + c] * factor * de[m] for m in range(4) if (i + m, j + c) in N)
         if loops.h:
-            every = loops.h == len(loops.J)
-            G = loops.factor if every else loops.regularised(loops.J[: loops.h])
-            z = self._projected(z, self._at_rest(loops.h), loops.h, G, loops.corrections if every else loops.passes[0])
+            z = loops.nearest(z, self._at_rest(loops.h), loops.h, *loops.holonomic)
         moved = substitute(rates, dict(zip(self.v, z, strict=True)))
         for i, _ in terms.quaternion_slots:
             e, de = self.q[i : i + 4], self.dq[i : i + 4]
@@ -92,7 +80,7 @@ class LoopSlopes:
         """The change of the projected v, q changing by dq."""
         turned = jvp(self.terms.velocity_constraints, dict(zip(self.q, dq, strict=True)))
         r = [x * i for x, i in zip(turned, self.loops.inverse, strict=True)]
-        return self._projected(dv, r, len(r), self.loops.factor, self.loops.corrections)
+        return self.loops.nearest(dv, r, len(r), self.loops.factor, self.loops.corrections)
 
     # -- accelerations --------------------------------------------------------------------------------------------
     def _changed(self, r1: Sequence[Expr], r2: Sequence[Expr]) -> list[Expr]:
@@ -109,7 +97,7 @@ class LoopSlopes:
             ]
             more = terms.constrained(again, term, loaded=False).accelerations
             da = [x + y for x, y in zip(da, more, strict=True)]
-        return self._projected(da, rest, len(rest), loops.factor, 1)
+        return loops.nearest(da, rest, len(rest), loops.factor, 1)
 
     def _along(self, dq: Sequence[Expr], dv: Sequence[Expr]) -> Outputs:
         """dq' and da along a projected direction."""
@@ -129,7 +117,7 @@ class LoopSlopes:
     def _columns(self) -> tuple[Outputs, Outputs]:
         zero, dq = self.terms.graph.zero, self._positions()
         by_position = self._along(dq, self._velocities(dq, [zero] * len(self.v)))
-        still = self._projected(
+        still = self.loops.nearest(
             list(self.dv),
             self._at_rest(len(self.loops.J)),
             len(self.loops.J),

@@ -7,13 +7,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UnavailableError, UsageError
+from ..errors import NonFiniteError, PartitionError, SingularMassMatrixError, UsageError
 from ..numeric.scales import Array
 from .refusals import refuse_reaction_laws, refuse_states, require_velocities
 from .room import read_numbers
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
+
+UNSOUND = (
+    "second derivatives of a right-hand side with constraints are taken from a solution without pivots, which is not "
+    "accurate at this state, such as near a change point or where hardly any inertia is left; "
+    "take differences of jacobian"
+)
 
 
 class InverseDynamicsDerivatives(NamedTuple):
@@ -119,10 +125,12 @@ def rhs_hessian_product(
     p: ArrayLike | None = None,
     u: ArrayLike | None = None,
 ) -> Array:
-    """Multiply the weighted sum of the Hessians of the right-hand side of a tree by a direction.
+    """Multiply the weighted sum of the Hessians of the right-hand side by a direction.
 
     With z = [x; u] and J = d(rhs)/dz it is the derivative of J(z + e direction)^T weights by e at e = 0, which is
-    ``sum_i weights[i] H_i direction`` with the Hessians H_i of the single rates.
+    ``sum_i weights[i] H_i direction`` with the Hessians H_i of the single rates.  With constraints the projection of x
+    is part of the right-hand side and is differentiated too, in directions off the constraints as well; the result is
+    that at the projected state.
 
     Parameters
     ----------
@@ -142,22 +150,29 @@ def rhs_hessian_product(
     Raises
     ------
     UnavailableError
-        The model has constraints, or its rates are given.
+        The rates of the model are given, or its constraints are solved with pivots only.
+    EvaluationError
+        The solution without pivots is not accurate at this state, such as near a change point.
     """
     layout = module.layout
     require_velocities(layout)
-    if layout.n_c:
-        raise UnavailableError(
-            f"model {layout.name!r} has constraints, and second derivatives of its right-hand side are not derived; "
-            "take inverse_dynamics_hessian_product of its tree, or differences of jacobian"
-        )
     d, n_x, n = read_numbers("direction", direction), layout.n_x, layout.n_x + layout.n_u
+    if layout.n_c:
+        x = module.project(x, t, p, u)
     parts = [("x", x, n_x), ("weights", weights, n_x)]
     if whole := d.shape[:1] != (n_x,):
         parts.append(("direction", d, n))
     else:
         parts += [("direction", d, n_x), ("direction", np.zeros(n - n_x), n - n_x)]
-    found = np.asarray(_kept(module, "timed", "rhs_hessian_product")(t, _stacked(parts), p, u))
+    kernel = _kept(module, "timed", "rhs_hessian_product")
+    try:
+        found = np.asarray(kernel(t, _stacked(parts), p, u))
+    except (SingularMassMatrixError, NonFiniteError) as error:
+        time, here, now = float(error.time or 0.0), np.asarray(error.state)[:n_x], None if u is None else np.asarray(u)
+        alone = now is None or now.ndim == 1
+        if not layout.n_c or (alone and not np.isfinite(module.rhs(time, here, p, now)).all()):
+            raise
+        raise PartitionError(f"rhs_hessian_product at t = {time:.6g}: {UNSOUND}", time, here) from error
     return found if whole else found[:n_x]
 
 

@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy
+from many_digits import drawn, in_digits
 from mechanisms import random_mechanism
 from sympy import cos, sin, symbols
 
@@ -18,7 +19,6 @@ from eomgen.equations import METHODS
 from eomgen.graph import evaluate
 from eomgen.graph.core import Expr
 from eomgen.graph.differentiate import jacobian
-from eomgen.graph.traverse import LEAVES, reachable
 from eomgen.kinematics import analyse
 from eomgen.kinematics.mobility import find_mobility
 from eomgen.program.collect import collect_terms
@@ -27,32 +27,6 @@ from eomgen.program.second_order import TreeHessian, hessian_product
 from eomgen.program.terms import SystemTerms
 
 KERNELS = ["inverse_dynamics_hessian_product", "rhs_hessian_product"]
-
-
-def in_digits(exprs: Sequence[Expr], values: Mapping[str, Any]) -> list[Any]:
-    """Values by mpmath, at its current precision."""
-    graph = exprs[0].graph
-    found: dict[int, Any] = {}
-    by_hand = {
-        "add": lambda x, y: x + y,
-        "sub": lambda x, y: x - y,
-        "mul": lambda x, y: x * y,
-        "div": lambda x, y: x / y,
-        "neg": lambda x: -x,
-    }
-    for i in reachable(graph, (x.id for x in exprs)):
-        kind, *args = graph.nodes[i]
-        if kind in LEAVES:
-            found[i] = mpmath.mpf(args[0]) if kind == "const" else values[args[0]]
-        else:
-            function = by_hand.get(kind) or getattr(mpmath, kind)
-            found[i] = function(*(found[k] for k in args))
-    return [found[x.id] for x in exprs]
-
-
-def drawn(names: Sequence[str], seed: int) -> dict[str, Any]:
-    random = np.random.default_rng(seed)
-    return {name: mpmath.mpf(round(random.uniform(-1, 1), 6)) for name in names}
 
 
 def double_pendulum() -> eg.Model:

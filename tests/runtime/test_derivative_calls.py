@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from models import three_cranks
 
 import eomgen as eg
-from eomgen.errors import UnavailableError, UsageError
+from eomgen.errors import PartitionError, UnavailableError, UsageError
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TARGETS = ["numpy", "cython"]
@@ -152,13 +153,47 @@ def test_wrong_arguments_are_told_by_name() -> None:
     with pytest.raises(UsageError, match=r"direction must have shape \(10,\)"):
         module.rhs_hessian_product(0.0, np.concatenate([q, v]), np.ones(9), np.ones(4))
     loop = eg.load(EXAMPLES / "slider_crank.yaml").compile(target="numpy")
-    with pytest.raises(UnavailableError, match="has constraints, and second derivatives"):
-        loop.rhs_hessian_product(0.0, loop.x0(), np.ones(loop.n_x), np.ones(loop.n_x))
+    with pytest.raises(UsageError, match=r"weights must have shape \(6,\)"):
+        loop.rhs_hessian_product(0.0, loop.x0(), np.ones(2), np.ones(loop.n_x))
     q, v, a = state(loop)
     w, d = np.ones(loop.n_v), np.ones(loop.n_q + 2 * loop.n_v)
     z = np.concatenate([q, v, a])
     bent = loop.inverse_dynamics_hessian_product(q, v, a, w, d)
     np.testing.assert_allclose(bent, slope(lambda e: joined(loop, z + e * d).T @ w), atol=1e-8)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize(("name", "method"), [("slider_crank", "embedding"), ("bricard", "recursive")])
+def test_products_of_loops_are_slopes_of_the_jacobian(name: str, method: str, target: str) -> None:
+    """Along the constraints, which the linkage of Bricard has one too many of, and symmetric in all directions."""
+    module = eg.load(EXAMPLES / f"{name}.yaml").derive(method).compile(target=target)
+    random = np.random.default_rng(7)
+    x = module.project(module.x0() + 0.05 * random.uniform(-1, 1, module.n_x))
+    w, d, e = random.uniform(-1, 1, (3, module.n_x))
+    d = slope(lambda h: module.project(x + h * d), 1e-4)
+    found = module.rhs_hessian_product(0.0, x, w, d)
+    along = slope(lambda h: module.jacobian(0.0, x + h * d).T @ w)
+    np.testing.assert_allclose(found, along, atol=1e-8 * np.abs(found).max())
+    crosswise = module.rhs_hessian_product(0.0, x, w, np.array([d, e]).T)
+    assert abs(crosswise[:, 0] @ e - crosswise[:, 1] @ d) < 1e-7 * np.abs(crosswise).max()
+    off = module.rhs_hessian_product(0.0, x + 1e-3 * e, w, d)
+    there = module.project(x + 1e-3 * e)
+    np.testing.assert_array_equal(off, module.rhs_hessian_product(0.0, there, w, d))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_products_of_loops_are_refused_where_they_would_be_wrong(target: str) -> None:
+    folded = three_cranks().compile(target=target)
+    one = np.ones(folded.n_x)
+    assert np.isfinite(folded.rhs_hessian_product(0.0, folded.x0(theta1=0.5), one, one)).all()
+    with pytest.raises(PartitionError, match="not accurate at this state, such as near a change point"):
+        folded.rhs_hessian_product(0.0, folded.x0(theta1=1e-3), one, one)
+    driven = eg.load(EXAMPLES / "driven_slider_crank.yaml").compile(target=target)
+    pivoted = eg.load(EXAMPLES / "four_bar.yaml").derive("augmented").compile(target=target)
+    for module in (driven, pivoted):
+        one = np.ones(module.n_x)
+        with pytest.raises(UnavailableError, match=f"of the right-hand side of {module.name!r} are not derived"):
+            module.rhs_hessian_product(0.0, module.x0(), one, one)
 
 
 def test_a_long_chain_is_differentiated_along_directions() -> None:
