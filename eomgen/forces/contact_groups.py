@@ -130,8 +130,7 @@ class ContactGroups(Force):
         if isinstance(self.normal_law, SoilPressure):
             return []  # soil yields
         _, function, operands = self._operands(view, "", still=True)
-        placed = operands[: function.first_state]
-        return pair_spots(view.graph, function, [*placed, *(view.graph.zero for _ in range(function.states))])
+        return pair_spots(view.graph, function, operands)
 
     @property
     def met_bodies(self) -> list[int]:
@@ -162,7 +161,8 @@ class ContactGroups(Force):
             operands += [graph.zero if still else x for v in moving for x in v]
         data = _SharedData(len(operands), graph)
         function = self._function(f"{part}{self.name}", bodies, data, bool(part))
-        return markers, function, [*operands, *data.values, *self._held(graph)]
+        held = [graph.zero] * function.states if still else self._held(graph)  # the energy does not depend on states
+        return markers, function, [*operands, *data.values, *held]
 
     def _held(self, graph: Graph) -> list[Expr]:
         """The states of all pairs; the number of pieces that touch is found, so 0 stands in its place."""

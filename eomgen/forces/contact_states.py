@@ -19,6 +19,8 @@ WHEEL = "wheel"  #: a circle with a width
 TEETH = 3  #: fewest teeth of a sprocket
 #: Parts that meet surfaces, in the order in which their states stand.
 PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon")
+#: Parts that meet surfaces and have no states.
+STATELESS = ("rim",)
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
 _ROUND = ("round", "rod", POLYGON)
 #: Kind of shape -> what it is where it is the first of a pair.

@@ -17,7 +17,7 @@ from eomgen.forces.contact_groups import _SharedData
 from eomgen.forces.contact_shape_fields import GROUNDS, SHAPE_FIELDS
 from eomgen.forces.contact_shape_fields import PLANAR as PLANE
 from eomgen.forces.contact_shapes import MEETINGS, meet
-from eomgen.forces.contact_states import PARTS, ShapeParts, class_of, given_groups, pair_states, part_of
+from eomgen.forces.contact_states import PARTS, STATELESS, ShapeParts, class_of, given_groups, pair_states, part_of
 from eomgen.generation import generate
 
 LUGRE = {
@@ -48,6 +48,18 @@ def test_one_pair_has_one_set_of_states(kind: str, count: int | None) -> None:
     wanted = [f"touch_bristle_{axis}_{k + 1}" for k in range(corners) for axis in "xz"]
     assert names == wanted
     assert len(m.derive().compile(target="numpy").x_names) == 12 + 2 * corners
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("law", [{}, {"friction_law": "coulomb", "smoothing": 1e-3}], ids=["lugre", "coulomb"])
+def test_bristles_take_nothing_from_the_energy_of_the_contact(law: dict[str, Any], target: str) -> None:
+    """k d^(n+1) / (n+1) of a circle in a half-plane, with states or without."""
+    m, (body,) = scenes.planar("one", 1, (0, 0, 0))
+    given = {**{k: v for k, v in LUGRE.items() if not law or "bristle" not in k}, **law, "exponent": 1.5}
+    m.contacts("touch", {"shape": "circle", "on": body, "radius": 0.1}, {"shape": "half_plane", "on": m.ground}, given)
+    mod = m.compile(target=target)
+    assert mod.energy(mod.x0(j0_y=0.09))[1] == pytest.approx(1e5 * 0.01**2.5 / 2.5, rel=1e-12)
+    assert mod.energy(mod.x0(j0_y=0.11))[1] == 0.0
 
 
 @pytest.mark.parametrize("target", ["numpy", "cython"])
@@ -266,7 +278,8 @@ def test_states_count_the_parts_that_shapes_have(kind: str) -> None:
         met = {first for first in surfaces if meet((first, second))}
         found = {k[2] for k in pair_states([[given], [ShapeParts("", {second: 1})]])[0] if k[0] == 0}
         assert found == {class_of(first, second) for first in met}, second
-    assert set(PARTS) == {b for _, b in MEETINGS}
+    assert {*PARTS, *STATELESS} == {b for _, b in MEETINGS}
+    assert not {*PARTS} & {*STATELESS}
 
 
 def test_bodies_on_a_slope_stay_and_batches_agree() -> None:

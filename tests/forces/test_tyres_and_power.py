@@ -137,7 +137,7 @@ def test_passive_car_never_gains_energy(law: dict[str, Any]) -> None:
 
 
 def grip_energy(load: float, length: float) -> float:
-    """Of a tread that is deflected up to full grip: the integral of mu F (1 - (1 - theta u / s)^3), 9 mu^2 F^2 s / (4 C)."""
+    """Of a tread deflected to full grip: the integral of mu F (1 - (1 - theta u / s)^3) is 9 mu^2 F^2 s / (4 C)."""
     return 9.0 * (MU * load) ** 2 * length / (4.0 * C)
 
 
