@@ -32,7 +32,9 @@ def woodpecker() -> Any:
     sleeve = m.body("sleeve", mass=M_M)
     m.prismatic("S", m.ground, sleeve, axis="y", coordinate="y")
     for name, J in (("M", J_M), ("B", J_S)):
-        m.revolute(f"turn_{name}", m.ground, m.body(f"disc_{name}", mass=0, inertia={"zz": J}), coordinate=f"phi_{name}")
+        m.revolute(
+            f"turn_{name}", m.ground, m.body(f"disc_{name}", mass=0, inertia={"zz": J}), coordinate=f"phi_{name}"
+        )
     m.prismatic("bird", m.ground, m.body("mass", mass=M_S), axis="y", coordinate="y_S")
     m.coupling("centre", {"y_S": 1, "y": -1, "phi_M": -L_M, "phi_B": -L_G})
     m.torque("spring_M", "turn_M", f"{C_PHI}*(phi_B - phi_M)")
