@@ -1,10 +1,10 @@
 """The tippe top: an eccentric sphere that slides on a plane turns over, or not, as published criteria say.
 
-With alpha = a / R (eccentricity), gamma = I_1 / I_3 and friction that grows with the sliding velocity, the inverted spin
-is the only stable one if 1 - alpha < gamma < 1 + alpha and Jellett's constant exceeds
+With alpha = a / R (eccentricity), gamma = I_1 / I_3 and friction that grows with the sliding velocity, the inverted
+spin is the only stable one if 1 - alpha < gamma < 1 + alpha and Jellett's constant exceeds
 sqrt(m g R^3 I_3 alpha) (1 + alpha)^2 / sqrt(1 + alpha - gamma) (S. Rauch-Wojciechowski, M. Skoldstam, T. Glad,
-Mathematical analysis of the tippe top, Regul. Chaotic Dyn. 10 (2005), 333-362; the three groups of tops also in T. Ueda,
-K. Sasaki, S. Watanabe, SIAM J. Appl. Dyn. Syst. 4 (2005), 1159-1194).
+Mathematical analysis of the tippe top, Regul. Chaotic Dyn. 10 (2005), 333-362; the three groups of tops also in
+T. Ueda, K. Sasaki, S. Watanabe, SIAM J. Appl. Dyn. Syst. 4 (2005), 1159-1194).
 """
 
 from __future__ import annotations

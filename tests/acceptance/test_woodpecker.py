@@ -1,8 +1,9 @@
 """The woodpecker toy (Glocker 1995; Leine, Glocker and van Campen 2001 and 2003): its limit cycle by rigid contact.
 
 A sleeve with clearance slides down a pole; a bird on a spring swings beside it.  The lower and the upper corner of the
-sleeve jam on the pole in turn, and the beak strikes it.  Numbers, the small-angle model and the state on the limit cycle
-are those of R. I. Leine, C. Glocker, D. H. van Campen, Nonlinear dynamics of the woodpecker toy, DETC2001/VIB-21608.
+sleeve jam on the pole in turn, and the beak strikes it.  Numbers, the small-angle model and the state on the limit
+cycle are those of R. I. Leine, C. Glocker, D. H. van Campen, Nonlinear dynamics of the woodpecker toy,
+DETC2001/VIB-21608.
 """
 
 from __future__ import annotations
