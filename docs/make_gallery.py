@@ -34,6 +34,7 @@ AT = 0.3  #: part of the run after which the picture is taken
 MOMENTS = {
     "bicycle": 0.1,
     "cart_pendulum": 0.45,
+    "compass_gait": 0.22,
     "double_pendulum": 0.9,
     "n_four_bar": 0.1,
     "pendulum": 0.1,

@@ -73,10 +73,9 @@ class Layout:
         if coordinate_of is not None:
             self.parameter_rates = tuple(f"{name}_dot" for name in self.q if f"{name}_dot" not in self.v)
         self.n_dof: int = data.get("n_dof", self.n_v)
-        of_outputs = ("n_coordinate_slopes", "n_wrenches", "n_wrench_geometry", "n_com", "n_momenta")
+        first = ("n_coordinate_slopes", "n_wrenches", "n_wrench_geometry", "n_com", "n_momenta")
         counts: list[int] = [
-            data.get(name, 0)
-            for name in (*of_outputs, "n_dae", "n_events", "n_resets", "n_strike", "n_spots", "n_held")
+            data.get(name, 0) for name in (*first, "n_dae", "n_events", "n_resets", "n_strike", "n_spots", "n_held")
         ]
         self.n_coordinate_slopes, self.n_wrenches, self.n_wrench_geometry, self.n_com, self.n_momenta = counts[:5]
         self.n_dae, self.n_events, self.n_resets, self.n_strike, self.n_spots, self.n_held = counts[5:]
