@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from ..program import Program
+from ..program import Block, Program
 from ..program.block_groups import ALONG, SHIFTS
 from ..program.loop_slopes import BY_BODIES
+from .pair_statements import kept_of
+from .pair_sums_used import sums_again
 
 CLOSE = ("scaled", "cholesky", "residual_sizes", "correct", "project", "close")
 PIVOT = ("eliminate", "pivots", "partition")
@@ -159,19 +161,36 @@ def passing_areas(program: Program) -> list[tuple[str, int]]:
 
 
 def _areas_of_bodies(program: Program) -> list[tuple[str, int]]:
-    """Areas of ``jacobian_bodies``; the first three follow one upon the other."""
+    """Areas of ``jacobian_bodies``; the first five follow one upon the other."""
     known = next((b.n_in for b in program.blocks if b.name == BY_BODIES[1]), None)
     if known is None:
         return []
     n_q, n, f = program.sizes.n_q, program.sizes.n_v, program.sizes.n_dof
+    again = sums_again(program)
     return [
         ("SLOPES", n + 2),  # v, whether sound, whether far
         ("COEFFICIENTS", known - n_q),
         ("TURNING", max(n_q, n)),  # a direction of q or of v
+        ("MET", len(again)),  # of each sum over pairs how many are near, 0 before they are looked for
+        ("SHAPES", sum(map(kept_of, again))),  # these pairs
         ("CHANGE", n_q + n),  # of q' and v'
         ("SPAN", 2 * f * (n_q + n)),
         ("SHARES", f * f),
     ]
+
+
+def places_again(program: Program, block: Block) -> dict[str, str]:
+    """Where blocks along a direction keep near pairs, by name of the sum: what they read, x, stands before these in w."""
+    again = sums_again(program) if block.name in BY_BODIES[1:] else []
+    if not again:
+        return {}
+    known = next(b.n_in for b in program.blocks if b.name == BY_BODIES[1]) - program.sizes.n_q
+    count = known + max(program.sizes.n_q, program.sizes.n_v)
+    found, at = {}, count + len(again)
+    for k, function in enumerate(again):
+        found[function.name] = f"w + (x - w) + {count + k}, w + (x - w) + {at}"
+        at += kept_of(function)
+    return found
 
 
 def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]], int]:

@@ -14,7 +14,8 @@ from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
 from ..program import Program
 from .c_text import print_pieces, used_helpers
-from .pair_sums_used import UsedSum, used_sums
+from .pair_statements import record_of
+from .pair_sums_used import UsedSum, sums_again, used_sums
 from .sources import render
 from .straight import cut
 
@@ -39,10 +40,14 @@ def _tables(function: PairFunction) -> list[dict[str, Any]]:
 
 def pair_files(program: Program) -> dict[str, str]:
     """The C files of the sums that a program uses."""
-    return {f"{program.name}_pairs_{used.function.name}.c": _file(program, used) for used in used_sums(program)}
+    again = {function.name for function in sums_again(program)}
+    return {
+        f"{program.name}_pairs_{used.function.name}.c": _file(program, used, used.function.name in again)
+        for used in used_sums(program)
+    }
 
 
-def _file(program: Program, used: UsedSum) -> str:
+def _file(program: Program, used: UsedSum, again: bool) -> str:
     function = used.function
     parts: list[tuple[PairPart, str]] = [("outputs", "")] if used.sums or used.slopes else []
     parts += [("slopes", "_slope")] if used.slopes else []
@@ -108,6 +113,9 @@ def _file(program: Program, used: UsedSum) -> str:
         "beyond": repr(BEYOND),
         "up_to": repr(UP_TO),
         "within": repr(WITHIN),
+        "again": again,
+        "kept": record_of(function),
+        "shapes": sum(map(len, function.tables)),
         "scratch": sum(len(table["rows"]) * table["length"] for table in tables),
     }
     return render("c/pairs.c.j2", context)
@@ -142,10 +150,11 @@ def _law(
 
 def pair_declarations(program: Program) -> list[str]:
     """Declarations of the sums, in every lane, for the files that call them."""
-    return [_declared(program.name, used) for used in used_sums(program)]
+    again = {function.name for function in sums_again(program)}
+    return [_declared(program.name, used, used.function.name in again) for used in used_sums(program)]
 
 
-def _declared(program: str, used: UsedSum) -> str:
+def _declared(program: str, used: UsedSum, again: bool) -> str:
     function = used.function
     prefix, n, results = f"{program}_pairs_{function.name}", function.count, function.results
     text = f"#define pairs_{function.name}_numbers {prefix}_numbers\n"
@@ -167,6 +176,11 @@ def _declared(program: str, used: UsedSum) -> str:
             f"EOMGEN_PIECE void {prefix}_slope(const double *given, const double *rates, double *out, double *work);\n"
         )
         text += _each(f"pairs_{function.name}_slope", f"{prefix}_slope", (n, n, results))
+    if again:
+        text += (
+            f"EOMGEN_PIECE void {prefix}_again(const double *given, const double *rates, double *out, double *met, "
+            f"double *kept);\n#define pairs_{function.name}_again {prefix}_again\n"
+        )
     return text
 
 

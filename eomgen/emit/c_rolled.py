@@ -9,6 +9,7 @@ import numpy as np
 
 from ..graph.core import Expr
 from ..program import Block, Program
+from .c_layout import places_again
 from .c_text import ARGUMENTS, SIGNATURE, BlockPrinter, Printed, direct_results, function_text
 from .repeats import FEW
 from .rolled import Place, SegmentKind, Segments, find_segments
@@ -24,13 +25,14 @@ ALIKE = 2
 def print_rolled(program: Program, block: Block) -> Printed | None:
     """The C functions of a block whose alike segments are loops; None if too few of its segments are alike."""
     texts = references(program, block.inputs)
-    return _print(program, block.name, block.outputs, block.checks, program.parameter_only, texts)
+    again = places_again(program, block)
+    return _print(program, block.name, block.outputs, block.checks, program.parameter_only, texts, again)
 
 
 def print_rolled_precompute(program: Program) -> Printed | None:
     """The same of ``precompute_block``."""
     texts = {program.graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)}
-    return _print(program, "precompute", program.hoisted, (), frozenset(), texts)
+    return _print(program, "precompute", program.hoisted, (), frozenset(), texts, {})
 
 
 def _print(
@@ -40,6 +42,7 @@ def _print(
     checks: Sequence[Expr],
     skipped: frozenset[int],
     texts: dict[int, str],
+    again: dict[str, str],
 ) -> Printed | None:
     graph, name = program.graph, f"{block}_block"
     given = {i: _place(text) for i, text in texts.items()}
@@ -47,6 +50,7 @@ def _print(
     found = find_segments(graph, outputs, checks, skipped, given, longest, program.is_searched(block))
     if ALIKE * found.written > found.carried_out:
         return None
+    found.lists.again = again
     carried = _find_carried(found)
     printed = [
         _print_kind(program, found, kind, along, f"{name}_{n}")

@@ -6,7 +6,8 @@ Every operation means what :mod:`eomgen.graph.evaluate` makes of it, NaN include
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 from ..graph.core import Expr
@@ -16,6 +17,7 @@ from ..operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operation
 from ..program import Block, Program
 from .angles import CIRCULAR, gather_angles, print_angles
 from .c_functions import each_lane, each_name
+from .c_layout import places_again
 from .pair_statements import CopiedRun, PairLists, copied_runs
 from .straight import Pieces, PrintedFunction, cut, references
 
@@ -26,6 +28,7 @@ SIGNATURE = (
 ARGUMENTS = ("t", "x", "u", "c", "out", "w")
 #: A row of at least so many zero results is filled by a loop.
 FILLED = 12
+NOWHERE: Mapping[str, str] = MappingProxyType({})  #: where no sum over pairs keeps anything
 
 
 def literal(value: float) -> str:
@@ -123,7 +126,7 @@ class BlockPrinter:
     def _statement(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
         if self.lists.is_list(i):
             self._load(i, piece, loaded, result)
-            self.used.add("w")
+            self.used |= {"x", "w"} if self.lists.again else {"w"}
             result += self.lists.lines(i, [f"w[{place}] = {self.real(x)};" for place, x in self.lists.fills(i)])
             return
         if i not in piece.inlined:
@@ -179,14 +182,24 @@ def print_block(program: Program, block: Block) -> Printed:
         outputs[run.first : run.first + run.length] = [graph.zero] * run.length
     lists = [Expr(graph, made) for made in dict.fromkeys(run.made for run in runs)]
     pieces = cut(graph, outputs, block.checks, program.parameter_only, program.limits.statements, lists)
-    return print_pieces(program, f"{block.name}_block", pieces, references(program, block.inputs), runs)
+    texts = references(program, block.inputs)
+    return print_pieces(program, f"{block.name}_block", pieces, texts, runs, places_again(program, block))
 
 
 def print_pieces(
-    program: Program, name: str, pieces: Pieces, texts: dict[int, str], runs: Sequence[CopiedRun] = ()
+    program: Program,
+    name: str,
+    pieces: Pieces,
+    texts: dict[int, str],
+    runs: Sequence[CopiedRun] = (),
+    again: Mapping[str, str] = NOWHERE,
 ) -> Printed:
-    """Print cut statements as one function, or as several and one that calls them; ``runs`` are copied at the end."""
+    """Print cut statements as one function, or as several and one that calls them.
+
+    ``runs`` are copied at the end; ``again`` is that of :class:`~.pair_statements.PairLists`.
+    """
     printer = BlockPrinter(program, texts, pieces)
+    printer.lists.again = again
     main = direct_results(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
     used = {*printer.used, *(["out"] if pieces.direct else [])}
     functions: list[tuple[str, str]] = []

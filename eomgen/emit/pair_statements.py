@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from ..graph.core import Expr, Graph
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
-from ..numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST
+from ..numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT
 
 COPIED = 16  #: entries of a list that are results one after the other, from which they are copied in a loop
 
@@ -43,6 +43,17 @@ def work_of(function: PairFunction) -> int:
     return 2 * shapes + 2 * function.count + max(function.results, function.spots)
 
 
+def kept_of(function: PairFunction) -> int:
+    """Numbers that derivatives at one place keep: shapes, their rates, and each near pair with what it exerts."""
+    shapes = sum(len(rows) * (POSE + len(rows[0]) - PLACE - REST + 4) for rows in function.tables)
+    return 2 * shapes + record_of(function) * function.room
+
+
+def record_of(function: PairFunction) -> int:
+    """Numbers of one near pair that is kept: its kind, its two shapes and what it exerts."""
+    return 3 + RESULT + max(kind.states for kind in function.kinds)
+
+
 class PairLists:
     """The lists of one block, behind the rest of its work.
 
@@ -58,6 +69,9 @@ class PairLists:
     ----------
     end : int
         Where it ends with them.
+    again : mapping of str to str
+        Sums of which derivatives are taken along one direction after another at one place, and the operands of C that
+        say where the count of near pairs and the pairs are kept (``pairs_again.c.j2``).
     """
 
     def __init__(self, graph: Graph, statements: Iterable[int], start: int) -> None:
@@ -80,6 +94,7 @@ class PairLists:
             work = max(work, work_of(function))
         self._work = end
         self.end = end + work
+        self.again: Mapping[str, str] = {}
 
     def call(self, i: int) -> PairCall | None:
         """What a node does, if it is one of a sum."""
@@ -142,8 +157,10 @@ class PairLists:
             after = f"w + {place + MEETING}, w + {place}, w + {work}"
             return [*filled, f"pairs_{function.name}_meeting(w + {given}, {after});"]
         rates = self._rates[function.name]
+        along, room = f"w + {given}, w + {rates}, w + {place}", self.again.get(function.name)
+        slope = f"slope({along}, w + {work})" if room is None else f"again({along}, {room})"
         return [
             f"for (int i = 0; i < {function.count}; i++) {{ w[{rates} + i] = same(0.0); }}",
             *filled,
-            f"pairs_{function.name}_slope(w + {given}, w + {rates}, w + {place}, w + {work});",
+            f"pairs_{function.name}_{slope};",
         ]

@@ -8,6 +8,7 @@ from ..errors import UsageError
 from ..graph.pair_calls import PairFunction, pair_call
 from ..graph.traverse import reachable
 from ..program import Program
+from ..program.loop_slopes import BY_BODIES
 
 
 class UsedSum(NamedTuple):
@@ -32,6 +33,20 @@ def used_sums(program: Program) -> list[UsedSum]:
         UsedSum(functions[name], *((name, part) in parts for part in ("sum", "slope", "meeting", "spots")))
         for name in sorted(functions)
     ]
+
+
+def sums_again(program: Program) -> list[PairFunction]:
+    """The sums of which the Jacobian takes derivatives along one direction after another at one place."""
+    graph = program.graph
+    roots = [y.id for block in program.blocks if block.name in BY_BODIES[1:] for y in block.outputs]
+    places: dict[str, set[int]] = {}
+    functions: dict[str, PairFunction] = {}
+    for operation, first, *_ in (graph.nodes[i] for i in reachable(graph, roots) if graph.nodes[i][0] in graph.calls):
+        call = pair_call(graph, operation)
+        if call is not None and call.part == "slope":
+            functions[call.function.name] = call.function
+            places.setdefault(call.function.name, set()).add(first)
+    return [functions[name] for name in sorted(functions) if len(places[name]) == 1]
 
 
 def refuse_sums(program: Program, target: str) -> None:

@@ -112,6 +112,9 @@ static int jacobian_here(double t, const double *restrict x, const double *restr
     if (close_directly(t, y, u, c, w) != 0 || loop_slopes_block(t, y, u, c, w + AT_SLOPES, w) != 0 || found[N] == 0.0) {
         return jacobian_by_partition(t, x, u, c, out, weakest, w);
     }
+    for (int k = AT_MET; k < AT_SHAPES; k++) { /* pairs of shapes that were near belong to another state */
+        w[k] = 0.0;
+    }
     *weakest = found[N + 1] != 0.0 ? 1.0 : find_weakest(t, y, u, c, &parts, w);
     (void)scales_block(t, y, u, c, w + AT_SCALES, w);
     if (!FEW || few_columns(t, u, c, out, w) != 0) {
