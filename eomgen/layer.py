@@ -42,6 +42,7 @@ LAYER = {
             "c/ensembles/lane_steps.c",
             "c/steppers/taylor_terms.c",
             "c/ensembles/lane_taylor.c",
+            "c/ensembles/lane_alone.c",
             "c/ensembles/lane_runs.c",
         ),
     ),

@@ -19,6 +19,8 @@ from .sources import read_template, render
 
 #: Public functions that have lanes where they are straight-line code.
 LANES = ("rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "outputs")
+#: Likewise, in modules that are made of them alone: they are long, and few who have the others in batches want these.
+DERIVATIVES = ("inverse_dynamics_derivatives", "inverse_dynamics_hessian_product", "rhs_hessian_product")
 
 #: Width -> instructions it needs on x86-64 beyond those that every such processor has, and their name in
 #: eomgen_processor.h.
@@ -49,7 +51,8 @@ def rhs_blocks(program: Program) -> list[str]:
 
 def public_blocks(program: Program) -> set[str]:
     """Names of the blocks behind public functions that are straight-line code and have lanes."""
-    wanted = {program.twins.get(name, name) for name in LANES}
+    made = {k.name for k in program.kernels}
+    wanted = {program.twins.get(name, name) for name in (*LANES, *(DERIVATIVES if made <= {*DERIVATIVES} else ()))}
     return wanted & {program.twins.get(k.name, k.name) for k in program.kernels if isinstance(k, Block)}
 
 

@@ -15,6 +15,7 @@ from ..runtime.layout import Layout
 from ..targets import PRECISIONS, find_target
 from ..texts import summary_text
 from .c import emit_c
+from .c_lanes import DERIVATIVES
 from .carried import carry
 from .layouts import describe_layouts
 from .numpy import emit_numpy
@@ -40,7 +41,6 @@ ANNOTATED: tuple[tuple[str, str], ...] = (
 FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces", "actuator_forces", "impact",
           "simulate_impacts", "consistent")  # fmt: skip
 MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
-DERIVATIVES = ("inverse_dynamics_derivatives", "inverse_dynamics_hessian_product", "rhs_hessian_product")
 ANALYSES = (*MOTIONS, *DERIVATIVES, "linearize", "modes", "equilibrium", "sensitivities", *FORCES)
 PICTURES = ("draw", "draw_branches")
 METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *PICTURES, *ANALYSES)

@@ -73,6 +73,67 @@ def test_a_loop_that_is_driven() -> None:
     compare(shares(module, 0.4, columns, 9, **TIGHT))
 
 
+def bouncing() -> eg.Model:
+    """Two balls on a swinging floor that they are thrown back from, of which the second pulls the first."""
+    m = eg.Model("bouncing", gravity=(0, -10.0, 0))
+    push = m.input("push")
+    one, two = m.body("one", mass=1.0), m.body("two", mass=0.7)
+    m.prismatic("y", m.ground, one, axis="y", coordinate="y")
+    m.prismatic("z", m.ground, two, axis="y", coordinate="z")
+    m.torque("pull", "z", push)
+    m.parameter("e", 0.8)
+    m.event("floor", "y", direction=-1, reset={"y_dot": "-e*y_dot"})
+    m.event("below", "z", direction=-1, reset={"z_dot": "-0.9*z_dot", "z": "z"})
+    return m
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK45"])
+def test_resets_and_events_that_end(method: str) -> None:
+    """Lanes meet the floor at other times and end at others; each does what it does alone."""
+    module, singly = bouncing().compile(), bouncing().compile(lanes=0)
+    columns = {"y": np.linspace(0.5, 2.0, 23), "z": np.linspace(1.5, 0.3, 23), "z_dot": 1.0}
+    watched = {"fast": {"expression": "z_dot + 4", "terminal": 2}, "turns": {"expression": "y_dot", "direction": -1}}
+    options = {
+        "t_eval": [0.0, 0.31, 0.9, 1.7],
+        "inputs": {"push": "0.3*sin(4*t)*y"},
+        "events": watched,
+        "method": method,
+    }
+    found = shares(module, 1.7, columns, 23, **options, **TIGHT)
+    compare(found)
+    whole, single = found[0][0], singly.simulate_many(1.7, columns, **options, **TIGHT)
+    assert set(whole.status) == {0, 1}
+    for name in whole.event_names:
+        t, x = whole.events(name)
+        for other, chosen in found[1:]:
+            there = other.events(name)
+            most = len(there[0])  # of the runs that were asked for
+            np.testing.assert_array_equal(there[0], t[:most, chosen])
+            np.testing.assert_array_equal(there[1], x[:, :most, chosen])
+            assert np.isnan(t[most:, chosen]).all()
+        alone = single.events(name)
+        np.testing.assert_allclose(t, alone[0], rtol=0, atol=1e-7)
+        np.testing.assert_allclose(x, alone[1], rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(whole.event_counts, single.event_counts)
+    np.testing.assert_array_equal(whole.status, single.status)
+    np.testing.assert_allclose(whole.samples, single.samples, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(whole.t_end, single.t_end, rtol=0, atol=1e-7)
+    assert not np.array_equal(whole.samples, single.samples)  # they were taken side by side
+
+
+def test_a_loop_with_events_and_an_expression(crank: Any) -> None:
+    columns = {"theta": np.linspace(0.1, 1.2, 14), "theta_dot": np.linspace(5, 12, 14)}
+    watched = {"half": "s - 0.3", "past": {"expression": "theta - 4", "terminal": 1}}
+    options = {"t_eval": [0.1, 0.5], "inputs": {"tau": "-0.05*theta_dot + 0.1*sin(9*t)"}, "events": watched}
+    found = shares(crank, 0.5, columns, 14, **options, **TIGHT)
+    compare(found)
+    single = compiled("slider_crank", "cython", 0).simulate_many(0.5, columns, **options, **TIGHT)
+    for name in single.event_names:
+        np.testing.assert_allclose(found[0][0].events(name)[0], single.events(name)[0], rtol=0, atol=1e-8)
+    np.testing.assert_array_equal(found[0][0].status, single.status)
+    np.testing.assert_allclose(found[0][0].x, single.x, rtol=0, atol=1e-6)
+
+
 @pytest.mark.parametrize("interpolation", ["zero-order", "linear", "cubic"])
 def test_a_tree_with_tables(interpolation: str) -> None:
     m = eg.Model("pushed_arm", gravity=(0, -9.81, 0))

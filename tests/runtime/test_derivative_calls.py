@@ -145,6 +145,26 @@ def test_batches_are_columns(target: str) -> None:
         np.testing.assert_allclose(curved[:, k], single, rtol=1e-10, atol=1e-11)
 
 
+@pytest.mark.parametrize("name", ["puma560", "slider_crank"])
+def test_states_side_by_side_have_the_bits_of_one_alone(name: str) -> None:
+    """Eleven columns: lanes of the processor, and a rest that does not fill them."""
+    module = eg.load(EXAMPLES / f"{name}.yaml").compile()
+    random = np.random.default_rng(5)
+    x = module.project(module.x0()[:, None] + 0.1 * random.uniform(-1, 1, (module.n_x, 11)))
+    q, v, a = x[: module.n_q], x[module.n_q :], random.uniform(-1, 1, (module.n_v, 11))
+    w, d = random.uniform(-1, 1, (module.n_x, 11)), random.uniform(-1, 1, (module.n_q + 2 * module.n_v, 11))
+    first = module.inverse_dynamics_derivatives(q, v, a)
+    bent = module.inverse_dynamics_hessian_product(q, v, a, w[: module.n_v], d)
+    curved = module.rhs_hessian_product(0.0, x, w, d[: module.n_x])
+    for k in range(11):
+        for mine, theirs in zip(first, module.inverse_dynamics_derivatives(q[:, k], v[:, k], a[:, k]), strict=True):
+            np.testing.assert_array_equal(mine[..., k], theirs)
+        alone = module.inverse_dynamics_hessian_product(q[:, k], v[:, k], a[:, k], w[: module.n_v, k], d[:, k])
+        np.testing.assert_array_equal(bent[:, k], alone)
+        alone = module.rhs_hessian_product(0.0, x[:, k], w[:, k], d[: module.n_x, k])
+        np.testing.assert_array_equal(curved[:, k], alone)
+
+
 def test_wrong_arguments_are_told_by_name() -> None:
     module = arm().compile(target="numpy")
     q, v, a = state(module)

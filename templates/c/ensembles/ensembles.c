@@ -38,7 +38,7 @@ ptrdiff_t eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *
 {
     const eomgen_lane_worker *const worker = find_worker(e, own);
     if (worker != NULL) {
-        return worker->memory(e);
+        return worker->memory(e, own);
     }
     return memory_of_one(e);
 }

@@ -66,13 +66,16 @@ typedef struct {
 /* How trajectories are run side by side; one for each width that was compiled. */
 typedef struct {
     int width;
-    ptrdiff_t (*memory)(const eomgen_ensemble *e);
+    ptrdiff_t (*memory)(const eomgen_ensemble *e, const eomgen_thread *own);
     int (*takes)(const eomgen_ensemble *e, const eomgen_thread *own); /* whether this ensemble can be run so */
     void (*work)(eomgen_ensemble *e, const eomgen_thread *own);
 } eomgen_lane_worker;
 
 /* The next trajectory of the queue, or -1. */
 ptrdiff_t eomgen_ensemble_take(eomgen_ensemble *e);
+
+/* Keep the events noted by now for trajectory k, as many as there is room for. */
+void eomgen_keep_notes(eomgen_ensemble *e, eomgen_journey *journey, ptrdiff_t k);
 
 /* Doubles of memory that one thread needs. */
 ptrdiff_t eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own);

@@ -92,6 +92,9 @@ static EOMGEN_APART void fill_lane(eomgen_ensemble *e, lane_run *run, int l, dou
             run->y[i][l] = e->x0[k * run->n + i];
         }
         run->t[l] = run->t_old[l] = e->nodes[0];
+        if (run->singles != NULL) {
+            fill_alone(e, run, l, k, constants);
+        }
         if (status != 0) {
             end_lane(e, run, l, EOMGEN_BAD_PARAMETERS);
         } else {
@@ -128,8 +131,8 @@ static EOMGEN_APART double longest_of(const eomgen_ensemble *e, const lane_run *
         x[run->n - e->n_q + i] = run->f[i][l];
     }
     for (int i = 0; i < run->n_u; i++) {
-        const int table = run->signals != NULL && run->signals[i].n > 0;
-        u[i] = table ? eomgen_table_value(run->signals + i, run->t[l], run->hold[l]) : run->u[i][l];
+        const int table = run->signals != NULL && run->signals[i].n > 0 && !run->plays;
+        u[i] = run->plays ? inputs_alone(run, l)[i] : table ? eomgen_table_value(run->signals + i, run->t[l], run->hold[l]) : run->u[i][l];
     }
     for (int i = 0; i < model->n_const; i++) {
         c[i] = run->c[i][l];
@@ -211,21 +214,17 @@ static const lane_method *find_method(const char *name)
 
 static int takes(const eomgen_ensemble *e, const eomgen_thread *own)
 {
-    const eomgen_signal *const signals = own->signals;
-    for (int i = 0; signals != NULL && i < e->model->n_u; i++) {
-        if (signals[i].n > 0 && signals[i].tape != NULL) {
-            return 0; /* an expression is played for one state */
-        }
-    }
-    return own->events == NULL && find_method(e->method->name) != NULL;
+    const lane_method *const method = find_method(e->method->name);
+    return method != NULL && (method != &lane_taylor || !has_alone(e, own));
 }
 
-static ptrdiff_t lane_memory(const eomgen_ensemble *e)
+static ptrdiff_t lane_memory(const eomgen_ensemble *e, const eomgen_thread *own)
 {
     const lane_method *const method = find_method(e->method->name);
     const ptrdiff_t rows = 5 + method->rows_K + method->rows_F, further = eomgen_further(e->method, e->n, e->series);
     const ptrdiff_t each = e->model->n_work + e->model->n_u + e->model->n_const; /* alone, and in every lane */
-    return e->model->n_const + each + 2 * e->n + W * (1 + each + rows * e->n + further);
+    const ptrdiff_t alone = has_alone(e, own) ? alone_shared(e, own->events) + W * alone_each(e, own->events) : 0;
+    return e->model->n_const + each + 2 * e->n + W * (1 + each + rows * e->n + further) + alone;
 }
 
 static void lay_out(lane_run *run, const eomgen_ensemble *e, const eomgen_thread *own, const lane_method *method, real *memory)
@@ -246,14 +245,19 @@ static void lay_out(lane_run *run, const eomgen_ensemble *e, const eomgen_thread
     run->F = run->series_work + eomgen_further(e->method, n, e->series);
     run->expand = (lane_series)e->lane_series;
     run->order = method == &lane_taylor ? taylor_order(e->rtol, e->series->most) : 0;
+    if (has_alone(e, own)) {
+        run->plays = plays_expressions(e, own);
+        run->singles = lay_out_alone(e, own, run, (double *)(run->F + method->rows_F * n));
+    }
 }
 
 /* What comes before a step: lanes that begin, and what each tries. */
-static void prepare_round(eomgen_ensemble *e, const lane_method *method, lane_run *run, double direction, double *constants)
+static void prepare_round(eomgen_ensemble *e, const lane_method *method, lane_run *run, double direction, double *constants,
+                          int has_events)
 {
     const size_t size = (size_t)run->n * sizeof(real);
+    flag first = { 0 };
     if (any_of(run->active & run->begins)) {
-        flag first = { 0 };
         for (int l = 0; l < W; l++) {
             first[l] = run->node[l] == 1 ? -1 : 0;
         }
@@ -261,10 +265,16 @@ static void prepare_round(eomgen_ensemble *e, const lane_method *method, lane_ru
         sample_lanes(e, method, run, first & run->begins & run->active, direction);
     }
     const int taylor = method == &lane_taylor, begins = any_of(run->active & run->begins);
+    const flag starts = run->active & run->begins & first;
     if (taylor) {
         begin_taylor(e, run);
     } else if (begins) {
         begin_lanes(e, method, run, direction);
+        for (int l = 0; has_events && l < W; l++) {
+            if (starts[l]) {
+                arm_lane(run, l);
+            }
+        }
     }
     if (begins) {
         advance_nodes(e, run, direction, constants); /* a part may have no length */
@@ -280,13 +290,21 @@ static void prepare_round(eomgen_ensemble *e, const lane_method *method, lane_ru
     run->calls = 0;
 }
 
-static void finish_round(eomgen_ensemble *e, const lane_method *method, lane_run *run, double direction, double *constants)
+static void finish_round(eomgen_ensemble *e, const lane_method *method, lane_run *run, double direction, double *constants,
+                         int has_events)
 {
     run->evaluations += run->awake & run->calls;
     const flag moved = accept_steps(run, method->error(run, run->step), method->error_order);
     keep_closed_lanes(run, moved);
-    if (e->n_eval > 0) {
+    if (e->n_eval > 0 && !has_events) {
         sample_lanes(e, method, run, moved, direction);
+    }
+    for (int l = 0; has_events && l < W; l++) {
+        const int status = moved[l] ? settle_lane(e, run, l) : 0;
+        if (status != 0) {
+            end_lane(e, run, l, status == EOMGEN_TERMINAL ? 1 : status);
+            fill_lane(e, run, l, constants);
+        }
     }
     advance_nodes(e, run, direction, constants);
 }
@@ -310,8 +328,8 @@ static void work_in_lanes(eomgen_ensemble *e, const eomgen_thread *own)
                 end_lane(e, &run, l, EOMGEN_STOPPED);
             }
         }
-        prepare_round(e, method, &run, direction, constants);
+        prepare_round(e, method, &run, direction, constants, own->events != NULL);
         method->attempt(&run, run.step);
-        finish_round(e, method, &run, direction, constants);
+        finish_round(e, method, &run, direction, constants, own->events != NULL);
     }
 }

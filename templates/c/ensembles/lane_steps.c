@@ -37,7 +37,11 @@ typedef struct {
     double failure_time[W];
     ptrdiff_t index[W], done[W]; /* trajectory; samples stored */
     int node[W];
+    struct lane_alone *singles; /* what is done for each lane alone, or NULL */
+    int plays;                  /* whether inputs are expressions */
 } lane_run;
+
+static EOMGEN_APART void play_lanes(lane_run *run, real t, const real *y);
 
 typedef struct {
     const char *name;
@@ -110,7 +114,9 @@ static EOMGEN_APART void read_tables(lane_run *run, real t)
 
 static inline void evaluate_lanes(lane_run *run, real t, const real *y, real *k)
 {
-    if (run->signals != NULL) {
+    if (run->plays) {
+        play_lanes(run, t, y);
+    } else if (run->signals != NULL) {
         read_tables(run, t);
     }
     run->calls++;

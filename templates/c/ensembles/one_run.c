@@ -33,8 +33,7 @@ static double *lay_out_one(eomgen_run *run, const eomgen_ensemble *e, const eomg
     return run->F + e->method->rows_F * n;
 }
 
-/* Keep the events noted by now, as many as there is room for. */
-static void keep_notes(eomgen_ensemble *e, eomgen_journey *journey, ptrdiff_t k)
+void eomgen_keep_notes(eomgen_ensemble *e, eomgen_journey *journey, ptrdiff_t k)
 {
     const ptrdiff_t width = 2 + e->n;
     for (ptrdiff_t i = 0; i < journey->n_notes; i++, e->noted[k]++) {
@@ -52,7 +51,7 @@ static int travel(eomgen_ensemble *e, eomgen_run *run, eomgen_journey *journey, 
     while (status == EOMGEN_FULL) {
         status = eomgen_travel(e->method, run, journey);
         if (journey->events != NULL) {
-            keep_notes(e, journey, k);
+            eomgen_keep_notes(e, journey, k);
         }
     }
     return status;

@@ -80,6 +80,9 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
 /* Go on from the present time at another state: that of run->y, which the caller has changed. 0 or EOMGEN_ZENO. */
 int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *journey);
 
+/* What the last step brought: output, events, resets; 0 to go on, or something of the above. */
+int eomgen_settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *journey);
+
 /* Events: values at the start; zeros of the last step in order, noted, up to one at which the run stops, at *t. Returns
    whether it stops, 2 if it is to end there, -1 if the caller's own events stopped the run, -2 if resets die away. */
 void eomgen_arm(eomgen_run *run, eomgen_events *events);

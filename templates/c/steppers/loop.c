@@ -105,8 +105,7 @@ static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_jou
     return eomgen_jump(method, run, j);
 }
 
-/* What the last step brought: output, events, resets. */
-static int settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
+int eomgen_settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
 {
     double t = run->t;
     const int stop = j->events != NULL ? eomgen_find_events(method, run, j, &t) : 0;
@@ -156,7 +155,7 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         }
         const double h_abs = run->h_abs;
         int status = eomgen_step(method, run);
-        status = status != 0 ? status : settle(method, run, j);
+        status = status != 0 ? status : eomgen_settle(method, run, j);
         if (status != 0) {
             return status;
         }
