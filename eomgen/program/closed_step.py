@@ -19,9 +19,8 @@ from .loop_blocks import LoopBlocks
 from .second_order import hessian_product
 from .sparse import times, transpose
 
-TURNED = (
-    0.25  #: part of w1 . w2 that Euler parameters lose along themselves in turns by w, 1 - cos(|w| / 2), twice derived
-)
+#: Part of w1 . w2 that Euler parameters lose along themselves in turns by w: 1 - cos(|w| / 2) derived twice.
+TURNED = 0.25
 
 
 class ClosedStep:
