@@ -30,6 +30,8 @@ SPARSE = ("jacobian", "input_jacobian", "parameter_jacobian", "mass_matrix", "co
 #: Kernels that are left out where they would be long, unless they are named.
 LONG = ("inverse_dynamics_hessian_product", "rhs_hessian_product")
 CURVED = LONG[1]
+#: With loops it takes more operations than the accelerations, at least this many times: 10 to 13 times in examples.
+CURVED_LEAST = 8
 #: Why there is none.
 NOT_CURVED = (
     "second derivatives of the right-hand side of {!r} are not derived: they follow from a solution without pivots, "
@@ -92,10 +94,13 @@ def build_program(
     if kernels is not None and "rhs" in kernels and terms.meeting_times:  # no run goes without
         kernels = [*kernels, "meeting_time"]
     wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]
-    if maker.has_loops and any(k.name == CURVED for k in wanted) and maker.curved_loops is None:
-        if kernels is not None:
+    if maker.has_loops and any(k.name == CURVED for k in wanted):
+        loops = maker.curved_loops
+        if loops is None and kernels is not None:
             raise UnavailableError(NOT_CURVED.format(name))
-        wanted = [k for k in wanted if k.name != CURVED]
+        longest = limits.second_order // CURVED_LEAST
+        if loops is None or (kernels is None and count(loops.dynamics()[0]).total > longest):
+            wanted = [k for k in wanted if k.name != CURVED]
     blocks: dict[str, Block] = {}
     drivers: list[KernelDriver] = []
     needed: dict[str, None] = {}

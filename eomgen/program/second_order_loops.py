@@ -16,12 +16,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..graph.core import Expr
-from ..graph.differentiate import jvp, vjp
+from ..graph.differentiate import vjp
 from ..graph.substitute import substitute
+from .closed_step import ClosedStep
 from .loop_blocks import LoopBlocks
 from .second_order import hessian_product
-
-TURNED = 0.125  #: part of |w|^2 that Euler parameters lose along themselves in a turn by w, 1 - cos(|w| / 2)
 
 
 class LoopHessian:
@@ -58,46 +57,16 @@ class LoopHessian:
         if not self.loops.h:
             return hessian_product(rows, self.weights, z, self.direction), [*checks, sound]
         tangent, pull, turned = self._named("tangent"), self._named("pull"), self._named("turned")
-        step, dq = self._step(), self.direction[:n_q]
+        step, dq = ClosedStep(self.loops), self.direction[:n_q]
         along = [*tangent, *self.direction[n_q:]]
         bent = hessian_product(rows, self.weights, z, along)
-        inner = [x + y for x, y in zip(bent[:n_q], self._at_closed(step, pull, tangent), strict=True)]
+        inner = [x + y for x, y in zip(bent[:n_q], step.curved(pull, tangent), strict=True)]
         total = [
-            *(x + y for x, y in zip(self._pulled(step, inner), self._at_closed(step, turned, dq), strict=True)),
+            *(x + y for x, y in zip(step.pulled(inner), step.curved(turned, dq), strict=True)),
             *bent[n_q:],
         ]
         force = vjp(rows, self.weights, self.q)
-        values = [*self._along(step, dq), *force, *self._pulled(step, pull)]
+        values = [*step.along(dq), *force, *step.pulled(pull)]
         names = [*tangent, *pull, *turned]
         values[2 * n_q :] = substitute(values[2 * n_q :], dict(zip(pull, force, strict=True)))
         return substitute(total, dict(zip(names, values, strict=True))), [*checks, sound]
-
-    # -- the step onto the constraints ----------------------------------------------------------------------------
-    def _step(self) -> list[Expr]:
-        """q after a step onto the constraints, to second order in that step."""
-        loops, terms, zero = self.loops, self.terms, self.terms.graph.zero
-        e = [x * i for x, i in zip(terms.constraints, loops.inverse, strict=False)]
-        d = loops.nearest([zero] * terms.n_v, e, loops.h, *loops.holonomic)
-        moves = substitute(list(terms.rates or self.v)[: len(self.q)], dict(zip(self.v, d, strict=True)))
-        step = [x + y for x, y in zip(self.q, moves, strict=True)]
-        for i, j in terms.quaternion_slots:
-            lost = (d[j] * d[j] + d[j + 1] * d[j + 1] + d[j + 2] * d[j + 2]) * TURNED
-            step[i : i + 4] = [x - lost * y for x, y in zip(step[i : i + 4], self.q[i : i + 4], strict=True)]
-        return step
-
-    def _at_closed(self, step: Sequence[Expr], weights: Sequence[Expr], direction: Sequence[Expr]) -> list[Expr]:
-        """sum_i weights[i] (d2 step_i / dq2) direction."""
-        return self._closed(hessian_product(step, weights, self.q, direction))
-
-    def _along(self, step: Sequence[Expr], direction: Sequence[Expr]) -> list[Expr]:
-        """P' direction."""
-        return self._closed(jvp(step, dict(zip(self.q, direction, strict=True))))
-
-    def _pulled(self, step: Sequence[Expr], weights: Sequence[Expr]) -> list[Expr]:
-        """P'^T weights."""
-        return self._closed(vjp(step, weights, self.q))
-
-    def _closed(self, values: Sequence[Expr]) -> list[Expr]:
-        """Where the constraints hold: their residuals are known to be 0 there."""
-        zero = self.terms.graph.zero
-        return substitute(list(values), {x: zero for x in self.terms.constraints if not x.is_zero})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -153,3 +154,11 @@ def test_products_are_second_differences_in_fifty_digits(name: str, method: str)
         size = max(abs(x) for x in product)
         assert size > 0.1
         assert abs(found - expected) <= mpmath.mpf(10) ** -10 * size
+
+
+@pytest.mark.parametrize(("name", "most"), [("slider_crank", 1884), ("four_bar", 2272), ("andrews_squeezer", 7737)])
+def test_products_take_the_operations_that_the_documents_say(name: str, most: int) -> None:
+    program = pipeline.build(build(name).derive(), "c", [KERNEL])
+    assert program.counts[KERNEL].total <= most
+    page = (Path(__file__).parents[2] / "docs/operations.md").read_text(encoding="utf-8")
+    assert f"| {program.counts[KERNEL].total:,} |" in page

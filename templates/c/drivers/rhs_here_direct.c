@@ -1,14 +1,40 @@
-/* The nearest q with C(q) = 0, in place; nonzero where that takes large steps or many. */
+/* The part of a long step that close_position takes, so that far states come to the same place; 0 where only rounding is
+   left of the constraints, whose weak rows ask for a term that is not known here. */
+static double part_of_long_step(double t, const double *restrict q, const double *restrict u, const double *restrict c,
+                                double *restrict w)
+{
+    const double *const found = w + AT_CLOSING;
+    double *const dz = w + AT_STEP;
+    if (!(found[0] > CONSTRAINTS_GENTLE) || !isfinite(found[2])) {
+        return 0.0;
+    }
+    (void)scales_block(t, q, u, c, w + AT_SCALES, w);
+    for (int k = 0; k < N; k++) {
+        dz[k] = found[3 + k] / w[AT_SCALES + k];
+    }
+    return damping(dz, N);
+}
+
+/* The nearest q with C(q) = 0, in place; nonzero where that takes many steps. */
 static int close_directly(double t, double *restrict q, const double *restrict u, const double *restrict c,
                           double *restrict w)
 {
     double *const found = w + AT_CLOSING;
-    for (int step = 0; step < 6; step++) {
+    for (int step = 0, all = 0; step < 6 && all < 25; all++) {
         (void)closing_block(t, q, u, c, found, w);
         const double left = found[1], length = found[2];
         if (!(length <= 0.25)) { /* or not a number */
-            break;
+            const double part = part_of_long_step(t, q, u, c, w);
+            if (part == 0.0) {
+                break;
+            }
+            for (int k = 0; k < N; k++) {
+                found[3 + k] *= part;
+            }
+            move(q, found + 3);
+            continue;
         }
+        step += !(found[0] > CONSTRAINTS_GENTLE); /* before, close_position makes the same steps, as many as it takes */
         move(q, found + 3);
         if (arrives(length, left)) {
             return 0;
