@@ -180,7 +180,7 @@ def _areas_of_bodies(program: Program) -> list[tuple[str, int]]:
 
 
 def places_again(program: Program, block: Block) -> dict[str, str]:
-    """Where blocks along a direction keep near pairs, by name of the sum: what they read, x, stands before these in w."""
+    """Where blocks along a direction keep near pairs, by name of the sum: in w behind what they read, x."""
     again = sums_again(program) if block.name in BY_BODIES[1:] else []
     if not again:
         return {}

@@ -135,12 +135,12 @@ def _is_closed(C: Array, C_q: Array, C_t: Array, q: Array, v: Array, scales: Sca
 
     Of n terms each is rounded, and the roundings add up as the root of n.
     """
-    rounding, J = EPS * len(scales.q) ** 0.5, scales.jacobian(C_q)
+    rounding, J = EPS * float(np.sqrt(len(scales.q))), scales.jacobian(C_q)
     placed = largest(scales.rounding(q, J[: len(C)])) / ROUNDED if given is None else 0.0
     moved = largest(np.abs(J) @ np.abs(v / scales.q) + np.abs(scales.residual(C_t)))
-    return largest(scales.residual(C)) <= max(EXACT, rounding * placed) and largest(
-        scales.residual(C_q @ v + C_t)
-    ) <= max(EXACT * max(1.0, scales.speed(v)), rounding * moved)
+    if not largest(scales.residual(C)) <= max(EXACT, rounding * placed):
+        return False
+    return largest(scales.residual(C_q @ v + C_t)) <= max(EXACT * max(1.0, scales.speed(v)), rounding * moved)
 
 
 def minimum_norm(C_q: Array, y: Array, scales: Scales, noise: float | None = None, order: int = 1) -> Array:

@@ -37,7 +37,11 @@ def test_a_projected_state_stays_as_it_is(n: int, shift: float, target: str) -> 
 
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_what_is_more_than_rounding_is_corrected(target: str) -> None:
-    mod = closed_chain(90).derive().compile(target=target, kernels=["project", "constraints", "constraint_jacobian", "velocity_constraints"])
+    mod = (
+        closed_chain(90)
+        .derive()
+        .compile(target=target, kernels=["project", "constraints", "constraint_jacobian", "velocity_constraints"])
+    )
     x = mod.project(mod.x0())
     q = x[: mod.n_q]
     C_q = mod.constraint_jacobian(q)
