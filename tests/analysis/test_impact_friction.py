@@ -361,3 +361,63 @@ def test_what_is_refused() -> None:
             strike(friction)
     with pytest.raises(eg.UsageError, match="friction= or lock=, not both"):
         strike({"gap": (0.3, "slide")}, lock=["fly_x"])
+
+
+@pytest.mark.parametrize("mu", [0.1, 1.0])
+def test_a_point_of_a_closed_loop(mu: float) -> None:
+    """A coupler point of a four-bar: of one freedom, so that sliding and closing stop together; the loop stays closed.
+
+    What is lost is the work of the impulses on the mean velocities; where the point sticks it does not come back.
+    """
+    m = eg.Model("four_bar", gravity=(0, -9.81, 0))
+    bars = {}
+    for name, mass, length in (("a", 1.0, 0.5), ("b", 2.0, 1.2), ("c", 3.0, 0.9)):
+        bars[name] = m.body(name, mass=mass, com=(0.5 * length, 0, 0), inertia={"zz": mass * length**2 / 12})
+    m.revolute("A", m.ground, bars["a"], coordinate="q")
+    m.revolute("B", bars["a"].at(0.5, 0, 0), bars["b"])
+    m.revolute("D", m.ground.at(1, 0, 0), bars["c"])
+    m.revolute("C", bars["b"].at(1.2, 0, 0), bars["c"].at(0.9, 0, 0))
+    bars["b"].marker("tip", at=(0.7, 0.3, 0))
+    m.output("gap", "y(b.tip)")
+    m.output("slide", "vx(b.tip)")
+    m.guess(B=-0.5, D=1.5)
+    mod = m.compile(target="numpy")
+    x = mod.x0(q=1.0, q_dot=-3.0)
+    hit = mod.impact(0.0, x, {"gap": 0.5}, closed=True, friction={"gap": (mu, "slide")})
+    C = mod.constraint_jacobian(x[: mod.n_q], rows="all")
+    assert np.abs(C @ hit.x[mod.n_q :]).max() < 1e-12
+    works = [
+        hit["gap"] * (hit.rates_before[0] + hit.rates_after[0]),
+        hit.friction["gap"][0] * (hit.sliding_before["gap"][0] + hit.sliding_after["gap"][0]),
+    ]
+    assert hit.energy_lost == pytest.approx(-0.5 * sum(works), rel=1e-10)
+    assert hit.energy_lost > 0.0
+    slope = hit.sliding_before["gap"][0] / hit.rates_before[0]
+    assert hit.sliding_after["gap"][0] == pytest.approx(slope * hit.rates_after[0], abs=1e-10)
+    if mu < abs(1 / slope):
+        assert hit.rates_after[0] > 0.1
+    else:
+        np.testing.assert_allclose(hit.x[mod.n_q :], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"friction": 0.3, "restitution": 0.5}, "friction: is given without slip; give slip: the output"),
+        ({"slip": "slide", "restitution": 0.5}, "slip: is given without friction; give friction: the coefficient"),
+        ({"slip": "slide", "friction": -1, "restitution": 0.5}, "friction: -1 is negative; give 0 or more"),
+        ({"slip": "slde", "friction": 0.3, "restitution": 0.5}, "slip: no output 'slde' .* did you mean 'slide'"),
+        ({"slip": "slide", "friction": 0.3}, "friction: is given without a restitution"),
+        ({"slip": "fast", "friction": 0.3, "restitution": 0.5}, "slip: the output 'fast' is in km/h"),
+        ({"slip": [], "friction": 0.3, "restitution": 0.5}, "slip: .* is not a list of names, or one name"),
+    ],
+)
+def test_what_events_refuse(keys: dict[str, Any], told: str) -> None:
+    m = eg.Model("r")
+    b = m.body("b", mass=1.0, inertia={"zz": 0.1})
+    m.planar("fly", m.ground, b)
+    m.output("slide", "vx(b)")
+    m.output("fast", "vx(b)", unit="km/h")
+    m.event("floor", "y(b)", **keys)
+    with pytest.raises(eg.ModelError, match=f"events.floor.{told}"):
+        m.check()

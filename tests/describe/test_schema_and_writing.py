@@ -158,3 +158,18 @@ def test_numbers_survive_yaml(number: float) -> None:
     assert isinstance(value, int | float)
     assert math.copysign(1, value) == math.copysign(1, number)
     assert value == number
+
+
+@pytest.mark.parametrize("given", ["b", "[b]", "[b, c]"])
+def test_one_name_or_several_are_released_and_slide(given: str) -> None:
+    text = f"""
+name: m
+bodies: {{a: {{mass: 1}}}}
+joints: {{x: {{type: prismatic, between: [ground, a]}}}}
+outputs: {{b: vx(a)}}
+constraints: {{k: {{type: coupling, equation: x_dot, closes: x, releases: {given}}}}}
+events: {{e: {{expression: x, restitution: 0.5, friction: 0.3, slip: {given}}}}}
+"""
+    assert not faults(text)
+    for key in ("releases", "slip"):
+        assert faults(text.replace(f"{key}: {given}", f"{key}: {{b: 1}}"))
