@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, cast
 
 from ..elements.looks import Seen
 from ..frames import Frame, Marker
@@ -43,7 +43,7 @@ from .soil_wheels import SoilWheel
 
 
 class _PairView:
-    """The motion of two shapes, as symbols of the graph of their law."""
+    """The motion of two shapes, as symbols of the graph of their law: what contacts ask of a view."""
 
     def __init__(self, graph: Graph, planar: bool) -> None:
         self.graph, self._planar = graph, planar
@@ -72,12 +72,6 @@ class _PairView:
 
     def angular_velocity(self, marker: Marker) -> Vec3:
         return self._poses[marker.body].angular_velocity
-
-    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
-        raise NotImplementedError  # no contact asks for it
-
-    def coordinate(self, name: str) -> tuple[Expr, Expr]:
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -264,7 +258,8 @@ class ContactGroups(Force):
     ) -> PairKind:
         """The law of one kind of pair in a graph of its own, with its derivative."""
         graph = Graph()
-        view = _PairView(graph, flat)
+        pair = _PairView(graph, flat)
+        view = cast(View, pair)  # contacts ask for markers alone, not for angles and coordinates of joints
         places: list[int] = []
 
         def own(x: Expr) -> Expr:
@@ -288,7 +283,7 @@ class ContactGroups(Force):
         bare = SpherePlane(self.name, *markers, normal, friction, graph.zero)
         contact = touching(kinds, markers, (given[0], given[1]), bare)
         if flat:
-            contact = AtHeight(self.name, *markers, contact.normal_law, contact.friction, contact, view.height())
+            contact = AtHeight(self.name, *markers, contact.normal_law, contact.friction, contact, pair.height())
         if kinds[1] == "rim":
             across = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2]
             contact = SoilWheel(self.name, *markers, normal, friction, contact, given[1][0], given[1][1], across)
