@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import reduce
 from operator import add
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -31,7 +31,7 @@ from .soil_wheels import SoilWheel
 
 
 class _PairView:
-    """The motion of two shapes, as symbols of the graph of their law."""
+    """The motion of two shapes, as symbols of the graph of their law: what contacts ask of a view."""
 
     def __init__(self, graph: Graph, planar: bool) -> None:
         self.graph, self._planar = graph, planar
@@ -60,12 +60,6 @@ class _PairView:
 
     def angular_velocity(self, marker: Marker) -> Vec3:
         return self._poses[marker.body].angular_velocity
-
-    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
-        raise NotImplementedError  # no contact asks for it
-
-    def coordinate(self, name: str) -> tuple[Expr, Expr]:
-        raise NotImplementedError
 
 
 class PairLaw(NamedTuple):
@@ -129,7 +123,8 @@ def pair_kind(
     """
     graph = Graph()
     flat = law.planar and kinds[0] != "half"  # which has no extent along its normal to leave out
-    view = _PairView(graph, flat)
+    pair = _PairView(graph, flat)
+    view = cast(View, pair)  # contacts ask for markers alone, not for angles and coordinates of joints
     places: list[int] = []
 
     def own(x: Expr) -> Expr:
@@ -160,7 +155,7 @@ def pair_kind(
         bare = SpherePlane(law.name, *markers, push, dry, graph.zero)
         contact = touching(kinds, markers, (given[0], given[1]), bare, spot)
         if flat:
-            contact = AtHeight(law.name, *markers, contact.normal_law, contact.friction, contact, view.height())
+            contact = AtHeight(law.name, *markers, contact.normal_law, contact.friction, contact, pair.height())
         if kinds[1] == "rim":
             across = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2]
             contact = SoilWheel(law.name, *markers, push, dry, contact, given[1][0], given[1][1], across)

@@ -12,7 +12,7 @@ from ..elements.field import LAW, Field
 from ..graph.core import Expr
 from ..records import dataclass
 from .force import Force, Load, View
-from .friction_laws import FRICTION_CHOICE, DryFriction, has_bristles, read_friction
+from .friction_laws import FRICTION_CHOICE, LineFriction, has_bristles, read_friction
 from .paths import ON_JOINT, Path, read_coordinate
 from .reaction_friction import BY_REACTION, read_reaction_friction
 from .springs import Damper
@@ -28,10 +28,10 @@ class JointFriction(Force):
 
     sentence: ClassVar[str] = "Friction in a joint: it opposes the rate $v$ of the coordinate."
     path: Path
-    law: DryFriction
+    law: LineFriction
 
     @property
-    def laws(self) -> tuple[DryFriction, ...]:
+    def laws(self) -> tuple[LineFriction, ...]:
         return (self.law,)
 
     @property

@@ -23,17 +23,9 @@ FRICTION_LAWS = ("coulomb", "brown_mcphee", BRISTLES)
 
 
 class DryFriction(ABC):
-    """What opposes sliding: forces for a joint, parts of the normal force for a contact.
-
-    ``formula`` says it of a contact and ``joint_formula`` of a joint, in LaTeX.
-    """
+    """What opposes sliding in a contact, as a part of the normal force; ``formula`` says it in LaTeX."""
 
     formula: ClassVar[str]
-    joint_formula: ClassVar[str]
-
-    @abstractmethod
-    def along(self, rate: Expr) -> Expr:
-        """Friction at a velocity along a line, with the sign of the velocity."""
 
     @abstractmethod
     def in_plane(self, slip: Slip) -> Vec3:
@@ -59,12 +51,22 @@ class DryFriction(ABC):
         """Rates of its states where surfaces are apart."""
         return ()
 
-    def rates_along(self, rate: Expr) -> tuple[Expr, ...]:
-        """Rates of its states at a velocity along a line."""
-        return ()
-
     def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
         """Rates of its states at a sliding velocity."""
+        return ()
+
+
+class LineFriction(DryFriction):
+    """Friction that acts in joints too, where it is a force; ``joint_formula`` says it there, in LaTeX."""
+
+    joint_formula: ClassVar[str]
+
+    @abstractmethod
+    def along(self, rate: Expr) -> Expr:
+        """Friction at a velocity along a line, with the sign of the velocity."""
+
+    def rates_along(self, rate: Expr) -> tuple[Expr, ...]:
+        """Rates of its states at a velocity along a line."""
         return ()
 
 
@@ -91,7 +93,7 @@ class Slip(NamedTuple):
         return vec.sub(found, vec.scale(vec.dot(found, self.normal), self.normal))
 
 
-class SlidingFriction(DryFriction):
+class SlidingFriction(LineFriction):
     """Friction that follows from the sliding velocity alone."""
 
     @abstractmethod
@@ -191,7 +193,7 @@ class BrownMcPhee(SlidingFriction):
 
 
 @dataclass(frozen=True)
-class LuGre(DryFriction):
+class LuGre(LineFriction):
     """Friction of bristles whose deflection z is a state; it holds a body at rest.
 
         z' = v - stiffness |v| / c(v) z,  friction = stiffness z + damping z' + viscous v
@@ -311,7 +313,7 @@ FRICTION_CHOICE: Fields = {
 _PLAIN = ("stribeck", "smoothing", "transition", "bristle_stiffness", "bristle_damping")
 
 
-def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool = False) -> DryFriction | None:
+def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool = False) -> LineFriction | None:
     """Dry friction from the keys of its parts; None without Coulomb's part, beside which viscous may stand alone."""
     if dynamic not in e.values:
         for key in (static, "friction_law", *_PLAIN, *(() if alone else (viscous,))):

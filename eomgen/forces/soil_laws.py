@@ -138,7 +138,6 @@ class SoilShear(DryFriction):
     formula: ClassVar[str] = (
         r"\tau = (c + p \tan\varphi) \frac{d}{K}, \quad \dot{d} = v - \frac{|v|}{K} d, \quad F_t = -\tau A"
     )
-    joint_formula: ClassVar[str] = ""
     cohesion: Expr
     slope: Expr  #: tan phi
     modulus: Expr
@@ -146,9 +145,6 @@ class SoilShear(DryFriction):
     area: Expr | None = None
     shears: tuple[Expr, ...] = ()
     lateral: Vec3 | None = None
-
-    def along(self, rate: Expr) -> Expr:
-        raise NotImplementedError("soil lies under plates")
 
     def in_plane(self, slip: Slip) -> Vec3:
         """Of a normal force without cohesion."""

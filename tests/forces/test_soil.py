@@ -146,6 +146,32 @@ def test_thrust_of_a_track_against_slip() -> None:
         assert found == pytest.approx(whole * (1 - K / (slip * L) * (1 - math.exp(-slip * L / K))), rel=1e-6)
 
 
+@pytest.mark.parametrize("name", ["dry_sand", "clayey_soil_38", "lete_sand", "upland_sandy_loam_51"])
+def test_drawbar_of_a_track_on_tabulated_soils(name: str) -> None:
+    """F = (A c + W tan phi) (1 - K / (i L) (1 - exp(-i L / K))) against slip, with Wong's numbers of the soils.
+
+    K is in his table of none of them; 0.01 m of firm sand stands for the last two.
+    """
+    soil, L, width, z = SOILS[name], 2.0, 0.4, 0.03
+    K, phi = soil.shear or 0.01, math.radians(soil.angle)
+    law = {"soil": name, "lateral": False, **({} if soil.shear else {"shear_modulus": K})}
+    mod = plate(law, 500.0, (0.2, width)).compile(target="numpy")
+    names = list(mod.x_names)
+    places, shears = ([names.index(f"soil_{what}_{j}") for j in (1, 2)] for what in ("sinkage", "shear"))
+    load = 0.2 * width * (soil.cohesive / width + soil.frictional) * z**soil.exponent
+    for slip in (0.05, 0.2, 0.6):
+
+        def rates(t: float, s: np.ndarray, slip: float = slip) -> np.ndarray:
+            x = mod.x0(y=-z, x_dot=slip)
+            x[places], x[shears] = z, s[:2]
+            out = mod.rhs(0.0, x)
+            return np.array([*out[shears], -500.0 * out[2]])
+
+        found = solve_ivp(rates, (0, L), np.zeros(3), rtol=1e-9, atol=1e-10).y[2, -1] / L
+        whole = 0.2 * width * soil.cohesion + load * math.tan(phi)
+        assert found == pytest.approx(whole * (1 - K / (slip * L) * (1 - math.exp(-slip * L / K))), rel=1e-6)
+
+
 def test_shear_turns_back_within_its_strength() -> None:
     """Stress falls and rises the other way with the same modulus, and never exceeds c + p tan phi."""
     mod = plate({**EXAMPLE, "lateral": False}).compile(target="numpy")
