@@ -13,7 +13,7 @@ from .shipped import shipped
 STEPPERS = (
     *("control", "signals", "tape"),
     *("plain", "rk4_step", "rk4"),
-    *("lu", "newton", "radau", "radau_step"),
+    *("lu", "lu_complex", "newton", "radau", "radau_step"),
     *("taylor_terms", "taylor"),
     *("event_values", "event_zero", "crossings", "loop"),
 )
@@ -34,6 +34,12 @@ LAYER = {
     "eomgen_loop.h": ("c/steppers/eomgen_loop.h",),
     "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45", "rk23")),
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
+    "_contacts.pxi": ("cython/_contacts.pxi",),
+    "eomgen_contacts.h": ("c/contacts/eomgen_contacts.h",),
+    "eomgen_contacts.c": (
+        "c/steppers/lu.c",
+        *(f"c/contacts/{name}.c" for name in ("maps", "newton", "rounded", "solve")),
+    ),
     "eomgen_wide_steps.c": ("c/steppers/wide.c",),
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
     "eomgen_ensembles.c": ("c/ensembles/one_run.c", "c/ensembles/ensembles.c"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from . import constraints, crossings, inertia, rounding, runs, systems
+from . import constraints, crossings, inertia, rigid_contacts, rounding, runs, systems
 
 KINDS = {
     "ROUNDING": rounding,
@@ -12,6 +12,7 @@ KINDS = {
     "CROSSINGS": crossings,
     "INERTIA": inertia,
     "SYSTEMS": systems,
+    "RIGID": rigid_contacts,
     "RUNS": runs,
 }
 _USED = re.compile(rf"\b({'|'.join(KINDS)})_([A-Z][A-Z_]*)\b")
@@ -20,4 +21,8 @@ _USED = re.compile(rf"\b({'|'.join(KINDS)})_([A-Z][A-Z_]*)\b")
 def definitions(text: str) -> str:
     """``#define`` lines, one for each limit that a text names; empty if it names none."""
     used = sorted({(match[1], match[2]) for match in _USED.finditer(text)})
-    return "".join(f"#define {kind}_{name} {getattr(KINDS[kind], name)!r}\n" for kind, name in used)
+    return "".join(f"#define {kind}_{name} {_in_c(getattr(KINDS[kind], name))}\n" for kind, name in used)
+
+
+def _in_c(limit: object) -> str:
+    return "{" + ", ".join(map(repr, limit)) + "}" if isinstance(limit, tuple) else repr(limit)

@@ -5,16 +5,22 @@ from __future__ import annotations
 #: Residual of the contact laws, relative to the largest velocity of the contacts without impulses: rounding of W P and
 #: of the free velocities, 1e-16 times a condition of 1e6 that chains and redundant contacts bring about, is below.
 SOLVED = 1e-9
-ITERATIONS = 200  #: of one step: Newton's method takes about as many as contacts change their state, and sweeps follow
+ITERATIONS = 600  #: of one step: rounded laws take up to 200 in each of their rounds
 #: Parts of their own compliance by which contacts are softer in the rounds of Newton's method, by turns: errors shrink
 #: by about this part in a round, and rounding in impulses that nothing determines is 1e-16 over it.
 SOFTER = (1e-8, 1e-6)
 TRIED = 10  #: iterations of a round: states of contacts that change still are in a circle
 SWEEPS = 5  #: over all contacts, after a round that led nowhere
+#: From so many contacts up to WARM times as many sweeps come first: a sweep takes (m d)^2 operations, a step of
+#: Newton's method (m d)^3/3.
+MANY, WARM = 8, 20
 #: The same in Newton's method for rounded laws, whose impulses go on farther in each step; the part by which the
 #: rounding shrinks when a step was good, at first and where that leads nowhere; and the part of the velocities at which
 #: laws count as sharp.
-SOFT, SHRINKS, SHARP = 1e-10, (0.2, 0.5), 1e-14
+SOFT, SHRINKS, SHARP = 1e-10, (0.2, 0.5, 0.8), 1e-14
+#: Roundings tried in vain, two iterations each, after which a smaller one is not reached: those that are reached take
+#: one or two.
+PATIENT = 8
 #: Approach below this multiple of what forces change in one step is rest, without a rebound: a body that rests
 #: approaches at once the change of a step.
 RESTING = 2.0

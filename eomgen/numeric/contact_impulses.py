@@ -13,7 +13,10 @@ which a Newton method with the derivatives of the branch at hand solves.  Contac
 each round solves for contacts that are a little softer about the impulses of the round before (the proximal point
 method, R. T. Rockafellar, SIAM J. Control Optim. 14 (1976), 877-898), which leaves the matrix regular and the solution
 as it is.  Where Newton leads nowhere, sweeps over single contacts go on (M. Jean, The non-smooth contact dynamics
-method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257).
+method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257); with many contacts they also come first.  What is left
+over goes to :func:`solve_smoothed`.
+
+``templates/c/contacts`` has the same iterations in C; modules with it do them as ``core.solve_contacts``.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import EvaluationError
-from ..limits.rigid_contacts import SHARP, SHRINKS, SOFT, SOFTER, SWEEPS, TRIED
+from ..limits.rigid_contacts import MANY, PATIENT, SHARP, SHRINKS, SOFT, SOFTER, SWEEPS, TRIED, WARM
 from . import algebra
 from .space import Array
 
@@ -168,8 +171,17 @@ def solve_contacts(problem: ContactProblem, start: Array, tolerance: float, most
         Iterations allowed.
     """
     P = np.array(start)
-    best, least = P, problem.size(problem.misses(P)[0])
+    best, least = np.array(P), problem.size(problem.misses(P)[0])
     count = 0
+    for _ in range(WARM if problem.m >= MANY else 0):
+        if least <= tolerance:
+            break
+        for _ in range(SWEEPS):
+            problem.sweep(P)
+        size = problem.size(problem.misses(P)[0])
+        if size < least:
+            best, least = np.array(P), size
+    P = np.array(best)
     for part in SOFTER:
         if least <= tolerance or count >= most:
             break
@@ -211,9 +223,9 @@ def solve_smoothed(problem: ContactProblem, tolerance: float, most: int, shrinks
     """
     P = np.zeros(problem.c.shape)
     best, least = P, np.inf
-    rounding, count = 1.0, 0
+    rounding, count, still = 1.0, 0, 0
     speed = float(np.abs(problem.c).max())
-    while least > tolerance and count < most and rounding > SHARP:
+    while least > tolerance and count < most and rounding > SHARP and still < PATIENT:
         about = problem.softer(P, SOFT)
         for _ in range(2):
             try:
@@ -226,8 +238,9 @@ def solve_smoothed(problem: ContactProblem, tolerance: float, most: int, shrinks
         size = problem.size(problem.misses(P)[0])
         if size < least:
             best, least = P, size
+        still += 1
         if left < rounding * speed:
-            rounding *= shrinks
+            rounding, still = rounding * shrinks, 0
     return best, count, least
 
 

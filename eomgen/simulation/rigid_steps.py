@@ -20,6 +20,7 @@ are longer is done in two.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,11 +30,15 @@ from ..limits.rigid_contacts import GENTLER, GROWN, HALVINGS, REMOVED, RESTING, 
 from ..numeric import algebra
 from ..numeric.contact_impulses import ContactImpulses, ContactProblem, solve_contacts
 from ..numeric.scales import Array
+from ..runtime.late import eager
 from .rigid_rows import RigidContacts, RigidRows
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.signals import Forcing
+
+
+Spot = tuple[int, int, int]  #: two shapes, and the number of the place where they touch
 
 
 class RigidSteps:
@@ -64,7 +69,8 @@ class RigidSteps:
         self._begins = True
         names = module.kernels.core.names
         self._meeting = module.kernels.motion("meeting_time") if "meeting_time" in names else None
-        self._last: dict[tuple[int, int], Array] = {}
+        self._solve = getattr(eager(module.core), "solve_contacts", None)
+        self._last: dict[Spot, Array] = {}
 
     def move(self, q: Array, d: Array) -> Array:
         """The position that velocities d (n_v,) lead to in unit time."""
@@ -118,12 +124,13 @@ class RigidSteps:
         bias = self.bias(middle, x, u=u)
         free = held.free(v - h * (held.inverse @ bias))
         rows = self._near(self.contacts.rows(middle, q_m, u), v, free, h)
-        new, P = self._contact(held, rows, v, free, h)
+        meeting = _Meeting(held, rows, v, self._last) if rows.gaps.size else None
+        new, P = self._contact(meeting, free, h)
         x[n_q:] = 0.5 * (v + new)
         again = self.bias(middle, x, u=u)
         if not np.array_equal(again, bias):
             free = held.free(v - h * (held.inverse @ again))
-            new, P = self._contact(held, rows, v, free, h)
+            new, P = self._contact(meeting, free, h)
         if self._passes(middle, q_m, new, u, 0.5 * h):
             return None
         position = self.move(q_m, 0.5 * h * new)
@@ -131,7 +138,7 @@ class RigidSteps:
         end = self.forcing(t + h, np.concatenate([position, new])) if self.forcing else None
         away = held.closing(position, t + h, end)
         if rows.gaps.size:
-            away = away + self._out(held, rows, P, new)
+            away = away + self._out(held, rows, P, new, h)
         return (self.move(position, away) if away.any() else position), new
 
     def _near(self, rows: RigidRows, v: Array, free: Array, h: float) -> RigidRows:
@@ -142,27 +149,22 @@ class RigidSteps:
         fastest = max(float(np.abs(rows.jacobian @ velocity).max()) for velocity in (v, free))
         return rows.chosen(np.flatnonzero(rows.gaps <= 2.0 * h * fastest))
 
-    def _contact(self, held: _Held, rows: RigidRows, v: Array, free: Array, h: float) -> tuple[Array, Array]:
+    def _contact(self, meeting: _Meeting | None, free: Array, h: float) -> tuple[Array, Array]:
         """Velocities after the impulses of contacts, and these (m, d)."""
-        m = len(rows.gaps)
-        if not m:
+        if meeting is None:
             return free, np.zeros((0, 2))
-        d = len(rows.jacobian) // m
-        before, undisturbed = ((rows.jacobian @ velocity).reshape(m, d) for velocity in (v, free))
-        spread = held.inverse @ rows.jacobian.T
-        W = rows.jacobian @ spread
+        rows, before, W = meeting.rows, meeting.before, meeting.compliance
+        undisturbed = (rows.jacobian @ free).reshape(before.shape)
         fast = before[:, 0] < -RESTING * np.abs(undisturbed[:, 0] - before[:, 0])
         strikes = fast & (rows.restitution > 0.0) & (rows.gaps + h * undisturbed[:, 0] < 0.0)
         arrive = np.where(rows.gaps > 0.0, -rows.gaps / h, 0.0)
         back = np.where(strikes, -rows.restitution * before[:, 0] - arrive, 0.0)
         scale = max(float(np.abs(before).max()), float(np.abs(undisturbed).max()))
-        keys = [(int(a), int(b)) for a, b in rows.pairs]
-        start = np.array([self._last.get(key, np.zeros(d))[:d] for key in keys])
         for k in range(GENTLER + 1):
             part = 0.0 if k == GENTLER else 0.5**k
             c = undisturbed.copy()
             c[:, 0] -= arrive + part * back
-            found = solve_contacts(ContactProblem(W, c, rows.friction), start, self.tolerance * scale, self.allowed)
+            found = self._impulses(W, c, rows.friction, meeting.start, self.tolerance * scale)
             P = found.impulses.ravel()
             after = undisturbed.ravel() + W @ P
             work = P @ after, P @ before.ravel()  # twice: forces act with the velocity of the middle
@@ -170,30 +172,73 @@ class RigidSteps:
                 np.abs(P) @ (np.abs(after) + np.abs(before.ravel()))
             ):
                 break  # impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985)
-        self._note(found, scale, m)
+        self._note(found, scale, len(rows.gaps))
         self._rests = ~strikes
-        self._last = dict(zip(keys, found.impulses, strict=True))
-        return free + spread @ P, found.impulses
+        self._last = dict(zip(meeting.keys, found.impulses, strict=True))
+        meeting.start = found.impulses
+        return free + meeting.spread @ P, found.impulses
+
+    def _impulses(self, W: Array, c: Array, friction: Array, start: Array, tolerance: float) -> ContactImpulses:
+        if self._solve is None:
+            return solve_contacts(ContactProblem(W, c, friction), start, tolerance, self.allowed)
+        return ContactImpulses(*self._solve(W, c, friction, start, tolerance, self.allowed))
 
     def _note(self, found: ContactImpulses, scale: float, m: int) -> None:
         self.residual = max(self.residual, found.residual)
         self._misses = self._misses or found.residual > self.tolerance * scale
         self.iterations, self.most = max(self.iterations, found.iterations), max(self.most, m)
 
-    def _out(self, held: _Held, rows: RigidRows, P: Array, new: Array) -> Array:
-        """A displacement (n_v,) that removes a part of the penetration of contacts that last."""
+    def _out(self, held: _Held, rows: RigidRows, P: Array, new: Array, h: float) -> Array:
+        """A displacement (n_v,) that removes a part of the penetration of contacts that last, with load or without."""
         d = len(rows.jacobian) // len(rows.gaps)
         normal = rows.jacobian[::d]
-        lasts = (rows.gaps < 0.0) & (P[:, 0] > 0.0)
-        lasts &= self._rests
+        removed = -REMOVED * rows.gaps
+        lasts = (rows.gaps < 0.0) & self._rests & ((P[:, 0] > 0.0) | (h * (normal @ new) < removed))
         if not lasts.any():
             return np.zeros(len(new))
-        J, wanted = normal[lasts], -REMOVED * rows.gaps[lasts]
+        J, wanted = normal[lasts], removed[lasts]
         spread = held.inverse @ J.T
         W = J @ spread
-        problem = ContactProblem(W + YIELDING * np.diag(np.diag(W)), -wanted[:, None], np.zeros(len(wanted)))
-        found = solve_contacts(problem, np.zeros((len(wanted), 1)), self.tolerance * float(wanted.max()), self.allowed)
+        W += YIELDING * np.diag(np.diag(W))
+        nothing = np.zeros(len(wanted))
+        found = self._impulses(W, -wanted[:, None], nothing, nothing[:, None], self.tolerance * float(wanted.max()))
         return np.asarray(spread @ found.impulses.ravel())
+
+
+def _numbered(pairs: Sequence[Sequence[int]]) -> list[Spot]:
+    """Pairs of shapes, those that touch at several places numbered."""
+    found: list[Spot] = []
+    seen: dict[tuple[int, int], int] = {}
+    for a, b in pairs:
+        place = seen.get((a, b), 0)
+        seen[a, b] = place + 1
+        found.append((a, b, place))
+    return found
+
+
+class _Meeting:
+    """The contacts of one position, which the two rounds of a step share.
+
+    Attributes
+    ----------
+    before, start : (m, d) array
+        Velocities before the impulses, and a guess of these: those of the same pairs of shapes in the last step.
+    spread : (n_v, m d) array
+        Velocities by impulses.
+    compliance : (m d, m d) array
+        Velocities of contacts by impulses.
+    """
+
+    def __init__(self, held: _Held, rows: RigidRows, v: Array, last: dict[Spot, Array]) -> None:
+        m = len(rows.gaps)
+        d = len(rows.jacobian) // m
+        self.rows = rows
+        self.before = (rows.jacobian @ v).reshape(m, d)
+        self.spread = held.inverse @ rows.jacobian.T
+        self.compliance = rows.jacobian @ self.spread
+        self.keys = _numbered(rows.pairs.tolist())
+        none = np.zeros(d)
+        self.start = np.array([last.get(key, none)[:d] for key in self.keys])
 
 
 class _Held:

@@ -396,3 +396,4 @@ state = quick_type(State, b"_core.State", offset_of_quick(State))
 
 include "_steppers.pxi"
 include "_ensembles.pxi"
+include "_contacts.pxi"

@@ -1,0 +1,63 @@
+static void keep_better(contacts *s, const double *P, double *least)
+{
+    const double size = residual_of(s, P);
+    if (size < *least) { *least = size, memcpy(s->best, P, (size_t)s->n*sizeof(double)); }
+}
+
+/* The whole of solve_contacts in numeric/contact_impulses.py. */
+static int iterate(contacts *s, double *P, double tolerance, int most, double *residual)
+{
+    static const double softer[] = RIGID_SOFTER, shrinks[] = RIGID_SHRINKS;
+    const size_t bytes = (size_t)s->n*sizeof(double);
+    double least = residual_of(s, P);
+    int count = 0;
+    memcpy(s->best, P, bytes);
+    for (int k = 0; k < RIGID_WARM && least > tolerance && s->m >= RIGID_MANY; k++) {
+        for (int l = 0; l < RIGID_SWEEPS; l++) { sweep(s, P); }
+        keep_better(s, P, &least);
+    }
+    memcpy(P, s->best, bytes);
+    for (size_t k = 0; k < sizeof(softer)/sizeof(*softer) && least > tolerance && count < most; k++) {
+        soften(s, P, softer[k]);
+        const int steps = newton(s, P, 0.5*tolerance, RIGID_TRIED < most - count ? RIGID_TRIED : most - count);
+        count += steps > 1 ? steps : 1;
+        keep_better(s, P, &least);
+        memcpy(P, s->best, bytes);
+        if (least > tolerance) {
+            for (int l = 0; l < RIGID_SWEEPS; l++) { sweep(s, P); }
+            keep_better(s, P, &least);
+        }
+    }
+    for (size_t k = 0; k < sizeof(shrinks)/sizeof(*shrinks) && least > tolerance && count < most; k++) {
+        count += follow(s, &least, tolerance, most - count, shrinks[k]);
+    }
+    memcpy(P, s->best, bytes);
+    *residual = least;
+    return count;
+}
+
+int eomgen_solve_contacts(int m, int d, const double *W, const double *c, const double *friction, double *P,
+                          double tolerance, int most, int *count, double *residual)
+{
+    const size_t n = (size_t)m*d;
+    contacts s = {m, d, (int)n, W, c, friction};
+    double *const room = malloc((n*(n + 8) + 3*(size_t)m + 1)*sizeof(double)), *next = room;
+    int *const numbers = malloc((n + m + 1)*sizeof(int));
+    double **const parts[] = {&s.c, &s.more, &s.y, &s.misses, &s.pulled, &s.b, &s.tried, &s.best};
+    if (room == NULL || numbers == NULL) {
+        free(room), free(numbers);
+        return 1;
+    }
+    for (size_t k = 0; k < sizeof(parts)/sizeof(*parts); k++, next += n) { *parts[k] = next; }
+    s.normal = next, s.across = next + m, s.pressed = next + 2*m, s.A = next + 3*m;
+    s.order = numbers, s.on = numbers + n;
+    for (int i = 0; i < m; i++) {
+        double across = 0.0;
+        for (int k = 1; k < d; k++) { across += W[(i*d + k)*(n + 1)]; }
+        s.normal[i] = W[(size_t)i*d*(n + 1)] > 0.0 ? W[(size_t)i*d*(n + 1)] : 1.0;
+        s.across[i] = across > 0.0 ? across : 1.0;
+    }
+    *count = iterate(&s, P, tolerance, most, residual);
+    free(room), free(numbers);
+    return 0;
+}
