@@ -104,7 +104,7 @@ def _axes(values: Mapping[str, Any], groups: Sequence[Sequence[ShapeParts]], lat
     kinds = {shape.kind for group in groups for shape in group}
     if kinds & set(PLANAR):
         return ("_x", "_z") if lateral else ("",)
-    round_pairs = any(first in ("round", "rod") for _, _, first, _ in pair_states(groups)[0])
+    round_pairs = any(first != "surface" for _, _, first, _ in pair_states(groups)[0])
     return ("_x", "_y", "_z") if round_pairs else ("_x", "_y")
 
 
@@ -129,8 +129,8 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
                 e.fault("second", f"{a} and {b} do not meet", _ALLOWED)
             elif (
                 (a in GROUNDS and b in GROUNDS)
-                or (a in _ON_GROUND and b in _IN_SPACE)
-                or (b in _ON_GROUND and a in _IN_SPACE)
+                or (a in _CLOSED and b in _OFF_CLOSED)
+                or (b in _CLOSED and a in _OFF_CLOSED)
             ) and (second or a != b or _differ(first, a)):
                 told = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
                 e.fault("second" if second else "first", told, _ALLOWED)
@@ -186,12 +186,12 @@ _CORNERED = (
     "smooth_outline",
     "sprocket",
 )  #: shapes whose corners meet segments
-_ON_GROUND = ("ellipsoid", "cuboid")  #: shapes that meet a half-space alone
-_IN_SPACE = ("sphere", "capsule", *_ON_GROUND)
+_CLOSED = ("ellipsoid", "cuboid")  #: shapes that meet half-spaces and spheres alone
+_OFF_CLOSED = ("capsule", *_CLOSED)
 _ALLOWED = (
     "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
     "smooth_profile, which plates meet too; sphere and capsule meet each other and half_space; ellipsoid and cuboid "
-    "meet half_space"
+    "meet half_space and sphere"
 )
 
 _NORMAL_LAW = CURVED["normal_law"]._replace(

@@ -35,8 +35,8 @@ from .contact_profiles import (
 )
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_shape_fields import GROUNDS
-from .contact_solids import EllipsoidPlane, RodRod
-from .contact_states import MET, POLYGON, WHEEL, ShapeParts, part_of, parts_of
+from .contact_solids import BlockRound, EllipsoidPlane, EllipsoidRound, RodRod
+from .contact_states import BLOCK, MET, POLYGON, WHEEL, ShapeParts, part_of, parts_of
 
 #: Shapes whose pieces are edges and arcs.
 PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
@@ -108,7 +108,8 @@ class ContactShape:
             x, y, z = (0.5 * size for size in self.sizes)
             thick = _least(self.sizes)
             ways = enumerate(itertools.product(_BOTH, repeat=3))
-            return [
+            whole = Feature(BLOCK, frame, (x, y, z), sqrt(x * x + y * y + z * z), thick)
+            return [whole] + [
                 Feature("end", _moved(frame, (i * x, j * y, k * z)), (zero,), zero, thick, n) for n, (i, j, k) in ways
             ]
         if self.kind == "plate":
@@ -228,7 +229,7 @@ class ContactShape:
         if self.kind == "ellipsoid":
             return [self._ellipse(i, j) for i, j in ((0, 1), (1, 2), (2, 0))]
         if self.kind == "cuboid":
-            found = [feature.frame for feature in self.features()]
+            found = [feature.frame for feature in self.features()[1:]]
             ways = ((0, 1, 3, 2, 0, 4, 5, 7, 6, 4), (1, 5), (2, 6), (3, 7))
             return [Drawn(tuple(Marker(marker.body, found[k], marker.label) for k in way)) for way in ways]
         if self.kind == "plate":
@@ -317,6 +318,9 @@ def touching(
         return RoundRound(*laws, (first[0], radius))
     if part_of(kinds[1]) == POLYGON:
         return PolygonPolygon(*laws, first, sizes[1], spot)
+    if kinds[0] in ("ellipsoid", BLOCK):
+        x, y, z = first
+        return (BlockRound if kinds[0] == BLOCK else EllipsoidRound)(*laws, (x, y, z), radius)
     if kinds[1] == "ellipsoid":
         x, y, z = sizes[1]
         return EllipsoidPlane(*laws, (x, y, z))

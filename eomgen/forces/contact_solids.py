@@ -1,14 +1,15 @@
-"""Force elements, contact of shapes in space: rods of a radius on each other, ellipsoids on a plane."""
+"""Force elements, contact of shapes in space: rods, ellipsoids on a plane, spheres on ellipsoids and cuboids."""
 
 from __future__ import annotations
 
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..limits.contacts import PARALLEL
+from ..limits.contacts import FOCAL, NEAREST, PARALLEL
 from ..records import dataclass
 from .branches import where
 from .contact import Contact, Touch
+from .contact_rounds import direction
 from .force import View
 
 
@@ -67,3 +68,78 @@ class EllipsoidPlane(Contact):
         lowest = vec.times(R, (-x / w, -y / w, -z / w))
         second = vec.add(lowest, vec.scale(0.5 * depth, normal))
         return normal, depth, vec.add(reach, second), second
+
+
+@dataclass(frozen=True)
+class BlockRound(Contact):
+    """A sphere about the second marker on a cuboid about the first, half lengths along its x, y, z.
+
+    A centre outside is pushed away from the nearest point of the cuboid, one inside out through the nearest face.
+    """
+
+    halves: tuple[Expr, Expr, Expr]
+    radius: Expr
+
+    def touch(self, view: View) -> Touch:
+        graph, R = view.graph, view.rotation(self.first)
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        place = vec.transpose_times(R, reach)
+        x, y, z = (
+            a - graph.apply("max", -h, graph.apply("min", h, a)) for a, h in zip(place, self.halves, strict=True)
+        )
+        beyond = [graph.apply("max", a, -a) - h for a, h in zip(place, self.halves, strict=True)]
+        face: Vec3 = (graph.one, graph.zero, graph.zero)
+        rise = beyond[0]
+        for k in (1, 2):
+            higher = graph.apply("lt", rise, beyond[k])
+            rise = where(higher, beyond[k], rise)
+            a, b, c = (where(higher, 1.0 if k == n else 0.0, face[n]) for n in range(3))
+            face = (a, b, c)
+        a, b, c = (where(graph.apply("lt", p, 0.0), -n, n) for p, n in zip(place, face, strict=True))
+        normal, distance = direction((x, y, z), (a, b, c))
+        gap = where(graph.apply("lt", 0.0, distance), distance, rise)
+        out = vec.times(R, normal)
+        depth = self.radius - gap
+        second = vec.scale(0.5 * depth - self.radius, out)
+        return out, depth, vec.add(reach, second), second
+
+
+@dataclass(frozen=True)
+class EllipsoidRound(Contact):
+    """A sphere about the second marker on an ellipsoid about the first, half axes along its x, y, z.
+
+    The nearest point to p is (a^2 p_x / (t + a^2), ...), where S(t), the sum of (a p_x / (t + a^2))^2, is 1 (Eberly,
+    Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid, 2013); t times (p_x / (t + a^2), ...) leads
+    from it to p.  Newton's method for 1 / sqrt(S) = 1, which is nearly linear (More and Sorensen, SIAM J. Sci. Stat.
+    Comput. 4, 1983, 553-572), comes to t from the side on which S > 1, where the largest of the three squares is 1, or
+    t = 0 of a centre outside.  Undefined at the centre of the ellipsoid.
+    """
+
+    axes: tuple[Expr, Expr, Expr]
+    radius: Expr
+
+    def touch(self, view: View) -> Touch:
+        graph, R = view.graph, view.rotation(self.first)
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        place = vec.transpose_times(R, reach)
+        squares = [a * a for a in self.axes]
+        scaled = [a * p for a, p in zip(self.axes, place, strict=True)]
+        least = graph.apply("min", squares[0], graph.apply("min", squares[1], squares[2]))
+        begin = -(1.0 - FOCAL) * least
+        for s, q in zip(scaled, squares, strict=True):
+            begin = graph.apply("max", begin, graph.apply("max", s, -s) - q)
+        rises = [p / a for p, a in zip(place, self.axes, strict=True)]
+        outside = graph.apply("lt", 1.0, rises[0] * rises[0] + rises[1] * rises[1] + rises[2] * rises[2])
+        begin = where(outside, graph.apply("max", begin, 0.0), begin)
+        t = begin
+        for _ in range(NEAREST):
+            parts = [s / (t + q) for s, q in zip(scaled, squares, strict=True)]
+            total = parts[0] * parts[0] + parts[1] * parts[1] + parts[2] * parts[2]
+            slope = sum((s * s / (t + q) for s, q in zip(parts, squares, strict=True)), graph.zero)
+            t = graph.apply("max", begin, t + total * (sqrt(total) - 1.0) / slope)
+        x, y, z = (p / (t + q) for p, q in zip(place, squares, strict=True))
+        size = sqrt(x * x + y * y + z * z)
+        out = vec.times(R, (x / size, y / size, z / size))
+        depth = self.radius - t * size
+        second = vec.scale(0.5 * depth - self.radius, out)
+        return out, depth, vec.add(reach, second), second

@@ -22,17 +22,23 @@ PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon
 #: Parts that meet surfaces and have no states.
 STATELESS = ("rim",)
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
+BLOCK = "block"  #: class of cuboids, which spheres meet
 _ROUND = ("round", "rod", POLYGON)
+#: Classes of first parts that are told apart; all others are surfaces.
+_APART = (*_ROUND, "ellipsoid", BLOCK)
 #: Kind of shape -> what it is where it is the first of a pair.
 _FIRST = {
     "circle": "round", "sphere": "round", "capsule": "rod", "segment": "segment", "box": POLYGON, "polygon": POLYGON,
     "profile": "ground", "smooth_profile": "ground", "outline": "ground", "smooth_outline": "ground",
     "sprocket": "ground", "half_plane": "half", "half_space": "half",
+    "ellipsoid": "ellipsoid", "cuboid": BLOCK,
 }  # fmt: skip
 #: What is met by each of these.
 MET = {
     "round": ("round",),
     "rod": ("round", "rod"),
+    "ellipsoid": ("round",),
+    BLOCK: ("round",),
     "segment": ("round", "corner", "vertex"),
     POLYGON: ("round", "corner", POLYGON),
     "ground": ("round", "corner", "vertex", "pad", "rim"),
@@ -84,7 +90,7 @@ def pair_states(groups: Sequence[Sequence[ShapeParts]]) -> tuple[dict[tuple[int,
     found: dict[tuple[int, int, str, str], PairStates] = {}
     start = 0
     for g, h in [(0, 0)] if len(groups) == 1 else [(0, 1), (1, 0)]:
-        for first in (*_ROUND, "surface"):
+        for first in (*_APART, "surface"):
             for second in PARTS:
                 if first == second and g > h:  # met already
                     continue
@@ -104,7 +110,7 @@ def pair_states(groups: Sequence[Sequence[ShapeParts]]) -> tuple[dict[tuple[int,
 def class_of(feature: str, met: str) -> str:
     """The class of a first part: its own where parts of one class meet each other, else that of surfaces."""
     own, other = part_of(feature), part_of(met)
-    return own if own in _ROUND and (own != POLYGON or other == POLYGON) else "surface"
+    return own if own in _APART and (own != POLYGON or other == POLYGON) else "surface"
 
 
 def part_of(feature: str) -> str:

@@ -22,3 +22,12 @@ NOWHERE = 1e100
 #: Shear displacement by K below which (1 - exp(-x)) / x is its series to x^4: the next term, x^5 / 720, is 1e-18, where
 #: the quotient's slope begins to lose 1e-16 / x^2.
 SHORT_WAY = 1e-3
+#: Steps of Newton's method for the point of an ellipsoid that is nearest to a centre.  Measured on 400,000 random
+#: centres with known nearest points, the largest half axis 1: the distance is right to 2e-15 after 7 steps for centres
+#: outside and axes up to 10 : 1, after 9 up to 30 : 1, and after 12 for centres inside, up to 0.95 of the least radius
+#: of curvature below the surface, of axes up to 10 : 1 (4e-10 at half of it at 30 : 1).
+NEAREST = 12
+#: Part of the squared least half axis of an ellipsoid by which t stays above the value at which nearest points of its
+#: inside are not unique: 1 / 1e-6 is lost of 16 digits there, and centres of spheres that touch it are outside or near
+#: its surface.
+FOCAL = 1e-6

@@ -189,12 +189,88 @@ def test_what_is_wrong_with_a_shape_is_told(given: dict[str, Any], told: str) ->
         m.mechanism()
 
 
-def test_shapes_that_meet_the_ground_alone() -> None:
-    for other in (ROD, SHAPES["cuboid"], {"shape": "sphere", "radius": 0.1}):
+@pytest.mark.parametrize("kind", ["ellipsoid", "cuboid"])
+def test_shapes_that_meet_half_spaces_and_spheres_alone(kind: str) -> None:
+    for other in (ROD, SHAPES["cuboid"], SHAPES["ellipsoid"]):
         m, (a, b) = flying(2)
-        m.contacts("touch", {**SHAPES["ellipsoid"], "on": a}, {**other, "on": b}, ELASTIC)
-        with pytest.raises(ModelError, match="do not meet.*ellipsoid and cuboid meet half_space"):
+        m.contacts("touch", {**SHAPES[kind], "on": a}, {**other, "on": b}, ELASTIC)
+        with pytest.raises(ModelError, match="do not meet.*ellipsoid and cuboid meet half_space and sphere"):
             m.mechanism()
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("kind", ["ellipsoid", "cuboid"])
+def test_a_sphere_on_a_closed_solid(kind: str, swapped: bool) -> None:
+    """In turned frames, against the least distance of points of the solid; momentum, slopes, both targets."""
+    m, (a, b) = flying(2)
+    own = Rotation.from_euler("xyz", (0.2, 0.5, -0.3))
+    groups = [
+        {**SHAPES[kind], "on": a.at(0.03, 0.01, -0.02, rpy=(0.2, 0.5, -0.3))},
+        {"shape": "sphere", "on": b.at(0.01, 0, 0), "radius": 0.08},
+    ]
+    m.contacts("touch", *(groups[::-1] if swapped else groups), ELASTIC)
+    mods = [m.compile(target=target) for target in ("numpy", "cython")]
+    rng, met = np.random.default_rng(8), 0
+    sizes = np.array(SHAPES[kind].get("semi_axes", 0.5 * np.array(SHAPES["cuboid"]["size"])))
+    for _ in range(60):
+        turns = [Rotation.random(random_state=rng.integers(1 << 30)) for _ in "ab"]
+        way = rng.standard_normal(3)
+        local = sizes * way / np.linalg.norm(way / (1 if kind == "ellipsoid" else 0.6))
+        centre = local + rng.uniform(0.0, 0.08) * way / np.linalg.norm(way)
+
+        def square(s: np.ndarray, centre: Any = centre) -> float:
+            if kind == "cuboid":
+                return float(((s - centre) ** 2).sum())
+            u = np.array([np.cos(s[0]) * np.sin(s[1]), np.sin(s[0]) * np.sin(s[1]), np.cos(s[1])])
+            return float(((sizes * u - centre) ** 2).sum())
+
+        if kind == "cuboid":
+            if (np.abs(centre) < sizes).all():
+                continue
+            found = [minimize(square, np.zeros(3), bounds=[(-x, x) for x in sizes], tol=1e-16).fun]
+        else:
+            if ((centre / sizes) ** 2).sum() < 1:
+                continue
+            starts = [(x, y) for x in (0.3, 2.0, 4.0, 5.5) for y in (0.7, 1.6, 2.5)]
+            found = [minimize(square, s, options={"gtol": 1e-12}).fun for s in starts]
+        depth = 0.08 - np.sqrt(min(found))
+        frame = turns[0] * own
+        place = turns[0].apply((0.03, 0.01, -0.02)) + frame.apply(centre) - turns[1].apply((0.01, 0, 0))
+        x = state(mods[0], [(0, 0, 0), place], turns)
+        if depth < 2e-3:
+            continue
+        met += 1
+        for mod in mods:
+            assert depth_of(mod, x) == pytest.approx(depth, abs=2e-7)
+        force = -mods[0].bias(0.0, x)
+        if met <= 5:
+            check_slopes(mods[0], x)
+            one, other = (mod.jacobian(0.0, x) for mod in mods)
+            assert np.abs(one - other).max() <= 1e-9 * np.abs(other).max()
+        assert np.abs(force[:3] + force[6:9]).max() <= 1e-12 * np.abs(force).max()
+    assert met >= 12
+
+
+def test_an_ellipsoid_of_equal_axes_is_a_sphere_and_a_flat_cuboid_a_plane() -> None:
+    places = [((0.0, 0.0, 0.0), (0.1, 0.05, 0.09)), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.14))]
+    values = []
+    for shape in ({"shape": "sphere", "radius": 0.1}, {"shape": "ellipsoid", "semi_axes": (0.1, 0.1, 0.1)}):
+        m, (a, b) = flying(2)
+        m.contacts("touch", {**shape, "on": a}, {"shape": "sphere", "on": b, "radius": 0.06}, ELASTIC)
+        mod = m.compile(target="numpy")
+        values.append([mod.bias(0.0, state(mod, place, [TURNED, TURNED])) for place in places])
+    np.testing.assert_allclose(values[1], values[0], rtol=1e-10, atol=1e-9)
+    assert np.abs(values[0]).max() > 1.0
+    flat, deep = [], []
+    for first in ({"shape": "cuboid", "size": (4, 4, 1)}, {"shape": "half_space"}):
+        m, (b,) = flying(1)
+        base = m.ground.at(0, 0, -0.5 if first["shape"] == "cuboid" else 0)
+        m.contacts("touch", {**first, "on": base}, {"shape": "sphere", "on": b, "radius": 0.06}, ELASTIC)
+        mod = m.compile(target="numpy")
+        flat.append(mod.bias(0.0, state(mod, [(0.3, 0.2, 0.05)], [TURNED])))
+        deep.append(mod.bias(0.0, state(mod, [(0.3, 0.2, -0.05)], [TURNED])))
+    np.testing.assert_allclose(flat[0], flat[1], rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(deep[0], deep[1], rtol=1e-10, atol=1e-12)
 
 
 def test_solids_are_drawn_and_verified(tmp_path: Any) -> None:
