@@ -1,7 +1,7 @@
 """The tracked excavator as a scene of MuJoCo: the bodies, joints, drive and shapes of examples/tracked_excavator.py.
 
-All contact happens in the plane z = 0, where a sphere is a circle and a capsule a segment.  Two things differ.  Shapes of
-the sprocket: a circle on whose rim the pins lie and a capsule for each tooth, because MuJoCo takes convex shapes alone.
+All contact happens in the plane z = 0, where a sphere is a circle and a capsule a segment.  Two things differ.  The
+sprocket is a circle on whose rim the pins lie and a capsule for each tooth, because MuJoCo takes convex shapes alone.
 And the upper structure, which the cylinders hold, is rigid at its start.
 """
 

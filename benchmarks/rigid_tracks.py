@@ -71,7 +71,7 @@ def run(quick: bool) -> Report:
     )
     notes = (
         f"{seconds:g} s from rest to 0.95 m/s, CPU seconds of one core, steps of 1 ms.",
-        "moreau with contact_tolerance=1e-3 and contact_iterations=1: up to 100 sweeps and a Newton step in each solution.",
+        "moreau with contact_tolerance=1e-3 and contact_iterations=1: at most 100 sweeps and a Newton step a solution.",
         "MuJoCo: implicitfast, elliptic cones, Newton, time constants of 2 ms; the upper structure is rigid there.",
         "Penetration: the deepest of the run by moreau, its start among it; that at the end in MuJoCo.",
     )

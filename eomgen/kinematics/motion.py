@@ -244,7 +244,7 @@ class MarkerMotion:
         found = part_exerted(self, force, quantity)
         if force.is_rigid:
             told = f"the contacts {force.name!r} have normal_law: rigid, which exerts impulses, not forces"
-            remedy = "a run by method moreau tells them as impacts; or give a normal law with a stiffness"
+            remedy = "give a normal law with a stiffness; runs by method moreau take such contacts as rigid too"
             raise ModelError([mechanism.problem(quantity.path, told, remedy)])
         if isinstance(found, str):
             remedy = f"give a body on which it acts; power({force.name}) is known of every element"
