@@ -264,7 +264,7 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
         lengths += [("DAE", 4 * program.sizes.n_dae), ("SLOPE", program.sizes.n_dae)]  # y, y', dy, dy'; dF
     lengths += _areas_of_bodies(program)
     if "inverse_tangent" in names:
-        lengths.append(("INVERSE", 2 * (n_q + 2 * n) + n))  # q, v, a, dq, dv, da; d(M a + h)
+        lengths.append(("TORQUES", 2 * (n_q + 2 * n) + n))  # q, v, a, dq, dv, da; d(M a + h)
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area
     for name, length in lengths:
         areas.append((name, start, length))

@@ -3,7 +3,7 @@ static int inverse_dynamics_derivatives_driver(double t, const double *restrict 
                                                const double *restrict c, double *restrict out, double *restrict w)
 {
     enum { NZ = NQ + 2 * N };
-    double *const along = w + AT_INVERSE, *const slope = along + 2 * NZ;
+    double *const along = w + AT_TORQUES, *const slope = along + 2 * NZ;
     for (int k = 0; k < NZ; k++) {
         along[k] = x[k];
         along[NZ + k] = 0.0;
