@@ -105,8 +105,8 @@ class ContactShape:
             x, y, z = (0.5 * size for size in self.sizes)
             thick = _least(self.sizes)
             ways = enumerate(itertools.product(_BOTH, repeat=3))
-            whole = Feature(BLOCK, frame, (x, y, z), sqrt(x * x + y * y + z * z), thick)
-            return [whole] + [
+            block = Feature(BLOCK, frame, (x, y, z), sqrt(x * x + y * y + z * z), thick)
+            return [block] + [
                 Feature("end", _moved(frame, (i * x, j * y, k * z)), (zero,), zero, thick, n) for n, (i, j, k) in ways
             ]
         if self.kind == "plate":
