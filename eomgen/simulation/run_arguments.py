@@ -48,8 +48,7 @@ def declare(module: BoundModel) -> dict[str, Any]:
 
 def own_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:
     """Method and step of a run: the model's own where it has steps of one size and nothing else is given."""
-    declared = module.metadata.get("simulation", {})
-    own, named = declared.get("step"), declared.get("method")
+    own, named = map(module.metadata.get("simulation", {}).get, ("step", "method"))
     if own is None or not module.layout.n_dof or not (method is None or (isinstance(method, str) and method == named)):
         return method, step
     return named, own if step is None else step
