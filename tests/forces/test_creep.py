@@ -31,7 +31,7 @@ def wheelset(law: str = "linear") -> eg.Model:
     m.joint_spring("yaw", "psi", stiffness="kpsi")
     more = {} if law == "linear" else {"normal": run.reaction.force[2] / 2, "friction": "mu"}
     for side, sign in (("left", 1), ("right", -1)):
-        m.creep(side, m.ground.at(0, 0, "-r"), axle.at(0, sign * P["b"], 0), radius=f"r + ({sign})*cone*y",
+        m.creep(side, m.ground.at(0, 0, "-r"), axle.at(0, "b" if sign > 0 else "-b", 0), radius=f"r + ({sign})*cone*y",
                 longitudinal="f11", lateral="f22", lateral_spin="f23", spin="f33", creep_law=law, **more)  # fmt: skip
     m.initial(phi_dot="V/r")
     return m
@@ -69,6 +69,53 @@ def test_linear_wheelset_and_its_critical_speed(target: str) -> None:
     truth = brentq(lambda V: np.linalg.eigvals(matrices(V, P)).real.max(), 10.0, 200.0, xtol=1e-8)
     assert found == pytest.approx(truth, rel=1e-6)
     assert growth(0.9 * found) < 0.0 < growth(1.1 * found)
+
+
+def published(V: float) -> np.ndarray:
+    """A wheelset on round rails, as printed: x = (q1, q2, u1, u2), lateral place, yaw and their rates.
+
+    D. Karnopp, Vehicle Dynamics, Stability, and Control (2nd edition, 2013), chapter 10, with the numbers of J. K.
+    Moore's laboratory on it (EME 134, University of California, Davis): stable at 20 m/s, hunting at 50 m/s.
+    """
+    m, d, N, k, f, curved = KARNOPP["m"], KARNOPP["b"], 80e3 / 4, 13e3, 1e6, 0.23 - 0.2
+    I, slope, r = m * d**2, 0.23 * (np.pi / 180) / curved, 0.46
+    down = [
+        [-(2 * k / m + 2 * N / (m * curved)), 2 * f / m, -2 * f / (V * m), 0],
+        [-2 * f * slope * d / (r * I), -2 * k * (d / 2) ** 2 / I, 0, -2 * f * d**2 / (V * I)],
+    ]
+    return np.vstack([np.eye(4)[2:], down])
+
+
+#: The same in the words of the wheelset above; the rails push it back by 2 N / (R - R').
+KARNOPP = {"m": 1000.0, "I": 1000.0 * 0.72**2, "b": 0.72, "r": 0.46, "cone": 0.23 * (np.pi / 180) / 0.03}
+KARNOPP |= {
+    "f11": 1e6,
+    "f22": 1e6,
+    "f23": 0.0,
+    "f33": 0.0,
+    "ky": 2 * 13e3 + 2 * 20e3 / 0.03,
+    "kpsi": 2 * 13e3 * 0.36**2,
+}
+
+
+def test_a_published_wheelset_hunts_at_its_critical_speed() -> None:
+    mod = wheelset().compile(target="numpy")
+
+    def slopes(V: float) -> np.ndarray:
+        bound = mod.bind(p={**KARNOPP, "V": V})
+        J = bound.jacobian(0.0, bound.x0(phi_dot=V / KARNOPP["r"]))
+        places = [bound.x_names.index(name) for name in ("y", "psi", "y_dot", "psi_dot")]
+        return J[np.ix_(places, places)]
+
+    def growth(of, V: float) -> float:
+        return float(np.linalg.eigvals(of(V)).real.max())
+
+    for V in (20.0, 50.0):
+        assert slopes(V) == pytest.approx(published(V), rel=1e-9, abs=1e-6)
+    assert growth(slopes, 20.0) < 0.0 < growth(slopes, 50.0)
+    found, truth = (brentq(lambda V, of=of: growth(of, V), 20.0, 50.0, xtol=1e-9) for of in (slopes, published))
+    assert found == pytest.approx(truth, rel=1e-6)
+    assert found == pytest.approx(48.558436, rel=1e-6)
 
 
 def test_klingel_wave() -> None:
