@@ -1,6 +1,6 @@
 /* The part of a long step that close_position takes, so that far states come to the same place; 0 where only rounding is
    left of the constraints, whose weak rows ask for a term that is not known here. */
-static double part_of_long_step(double t, const double *restrict q, const double *restrict u, const double *restrict c,
+static double kept_part(double t, const double *restrict q, const double *restrict u, const double *restrict c,
                                 double *restrict w)
 {
     const double *const found = w + AT_CLOSING;
@@ -24,7 +24,7 @@ static int close_directly(double t, double *restrict q, const double *restrict u
         (void)closing_block(t, q, u, c, found, w);
         const double left = found[1], length = found[2];
         if (!(length <= 0.25)) { /* or not a number */
-            const double part = part_of_long_step(t, q, u, c, w);
+            const double part = kept_part(t, q, u, c, w);
             if (part == 0.0) {
                 break;
             }
