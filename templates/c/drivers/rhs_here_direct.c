@@ -1,7 +1,7 @@
 /* The part of a long step that close_position takes, so that far states come to the same place; 0 where only rounding is
    left of the constraints, whose weak rows ask for a term that is not known here. */
 static double kept_part(double t, const double *restrict q, const double *restrict u, const double *restrict c,
-                                double *restrict w)
+                        double *restrict w)
 {
     const double *const found = w + AT_CLOSING;
     double *const dz = w + AT_STEP;
