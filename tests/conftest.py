@@ -12,6 +12,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 CACHE = pytest.StashKey[str]()
+#: Scripts that made reference numbers with other programs, which need not be installed.
+collect_ignore_glob = ["reference/*.py"]
 #: Programs that some tests need and the README does not promise: a mark ``needs(name)`` leaves a test out where there
 #: is none, and the end of the run says so.  Name -> the commands it goes by, and Debian's package.
 PROGRAMS = {
