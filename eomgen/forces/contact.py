@@ -59,23 +59,32 @@ class Contact(Force):
         """The part of the law that counts here, of a surface made of pieces; None means all."""
         return None
 
+    def law_here(self, view: View) -> NormalLaw:
+        """The law of the normal force as it acts here."""
+        return self.normal_law
+
+    def couple(self, view: View) -> Vec3 | None:
+        """A couple on the second body that the energy has beside the force; its opposite acts on the first."""
+        return None
+
     def _shared(self, view: View, x: Expr) -> Expr:
         share = self.share(view)
         return x if share is None else share * x
 
     def loads(self, view: View) -> list[Load]:
         normal, depth, arms, sliding, rate = self._motion(view)
-        push = self._shared(view, self.normal_law.force(depth, rate))
+        push = self._shared(view, self.law_here(view).force(depth, rate))
         drag = self._drag(self._slip(view, normal, depth, sliding, push))
-        return self._pair(arms, vec.add(vec.scale(push, normal), drag))
+        return self._pair(arms, vec.add(vec.scale(push, normal), drag), self.couple(view))
 
     def potential(self, view: View) -> Expr | None:
-        return self._shared(view, self.normal_law.energy(self.touch(view)[1]))
+        return self._shared(view, self.law_here(view).energy(self.touch(view)[1]))
 
     def remainder(self, view: View) -> list[Load]:
         normal, depth, arms, sliding, rate = self._motion(view)
-        push = self._shared(view, self.normal_law.force(depth, rate))
-        lost = push - self._shared(view, self.normal_law.elastic(depth))
+        law = self.law_here(view)
+        push = self._shared(view, law.force(depth, rate))
+        lost = push - self._shared(view, law.elastic(depth))
         drag = self._drag(self._slip(view, normal, depth, sliding, push))
         return self._pair(arms, vec.add(vec.scale(lost, normal), drag))
 
@@ -84,7 +93,7 @@ class Contact(Force):
         own = self.normal_law.rates(depth, rate)
         if self.friction is None:
             return own
-        push = self.normal_law.force(depth, rate)
+        push = self.law_here(view).force(depth, rate)
         return (*self.friction.rates_in_plane(self._slip(view, normal, depth, sliding, push)), *own)
 
     def rates_apart(self) -> tuple[Expr, ...]:
@@ -98,7 +107,7 @@ class Contact(Force):
 
     def measured(self, view: View) -> Measured:
         _, depth, _, _, rate = self._motion(view)
-        return Measured(depth, rate, self._shared(view, self.normal_law.force(depth, rate)))
+        return Measured(depth, rate, self._shared(view, self.law_here(view).force(depth, rate)))
 
     def _motion(self, view: View) -> tuple[Vec3, Expr, tuple[Vec3, Vec3], Vec3, Expr]:
         """Normal, penetration, arms, sliding velocity and the rate of penetration."""
@@ -117,13 +126,12 @@ class Contact(Force):
     def _drag(self, slip: Slip) -> Vec3:
         return vec.zero(slip.push.graph) if self.friction is None else self.friction.drag(slip.push, slip)
 
-    def _pair(self, arms: tuple[Vec3, Vec3], force: Vec3) -> list[Load]:
-        """The force on the second body at the contact point, its opposite on the first."""
-        first, second = arms
-        return [
-            MarkerLoad(self.second, force, vec.cross(second, force)),
-            MarkerLoad(self.first, vec.neg(force), vec.cross(force, first)),
-        ]
+    def _pair(self, arms: tuple[Vec3, Vec3], force: Vec3, couple: Vec3 | None = None) -> list[Load]:
+        """The force on the second body at the contact point and a couple, their opposites on the first."""
+        on_second, on_first = vec.cross(arms[1], force), vec.cross(force, arms[0])
+        if couple is not None:
+            on_second, on_first = vec.add(on_second, couple), vec.sub(on_first, couple)
+        return [MarkerLoad(self.second, force, on_second), MarkerLoad(self.first, vec.neg(force), on_first)]
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,14 @@ The edges are chosen as for manifolds of contact (Gregorius, Contact manifolds, 
 edge along whose normal the polygons overlap least (the separating axis theorem), and of the other polygon the edge that
 faces it most.  Spots lie at both ends of the part in which the edges lie beside each other; each is a corner of one
 polygon against the line of the other's edge.  Places are compared along the mean of both directions, so that both
-depths are equal where one corner takes the place of another: the energy is continuous there, and it does not matter
-which polygon is the first.
+depths are equal where one corner takes the place of another, and it does not matter which polygon is the first.
+
+The energy is E(D) + y E(min(d, O - D)): D is the least overlap along a normal (the separating axis theorem), which is
+the depth of the deeper spot, d the depth of the other, and O the least overlap along the normals of all other edges.
+The part y is 1 where the edges are nearly parallel and goes to 0 where a neighbour faces the other edge as much.  So
+the second spot counts nothing where other edges take over, be it because the overlap along them is as little (O = D)
+or because they face each other as much (y = 0), and the energy is continuous.  Forces are its slopes: where O - D is
+the lesser, the second spot lies at the edge of O and the deeper spot pushes so much less; y gives a couple.
 """
 
 from __future__ import annotations
@@ -24,30 +30,63 @@ from .contact import Contact, Touch
 from .contact_profiles import Point, dot, minus, times, unit
 from .contact_rounds import EDGE
 from .force import View
+from .normal_laws import NormalLaw, PartOfLaw
+
+
+_FLAT = 0.25  #: part of the squared half angle to a neighbour up to which edges count as parallel
 
 
 class _Edge(NamedTuple):
-    """An edge of a polygon, counterclockwise: its corners and the outward normal (shorter where bodies tilt)."""
+    """An edge of a polygon, counterclockwise.
+
+    Its corners, the outward normal (shorter where bodies tilt), by how much it rises out of the plane along its
+    direction, the cosine of the angle to the neighbour whose direction is nearest, its number.
+    """
 
     start: Point
     end: Point
     normal: Point
+    rise: Expr
+    bend: Expr
+    number: Expr
+
+
+class _Spot(NamedTuple):
+    """A corner against the line of an edge: the corner, the normal from the first polygon to the second, the depth."""
+
+    place: Point
+    normal: Point
+    own: Expr  #: whether the corner is of the first polygon
+    depth: Expr
 
 
 def _plus(a: Point, b: Point) -> Point:
     return a[0] + b[0], a[1] + b[1]
 
 
-def _chosen(condition: Expr, yes: _Edge, no: _Edge) -> _Edge:
-    flat = [(where(condition, a[0], b[0]), where(condition, a[1], b[1])) for a, b in zip(yes, no, strict=True)]
-    return _Edge(*flat)
+def _either(condition: Expr, yes: Point, no: Point) -> Point:
+    return where(condition, yes[0], no[0]), where(condition, yes[1], no[1])
+
+
+def _chosen(condition: Expr, a: _Edge, b: _Edge) -> _Edge:
+    points = [_either(condition, p, q) for p, q in zip(a[:3], b[:3], strict=True)]
+    return _Edge(*points, *(where(condition, p, q) for p, q in zip(a[3:], b[3:], strict=True)))
+
+
+def _spot_of(condition: Expr, a: _Spot, b: _Spot) -> _Spot:
+    place, normal = _either(condition, a.place, b.place), _either(condition, a.normal, b.normal)
+    return _Spot(place, normal, where(condition, a.own, b.own), where(condition, a.depth, b.depth))
 
 
 def _edges(sizes: Sequence[Expr]) -> list[_Edge]:
     """Edges of a polygon in its own axes."""
+    graph = sizes[0].graph
     starts = list(zip(sizes[::EDGE], sizes[1::EDGE], strict=True))
-    normals = zip(sizes[2::EDGE], sizes[3::EDGE], strict=True)
-    return [_Edge(*one) for one in zip(starts, [*starts[1:], starts[0]], normals, strict=True)]
+    normals = list(zip(sizes[2::EDGE], sizes[3::EDGE], strict=True))
+    turns = [dot(a, b) for a, b in zip(normals, [*normals[1:], normals[0]], strict=True)]
+    bends = [graph.apply("max", a, b) for a, b in zip(turns, [turns[-1], *turns], strict=False)]
+    found = zip(starts, [*starts[1:], starts[0]], normals, bends, strict=True)
+    return [_Edge(a, b, n, graph.zero, bend, graph.constant(k)) for k, (a, b, n, bend) in enumerate(found)]
 
 
 def _first_least(found: Sequence[tuple[Expr, _Edge]]) -> tuple[Expr, _Edge]:
@@ -66,13 +105,42 @@ def _overlap(edge: _Edge, corners: Sequence[Point]) -> Expr:
     return reduce(lambda a, b: a.graph.apply("max", a, b), depths)
 
 
+def _deepest(edge: _Edge, corners: Sequence[Point]) -> Point:
+    """The deepest of some corners below an edge."""
+    best, place = dot(edge.normal, minus(edge.start, corners[0])), corners[0]
+    for corner in corners[1:]:
+        depth = dot(edge.normal, minus(edge.start, corner))
+        deeper = best.graph.apply("lt", best, depth)
+        best, place = where(deeper, depth, best), _either(deeper, corner, place)
+    return place
+
+
+def _without(found: Sequence[tuple[Expr, _Edge]], left_out: _Edge) -> list[tuple[Expr, _Edge]]:
+    """Overlaps along edges but one."""
+    graph, known = left_out.number.graph, []
+    for k, (overlap, edge) in enumerate(found):
+        other = graph.apply("lt", left_out.number, k - 0.5), graph.apply("lt", k + 0.5, left_out.number)
+        known.append((where(other[0], overlap, where(other[1], overlap, NOWHERE)), edge))
+    return known
+
+
 class _Facing(NamedTuple):
-    """Two edges that face each other, how far the polygons overlap and along which normal of the first or second."""
+    """Two edges that face each other; how far the polygons overlap, at which spot, and the edge of the next overlap."""
 
     first: _Edge
     second: _Edge
-    overlap: Expr
-    out: Point
+    least: _Spot
+    next: _Spot
+
+
+class _Parts(NamedTuple):
+    """One of two spots as it counts."""
+
+    spot: _Spot
+    share: Expr  #: the part of its law
+    change: Expr  #: slope of that part by the cosine of the angle of both edges
+    relief: Expr  #: the depth that this spot carries less
+    relieved: Expr  #: the part of the law of that depth
 
 
 @dataclass(frozen=True)
@@ -88,52 +156,115 @@ class PolygonPolygon(Contact):
 
     def touch(self, view: View) -> Touch:
         graph, R = view.graph, view.rotation(self.first)
-        a, b, _, _ = self._facing(view)
-        normal_a, normal_b = a.normal, unit(b.normal)
-        way = (normal_b[1] - normal_a[1], normal_a[0] - normal_b[0])  # the first edge goes along it, the second back
-        low = graph.apply("lt", dot(way, b.end), dot(way, a.start))
-        high = graph.apply("lt", dot(way, a.end), dot(way, b.start))
-        ends = ((low, a.start, b.end), (high, a.end, b.start))
-        kept = [tuple(where(own, p, q) for p, q in zip(one, other, strict=True)) for own, one, other in ends]
-        beside = graph.apply("lt", dot(way, (kept[0][0], kept[0][1])), dot(way, (kept[1][0], kept[1][1])))
-        own, place = ends[self.spot][0], (kept[self.spot][0], kept[self.spot][1])
-        normal = (where(own, -normal_b[0], normal_a[0]), where(own, -normal_b[1], normal_a[1]))
-        depth = where(own, dot(normal_b, minus(b.start, place)), dot(normal_a, minus(a.start, place)))
+        place, normal, own, depth = self._parts(view)[0]
         half = times(normal, where(own, -0.5 * depth, 0.5 * depth))
         middle = vec.times(R, (*_plus(place, half), graph.zero))
         reach = vec.sub(view.position(self.second), view.position(self.first))
         out = vec.times(R, (*normal, graph.zero))
-        return out, where(beside, depth, -NOWHERE), middle, vec.sub(middle, reach)
+        return out, depth, middle, vec.sub(middle, reach)
 
     def nearness(self, view: View) -> tuple[Vec3, Expr]:
-        facing = self._facing(view)
-        return vec.times(view.rotation(self.first), (*facing.out, view.graph.zero)), facing.overlap
+        least = self._facing(view).least
+        return vec.times(view.rotation(self.first), (*least.normal, view.graph.zero)), least.depth
+
+    def law_here(self, view: View) -> NormalLaw:
+        if self.normal_law.elastic(view.graph.one).is_zero:
+            return self.normal_law
+        parts = self._parts(view)
+        less = parts.relieved * self.normal_law.elastic(parts.relief)
+        return PartOfLaw(self.normal_law, parts.share, less)
+
+    def couple(self, view: View) -> Vec3 | None:
+        graph, parts = view.graph, self._parts(view)
+        energy = self.normal_law.energy(parts.spot.depth)
+        if energy.is_zero:
+            return None
+        a, b = self._facing(view)[:2]
+        along = (-b.normal[1], b.normal[0], b.rise)
+        turn = vec.cross(along, (-a.normal[1], a.normal[0], graph.zero))
+        return vec.times(view.rotation(self.first), vec.scale(-parts.change * energy, turn))
+
+    def _parts(self, view: View) -> _Parts:
+        graph = view.graph
+        a, b, least, other = self._facing(view)
+        normal_a, normal_b = a.normal, unit(b.normal)
+        way = (normal_b[1] - normal_a[1], normal_a[0] - normal_b[0])  # the first edge goes along it, the second back
+        low = graph.apply("lt", dot(way, b.end), dot(way, a.start))
+        high = graph.apply("lt", dot(way, a.end), dot(way, b.start))
+        spots = []
+        for own, one, two in ((low, a.start, b.end), (high, a.end, b.start)):
+            place = _either(own, one, two)
+            normal = _either(own, times(normal_b, -graph.one), normal_a)
+            depth = where(own, dot(normal_b, minus(b.start, place)), dot(normal_a, minus(a.start, place)))
+            spots.append(_Spot(place, normal, own, depth))
+        beside = graph.apply("lt", dot(way, spots[0].place), dot(way, spots[1].place))
+        deeper = graph.apply("lt", spots[0].depth, spots[1].depth)  # whether the second is
+        main = deeper if self.spot else 1.0 - deeper
+        share, slope = self._share(a, b)
+        meets, faces = graph.apply("lt", 0.0, least.depth), graph.apply("lt", 0.0, share)
+        # the deeper spot: that of the least overlap, which it is as long as the edges face each other
+        deep = _spot_of(faces, spots[self.spot], least)
+        # the other: up to the next overlap
+        room, mine = other.depth - least.depth, spots[self.spot]
+        short = [graph.apply("lt", room, spot.depth) for spot in spots]
+        limited = _spot_of(short[self.spot], other._replace(depth=room), mine)
+        limited = limited._replace(depth=where(faces, limited.depth, -NOWHERE))
+        engaged = _spot_of(main, deep, limited)
+        apart = mine._replace(depth=where(beside, mine.depth, -NOWHERE))
+        relieved = where(meets, where(short[1 - self.spot], where(main, share, 0.0), 0.0), 0.0)
+        return _Parts(
+            _spot_of(meets, engaged, apart),
+            where(meets, where(main, 1.0, share), 1.0),
+            where(meets, where(main, 0.0, slope), 0.0),
+            room,
+            relieved,
+        )
+
+    def _share(self, a: _Edge, b: _Edge) -> tuple[Expr, Expr]:
+        """The part of the second spot, 1 near parallel edges, and its slope by the cosine of the angle of the edges."""
+        graph = a.bend.graph
+        apart = _plus(a.normal, b.normal)  # its square is 4 sin^2(angle / 2)
+        cosine = sqrt(0.5 + 0.5 * graph.apply("max", a.bend, b.bend))  # of half the angle to a neighbour
+        limit = 2.0 - 2.0 * cosine
+        left = (1.0 - dot(apart, apart) / limit) / (1.0 - _FLAT)
+        part = graph.apply("max", 0.0, graph.apply("min", 1.0, left))
+        slope = -12.0 * part * (1.0 - part) / ((1.0 - _FLAT) * limit)
+        return part * part * (3.0 - 2.0 * part), slope
 
     def _facing(self, view: View) -> _Facing:
         """The edges in axes of the first marker."""
         graph, R = view.graph, view.rotation(self.first)
         x, y, _ = vec.transpose_times(R, vec.sub(view.position(self.second), view.position(self.first)))
-        (xx, xy, _), (yx, yy, _), _ = vec.product(vec.transpose(R), view.rotation(self.second))
+        (xx, xy, _), (yx, yy, _), (zx, zy, _) = vec.product(vec.transpose(R), view.rotation(self.second))
 
         def placed(p: Point) -> Point:
             return x + xx * p[0] + xy * p[1], y + yx * p[0] + yy * p[1]
 
         own = _edges(self.edges)
         others = []
-        for start, end, (nx, ny) in _edges(self.others):
+        for edge in _edges(self.others):
+            nx, ny = edge.normal
             across = (yy * nx - yx * ny, xx * ny - xy * nx)  # of the edge as placed
-            others.append(_Edge(placed(start), placed(end), across))
-        starts = [edge.start for edge in others]
-        deep_a, a = _first_least([(_overlap(edge, starts), edge) for edge in own])
-        corners = [edge.start for edge in own]
-        deep_b, b = _first_least([(_overlap(edge, corners), edge) for edge in others])
+            moved = (placed(edge.start), placed(edge.end), across, zy * nx - zx * ny)
+            others.append(_Edge(*moved, edge.bend, edge.number))
+        starts, corners = [edge.start for edge in others], [edge.start for edge in own]
+        overlaps_a = [(_overlap(edge, starts), edge) for edge in own]
+        overlaps_b = [(_overlap(edge, corners), edge) for edge in others]
+
+        def least_of(a: tuple[Expr, _Edge], b: tuple[Expr, _Edge]) -> tuple[Expr, _Spot]:
+            of_second, out = graph.apply("lt", b[0], a[0]), unit(b[1].normal)
+            place = _either(of_second, _deepest(b[1], corners), _deepest(a[1], starts))
+            normal = _either(of_second, times(out, -graph.one), a[1].normal)
+            return of_second, _Spot(place, normal, of_second, where(of_second, b[0], a[0]))
+
+        best = _first_least(overlaps_a), _first_least(overlaps_b)
+        of_second, least = least_of(*best)
+        a, b = best[0][1], best[1][1]
         _, facing_a = _first_least([(dot(edge.normal, b.normal), edge) for edge in own])
         _, facing_b = _first_least([(dot(edge.normal, a.normal), edge) for edge in others])
-        of_second = graph.apply("lt", deep_b, deep_a)
-        out = unit(b.normal)
-        normal = (where(of_second, -out[0], a.normal[0]), where(of_second, -out[1], a.normal[1]))
         first, second = _chosen(of_second, facing_a, a), _chosen(of_second, b, facing_b)
-        return _Facing(first, second, where(of_second, deep_b, deep_a), normal)
+        rest = _first_least(_without(overlaps_a, first)), _first_least(_without(overlaps_b, second))
+        return _Facing(first, second, least, least_of(*rest)[1])
 
 
 def most_reach(sizes: Sequence[Expr]) -> Expr:

@@ -9,6 +9,7 @@ from ..records import dataclass
 from .branches import where
 from .contact import Contact, SphereSphere, Touch
 from .force import View
+from .normal_laws import NormalLaw
 
 EDGE = 5  #: numbers of an edge of a polygon: its first corner, its outward normal, its length
 
@@ -114,3 +115,9 @@ class AtHeight(Contact):
 
     def share(self, view: View) -> Expr | None:
         return self.flat.share(view)
+
+    def law_here(self, view: View) -> NormalLaw:
+        return self.flat.law_here(view)
+
+    def couple(self, view: View) -> Vec3 | None:
+        return self.flat.couple(view)

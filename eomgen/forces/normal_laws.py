@@ -172,6 +172,27 @@ class HertzBodies(NormalLaw):
 
 
 @dataclass(frozen=True)
+class PartOfLaw(NormalLaw):
+    """A part of another law, less an elastic force that another place of contact has taken over with its energy."""
+
+    law: NormalLaw
+    share: Expr
+    less: Expr
+
+    def force(self, depth: Expr, rate: Expr) -> Expr:
+        return depth.graph.apply("max", 0.0, self.share * self.law.force(depth, rate) - self.less)
+
+    def elastic(self, depth: Expr) -> Expr:
+        return self.share * self.law.elastic(depth) - self.less
+
+    def energy(self, depth: Expr) -> Expr:
+        return self.share * self.law.energy(depth)
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> PartOfLaw:
+        return PartOfLaw(self.law.mapped(own), own(self.share), own(self.less))
+
+
+@dataclass(frozen=True)
 class RigidLaw(NormalLaw):
     """No penetration: the force is what it takes, found by a time-stepping method; elsewhere it is none."""
 
