@@ -32,6 +32,7 @@ from .tables import as_text
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+    from ..runtime.signals import Forcing
 
 
 @dataclass(frozen=True)
@@ -181,8 +182,7 @@ def strike_events(
     x: Array,
     events: Sequence[Mapping[str, Any]],
     fired: Sequence[int],
-    u: Array,
-    state_dependent: Sequence[int] = (),
+    forcing: Forcing,
 ) -> Array:
     """The state (n_x,) after the impacts of the model's own events, those that happened and any gap that is closed.
 
@@ -195,16 +195,15 @@ def strike_events(
         As in the metadata; those with a restitution are gaps.
     fired : sequence of int
         Events that happened.
-    u : (n_u,) array
-    state_dependent : sequence of int
-        Inputs that depend on the state.
+    forcing : Forcing
+        Inputs of the run.
 
     Raises
     ------
     UsageError
         A gap depends on velocities or on such an input, or no impulses obey the constraints and the laws.
     """
-    layout = module.layout
+    layout, u = module.layout, forcing(t, x)
     module = module.bind(None, u)
     kernel = module.kernels.timed("events", nan=True)
     values = kernel(t, x, u=u)
@@ -214,7 +213,7 @@ def strike_events(
         for i, event in enumerate(events)
         if event.get("restitution") is not None and (i in fired or abs(values[i]) <= near)
     }
-    for k in state_dependent:
+    for k in forcing.state_dependent:
         change = kernel(t, x, u=u + np.eye(layout.n_u)[k]) - values
         for i in gaps:
             if change[i] != 0.0:
@@ -237,7 +236,7 @@ def strike_events(
         for i in gaps
         if events[i].get("friction") is not None
     }
-    sliding = find_sliding(module, rough, names, t, states.x[:, 0])
+    sliding = find_sliding(module, rough, names, t, states.x[:, 0], forcing)
     return _apply(states, rows, rates, np.array([*gaps.values()]), names, sliding).x
 
 

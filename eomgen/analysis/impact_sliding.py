@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 Rough = Mapping[str, tuple[float, tuple[str, ...]]]
 
 #: Units of gaps and sliding velocities whose impulses are in N s or N m s.
-SI = ("", "m", "m/s", "m*s^-1", "m s^-1", "rad", "rad/s", "1/s")
+RATES = ("m/s", "m*s^-1", "m s^-1", "rad/s", "1/s")
+SI = ("", "m", "rad", *RATES)
 
 
 def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], word: str = "friction") -> Rough:
@@ -87,6 +88,11 @@ def _listed(names: Any) -> str:
     return f"there are {', '.join(names)}"
 
 
+def _is_velocity(layout: Layout, output: str) -> bool:
+    """Whether an output is a velocity by how it is written or by its unit, though perhaps no velocity moves it."""
+    return output in layout.metadata.get("velocity_outputs", ()) or layout.unit(output) in RATES
+
+
 def find_sliding(
     module: BoundModel, rough: Rough, gaps: Sequence[str], t: float, x: Array, forcing: Forcing | None = None
 ) -> Sliding:
@@ -124,7 +130,7 @@ def find_sliding(
         values = module.kernels.motion("motion_outputs")(q, v, still, t=t)
     for k, name in enumerate(names):
         j = layout.y.index(name) if name in layout.y else -1
-        if j < 0 or not slopes[j, n_q : layout.n_x].any():  # a place, whose rate it is
+        if j < 0 or not (_is_velocity(layout, name) or slopes[j, n_q : layout.n_x].any()):  # a place, whose rate it is
             own = Gaps(module, (name,), forcing)
             rows[k], rates[k] = own.normals(t, x)[0], own.rates(t, x)[0]
             continue

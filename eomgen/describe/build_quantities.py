@@ -14,8 +14,11 @@ from ..operations import OPERATIONS
 from .checks import check_keys
 from .description import DescribedEntry
 from .fields import INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, Fields
+from .marker_quantities import marker_quantity
 from .mechanism import Input, Output, Parameter
+from .names import QUANTITIES, VELOCITIES
 from .printed_names import take_latex
+from .rewritten_texts import motions_of, names_of
 from .units import Unit, UnitError, read_unit
 from .values import Reader
 
@@ -140,7 +143,22 @@ class Outputs:
                 remedy = f"leave the unit out, or give the output in {unit.text} another name"
                 faults.add(f"{path}.unit", f"{entry.name!r} is a {kind}, which is in SI units", remedy)
         given = expression / unit.size if unit.size != 1.0 else expression
-        return Output(str(entry.name), given, unit.text, doc), expression
+        return Output(str(entry.name), given, unit.text, doc, self._of_velocities(entry, expression)), expression
+
+    def _of_velocities(self, entry: DescribedEntry, expression: Expr) -> bool:
+        """Whether an output is written with velocities, also where they cancel, as in ``0*vx(b) - 2``."""
+        text, kinds = entry.values.get("expression"), self._reader.names.kinds
+        names = {*symbols_of([expression]), *names_of(text)}
+        motions = [*filter(None, map(marker_quantity, names)), *motions_of(text)]
+        return (
+            any(QUANTITIES[motion.name][0] in VELOCITIES for motion in motions)
+            or any(kinds.get(name) in ("velocity", "rate") for name in names)
+            or any(
+                self._at(k)[0].of_velocities
+                for k in (self._places[name] for name in names if name in self._places)
+                if k not in self._open
+            )
+        )
 
 
 #: Kinds of names that an output may repeat.

@@ -192,6 +192,7 @@ class Output:
     expression: Expr
     unit: str = ""
     doc: str = ""
+    of_velocities: bool = False  #: whether it is written with a velocity, even one that is always 0
 
 
 STATE_RATE = "state "  #: begins the quantity of an element that is the rate of its state of a number

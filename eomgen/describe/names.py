@@ -49,6 +49,8 @@ REACTION, MULTIPLIER = "reaction", "multiplier"
 REACTION_PARTS = ("x", "y", "z", "mx", "my", "mz", "size", "normal")
 #: What a force element exerts on the body of a marker, ``force(track, on=wheel).x``, and its parts.
 WRENCH, WRENCH_PARTS = "force", ("x", "y", "z", "mx", "my", "mz", "size")
+#: Levels of what is linear in velocities.
+VELOCITIES = (1, 3, 5, 7, 8)
 #: Levels of what only the accelerations tell.
 ACCELERATIONS = (2, 9, 10)
 #: Sums over all bodies that need no marker, in outputs; a name of the model's own comes first.

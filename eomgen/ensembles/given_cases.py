@@ -19,7 +19,7 @@ from ..runtime.assembled import initial_of
 from ..runtime.given_start import last_state
 from ..runtime.near_names import check_names, without_dots
 from ..runtime.room import read_numbers, require_room
-from ..simulation.clocks import at_next_samples
+from ..simulation.clocks import at_next_samples, require_agreement
 from ..simulation.run_arguments import find_state
 
 if TYPE_CHECKING:
@@ -151,7 +151,22 @@ def assemble_states(
     if module.metadata.get("clocks"):
         for k in np.flatnonzero(~failed).tolist():
             x[:, k] = at_next_samples(module.bind(**cases.column(k)), t, x[:, k])
+    if module.metadata.get("held_rows") and cases.states is None:
+        return _only_in_agreement(module, cases, t, x, failed, words)
     return x, failed, words
+
+
+def _only_in_agreement(
+    module: BoundModel, cases: Cases, t: float, x: Array, failed: Mask, words: list[str]
+) -> tuple[Array, Mask, list[str]]:
+    """The same without runs that start where a constraint declared closed does not hold."""
+    told = dict(zip(np.flatnonzero(failed).tolist(), words, strict=True))
+    for k in np.flatnonzero(~failed).tolist():
+        try:
+            require_agreement(module.bind(**cases.column(k)), t, x[:, k], cases.values)
+        except UsageError as error:
+            told[k], x[:, k] = str(error), np.nan
+    return x, np.array([k in told for k in range(cases.count)], dtype=bool), [told[k] for k in sorted(told)]
 
 
 def _assemble_all(

@@ -226,6 +226,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "u_names": list(kinematics.input_names),
         "p_names": list(kinematics.parameter_names),
         "y_names": [o.name for o in m.outputs],
+        **({"velocity_outputs": moved} if (moved := [o.name for o in m.outputs if o.of_velocities]) else {}),
         "body_names": [b.name for b in m.bodies],
         "masses": dict(_mass_parameters(kinematics)),
         "joint_names": [j.name for j in m.joints],

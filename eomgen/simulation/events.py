@@ -192,7 +192,7 @@ class Events:
                 after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
-            after = self._strike(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
+            after = self._strike(module, t, after, self.declared, gaps, forcing)
         return after
 
     def renewed(self, module: BoundModel, forcing: Forcing, t: float, x: Array, event: int) -> Array:

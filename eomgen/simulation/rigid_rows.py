@@ -37,15 +37,15 @@ class RigidContacts:
     Raises
     ------
     UsageError
-        It has none.
+        It has none, or all of them are on soil.
     """
 
     def __init__(self, module: BoundModel) -> None:
         known = module.metadata.get("rigid_contacts")
         if not known:
             raise UsageError(
-                f"method moreau is for rigid contact between groups of shapes, and {module.name} has no contacts: "
-                "describe them by m.contacts(...), or choose another method"
+                f"method moreau is for rigid contact between groups of shapes, and {module.name} has no contacts that can "
+                "be rigid (soil yields): describe them by m.contacts(...) without soil, or choose another method"
             )
         self.lists: list[tuple[str, int, int]] = [tuple(row) for row in known["lists"]]
         parents = known["parents"]
