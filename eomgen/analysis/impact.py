@@ -24,7 +24,7 @@ from ..runtime.layout import Layout
 from ..runtime.room import read_flag, read_number, read_numbers
 from ..runtime.signal_rates import drift, moving_inputs
 from .constrained import ProjectedStates, conditioned_motions, prepare, solve_multipliers
-from .impact_friction import Sliding, strike_rough
+from .impact_friction import Sliding, strike
 from .impact_gaps import Gaps, allowance, by_velocity, check_gaps
 from .impact_law import collide
 from .impact_sliding import Rough, check_friction, find_sliding
@@ -54,7 +54,8 @@ class Impact:
     constraint_impulses : (n_rows,) array
         Of all constraint rows, with the sign of ``multipliers``.
     energy_lost : float
-        Kinetic energy before less that after (J).  Negative only where a gap that moves in time brings energy in.
+        Kinetic energy before less that after (J).  Negative only where what moves by itself brings energy in: a gap
+        that moves in time, or a belt, whose speed is part of the sliding velocity.
     friction : dict of str to (d,) array
         By gap with friction, the impulses along its sliding velocities.
     sliding_before, sliding_after : dicts of str to (d,) array
@@ -144,9 +145,9 @@ def impact(
     rest: each impulse is 0 or positive, rate+ + e min(rate-, 0) too, and one of the two is 0 (Moreau 1988; Pfeiffer and
     Glocker, Multibody Dynamics with Unilateral Contacts, ch. 8; Brogliato, Nonsmooth Mechanics, ch. 5).  A gap that was
     opening and is closing after that makes a further impact at the same instant.  No energy is ever gained, but
-    from gaps that move in time.  Springs, dampers and other finite forces have no part in it.  Velocities after
-    the impact are unique; impulses are not where gaps depend on each other, and the law itself is a choice:
-    momentum and energy alone do not determine what several bodies that touch do.
+    from gaps that move in time and, with friction, from belts.  Springs, dampers and other finite forces have no
+    part in it.  Velocities after the impact are unique; impulses are not where gaps depend on each other, and the law
+    itself is a choice: momentum and energy alone do not determine what several bodies that touch do.
 
     With friction, one gap with one sliding velocity follows Routh's method with Poisson's restitution: sliding,
     sticking and sliding back within the impact are exact (Wang and Mason 1992).  In space, and where gaps that move
@@ -311,8 +312,7 @@ def _apply(
         free = np.where(fixed[: len(rates)], 0.0, rates)
         free[count:] = rates[count:]  # a body may slide as a driver or a belt moves it
         if sliding.names:
-            impulses = strike_rough(H.T @ H, free, e, rest, sliding.coefficients, sliding.owner, names)
-            z = H @ impulses
+            impulses, z = strike(H, free, e, rest, sliding.coefficients, sliding.owner, names)
         else:
             impulses, z = collide(H, free, e, rest, names)
         change = B @ algebra.solve(factor.T, z)

@@ -14,7 +14,10 @@ Dynamics with Unilateral Contacts (1996), ch. 8):
 
 Newton's law may bring in energy where friction acts (T. R. Kane, D. A. Levinson, Dynamics (1985), sec. 5.8).  So
 restitutions are then multiplied by the largest factor with which the impulses bring in none, P . (y- + y+) / 2 <= 0;
-so too where gaps that are jammed cannot open as fast as all restitutions demand.
+so too where gaps that are jammed cannot open as fast as all restitutions demand.  The rates y are those of the gaps and
+of sliding on what moves by itself: a belt or a racket may still do work on the bodies.
+
+Gaps that move no gap with friction, and all gaps whose coefficient is 0, obey the law without friction.
 """
 
 from __future__ import annotations
@@ -29,6 +32,8 @@ from ..errors import UsageError
 from ..limits.impacts import COUPLED, GAINS, GIVES, REACHED, STRUCK
 from ..numeric.contact_impulses import ContactProblem, solve_contacts
 from ..numeric.scales import Array
+from .impact_law import collide
+from .sliding_direction import impulses_in_space
 
 TRIALS = 400  #: iterations for the impulses of one instant
 HALVED = 40  #: halvings of the range of the factor of restitutions
@@ -42,6 +47,45 @@ class Sliding(NamedTuple):
     coefficients: Array  #: (k,) of each gap, 0 or greater
     rows: Array  #: (s, n_v) derivatives by v
     rates: Array  #: (s,) before
+
+
+def strike(
+    H: Array, rates: Array, e: Array, rest: Array, mu: Array, owner: NDArray[np.int64], names: Sequence[str]
+) -> tuple[Array, Array]:
+    """Impulses (k + s,) and the change of velocities (m,), where some of k gaps have friction.
+
+    Gaps that share no body with one of friction greater than 0 obey :func:`.impact_law.collide`, all at once.
+
+    Parameters
+    ----------
+    H : (m, k + s) array
+        As for :func:`.impact_law.collide`, gaps first, then sliding velocities.
+    rates, e, rest, mu, owner, names
+        As for :func:`strike_rough`.
+
+    Raises
+    ------
+    UsageError
+        No impulses are found.
+    """
+    k = len(e)
+    rubbing = np.flatnonzero(mu[owner] > 0.0)
+    used, owner = [*range(k), *(k + rubbing).tolist()], owner[rubbing]
+    W = H[:, used].T @ H[:, used]
+    rough = sorted(i for group in _coupled(W, k, owner) if np.isin(owner, group).any() for i in group)
+    smooth = [i for i in range(k) if i not in rough]
+    found, change = np.zeros(len(rates)), np.zeros(len(H))
+    if smooth:
+        named = [names[i] for i in smooth]
+        found[smooth], change = collide(H[:, smooth], rates[smooth], e[smooth], rest[smooth], named)
+    if rough:
+        of = np.flatnonzero(np.isin(owner, rough))
+        places = [*rough, *(k + of).tolist()]
+        every = [used[i] for i in places]
+        given = rates[every], e[rough], rest[every], mu[rough], np.searchsorted(rough, owner[of])
+        found[every] = strike_rough(W[np.ix_(places, places)], *given, [names[i] for i in rough])
+        change = change + H[:, every] @ found[every]
+    return found, change
 
 
 def strike_rough(
@@ -155,12 +199,17 @@ def _together(W: Array, rates: Array, places: list[list[int]], mu: Array, e: Arr
         """Impulses for restitutions times a factor, and how far they are from what is allowed."""
         c = before.copy()
         c[:, 0] += part * back
-        found = solve_contacts(ContactProblem(full, c, mu), start, REACHED * fast, TRIALS)
+        problem = ContactProblem(full, c, mu)
+        found = solve_contacts(problem, start, REACHED * fast, TRIALS)
+        impulses = found.impulses
         if found.residual > GIVES * fast:
-            return found.impulses, np.inf
-        P = found.impulses.ravel()
+            other = impulses_in_space(problem, GIVES * fast) if problem.c.shape == (1, 3) else None
+            if other is None:
+                return impulses, np.inf
+            impulses = other
+        P = impulses.ravel()
         work = P * (2.0 * flat + full @ P)
-        return found.impulses, float(work.sum()) - GAINS * float(np.abs(work).sum())
+        return impulses, float(work.sum()) - GAINS * float(np.abs(work).sum())
 
     impulses, gained = strike(1.0)
     if gained > 0.0:
@@ -168,8 +217,8 @@ def _together(W: Array, rates: Array, places: list[list[int]], mu: Array, e: Arr
         impulses, gained = strike(0.0)
         if gained > 0.0:
             raise UsageError(
-                f"no impulses of the gaps {', '.join(names)} are found that obey the laws of impact and friction, with "
-                "any restitution; give smaller coefficients of friction"
+                f"the search for impulses of the gaps {', '.join(names)} that obey the laws of impact and friction did not "
+                "end, with restitutions of 0 either (there may be some); give smaller coefficients of friction"
             )
         for _ in range(HALVED):
             middle = 0.5 * (low + high)

@@ -29,7 +29,7 @@ from ..simulation.steppers import step
 from .bench import Bench
 from .cases import Case
 from .comparison import Comparison, size_of
-from .finding import Finding
+from .finding import RIGID, Finding
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -70,7 +70,7 @@ def _inapplicable(bench: Bench) -> str:
     if not bench.module.layout.n_dof:
         return "drivers move the whole mechanism, so nothing is integrated"
     if bench.layout.metadata.get("rigid_only"):
-        return "its rigid contacts exert impulses, which only method moreau solves for"
+        return RIGID
     if Events(bench.layout, None).resets:
         return "events reset its state, and an integrator finds no events"
     if not bench.layout.projects:

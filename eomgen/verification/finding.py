@@ -9,6 +9,8 @@ from ..files.terminal import fold, terminal_width
 
 WIDTH = 118  #: of the table
 NOT_REACHED = "not reached"  #: how the note of a check begins for which no time was left
+#: Why nothing is integrated of a model with contacts that have no law of force.
+RIGID = "its rigid contacts exert impulses, which only method moreau solves for"
 HEADER = ("", "check", "worst", "limit", "where")
 
 

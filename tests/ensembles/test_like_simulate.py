@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+import eomgen as eg
+
 from .conftest import compiled
 from .test_simulate_many import TIGHT, angles
 
@@ -92,3 +94,27 @@ def test_a_state_that_cannot_be_closed_holds_up_no_other(crank: Any) -> None:
     ensemble = crank.simulate_many(0.3, states, **TIGHT)
     assert [failure.run for failure in ensemble.failures()] == [2]
     np.testing.assert_array_equal(np.delete(ensemble.x, 2, axis=1), crank.simulate_many(0.3, good, **TIGHT).x)
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_starts_at_which_a_closed_constraint_does_not_hold(target: str) -> None:
+    """Such runs are marked with the words of simulate, and the others go on; states are taken as they are."""
+    m = eg.Model("clutch")
+    for name in ("a1", "b1"):
+        m.revolute(name, m.ground, m.body(f"disc_{name}", mass=1.0, inertia={"zz": 0.3}), coordinate=name)
+    m.parameter("off", 0.0)
+    m.coupling("c", equation="a1 - b1 - off", opens="3 - t", closed=True)
+    mod = m.compile(target=target)
+    with pytest.raises(eg.UsageError, match="constraint c is closed at the start, and its equation") as refusal:
+        mod.simulate(1.0, {"a1": 0.4})
+    runs = mod.simulate_many(1.0, {"a1": [0.5, 0.4, 0.0], "b1": [0.5, 0.0, 0.0], "b1_dot": [0.0, 0.0, 1.0]})
+    assert [bool(ok) for ok in runs.ok] == [True, False, False]
+    told = {failure.run: failure.message for failure in runs.failures()}
+    assert told[1] == str(refusal.value)
+    assert "changes by -1 rad/s" in told[2]
+    assert np.isnan(runs.x[:, 1]).all()
+    np.testing.assert_allclose(runs.x[:2, 0], 0.5, atol=1e-12)
+    later = mod.simulate_many(1.0, {"a1": [0.4, 0.4]}, {"off": [0.4, 0.3]})
+    assert [bool(ok) for ok in later.ok] == [True, False]
+    assert mod.simulate_many(1.0, {"a1": [0.5, 0.4], "c_closed": 1.0}).ok.all()
+    assert mod.simulate_many(1.0, np.repeat(mod.x0(a1=0.4)[:, None], 2, axis=1)).ok.all()

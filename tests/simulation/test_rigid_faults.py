@@ -154,3 +154,14 @@ def test_inputs() -> None:
     t = run.t[-1]
     np.testing.assert_allclose(run["j_x_dot"][-1], 4.0 * (t * t - begins**2) - 0.4 * G * (t - begins), atol=1e-4)
     np.testing.assert_allclose(run["a"], 8.0 * (run.t - 1 + np.exp(-run.t)), atol=1e-3)
+
+
+def test_soil_is_not_rigid() -> None:
+    """A model may have contacts of which the method knows none."""
+    m = eg.Model("sunk", gravity=(0, -9.81, 0))
+    body = m.body("sole", mass=100.0)
+    m.prismatic("y", m.ground, body, axis="y")
+    shape = {"shape": "plate", "on": body, "length": 0.5, "width": 0.3}
+    m.contacts("bed", shape, {"shape": "half_plane", "on": m.ground}, {"soil": "dry_sand", "lateral": False})
+    with pytest.raises(UsageError, match=r"sunk has no contacts that can be rigid \(soil yields\)"):
+        m.compile(target="numpy").simulate(1.0, method="moreau", step=1e-3)

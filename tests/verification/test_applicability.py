@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import eomgen as eg
 from eomgen.cli import main
 from eomgen.verification import Finding, Verification
 from eomgen.verification.comparison import Comparison
+from eomgen.verification.variants import variant_findings
 
 
 def lift(name: str, equation: str) -> eg.Model:
@@ -137,3 +139,24 @@ def test_a_check_without_a_finite_limit_is_left_out() -> None:
     nothing = Comparison("no number")
     nothing.add(0, [np.nan], np.inf)
     assert not nothing.finding().ok
+
+
+@pytest.mark.parametrize("law", [{"normal_law": "rigid"}, {"stiffness": 1e4}])
+@pytest.mark.parametrize("simulation", [None, {"method": "moreau", "step": 1e-3}])
+def test_contacts_that_runs_take_as_rigid(law: dict[str, Any], simulation: dict[str, Any] | None) -> None:
+    """No integrator runs rigid contacts; those with a law of force are run by one, whatever the model says."""
+    m = eg.Model("dropped", gravity=(0, -9.81, 0))
+    body = m.body("b", mass=1.0, inertia={"zz": 0.1})
+    m.planar("j", m.ground, body)
+    m.input("F", 0.5)
+    m.force("push", body, ("F", 0, 0))
+    m.contacts("c", {"shape": "circle", "on": body, "radius": 0.1}, {"shape": "half_plane", "on": m.ground}, law)
+    m.initial(j_y=0.3)
+    if simulation:
+        m.simulation = simulation
+    found = {f.check: f for seed in ("inputs", "short runs") for f in variant_findings(m, only=seed)}
+    assert all(f.ok for f in found.values()), found
+    runs = found["variants: short runs"]
+    assert runs.left_out == ("normal_law" in law)
+    assert not runs.left_out or "rigid contacts exert impulses" in runs.note
+    assert not found["variants: inputs"].left_out

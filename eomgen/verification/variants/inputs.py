@@ -48,9 +48,9 @@ def input_findings(check: str, model: Builder, original: Original, random: Any) 
     if any("signal" in entry.values for entry in entries):
         return Finding.skipped(check, "the inputs have signals of their own")
     still = _as_parameters(check, original)
-    if not still.ok:
+    if not still.ok or original.module.metadata.get("rigid_only"):  # no integrator runs these
         return still
-    end = duration(original)
+    end, how = duration(original), options_of(original.module)
     start = {e.name: number_of(e.values.get("value", 0.0), {}) for e in entries}
     slope = {name: SLOPE * (abs(value) + 1.0) for name, value in start.items()}
     x, times = original.states[:, 0], np.linspace(0.0, end, 5)
@@ -58,13 +58,13 @@ def input_findings(check: str, model: Builder, original: Original, random: Any) 
     course = {name: LineOverTime(start[name], slope[name]) for name in start}
     table = {name: (times, start[name] + slope[name] * times) for name in start}
     runs = {
-        "function": simulate(original.module, (0.0, end), x, inputs=course, t_eval=times, rtol=RTOL, atol=ATOL),
-        "table": simulate(original.module, (0.0, end), x, inputs=table, t_eval=times, rtol=RTOL, atol=ATOL),
+        "function": simulate(original.module, (0.0, end), x, inputs=course, t_eval=times, **how),
+        "table": simulate(original.module, (0.0, end), x, inputs=table, t_eval=times, **how),
     }
     made = copied(original.description)
     for entry in made.sections["inputs"]:
         entry.values["signal"] = f"{start[entry.name]!r} + {slope[entry.name]!r}*t"
-    runs["text"] = simulate(compiled(made), (0.0, end), x, t_eval=times, rtol=RTOL, atol=ATOL)
+    runs["text"] = simulate(compiled(made), (0.0, end), x, t_eval=times, **how)
     worst, where = (0.0, "") if still.left_out else (still.worst * RUNS / still.limit, still.where)
     for way in ("table", "text"):
         size = np.abs(runs["function"].x).max(axis=1, initial=1.0)
@@ -83,6 +83,12 @@ def _as_parameters(check: str, original: Original) -> Finding:
         made.add("parameters", entry.name, {"value": value})
     made.sections["inputs"] = []
     return compare_module(check, original, Variant(made), compiled(made, kernels=OBSERVED))
+
+
+def options_of(module: Any) -> dict[str, Any]:
+    """Options of these runs: tight tolerances; an integrator where the model itself runs by the method moreau."""
+    declared = module.metadata.get("simulation", {}).get("method")
+    return {"rtol": RTOL, "atol": ATOL, **({"method": "DOP853"} if declared == "moreau" else {})}
 
 
 def duration(original: Original) -> float:

@@ -10,12 +10,12 @@ import numpy as np
 from ...describe.description import Description
 from ...describe.rewritten_texts import names_of
 from ...errors import EomgenError
-from ...limits.verification import ATOL, RTOL, RUNS
+from ...limits.verification import RUNS
 from ...simulation.simulate import simulate
-from ..finding import Finding
+from ..finding import RIGID, Finding
 from .compare import FREE_CONSTANT, refused
 from .cuts import cut_another
-from .inputs import duration
+from .inputs import duration, options_of
 from .probe_states import Original, compiled
 from .variant import NotApplicable, Variant
 
@@ -27,6 +27,8 @@ def run_findings(
     check: str, original: Original, changes: Mapping[str, Callable[[Description, Any], Variant]], random: Any
 ) -> Finding:
     """Runs of the variants against the original's: outputs at some times, numbers and times of events."""
+    if original.module.metadata.get("rigid_only"):
+        return Finding.skipped(check, RIGID)
     k = original.states.shape[1] - 1
     end = duration(original)
     if original.description.sections["events"]:
@@ -53,7 +55,7 @@ def run_findings(
 
 
 def _run(module: Any, x: Any, end: float) -> Any:
-    return simulate(module, (0.0, end), x, t_eval=np.linspace(0.0, end, TIMES), rtol=RTOL, atol=ATOL)
+    return simulate(module, (0.0, end), x, t_eval=np.linspace(0.0, end, TIMES), **options_of(module))
 
 
 def _difference(original: Original, variant: Variant, first: Any, second: Any) -> tuple[float, str]:
