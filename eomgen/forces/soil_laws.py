@@ -40,7 +40,7 @@ class SoilPressure(NormalLaw):
 
     after Wong, Theory of Ground Vehicles (2008), section 2.4 (pressure and sinkage, response to repetitive loading).
     Without k_0 and A_u unloading gives back a part of the sinkage, k_u = k z_m^n / (rebound z_m).  No point pulls, and
-    unloading is at least as steep as the line to z = 0.  With dissipation p is multiplied by max(0, 1 + lambda z').
+    unloading is at least as steep as the line to z = 0, and as (n + 1) / 2 times that, which gives back all work.  With dissipation p is multiplied by max(0, 1 + lambda z').
     """
 
     formula: ClassVar[str] = (
@@ -69,11 +69,16 @@ class SoilPressure(NormalLaw):
         return self.modulus_of(width) * depth**self.exponent
 
     def unloading_slope(self, deepest: Expr, top: Expr) -> Expr:
-        """k_u below the greatest sinkage so far, at which the pressure was ``top``."""
+        """k_u below the greatest sinkage so far, at which the pressure was ``top``.
+
+        It gives back p^2 / (2 k_u) of the work p z / (n + 1) of the pressing, so that it is at least (n + 1) / 2 p / z.
+        """
+        apply = deepest.graph.apply
+        least = apply("max", 1.0, 0.5 * (self.exponent + 1.0))
         if self.unloading is None:
             assert self.rebound is not None
-            return top / (self.rebound * deepest)
-        return deepest.graph.apply("max", self.unloading[0] + self.unloading[1] * deepest, top / deepest)
+            return top / deepest * apply("max", 1.0 / self.rebound, least)
+        return apply("max", self.unloading[0] + self.unloading[1] * deepest, top / deepest * least)
 
     def on_pad(self, area: Expr, width: Expr) -> SoilPressure:
         return replace(self, area=area, width=width if self.width is None else self.width)

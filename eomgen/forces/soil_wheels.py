@@ -9,7 +9,7 @@ import numpy as np
 from ..graph import vectors as vec
 from ..graph.core import Expr, cos, sin, sqrt
 from ..graph.vectors import Vec3
-from ..limits.contacts import SHORT_WAY
+from ..limits.contacts import FOREMOST, SHORT_WAY
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .contact import Contact, Touch
@@ -53,9 +53,13 @@ class SoilWheel(Contact):
         j = R [(a1 - a) - (V / (R Omega)) (sin a1 - sin a)]                  (Wong and Reece)
 
     after Wong, Theory of Ground Vehicles (4th edition, 2008), sections 2.4 and 2.5.  With ``peak`` c1, c2 the pressure
-    is greatest at a_m = (c1 + c2 |i|) a1 and falls to 0 at the lowest point, where it is that of the angle
+    is greatest at a_m = min(c1 + c2 |i|, 0.9) a1 and falls to 0 at the lowest point, where it is that of the angle
     a1 - (a1 - a_m) a / a_m (Wong and Reece, J. Terramechanics 4 (1967), 81-98).  tanh(V / reversal) tells which side is
     ahead, and j is that of the spin sqrt(Omega^2 + (reversal / R)^2): a wheel at rest has no shear.
+
+    A wheel that sinks at the rate d' slides by -d' (cos a - cos a1) / Omega more.  Where shear would put more power
+    into the motion than the compaction of the soil takes, V times the horizontal part of the pressure, as in bounces
+    that are faster than the rolling, all shear is reduced to that power.
     """
 
     flat: Contact
@@ -73,7 +77,9 @@ class SoilWheel(Contact):
         motion = self._rolling(view)
         normal, along, sideways = motion.normal, motion.along, self.lateral
         inside = view.graph.apply("lt", 0.0, motion.depth)
-        sums = self._sums(motion._replace(depth=where(inside, motion.depth, self.radius)))
+        pressed, sheared = self._sums(motion._replace(depth=where(inside, motion.depth, self.radius)))
+        part = self._passive(view, motion, pressed, sheared)
+        sums = [x + part * y for x, y in zip((*pressed, *(view.graph.zero,) * 4), sheared, strict=True)]
         scale = self._shared(view, self.width * self.radius)
         force_along, force_up, force_across, torque, tilt, yaw = (where(inside, scale * x, 0.0) for x in sums)
         force = vec.add(vec.add(vec.scale(force_along, along), vec.scale(force_up, normal)),
@@ -99,8 +105,25 @@ class SoilWheel(Contact):
             -self.radius * vec.dot(self.lateral, spin),
         )
 
-    def _sums(self, motion: _Rolling) -> list[Expr]:
-        """Of all nodes, by width and radius: forces along, up and across; moments by the radius about these axes."""
+    def _passive(self, view: View, motion: _Rolling, pressed: list[Expr], sheared: list[Expr]) -> Expr:
+        """The part of the shear that takes no more work from the ground than the compaction of the soil puts in."""
+        graph, side = view.graph, self.lateral
+        spin = vec.sub(view.angular_velocity(self.second), view.angular_velocity(self.first))
+        sideways = motion.sideways + self.radius * vec.dot(motion.along, spin)  # of the centre
+        turns = (vec.dot(side, spin), -vec.dot(motion.along, spin), -vec.dot(motion.normal, spin))
+        speeds = (motion.forward, -motion.rate, sideways, *(self.radius * one for one in turns))
+        gain = graph.zero
+        for force, speed in zip(sheared, speeds, strict=True):
+            gain = gain + force * speed
+        lost = graph.apply("max", 0.0, -pressed[0] * motion.forward)
+        over = graph.apply("lt", lost, gain)
+        return where(over, lost / where(over, gain, 1.0), 1.0)
+
+    def _sums(self, motion: _Rolling) -> tuple[list[Expr], list[Expr]]:
+        """Of all nodes, by width and radius: of pressure the forces along and up; of shear those along, up and across.
+
+        Moments of shear by the radius about the lateral axis, and against the axes along and up, follow.
+        """
         graph, shear, law = motion.depth.graph, self.friction, self.normal_law
         assert isinstance(shear, SoilShear)
         assert isinstance(law, SoilPressure)
@@ -109,28 +132,30 @@ class SoilWheel(Contact):
         spin = sqrt(motion.rim * motion.rim / (self.radius * self.radius) + slow * slow)
         entry = _angle(motion.depth, self.radius)
         gain = graph.apply("max", 0.0, 1.0 + law.dissipation * motion.rate)
-        found = [graph.zero] * 6
+        pressed, found = [graph.zero] * 2, [graph.zero] * 6
         for node in self._nodes(law, motion, entry):
             c, s = cos(node.angle), sin(node.angle)
             angle, sine = (node.angle, s) if node.ahead else (-node.angle, -s)
             passed = entry - angle
-            slid = (motion.forward * (sin(entry) - sine) - motion.rim * passed) / spin
+            sunk = way * motion.rate * (c - cos(entry))
+            slid = (motion.forward * (sin(entry) - sine) - sunk - motion.rim * passed) / spin
             aside = motion.sideways * passed / spin
             pressure = gain * node.pressure
-            pressed = graph.apply("lt", 0.0, pressure)
-            strength = where(pressed, shear.cohesion + pressure * shear.slope, 0.0)
+            loaded = graph.apply("lt", 0.0, pressure)
+            strength = where(loaded, shear.cohesion + pressure * shear.slope, 0.0)
             drag = -node.part * strength * _built_up(slid * slid + aside * aside, shear.modulus)
             push, front = node.part * pressure, way * sine
+            pressed = [pressed[0] - front * push, pressed[1] + c * push]
             added = (
-                c * drag * slid - front * push,
-                c * push + front * drag * slid,
+                c * drag * slid,
+                front * drag * slid,
                 drag * aside,
                 drag * slid,
                 c * drag * aside,
                 front * drag * aside,
             )
             found = [x + y for x, y in zip(found, added, strict=True)]
-        return found
+        return pressed, found
 
     def _nodes(self, law: SoilPressure, motion: _Rolling, entry: Expr) -> list[_Node]:
         """Points of the arc; where pressure begins as a power of the depth they lie at squares of Gauss's."""
@@ -142,8 +167,8 @@ class SoilWheel(Contact):
             return stiffness * (z + depth.graph.apply("max", 0.0, depth - radius)) ** law.exponent
 
         if law.peak is not None:
-            most = (law.peak[0] + law.peak[1] * _slip(motion, law.reversal)) * entry
-            most = depth.graph.apply("min", most, entry)
+            place = law.peak[0] + law.peak[1] * _slip(motion, law.reversal)
+            most = depth.graph.apply("min", FOREMOST, place) * entry
             rest, found = entry - most, list[_Node]()
             for u, weight in _gauss():
                 seen = bekker(entry - rest * u * u)

@@ -54,6 +54,13 @@ class TyreLaw(ABC):
     def forces(self, slips: Slips, load: Expr) -> TyreForces:
         """Forces along and across the wheel and the moment about the normal at a load above 0."""
 
+    def gradients(self, slips: Slips, load: Expr) -> tuple[Expr, Expr] | None:
+        """Growth of the force with the slip, across it and along it, as parts of that without slip.
+
+        None where the law cannot say how a tread and a carcass share the deflections.
+        """
+        return None
+
 
 @dataclass(frozen=True)
 class Brush(TyreLaw):
@@ -78,9 +85,12 @@ class Brush(TyreLaw):
 
     def slides(self, slips: Slips, load: Expr) -> Expr:
         """Beyond |s| = 1 / theta; where driving takes more than twice that as kappa = -s / (1 - s), at twice."""
-        theta = self.stiffness / (3.0 * self.friction * load)
+        return load.graph.apply("le", *self._filled(slips, load))
+
+    def _filled(self, slips: Slips, load: Expr) -> tuple[Expr, Expr]:
+        """|1 - w kappa|, at most 2, and theta |s| of the slips by V_x; all slides where the second is the greater."""
         turning = load.graph.apply("min", 2.0, load.graph.apply("abs", 1.0 - slips.way * slips.along))
-        return load.graph.apply("le", turning, theta * slips.size())
+        return turning, self.stiffness / (3.0 * self.friction * load) * slips.size()
 
     def forces(self, slips: Slips, load: Expr) -> TyreForces:
         graph = load.graph
@@ -102,6 +112,18 @@ class Brush(TyreLaw):
         trail = self.half / 3.0 * rest * rest * rest / (rest + s * s / 3.0)
         onwards = where(graph.apply("lt", rolling, 0.0), -slips.way, slips.way)  # the tread's, not the wheel's
         return TyreForces(along, across, -onwards * trail * across, graph.zero)
+
+    def gradients(self, slips: Slips, load: Expr) -> tuple[Expr, Expr]:
+        """1 - r + r^2 / 3 across and (1 - r)^2 along, by |1 - w kappa|; where all slides 1 / (3 theta |s|) and 0."""
+        turning, filled = self._filled(slips, load)
+        adheres = load.graph.apply("lt", filled, turning)
+        part = where(adheres, turning, 1.0)
+        r = where(adheres, filled / part, 0.0)
+        sliding = 1.0 / (3.0 * where(adheres, 1.0, filled))
+        return (
+            where(adheres, (1.0 - r + r * r / 3.0) / part, sliding),
+            where(adheres, (1.0 - r) * (1.0 - r) / part, 0.0),
+        )
 
 
 #: The car tyre 205/60R15 91V at 2.2 bar of Pacejka, Tyre and Vehicle Dynamics (2nd edition, 2006), appendix 3.

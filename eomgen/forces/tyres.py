@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, SPEED, STIFFNESS, TIME
@@ -54,6 +55,9 @@ class Tyre(Force):
     with slip velocities V_s and relaxation lengths s (Pacejka, Tyre and Vehicle Dynamics (2nd edition, 2006), section
     7.2, where tau is 0).  The time tau_0 damps a wheel at rest and does not change steady slips.  A wheel in the air
     rolls its deflections off.
+
+    A brush of two lengths is a tread of the shorter one s_0 before a carcass of the rest: instead of u and v the vectors
+    s_0 (kappa, tan alpha) + (s - s_0) F / C grow in this way, so that the force at rest has a potential.
 
     Where the tyre slides as a whole the deflections have no more to give: u' = V_sx - (|V_x| + l) kappa and v' = V_sy -
     (|V_x| + l) tan alpha with the l >= 0 that keeps kappa^2 + tan^2 alpha from growing, so that they come to lie along
@@ -181,18 +185,38 @@ class Tyre(Force):
         bears = graph.apply("lt", 0.0, load)
         off = speed + graph.apply("abs", way.rolling)
         slips = self._slips(way)
-        rates = [v - speed * slip for v, slip in zip((way.forward - way.rolling, way.sideways), slips, strict=True)]
+        moved = [v - speed * slip for v, slip in zip((way.forward - way.rolling, way.sideways), slips, strict=True)]
         turned = Slips(*slips, way.camber, graph.apply("tanh", way.forward / self.reversal))
-        slides = self.law.slides(turned, where(bears, load, 1.0))
+        carried = where(bears, load, 1.0)
+        slides = self.law.slides(turned, carried)
+        taken = self._shares(way, carried)
+        rates, unwound = taken(*moved), taken(*slips)
         growth = slips[0] * rates[0] / x + slips[1] * rates[1] / y
-        weight = slips[0] * slips[0] / x + slips[1] * slips[1] / y
+        weight = slips[0] * unwound[0] / x + slips[1] * unwound[1] / y
         grows = where(graph.apply("lt", 0.0, weight), graph.apply("lt", 0.0, growth), 0.0)
         lost = where(slides, where(grows, growth / where(grows, weight, 1.0), 0.0), 0.0)
         found = [
-            where(bears, rate - lost * slip, -off / length * deflection)
-            for rate, slip, deflection, length in zip(rates, slips, (u, v), (x, y), strict=True)
+            where(bears, rate - lost * back, -off / length * deflection)
+            for rate, back, deflection, length in zip(rates, unwound, (u, v), (x, y), strict=True)
         ]
         return tuple(found)
+
+    def _shares(self, way: _WheelMotion, load: Expr) -> Callable[[Expr, Expr], tuple[Expr, Expr]]:
+        """Rates of the deflections of the motion that the tyre takes up: of a tread beside the rest of a carcass."""
+        (u, v), (x, y), graph = self.deflections, self.relaxation, load.graph
+        held = Slips(u / x, v / y, way.camber, graph.apply("tanh", way.forward / self.reversal))
+        found = None if (y - x).is_zero else self.law.gradients(held, load)
+        if found is None:
+            return lambda along, across: (along, across)
+        around, outwards = found
+        size, tread = held.size(), graph.apply("min", x, y)
+        some = graph.apply("lt", 0.0, size)
+        c, s = (where(some, one / where(some, size, 1.0), 0.0) for one in (held.along, held.across))
+        bend = outwards - around
+        a, b = tread + (x - tread) * (around + bend * c * c), (x - tread) * bend * c * s
+        d, e = (y - tread) * bend * c * s, tread + (y - tread) * (around + bend * s * s)
+        whole = a * e - b * d
+        return lambda along, across: (x * (e * along - b * across) / whole, y * (a * across - d * along) / whole)
 
 
 # -- reading ----------------------------------------------------------------------------------------------------------

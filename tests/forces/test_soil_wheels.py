@@ -143,6 +143,51 @@ def test_no_motion_gains_energy(law: dict[str, Any]) -> None:
         assert along * forward - moment * spin < 0
 
 
+@pytest.mark.parametrize("law", [SOIL, {**SOIL, "sinkage_exponent": 1.6, "rebound": 1.0}])
+def test_no_bounce_gains_energy(law: dict[str, Any]) -> None:
+    """Of random motions with a rate of sinkage: beside what the load of a wheel at rest would take, all power is lost.
+
+    That load is a function of the sinkage, so that its work of a closed cycle is 0.
+    """
+    mod = wheel(law).compile(target="numpy")
+    rng = np.random.default_rng(6)
+    for _ in range(400):
+        depth, sink = rng.uniform(1e-3, 0.3), rng.standard_normal() * 10 ** rng.uniform(-3, 1)
+        forward, spin = rng.standard_normal(2) * 10 ** rng.uniform(-3, 1, 2)
+        if rng.random() < 0.5:
+            spin = forward / R * (1 + 0.3 * rng.standard_normal())
+        along, up, moment = forces(mod, depth, forward, spin, sink)
+        rest = forces(mod, depth, 0.0, 0.0)[1]
+        size = rest * (abs(forward) + abs(sink) + R * abs(spin))
+        assert along * forward - moment * spin - (up - rest) * sink <= 1e-12 * size
+
+
+def test_no_cycle_of_sinkage_and_slip_gains_energy() -> None:
+    """A wheel sinks while it brakes and rises while it drives, or the other way round, faster than it rolls."""
+    mod = wheel({"soil": "dry_sand"}).compile(target="numpy")
+    depths = np.linspace(0.03, 0.09, 16)
+    for forward, sink, slip in ((0.1, 0.6, 0.2), (0.1, 1.0, 0.2), (0.2, 1.5, 0.2)):
+        for way in (1, -1):
+            work = 0.0
+            for depth in 0.5 * (depths[1:] + depths[:-1]):
+                for side in (1, -1):
+                    spin = forward * (1 - slip if side * way > 0 else 1 / (1 - slip)) / R
+                    along, up, moment = forces(mod, depth, forward, spin, side * sink)
+                    power = along * forward - moment * spin - up * side * sink
+                    work += power * (depths[1] - depths[0]) / sink
+            assert work < -1.0
+
+
+def test_greatest_pressure_stays_inside_the_arc() -> None:
+    """At 0.9 of the angle of entry or less: the wheel carries at any c1 + c2 |i|, as it does at c1 = 0.9."""
+    wide, bound = (wheel({**SOIL, "peak_angle": pair}).compile(target="numpy") for pair in ([0.8, 0.32], [0.9, 0.0]))
+    for spin in (0.0, 0.6):
+        found = forces(wide, 0.1, 1.0, spin)
+        assert found[1] > 100.0
+        np.testing.assert_allclose(found, forces(bound, 0.1, 1.0, spin), rtol=1e-9)
+    assert np.abs(forces(wide, 0.1, 1.0, 2.0) - forces(bound, 0.1, 1.0, 2.0)).max() > 1.0  # of a slip of 0: at 0.8
+
+
 def test_pressing_and_lifting_a_wheel_that_stands() -> None:
     """Without dissipation the force is that of the sinkage; with it pressing takes more than lifting gives."""
     bare, damped = (wheel({**SOIL, "dissipation": x}).compile(target="numpy") for x in (0.0, 0.8))

@@ -181,21 +181,49 @@ def test_locked_wheel_stops_on_its_way() -> None:
     assert traj["x_dot"][-1] == pytest.approx(10.0 - MU * load / 500.0, rel=0.02)
 
 
-def test_relaxation_of_a_step_in_the_slip_angle() -> None:
-    """A force builds up as 1 - exp(-x / s) of the way x."""
-    m = corner(BRUSH)
+@pytest.mark.parametrize(
+    ("law", "lengths"), [(BRUSH, (0.4, 0.4)), ({"law": "magic_formula"}, RELAXATION)], ids=["brush", "magic_formula"]
+)
+def test_relaxation_of_a_step_in_the_slip_angle(law: dict[str, Any], lengths: tuple[float, float]) -> None:
+    """A slip builds up as 1 - exp(-x / s) of the way x."""
+    m = corner({**law, "relaxation": lengths})
     mod = m.compile(target="numpy")
     names = list(mod.x_names)
     x = mod.x0(z=R - 0.02, x_dot=10.0, y_dot=0.1, spin_dot=10.0 / R)
     u, v = (names.index(f"tyre_deflection_{k}") for k in "xy")
     for way in (0.0, 0.1, 1.0):
-        x[v] = RELAXATION[1] * 0.01 * (1 - math.exp(-way / RELAXATION[1]))
+        x[v] = lengths[1] * 0.01 * (1 - math.exp(-way / lengths[1]))
         rates = mod.rhs(0.0, x)
-        assert rates[v] == pytest.approx(0.1 * math.exp(-way / RELAXATION[1]), rel=1e-9)
+        assert rates[v] == pytest.approx(0.1 * math.exp(-way / lengths[1]), rel=1e-9)
         assert rates[u] == pytest.approx(0.0, abs=1e-12)
     x[names.index("z")] = 1.0  # in the air
-    assert mod.rhs(0.0, x)[v] == pytest.approx(-20.0 / RELAXATION[1] * x[v], rel=1e-12)
-    assert np.abs(mod.bias(0.0, x)).max() < 1e-9
+    assert mod.rhs(0.0, x)[v] == pytest.approx(-20.0 / lengths[1] * x[v], rel=1e-12)
+    if law is BRUSH:
+        assert np.abs(mod.bias(0.0, x)).max() < 1e-9
+
+
+def test_tread_and_carcass_of_two_relaxation_lengths() -> None:
+    """The tread's s_0 slip and the carcass's (s - s_0) F / C grow together by the slip velocity; s_0 is the shorter."""
+    load = 0.02 * STIFFNESS
+    for lengths in (RELAXATION, RELAXATION[::-1]):
+        mod = corner({**POINT, "relaxation": lengths}).compile(target="numpy")
+        tread, rows = min(lengths), [mod.x_names.index(f"tyre_deflection_{k}") for k in "xy"]
+        grip = 3.0 * MU * load / C
+
+        def held(slips: np.ndarray, tread: float = tread, grip: float = grip, s: Any = lengths) -> np.ndarray:
+            r = min(1.0, float(np.hypot(*slips)) / grip)
+            force = MU * load * (1 - (1 - r) ** 3) * slips / np.hypot(*slips)
+            return tread * slips + (np.array(s) - tread) * force / C
+
+        for slips in ((0.01, 0.02), (-0.05, 0.1), (0.1, -0.03), (0.0, 0.12), (0.3, 0.2)):
+            slip, V = np.array(slips), np.array([-0.004, 0.003]) * np.sign(slips)  # at rest, and back from sliding
+            x = mod.x0(z=R - load / STIFFNESS, y_dot=V[1], spin_dot=-V[0] / R)
+            x[rows] = slip * lengths
+            change, step = mod.rhs(0.0, x)[rows] / lengths, 1e-7
+            if np.hypot(*slip) > grip and slip @ V > 0:
+                continue
+            taken = (held(slip + step * change) - held(slip - step * change)) / (2 * step)
+            np.testing.assert_allclose(taken, V, rtol=1e-6, atol=1e-9)
 
 
 def test_settling_damps_a_standing_wheel_and_no_steady_slip() -> None:
