@@ -190,19 +190,26 @@ def touching(name: str, law: Any, swapped: bool = False, target: str = "numpy") 
 
 
 def poses(name: str, rng: np.random.Generator, count: int) -> Iterator[tuple[np.ndarray, float]]:
-    """The second body against the first, in each other by some depth, near flush or not."""
+    """The second body in the first by some depth, near flush or not; of each second pose a corner in a corner."""
     first, second = (np.array(points) for points in PAIRS[name])
     ways = [np.arctan2(*(q - p)) for one in (first, second) for p, q in zip(one, np.roll(one, -1, 0), strict=True)]
-    for _ in range(count):
+    while count:
         turn = rng.choice([rng.uniform(-3, 3), rng.choice(ways) - rng.choice(ways) + np.pi * rng.integers(2)])
         turn += rng.choice([0.0, 1e-3, 0.1]) * rng.standard_normal()
         way, depth = rng.uniform(-np.pi, np.pi), 10 ** rng.uniform(-4, -1.7)
-        low, high = 0.0, 1.0
-        for _ in range(30):
-            middle = (low + high) / 2
-            place = scenes.placed([middle * np.cos(way), middle * np.sin(way), turn], second)
-            low, high = (middle, high) if scenes.facing(first, place)[0][0] > depth else (low, middle)
-        yield np.array([0, 0, 0, low * np.cos(way), low * np.sin(way), turn]), depth
+        if count % 2:
+            corner = scenes.placed([0, 0, turn], second[rng.integers(len(second))])
+            place = first[rng.integers(len(first))] - corner + 2 * depth * np.array([np.cos(way), np.sin(way)])
+        else:
+            low, high = 0.0, 1.0
+            for _ in range(30):
+                middle = (low + high) / 2
+                outline = scenes.placed([middle * np.cos(way), middle * np.sin(way), turn], second)
+                low, high = (middle, high) if scenes.facing(first, outline)[0][0] > depth else (low, middle)
+            place = low * np.array([np.cos(way), np.sin(way)])
+        if 0.0 < scenes.facing(first, scenes.placed([*place, turn], second))[0][0] < 0.03:
+            count -= 1
+            yield np.array([0, 0, 0, *place, turn]), depth
 
 
 def states(q: np.ndarray) -> np.ndarray:
@@ -241,11 +248,11 @@ def test_forces_are_slopes_of_the_energy_of_the_geometry(name: str) -> None:
     k, n = 1e7, 1.5
     mod, compiled = (touching(name, {"stiffness": k, "exponent": n}, False, target) for target in ("numpy", "cython"))
     first, second = (np.array(points) for points in PAIRS[name])
-    shared = kinks = 0
+    second_spots = kinks = 0
     for q, depth in poses(name, np.random.default_rng(12), 200):
         x = np.concatenate([q, np.zeros(6)])
         found = scenes.facing(first, scenes.placed(q[3:], second))
-        shared += len(found) > 1 and 0.0 < found[1][1] < 1.0 and found[1][0] > 0.0
+        second_spots += found[1][0] > 0.0 and found[1][1] > 0.0
         wanted = sum(part * k * max(d, 0.0) ** (n + 1) / (n + 1) for d, part in found)
         assert mod.energy(x)[1] == pytest.approx(wanted, rel=1e-8)
         assert compiled.energy(x)[1] == pytest.approx(wanted, rel=1e-8)
@@ -262,7 +269,8 @@ def test_forces_are_slopes_of_the_energy_of_the_geometry(name: str) -> None:
             kinks += 1
             continue
         assert np.all(np.abs(force - slopes) < 1e-4 * scale), (q, depth)
-    assert kinks < 10
+    assert second_spots >= 10
+    assert kinks < 20
 
 
 @pytest.mark.parametrize("name", PAIRS)
