@@ -68,8 +68,9 @@ def _either(condition: Expr, yes: Point, no: Point) -> Point:
 
 
 def _chosen(condition: Expr, a: _Edge, b: _Edge) -> _Edge:
-    points = [_either(condition, p, q) for p, q in zip(a[:3], b[:3], strict=True)]
-    return _Edge(*points, *(where(condition, p, q) for p, q in zip(a[3:], b[3:], strict=True)))
+    start, end, normal = (_either(condition, p, q) for p, q in zip(a[:3], b[:3], strict=True))
+    rise, bend, number = (where(condition, p, q) for p, q in zip(a[3:], b[3:], strict=True))
+    return _Edge(start, end, normal, rise, bend, number)
 
 
 def _spot_of(condition: Expr, a: _Spot, b: _Spot) -> _Spot:
@@ -116,7 +117,8 @@ def _deepest(edge: _Edge, corners: Sequence[Point]) -> Point:
 
 def _without(found: Sequence[tuple[Expr, _Edge]], left_out: _Edge) -> list[tuple[Expr, _Edge]]:
     """Overlaps along edges but one."""
-    graph, known = left_out.number.graph, []
+    graph = left_out.number.graph
+    known: list[tuple[Expr, _Edge]] = []
     for k, (overlap, edge) in enumerate(found):
         other = graph.apply("lt", left_out.number, k - 0.5), graph.apply("lt", k + 0.5, left_out.number)
         known.append((where(other[0], overlap, where(other[1], overlap, NOWHERE)), edge))
