@@ -63,8 +63,18 @@ def corners_of(kind: str) -> np.ndarray:
     return np.array(TRIANGLE) if kind == "polygon" else np.array([(-0.15, 0.0), (0.15, 0.0)])
 
 
-def facing(first: np.ndarray, second: np.ndarray) -> list[float]:
-    """How deep two convex outlines are in each other at both ends of the edges that face each other.
+def rectangle(wide: float, high: float) -> list[tuple[float, float]]:
+    """Corners of a box."""
+    return [(-wide / 2, -high / 2), (wide / 2, -high / 2), (wide / 2, high / 2), (-wide / 2, high / 2)]
+
+
+def regular(count: int, radius: float) -> list[tuple[float, float]]:
+    """Corners on a circle."""
+    return [(radius * np.cos(t), radius * np.sin(t)) for t in 2 * np.pi * np.arange(count) / count]
+
+
+def facing(first: np.ndarray, second: np.ndarray) -> list[tuple[float, float]]:
+    """How deep two convex outlines are in each other at both spots, and the part of the law that counts there.
 
     Heights of both edges along the mean of their normals, as functions of the place across it.
     """
@@ -76,28 +86,47 @@ def facing(first: np.ndarray, second: np.ndarray) -> list[float]:
     sides = [edges(first), edges(second)]
     overlaps = [[max(n @ (p - c) for c, _, _ in sides[1 - k]) for p, _, n in sides[k]] for k in (0, 1)]
     k = int(np.argmin([min(one) for one in overlaps]))
-    own = sides[k][int(np.argmin(overlaps[k]))]
-    other = sides[1 - k][int(np.argmin([n @ own[2] for _, _, n in sides[1 - k]]))]
+    i = int(np.argmin(overlaps[k]))
+    own = sides[k][i]
+    j = int(np.argmin([n @ own[2] for _, _, n in sides[1 - k]]))
+    other = sides[1 - k][j]
+    least = overlaps[k][i]
+    following = min(overlaps[k][:i] + overlaps[k][i + 1 :] + overlaps[1 - k][:j] + overlaps[1 - k][j + 1 :])
     normal = own[2] - other[2]
     cosine = np.linalg.norm(normal) / 2
     normal /= np.linalg.norm(normal)
     across = np.array([normal[1], -normal[0]])
     spans = [sorted((across @ one[0], across @ one[1])) for one in (own, other)]
     low, high = max(spans[0][0], spans[1][0]), min(spans[0][1], spans[1][1])
-    if low >= high:
-        return [-1e100, -1e100]
+    if least <= 0.0 and low >= high:
+        return [(-1e100, 1.0)]
 
     def height(one: tuple[np.ndarray, np.ndarray, np.ndarray], x: float) -> float:
         (x0, x1), (y0, y1) = (across @ one[0], across @ one[1]), (normal @ one[0], normal @ one[1])
         return float(y0 + (y1 - y0) * (x - x0) / (x1 - x0))
 
-    return [cosine * (height(own, x) - height(other, x)) for x in (low, high)]
+    ends = [cosine * (height(own, x) - height(other, x)) for x in (low, high)]
+    if least <= 0.0:
+        return [(depth, 1.0) for depth in ends]
+    both = ((sides[k], i), (sides[1 - k], j))
+    bends = [side[n][2] @ side[(n + 1) % len(side)][2] for side, m in both for n in (m - 1, m)]
+    limit = np.arccos(max(bends)) / 2  # half the angle to the nearest neighbour
+    turned = np.linalg.norm(own[2] + other[2]) / (2 * np.sin(limit / 2))
+    part = np.clip((1 - turned**2) / 0.75, 0, 1)
+    return [(least, 1.0), (min(*ends, following - least), float(part**2 * (3 - 2 * part)))]
+
+
+def spots(first: str, second: str, q1: Sequence[float], q2: Sequence[float]) -> list[tuple[float, float]]:
+    """Depths of all places of contact, and the part of the law that counts there."""
+    if {first, second} <= {"box", "polygon"}:
+        return facing(placed(q1, corners_of(first)), placed(q2, corners_of(second)))
+    return [(depth, 1.0) for depth in depths(first, second, q1, q2)]
 
 
 def depths(first: str, second: str, q1: Sequence[float], q2: Sequence[float]) -> list[float]:
     """How deep the round parts of two shapes are in the other shape, or how deep two polygons are in each other."""
     if {first, second} <= {"box", "polygon"}:
-        return facing(placed(q1, corners_of(first)), placed(q2, corners_of(second)))
+        return [depth for depth, _ in spots(first, second, q1, q2)]
     found = []
     for (a, qa), (b, qb) in (((first, q1), (second, q2)), ((second, q2), (first, q1))):
         if a == "circle" == b:

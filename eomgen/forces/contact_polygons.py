@@ -23,7 +23,7 @@ from typing import NamedTuple
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..limits.contacts import NOWHERE
+from ..limits.contacts import FLAT_CORNER, NOWHERE
 from ..records import dataclass
 from .branches import where
 from .contact import Contact, Touch
@@ -32,8 +32,7 @@ from .contact_rounds import EDGE
 from .force import View
 from .normal_laws import NormalLaw, PartOfLaw
 
-
-_FLAT = 0.25  #: part of the squared half angle to a neighbour up to which edges count as parallel
+_PARALLEL = 0.25  #: part of the squared half angle to a neighbour up to which edges count as parallel
 
 
 class _Edge(NamedTuple):
@@ -69,8 +68,9 @@ def _either(condition: Expr, yes: Point, no: Point) -> Point:
 
 
 def _chosen(condition: Expr, a: _Edge, b: _Edge) -> _Edge:
-    points = [_either(condition, p, q) for p, q in zip(a[:3], b[:3], strict=True)]
-    return _Edge(*points, *(where(condition, p, q) for p, q in zip(a[3:], b[3:], strict=True)))
+    start, end, normal = (_either(condition, p, q) for p, q in zip(a[:3], b[:3], strict=True))
+    rise, bend, number = (where(condition, p, q) for p, q in zip(a[3:], b[3:], strict=True))
+    return _Edge(start, end, normal, rise, bend, number)
 
 
 def _spot_of(condition: Expr, a: _Spot, b: _Spot) -> _Spot:
@@ -117,7 +117,8 @@ def _deepest(edge: _Edge, corners: Sequence[Point]) -> Point:
 
 def _without(found: Sequence[tuple[Expr, _Edge]], left_out: _Edge) -> list[tuple[Expr, _Edge]]:
     """Overlaps along edges but one."""
-    graph, known = left_out.number.graph, []
+    graph = left_out.number.graph
+    known: list[tuple[Expr, _Edge]] = []
     for k, (overlap, edge) in enumerate(found):
         other = graph.apply("lt", left_out.number, k - 0.5), graph.apply("lt", k + 0.5, left_out.number)
         known.append((where(other[0], overlap, where(other[1], overlap, NOWHERE)), edge))
@@ -225,10 +226,10 @@ class PolygonPolygon(Contact):
         graph = a.bend.graph
         apart = _plus(a.normal, b.normal)  # its square is 4 sin^2(angle / 2)
         cosine = sqrt(0.5 + 0.5 * graph.apply("max", a.bend, b.bend))  # of half the angle to a neighbour
-        limit = 2.0 - 2.0 * cosine
-        left = (1.0 - dot(apart, apart) / limit) / (1.0 - _FLAT)
+        limit = graph.apply("max", FLAT_CORNER, 2.0 - 2.0 * cosine)
+        left = (1.0 - dot(apart, apart) / limit) / (1.0 - _PARALLEL)
         part = graph.apply("max", 0.0, graph.apply("min", 1.0, left))
-        slope = -12.0 * part * (1.0 - part) / ((1.0 - _FLAT) * limit)
+        slope = -12.0 * part * (1.0 - part) / ((1.0 - _PARALLEL) * limit)
         return part * part * (3.0 - 2.0 * part), slope
 
     def _facing(self, view: View) -> _Facing:

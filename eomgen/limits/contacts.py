@@ -17,6 +17,9 @@ PARALLEL = 1e-12
 #: Slip of a tyre that counts as none, and part of the velocity below which a wheel counts as locked: a brush adheres up
 #: to slips of 3 mu F_z / C, hundredths, beside which it is nothing, and its square, 1e-18, is a number.
 NO_SLIP = 1e-9
+#: Squared angle of two edges of a polygon below which a corner counts as flat: cosines near 1 have errors of 1e-16,
+#: so that the squares of smaller angles lose a thousandth.
+FLAT_CORNER = 1e-13
 #: (m) How far a shape is from a piece of a profile that is not its nearest, for those who look for what is near.
 NOWHERE = 1e100
 #: Shear displacement by K below which (1 - exp(-x)) / x is its series to x^4: the next term, x^5 / 720, is 1e-18, where

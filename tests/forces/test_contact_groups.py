@@ -78,8 +78,7 @@ def test_depth_and_force_against_geometry(kinds: tuple[str, str]) -> None:
         q[3:5] = q[:2] + rng.uniform(0.1, 0.25) * np.array([np.cos(way), np.sin(way)])
         q[5] = rng.uniform(-3, 3)
         x = np.concatenate([q, np.zeros(6)])
-        deep = [max(d, 0.0) for d in scenes.depths(*kinds, q[:3], q[3:])]
-        wanted = sum(2e4 * d**2.5 / 2.5 for d in deep)
+        wanted = sum(part * 2e4 * max(d, 0.0) ** 2.5 / 2.5 for d, part in scenes.spots(*kinds, q[:3], q[3:]))
         assert mod.energy(x)[1] == pytest.approx(wanted, rel=1e-9, abs=1e-15)
         force = -mod.bias(0.0, x)
         if wanted < 1e-3:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import contact_scenes as scenes
@@ -167,3 +168,124 @@ def test_a_stack_rests_as_in_mujoco() -> None:
     x = run.x[:, -1]
     force = -mod.bias(0.0, x) + [0, mass * G, 0] * 2
     np.testing.assert_allclose(force[[1, 4]], [mass * G, mass * G], rtol=1e-5)
+
+
+#: Pairs of corners, of which the second is acute, obtuse, as wide as the first, nearly flat, or has several edges.
+PAIRS: dict[str, tuple[Any, Any]] = {
+    "wedge": ([(0, 0), (0.12, 0.4), (-0.12, 0.4)], scenes.rectangle(0.3, 0.1)),
+    "needles": ([(0.2, 0.0), (-0.1, 0.05), (-0.1, -0.03)], [(0.2, -0.1), (0.1, 0.15), (-0.2, -0.1)]),
+    "equal": (scenes.rectangle(0.2, 0.1), scenes.rectangle(0.2, 0.1)),
+    "narrow": (scenes.rectangle(0.05, 0.1), scenes.rectangle(0.4, 0.02)),
+    "obtuse": ([(-0.1, -0.05), (0, -0.06), (0.1, -0.05), (0.1, 0.05), (-0.1, 0.05)], scenes.rectangle(0.2, 0.1)),
+    "rounds": (scenes.regular(9, 0.1), scenes.regular(7, 0.12)),
+}
+
+
+def touching(name: str, law: Any, swapped: bool = False, target: str = "numpy") -> Any:
+    """Two bodies of a pair of shapes, without gravity."""
+    m, bodies = scenes.planar(name, 2, (0, 0, 0))
+    group = [{"shape": "polygon", "points": list(p), "on": b} for p, b in zip(PAIRS[name], bodies, strict=True)]
+    m.contacts("c", *(group[::-1] if swapped else group), law)
+    return m.compile(target=target)
+
+
+def poses(name: str, rng: np.random.Generator, count: int) -> Iterator[tuple[np.ndarray, float]]:
+    """The second body in the first by some depth, near flush or not; of each second pose a corner in a corner."""
+    first, second = (np.array(points) for points in PAIRS[name])
+    ways = [np.arctan2(*(q - p)) for one in (first, second) for p, q in zip(one, np.roll(one, -1, 0), strict=True)]
+    while count:
+        turn = rng.choice([rng.uniform(-3, 3), rng.choice(ways) - rng.choice(ways) + np.pi * rng.integers(2)])
+        turn += rng.choice([0.0, 1e-3, 0.1]) * rng.standard_normal()
+        way, depth = rng.uniform(-np.pi, np.pi), 10 ** rng.uniform(-4, -1.7)
+        if count % 2:
+            corner = scenes.placed([0, 0, turn], second[rng.integers(len(second))])
+            place = first[rng.integers(len(first))] - corner + 2 * depth * np.array([np.cos(way), np.sin(way)])
+        else:
+            low, high = 0.0, 1.0
+            for _ in range(30):
+                middle = (low + high) / 2
+                outline = scenes.placed([middle * np.cos(way), middle * np.sin(way), turn], second)
+                low, high = (middle, high) if scenes.facing(first, outline)[0][0] > depth else (low, middle)
+            place = low * np.array([np.cos(way), np.sin(way)])
+        if 0.0 < scenes.facing(first, scenes.placed([*place, turn], second))[0][0] < 0.03:
+            count -= 1
+            yield np.array([0, 0, 0, *place, turn]), depth
+
+
+def states(q: np.ndarray) -> np.ndarray:
+    """States at rest, one a column."""
+    return np.ascontiguousarray(np.concatenate([q.T, np.zeros((6, len(q)))]))
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_energy_is_continuous(name: str) -> None:
+    """Along random ways of the size of the depth: what changes most between two places is bisected."""
+    mod, swapped = (touching(name, {"stiffness": 1e7, "exponent": 1.5}, order) for order in (False, True))
+    rng = np.random.default_rng(11)
+    starts, ends, most = [], [], []
+    for q, depth in poses(name, rng, 300):
+        step = np.concatenate([np.zeros(3), rng.standard_normal(2), rng.choice([0, 10]) * rng.standard_normal(1)])
+        line = q + np.linspace(-2, 2, 129)[:, None] * depth * step * rng.choice([0.1, 1.0])
+        energy = mod.energy(states(line))[1]
+        np.testing.assert_allclose(swapped.energy(states(line))[1], energy, rtol=1e-7, atol=1e-9 * energy.max())
+        for k in np.argsort(np.abs(np.diff(energy)))[-2:]:
+            starts.append(line[k])
+            ends.append(line[k + 1])
+            most.append(energy.max())
+    low, high = np.array(starts), np.array(ends)
+    for _ in range(36):
+        middle = (low + high) / 2
+        a, b, c = (mod.energy(states(q))[1] for q in (low, middle, high))
+        upper = (np.abs(b - a) < np.abs(c - b))[:, None]
+        low, high = np.where(upper, middle, low), np.where(upper, high, middle)
+    jumps = np.abs(mod.energy(states(high))[1] - mod.energy(states(low))[1])
+    assert np.all(jumps < 1e-7 * np.array(most))
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_forces_are_slopes_of_the_energy_of_the_geometry(name: str) -> None:
+    """At any depth; momentum and its moment are kept, and of both targets the numbers are the same."""
+    k, n = 1e7, 1.5
+    mod, compiled = (touching(name, {"stiffness": k, "exponent": n}, False, target) for target in ("numpy", "cython"))
+    first, second = (np.array(points) for points in PAIRS[name])
+    second_spots = kinks = 0
+    for q, depth in poses(name, np.random.default_rng(12), 200):
+        x = np.concatenate([q, np.zeros(6)])
+        found = scenes.facing(first, scenes.placed(q[3:], second))
+        second_spots += found[1][0] > 0.0 and found[1][1] > 0.0
+        wanted = sum(part * k * max(d, 0.0) ** (n + 1) / (n + 1) for d, part in found)
+        assert mod.energy(x)[1] == pytest.approx(wanted, rel=1e-8)
+        assert compiled.energy(x)[1] == pytest.approx(wanted, rel=1e-8)
+        force = -mod.bias(0.0, x)
+        scale = np.array([1, 1, 0.1] * 2) * np.abs(force).max()
+        assert np.all(np.abs(compiled.bias(0.0, x) + force) < 1e-9 * scale)
+        assert np.abs(force[:2] + force[3:5]).max() < 1e-12 * scale[0]
+        assert abs(force[2] + force[5] + q[3] * force[4] - q[4] * force[3]) < 1e-12 * scale[0]
+        h = 1e-5 * depth
+        sides = np.array([q + way * h * np.eye(6)[i] for i in range(6) for way in (1, -1)])
+        slopes = np.diff(mod.energy(states(sides))[1].reshape(6, 2), axis=1)[:, 0] / (2 * h)
+        around = -mod.bias(0.0, states(sides))
+        if np.abs(around.T - force).max() > 1e-2 * scale[0]:  # the force jumps here
+            kinks += 1
+            continue
+        assert np.all(np.abs(force - slopes) < 1e-4 * scale), (q, depth)
+    assert second_spots >= 10
+    assert kinks < 20
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_energy_is_kept_in_deep_hits(name: str) -> None:
+    """Tied by a spring, thrown at each other ten times: the corners go deep into each other."""
+    m, bodies = scenes.planar(name, 2)
+    group = [{"shape": "polygon", "points": list(p), "on": b} for p, b in zip(PAIRS[name], bodies, strict=True)]
+    m.contacts("c", *group, {"stiffness": 1e7, "exponent": 1.5})
+    m.spring("tie", *bodies, stiffness=300.0)
+    mod = m.compile()
+    rng = np.random.default_rng(7)
+    for _ in range(5):
+        way = rng.uniform(-np.pi, np.pi)
+        start = {"j1_x": 0.45 * np.cos(way), "j1_y": 0.45 * np.sin(way), "j0_3_dot": rng.uniform(-9, 9)}
+        start |= {"j1_3": rng.uniform(-3, 3), "j1_3_dot": rng.uniform(-9, 9)}
+        run = mod.simulate((0, 1), initial=start, method="DOP853", rtol=1e-9, atol=1e-11)
+        energy = np.sum(mod.energy(np.ascontiguousarray(run.x)), axis=0)
+        assert np.abs(np.diff(energy)).max() < 1e-4 * np.ptp(mod.energy(np.ascontiguousarray(run.x))[0])
