@@ -217,8 +217,8 @@ def _together(W: Array, rates: Array, places: list[list[int]], mu: Array, e: Arr
         impulses, gained = strike(0.0)
         if gained > 0.0:
             raise UsageError(
-                f"the search for impulses of the gaps {', '.join(names)} that obey the laws of impact and friction did not "
-                "end, with restitutions of 0 either (there may be some); give smaller coefficients of friction"
+                f"the search for impulses of the gaps {', '.join(names)} that obey the laws of impact and friction did "
+                "not end, with restitutions of 0 either (there may be some); give smaller coefficients of friction"
             )
         for _ in range(HALVED):
             middle = 0.5 * (low + high)

@@ -44,8 +44,8 @@ class RigidContacts:
         known = module.metadata.get("rigid_contacts")
         if not known:
             raise UsageError(
-                f"method moreau is for rigid contact between groups of shapes, and {module.name} has no contacts that can "
-                "be rigid (soil yields): describe them by m.contacts(...) without soil, or choose another method"
+                f"method moreau is for rigid contact between groups of shapes, and {module.name} has no contacts that "
+                "can be rigid (soil yields): describe them by m.contacts(...) without soil, or choose another method"
             )
         self.lists: list[tuple[str, int, int]] = [tuple(row) for row in known["lists"]]
         parents = known["parents"]
