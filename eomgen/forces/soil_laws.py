@@ -40,7 +40,8 @@ class SoilPressure(NormalLaw):
 
     after Wong, Theory of Ground Vehicles (2008), section 2.4 (pressure and sinkage, response to repetitive loading).
     Without k_0 and A_u unloading gives back a part of the sinkage, k_u = k z_m^n / (rebound z_m).  No point pulls, and
-    unloading is at least as steep as the line to z = 0, and as (n + 1) / 2 times that, which gives back all work.  With dissipation p is multiplied by max(0, 1 + lambda z').
+    unloading is at least as steep as the line to z = 0, and as (n + 1) / 2 times that, which gives back all work.
+    With dissipation p is multiplied by max(0, 1 + lambda z').
     """
 
     formula: ClassVar[str] = (

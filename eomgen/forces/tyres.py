@@ -56,8 +56,8 @@ class Tyre(Force):
     7.2, where tau is 0).  The time tau_0 damps a wheel at rest and does not change steady slips.  A wheel in the air
     rolls its deflections off.
 
-    A brush of two lengths is a tread of the shorter one s_0 before a carcass of the rest: instead of u and v the vectors
-    s_0 (kappa, tan alpha) + (s - s_0) F / C grow in this way, so that the force at rest has a potential.
+    A brush of two lengths is a tread of the shorter one s_0 before a carcass of the rest: instead of u and v, s_0
+    (kappa, tan alpha) + (s - s_0) F / C grows in this way, so that the force at rest has a potential.
 
     Where the tyre slides as a whole the deflections have no more to give: u' = V_sx - (|V_x| + l) kappa and v' = V_sy -
     (|V_x| + l) tan alpha with the l >= 0 that keeps kappa^2 + tan^2 alpha from growing, so that they come to lie along

@@ -26,7 +26,7 @@ NOWHERE = 1e100
 #: the quotient's slope begins to lose 1e-16 / x^2.
 SHORT_WAY = 1e-3
 #: Part of the angle of entry that the greatest pressure of a wheel on soil is at, at most: published c1 + c2 reach 0.75
-#: (compact sand, slip 1), and at 0.9 the greatest pressure is that of 1 - 0.81, a fifth, of the sinkage; at 1 it is none.
+#: (compact sand, slip 1), and at 0.9 the greatest pressure is that of a fifth of the sinkage; at 1 it is none.
 FOREMOST = 0.9
 #: Steps of Newton's method for the point of an ellipsoid that is nearest to a centre.  Measured on 400,000 random
 #: centres with known nearest points, the largest half axis 1: the distance is right to 2e-15 after 7 steps for centres

@@ -161,8 +161,8 @@ def test_brush_is_passive(lengths: tuple[float, float], settling: float) -> None
     """Of random states that stand or roll: power of the road and what the tyre takes up are no gain together.
 
     The tread holds s_0 times the integral of the force over the size of the slip, and the carcass F (s - s_0) F / (2 C)
-    in each direction; at rest that is a function of the deflections alone, and moving slowly enough, V < reversal / 100,
-    it still is.
+    in each direction; at rest that is a function of the deflections alone, and moving slowly enough, V < reversal /
+    100, it still is.
     """
     mod = corner(BRUSH, relaxation=lengths, settling=settling)
     random, load, lost = np.random.default_rng(12), 3000.0, 0
@@ -197,7 +197,7 @@ def test_closed_loops_of_a_locked_wheel_gain_no_energy(lengths: tuple[float, flo
     wheel, load = m.body("wheel", mass=1.0, inertia=(1, 1, 1)), 3000.0
     m.translational("j", m.ground.at(0, 0, R - load / STIFFNESS), wheel)
     m.tyre("tyre", m.ground, wheel, radius=R, stiffness=STIFFNESS, **{**BRUSH, "relaxation": lengths})
-    mod = m.compile()
+    mod = m.compile(target="numpy")
     names = list(mod.x_names)
     rows = [names.index(k) for k in ("tyre_deflection_x", "tyre_deflection_y", "j_x_dot", "j_y_dot")]
     grip, turn, number = 3.0 * MU * load / C, 2.0 * np.pi, 60  # one loop in a second
