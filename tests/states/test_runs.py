@@ -121,7 +121,7 @@ def test_many_runs_are_single_runs() -> None:
     for k, (tau, a) in enumerate(zip(taus, starts, strict=True)):
         single = mod.simulate(3.0, parameters={"tau": tau}, initial={"a": a}).x[:, -1]
         np.testing.assert_array_equal(alone.x[:, k], single)
-        np.testing.assert_allclose(many.x[:, k], single, rtol=0.0, atol=1e-8)  # steps are chosen by sums in other orders
+        np.testing.assert_allclose(many.x[:, k], single, rtol=0.0, atol=1e-8)
 
 
 def test_trajectories_keep_states(tmp_path: Path) -> None:
