@@ -37,8 +37,9 @@ LAYER = {
     "_contacts.pxi": ("cython/_contacts.pxi",),
     "eomgen_contacts.h": ("c/contacts/eomgen_contacts.h",),
     "eomgen_contacts.c": (
+        "c/contacts/maps.c",
         "c/steppers/lu.c",
-        *(f"c/contacts/{name}.c" for name in ("maps", "newton", "rounded", "solve")),
+        *(f"c/contacts/{name}.c" for name in ("newton", "rounded", "solve")),
     ),
     "eomgen_wide_steps.c": ("c/steppers/wide.c",),
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),

@@ -1,5 +1,6 @@
 /* The laws of contact as natural maps. */
-#include <stdlib.h>
+#include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #include "eomgen_contacts.h"
@@ -40,7 +41,7 @@ static void soften(contacts *s, const double *P, double part)
 
 static void velocities(contacts *s, const double *P)
 {
-    for (int k = 0; k < s->n; k++) { s->y[k] = s->c[k] + dot(s->n, s->W + (size_t)k*s->n, P) + s->more[k]*P[k]; }
+    for (int k = 0; k < s->n; k++) { s->y[k] = s->c[k] + dot(s->n, s->W + (ptrdiff_t)k*s->n, P) + s->more[k]*P[k]; }
 }
 
 static double length_of(int n, const double *x)
@@ -77,12 +78,12 @@ static void sweep(const contacts *s, double *P)
 {
     const int d = s->d, n = s->n;
     for (int i = 0; i < s->m; i++) {
-        const double *const W = s->W + (size_t)i*d*n;
+        const double *const W = s->W + (ptrdiff_t)i*d*n;
         double *const p = P + i*d, pulled[4], y[4];
-        for (int k = 0; k < d; k++) { y[k] = s->given[i*d + k] + dot(n, W + (size_t)k*n, P); }
+        for (int k = 0; k < d; k++) { y[k] = s->given[i*d + k] + dot(n, W + (ptrdiff_t)k*n, P); }
         const double pressed = p[0] - y[0]/s->normal[i], push = pressed > 0.0 ? pressed : 0.0, change = push - p[0];
         p[0] = push;
-        for (int k = 1; k < d; k++) { pulled[k] = p[k] - (y[k] + W[(size_t)k*n + i*d]*change)/s->across[i]; }
+        for (int k = 1; k < d; k++) { pulled[k] = p[k] - (y[k] + W[(ptrdiff_t)k*n + i*d]*change)/s->across[i]; }
         const double size = length_of(d - 1, pulled + 1), reach = s->friction[i]*push;
         for (int k = 1; k < d; k++) { p[k] = size > reach ? pulled[k]*(reach/size) : pulled[k]; }
     }

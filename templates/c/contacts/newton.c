@@ -9,7 +9,7 @@ static void add_rows(const contacts *s, int i, int count, const double *own, con
         if (slopes[k] == 0.0 && own[k] == 0.0) {
             continue;
         }
-        const double *const W = s->W + (size_t)(i*d + k)*s->n;
+        const double *const W = s->W + (ptrdiff_t)(i*d + k)*s->n;
         for (int a = 0; a < count; a++) {
             const int j = s->on[a];
             for (int l = 0; l < d; l++) { row[a*d + l] += slopes[k]*W[j*d + l]; }
@@ -33,7 +33,7 @@ static int newton_step(contacts *s, double *P)
         if (s->pressed[i] > 0.0) { s->on[count++] = i; }
     }
     const int n = count*d;
-    memset(s->A, 0, (size_t)n*n*sizeof(double));
+    memset(s->A, 0, (size_t)n*(size_t)n*sizeof(double));
     for (int a = 0; a < count; a++) {
         const int i = s->on[a];
         const double *const pulled = s->pulled + i*d;
@@ -54,7 +54,7 @@ static int newton_step(contacts *s, double *P)
                     own[l] -= part, slopes[l] += part/s->across[i];
                 }
             }
-            add_rows(s, i, count, own, slopes, s->A + (size_t)(a*d + k)*n, s->b + a*d + k);
+            add_rows(s, i, count, own, slopes, s->A + (ptrdiff_t)(a*d + k)*n, s->b + a*d + k);
         }
     }
     if (lu_factor(n, s->A, s->order)) {

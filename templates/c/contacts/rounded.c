@@ -10,7 +10,7 @@ static int rounded_step(contacts *s, double *P, double rounding, double *left)
         const double near = rounding/s->normal[i], beside = rounding/s->across[i];
         const double x = p[0] - y[0]/s->normal[i], root = sqrt(x*x + 4.0*near*near);
         const double push = x < 0.0 ? 2.0*near*near/(fabs(x) + root) : 0.5*(x + root), rise = 0.5*(1.0 + x/root);
-        double *const rows = s->A + (size_t)i*d*n, square = beside*beside;
+        double *const rows = s->A + (ptrdiff_t)i*d*n, square = beside*beside;
         miss[0] = p[0] - push;
         for (int k = 1; k < d; k++) {
             pulled[k] = p[k] - y[k]/s->across[i];
@@ -24,12 +24,12 @@ static int rounded_step(contacts *s, double *P, double rounding, double *left)
         for (int k = 1; k < d; k++) { miss[k] = p[k] - part*pulled[k]; }
         for (int k = 0; k < d; k++) {
             /* slopes of the map k by x (k = 0) and by the pulled ones: rows of I minus these times rows of d x, d pulled */
-            double *const row = rows + (size_t)k*n;
+            double *const row = rows + (ptrdiff_t)k*n;
             slope[0] = k ? pulled[k]*by_reach*s->friction[i]*rise : rise;
             for (int l = 1; l < d; l++) { slope[l] = k ? pulled[k]*by_size*pulled[l]/size + (k == l)*part : 0.0; }
             memset(row, 0, (size_t)n*sizeof(double));
             for (int l = 0; l < d; l++) {
-                const double *const W = s->W + (size_t)(i*d + l)*n, ratio = slope[l]/(l ? s->across[i] : s->normal[i]);
+                const double *const W = s->W + (ptrdiff_t)(i*d + l)*n, ratio = slope[l]/(l ? s->across[i] : s->normal[i]);
                 for (int j = 0; ratio != 0.0 && j < n; j++) { row[j] += ratio*W[j]; }
                 row[i*d + l] += ratio*s->more[i*d + l] - slope[l];
             }

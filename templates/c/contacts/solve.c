@@ -36,28 +36,22 @@ static int iterate(contacts *s, double *P, double tolerance, int most, double *r
     return count;
 }
 
-int eomgen_solve_contacts(int m, int d, const double *W, const double *c, const double *friction, double *P,
-                          double tolerance, int most, int *count, double *residual)
+void eomgen_solve_contacts(int m, int d, const double *W, const double *c, const double *friction, double *P,
+                           double tolerance, int most, double *work, int *numbers, int *count, double *residual)
 {
-    const size_t n = (size_t)m*d;
-    contacts s = {m, d, (int)n, W, c, friction};
-    double *const room = malloc((n*(n + 8) + 3*(size_t)m + 1)*sizeof(double)), *next = room;
-    int *const numbers = malloc((n + m + 1)*sizeof(int));
+    const int n = m*d;
+    contacts s;
+    double *next = work;
     double **const parts[] = {&s.c, &s.more, &s.y, &s.misses, &s.pulled, &s.b, &s.tried, &s.best};
-    if (room == NULL || numbers == NULL) {
-        free(room), free(numbers);
-        return 1;
-    }
+    s.m = m, s.d = d, s.n = n, s.W = W, s.given = c, s.friction = friction;
     for (size_t k = 0; k < sizeof(parts)/sizeof(*parts); k++, next += n) { *parts[k] = next; }
     s.normal = next, s.across = next + m, s.pressed = next + 2*m, s.A = next + 3*m;
     s.order = numbers, s.on = numbers + n;
     for (int i = 0; i < m; i++) {
         double across = 0.0;
         for (int k = 1; k < d; k++) { across += W[(i*d + k)*(n + 1)]; }
-        s.normal[i] = W[(size_t)i*d*(n + 1)] > 0.0 ? W[(size_t)i*d*(n + 1)] : 1.0;
+        s.normal[i] = W[i*d*(n + 1)] > 0.0 ? W[i*d*(n + 1)] : 1.0;
         s.across[i] = across > 0.0 ? across : 1.0;
     }
     *count = iterate(&s, P, tolerance, most, residual);
-    free(room), free(numbers);
-    return 0;
 }
