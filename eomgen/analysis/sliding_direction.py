@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..limits.rounding import EPS
 from ..numeric import algebra
 from ..numeric.contact_impulses import ContactProblem
 from ..numeric.scales import Array
@@ -44,7 +45,7 @@ def _angles(W: Array, c: Array, mu: float) -> Array:
     moved = W @ np.vstack([np.ones(SAMPLES), -mu * u])
     y = moved[0] * c[1:, None] - c[0] * moved[1:]
     waves = (np.fft.fft(u[0] * y[1] - u[1] * y[0]) / SAMPLES)[ORDERS]
-    orders = ORDERS if abs(waves[0]) > np.finfo(float).eps * np.abs(waves).max() else ORDERS[1:-1]
+    orders = ORDERS if abs(waves[0]) > EPS * np.abs(waves).max() else ORDERS[1:-1]
     waves = waves[2 - orders]
     if not abs(waves[0]) > 0.0:
         return np.zeros(0)
