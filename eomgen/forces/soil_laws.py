@@ -219,7 +219,7 @@ SOIL: Fields = {
     "peak_angle": Field(
         "radii",
         "c1 and c2 of wheels, whose pressure is greatest at (c1 + c2 abs(slip)) times the angle of entry, such as "
-        "[0.43, 0.32] of compact and [0.18, 0.32] of loose sand (Wong and Reece, 1967); at the lowest point unless given",
+        "[0.43, 0.32] of compact, [0.18, 0.32] of loose sand (Wong and Reece, 1967); at the lowest point unless given",
         dimension=NONE,
     ),
     "reversal": Field(

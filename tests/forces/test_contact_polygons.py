@@ -265,7 +265,7 @@ def test_forces_are_slopes_of_the_energy_of_the_geometry(name: str) -> None:
         sides = np.array([q + way * h * np.eye(6)[i] for i in range(6) for way in (1, -1)])
         slopes = np.diff(mod.energy(states(sides))[1].reshape(6, 2), axis=1)[:, 0] / (2 * h)
         around = -mod.bias(0.0, states(sides))
-        if np.abs(around.T - force).max() > 1e-2 * scale[0]:  # the force jumps here
+        if np.any(np.abs(around.T - force) > 1e-3 * scale):  # the force or its moment jumps here
             kinks += 1
             continue
         assert np.all(np.abs(force - slopes) < 1e-4 * scale), (q, depth)
@@ -284,7 +284,7 @@ def test_energy_is_kept_in_deep_hits(name: str) -> None:
     rng = np.random.default_rng(7)
     for _ in range(5):
         way = rng.uniform(-np.pi, np.pi)
-        start = {"j1_x": 0.45 * np.cos(way), "j1_y": 0.45 * np.sin(way), "j0_3_dot": rng.uniform(-9, 9)}
+        start = {"j1_x": 0.7 * np.cos(way), "j1_y": 0.7 * np.sin(way), "j0_3_dot": rng.uniform(-9, 9)}
         start |= {"j1_3": rng.uniform(-3, 3), "j1_3_dot": rng.uniform(-9, 9)}
         run = mod.simulate((0, 1), initial=start, method="DOP853", rtol=1e-9, atol=1e-11)
         energy = np.sum(mod.energy(np.ascontiguousarray(run.x)), axis=0)

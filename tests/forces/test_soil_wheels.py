@@ -208,11 +208,11 @@ def test_exact_derivatives(target: str, peak: dict[str, Any]) -> None:
     shape = {"shape": "circle", "on": body, "radius": m.parameter("r", R), "width": B}
     m.contacts("soil", shape, {"shape": "half_plane", "on": m.ground}, law)
     mod = m.compile(target=target)
-    for depth, forward, spin, h in (
-        (0.06, 1.0, 2.4, 1e-6), (0.02, -0.003, 0.01, 1e-6), (-0.1, 1.0, 2.0, 1e-6),
-        (0.06, 0.0, 0.0, 1e-9),  # where the slope of j (1 - |j| / (2 K)) turns
+    for depth, forward, spin, sink, h in (
+        (0.06, 1.0, 2.4, 0.05, 1e-6), (0.02, -0.003, 0.01, 0.05, 1e-6), (-0.1, 1.0, 2.0, 0.05, 1e-6),
+        (0.06, 0.0, 0.0, 0.0, 1e-9),  # where the slope of j (1 - |j| / (2 K)) turns; pressed in, the shear's bound does
     ):  # fmt: skip
-        x = mod.x0(j_y=R - depth, j_x_dot=forward, j_y_dot=-0.05, j_3_dot=-spin)
+        x = mod.x0(j_y=R - depth, j_x_dot=forward, j_y_dot=-sink, j_3_dot=-spin)
         step = h * np.eye(len(x))
         wanted = np.array([(mod.rhs(0.0, x + e) - mod.rhs(0.0, x - e)) / (2 * h) for e in step]).T
         tolerance = 1e-6 if h == 1e-6 else 1e-5
