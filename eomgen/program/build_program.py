@@ -36,7 +36,7 @@ CURVED_LEAST = 8
 NOT_CURVED = (
     "second derivatives of the right-hand side of {!r} are not derived: they follow from a solution without pivots, "
     "which the methods augmented, newton_euler and amalgamated do not have, nor mechanisms without a degree of freedom "
-    "or with given rates; derive by another method, or take differences of jacobian"
+    "or with given rates; derive by another method, or take mixed differences of rhs"
 )
 
 

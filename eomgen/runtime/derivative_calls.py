@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 UNSOUND = (
     "second derivatives of a right-hand side with constraints are taken from a solution without pivots, which is not "
     "accurate at this state, such as near a change point or where hardly any inertia is left; "
-    "take differences of jacobian"
+    "take mixed differences of rhs, or differences of jacobian in directions along the constraints"
 )
 
 
