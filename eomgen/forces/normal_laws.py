@@ -142,33 +142,20 @@ class DampedLinear(NormalLaw):
 
 
 @dataclass(frozen=True)
-class HertzBodies(NormalLaw):
-    """Hertz's law of two elastic bodies, before their radii are known.
+class HertzBodies(HuntCrossley):
+    """Hertz's law of two elastic bodies, of an effective radius of 1 m; :meth:`at` gives that of others.
 
     F = (4/3) E sqrt(R) d^(3/2), with 1 / E = (1 - nu1^2) / E1 + (1 - nu2^2) / E2 and 1 / R = 1 / R1 + 1 / R2 (Johnson,
-    Contact Mechanics, 1985, equations 4.22 to 4.24).  ``modulus`` is E (Pa).
+    Contact Mechanics, 1985, equations 4.22 to 4.24).
     """
 
     formula: ClassVar[str] = r"F_n = \frac{4}{3} E \sqrt{R} d^{3/2} (1 + \lambda \dot{d}), \quad d > 0"
 
-    modulus: Expr
-    dissipation: Expr
-
     def at(self, radius: Callable[[], Expr]) -> HuntCrossley:
-        stiffness = 4.0 / 3.0 * self.modulus * sqrt(radius())
-        return HuntCrossley(stiffness, stiffness.graph.constant(EXPONENT), self.dissipation)
+        return HuntCrossley(self.stiffness * sqrt(radius()), self.exponent, self.dissipation)
 
     def mapped(self, own: Callable[[Expr], Expr]) -> HertzBodies:
-        return HertzBodies(own(self.modulus), own(self.dissipation))
-
-    def force(self, depth: Expr, rate: Expr) -> Expr:
-        raise NotImplementedError("radii are missing")
-
-    def elastic(self, depth: Expr) -> Expr:
-        raise NotImplementedError("radii are missing")
-
-    def energy(self, depth: Expr) -> Expr:
-        raise NotImplementedError("radii are missing")
+        return HertzBodies(own(self.stiffness), own(self.exponent), own(self.dissipation))
 
 
 @dataclass(frozen=True)
@@ -301,11 +288,12 @@ def _elastic(e: Entry, kind: str) -> NormalLaw:
     ):
         for k, x in enumerate(found or ()):
             e.require(f"{key}[{k}]", x, right, rule)
-    dissipation = _dissipation(e)
+    exponent, dissipation = e.graph.constant(EXPONENT), _dissipation(e)
     if moduli is None or ratios is None:
-        return HertzBodies(e.stand_in, dissipation)
+        return HertzBodies(e.stand_in, exponent, dissipation)
     (E1, E2), (nu1, nu2) = moduli, ratios
-    return HertzBodies(1.0 / ((1.0 - nu1 * nu1) / E1 + (1.0 - nu2 * nu2) / E2), dissipation)
+    modulus = 1.0 / ((1.0 - nu1 * nu1) / E1 + (1.0 - nu2 * nu2) / E2)
+    return HertzBodies(4.0 / 3.0 * modulus, exponent, dissipation)
 
 
 def _dissipation(e: Entry) -> Expr:
