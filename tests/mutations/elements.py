@@ -168,8 +168,8 @@ FAULTS = (
     ),
     Fault(
         "contact-arm", "eomgen/forces/contact.py",
-        "MarkerLoad(self.first, vec.neg(force), vec.cross(force, first)),",
-        "MarkerLoad(self.first, vec.neg(force), vec.cross(first, force)),",
+        "on_second, on_first = vec.cross(arms[1], force), vec.cross(force, arms[0])",
+        "on_second, on_first = vec.cross(arms[1], force), vec.cross(arms[0], force)",
         "friction at a contact turns the first body the wrong way",
         ("tests/forces/test_loads.py::test_contact_of_two_bodies[point_plane]",),
     ),
