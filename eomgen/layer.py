@@ -39,7 +39,7 @@ LAYER = {
     "eomgen_contacts.c": (
         "c/contacts/maps.c",
         "c/steppers/lu.c",
-        *(f"c/contacts/{name}.c" for name in ("newton", "rounded", "solve")),
+        *(f"c/contacts/{name}.c" for name in ("newton", "rounded", "solve", "held", "near", "collide", "step")),
     ),
     "eomgen_wide_steps.c": ("c/steppers/wide.c",),
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),

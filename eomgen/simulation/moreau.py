@@ -119,6 +119,7 @@ def step_rigidly(
     finally:
         if watch is not None:
             watch.close()
+    steps.finish()
     if steps.missed and not is_told_by_the_caller():
         warnings.warn(
             f"{steps.missed} of {steps.taken} steps leave a residual of the contact laws of up to {steps.residual:.3g} "

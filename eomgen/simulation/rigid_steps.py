@@ -31,6 +31,7 @@ from ..numeric import algebra
 from ..numeric.contact_impulses import ContactImpulses, ContactProblem, solve_contacts
 from ..numeric.scales import Array
 from ..runtime.late import eager
+from .rigid_in_c import DONE, TOO_LONG, rigid_stepper
 from .rigid_rows import RigidContacts, RigidRows
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ class RigidSteps:
         self._meeting = module.kernels.motion("meeting_time") if "meeting_time" in names else None
         self._solve = getattr(eager(module.core), "solve_contacts", None)
         self._last: dict[Spot, Array] = {}
+        self._in_c = rigid_stepper(module, forcing, self.contacts, tolerance, iterations)
 
     def move(self, q: Array, d: Array) -> Array:
         """The position that velocities d (n_v,) lead to in unit time."""
@@ -86,6 +88,14 @@ class RigidSteps:
             Shapes pass each other in steps that are much shorter.
         """
         return self._whole_or_halves(t, q, v, h, HALVINGS)
+
+    def finish(self) -> None:
+        """Count what compiled code did among the rest."""
+        if self._in_c is not None:
+            done, self._in_c = self._in_c, None
+            self.residual, self.depth = max(self.residual, done.residual), max(self.depth, done.depth)
+            self.iterations, self.most = max(self.iterations, done.iterations), max(self.most, done.contacts)
+            self.missed += done.missed
 
     def _whole_or_halves(self, t: float, q: Array, v: Array, h: float, left: int) -> tuple[Array, Array]:
         known = self.residual, self.missed, self.iterations, self.most, self.depth
@@ -111,6 +121,17 @@ class RigidSteps:
 
     def _one(self, t: float, q: Array, v: Array, h: float) -> tuple[Array, Array] | None:
         """One step, or None where shapes may pass each other in one of its halves."""
+        if self._in_c is not None:
+            x = np.concatenate([q, v])
+            status = self._in_c.step(t, h, x, x)
+            if status == TOO_LONG:
+                return None
+            if status == DONE:
+                return x[: len(q)], x[len(q) :]
+        return self._in_python(t, q, v, h)
+
+    def _in_python(self, t: float, q: Array, v: Array, h: float) -> tuple[Array, Array] | None:
+        """The same here, which says what is wrong where compiled code fails."""
         middle, n_q = t + 0.5 * h, len(q)
         self._misses = False
         q_m = self.move(q, 0.5 * h * v)

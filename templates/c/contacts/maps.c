@@ -1,4 +1,5 @@
 /* The laws of contact as natural maps. */
+#include <float.h>
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -39,9 +40,20 @@ static void soften(contacts *s, const double *P, double part)
     }
 }
 
+/* y = c + W P + more P, by rows of W, which is symmetric. */
+EOMGEN_ROWS static void find_velocities(int n, const double *restrict W, const double *restrict c, const double *restrict more,
+                                        const double *restrict P, double *restrict y)
+{
+    for (int k = 0; k < n; k++) { y[k] = c[k] + more[k]*P[k]; }
+    for (int j = 0; j < n; j++) {
+        const double *restrict const row = W + (ptrdiff_t)j*n;
+        for (int k = 0; P[j] != 0.0 && k < n; k++) { y[k] += P[j]*row[k]; }
+    }
+}
+
 static void velocities(contacts *s, const double *P)
 {
-    for (int k = 0; k < s->n; k++) { s->y[k] = s->c[k] + dot(s->n, s->W + (ptrdiff_t)k*s->n, P) + s->more[k]*P[k]; }
+    find_velocities(s->n, s->W, s->c, s->more, P, s->y);
 }
 
 static double length_of(int n, const double *x)
@@ -73,18 +85,39 @@ static double find_misses(contacts *s, const double *P)
     return largest;
 }
 
-/* Each contact for itself, one after the other, as given. */
-static void sweep(const contacts *s, double *P)
+/* Each contact for itself, one after the other, as given; y are the velocities for P and stay so. */
+EOMGEN_ROWS static void sweep_all(int m, int d, const double *restrict given, const double *restrict normal,
+                                  const double *restrict across, const double *restrict friction, double *restrict P,
+                                  double *restrict y)
 {
-    const int d = s->d, n = s->n;
-    for (int i = 0; i < s->m; i++) {
-        const double *const W = s->W + (ptrdiff_t)i*d*n;
-        double *const p = P + i*d, pulled[4], y[4];
-        for (int k = 0; k < d; k++) { y[k] = s->given[i*d + k] + dot(n, W + (ptrdiff_t)k*n, P); }
-        const double pressed = p[0] - y[0]/s->normal[i], push = pressed > 0.0 ? pressed : 0.0, change = push - p[0];
+    const int n = m*d;
+    for (int i = 0; i < m; i++) {
+        const double *restrict const W = given + (ptrdiff_t)i*d*n;
+        double *restrict const p = P + i*d, change[3] = {0.0, 0.0, 0.0}, pulled[3], square = 0.0;
+        const double pressed = p[0] - y[i*d]/normal[i], push = pressed > 0.0 ? pressed : 0.0, reach = friction[i]*push;
+        change[0] = push - p[0];
+        for (int k = 1; k < d; k++) {
+            pulled[k] = p[k] - (y[i*d + k] + W[(ptrdiff_t)k*n + i*d]*change[0])/across[i];
+            square += pulled[k]*pulled[k];
+        }
+        const double size = sqrt(square), part = size > reach ? reach/size : 1.0;
         p[0] = push;
-        for (int k = 1; k < d; k++) { pulled[k] = p[k] - (y[k] + W[(ptrdiff_t)k*n + i*d]*change)/s->across[i]; }
-        const double size = length_of(d - 1, pulled + 1), reach = s->friction[i]*push;
-        for (int k = 1; k < d; k++) { p[k] = size > reach ? pulled[k]*(reach/size) : pulled[k]; }
+        for (int k = 1; k < d; k++) {
+            change[k] = pulled[k]*part - p[k];
+            p[k] = pulled[k]*part;
+        }
+        if (d == 2 && (change[0] != 0.0 || change[1] != 0.0)) {
+            for (int k = 0; k < n; k++) { y[k] += change[0]*W[k] + change[1]*W[n + k]; }
+            continue;
+        }
+        for (int l = 0; l < d; l++) {
+            for (int k = 0; change[l] != 0.0 && k < n; k++) { y[k] += change[l]*W[(ptrdiff_t)l*n + k]; }
+        }
     }
+}
+
+/* As many sweeps, from the velocities for P on. */
+static void sweep(const contacts *s, double *P, int times)
+{
+    for (int k = 0; k < times; k++) { sweep_all(s->m, s->d, s->W, s->normal, s->across, s->friction, P, s->y); }
 }

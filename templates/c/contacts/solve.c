@@ -13,7 +13,7 @@ static int iterate(contacts *s, double *P, double tolerance, int most, double *r
     int count = 0;
     memcpy(s->best, P, bytes);
     for (int k = 0; k < RIGID_WARM && least > tolerance && s->m >= RIGID_MANY; k++) {
-        for (int l = 0; l < RIGID_SWEEPS; l++) { sweep(s, P); }
+        sweep(s, P, RIGID_SWEEPS);
         keep_better(s, P, &least);
     }
     memcpy(P, s->best, bytes);
@@ -24,7 +24,8 @@ static int iterate(contacts *s, double *P, double tolerance, int most, double *r
         keep_better(s, P, &least);
         memcpy(P, s->best, bytes);
         if (least > tolerance) {
-            for (int l = 0; l < RIGID_SWEEPS; l++) { sweep(s, P); }
+            (void)residual_of(s, P); /* velocities */
+            sweep(s, P, RIGID_SWEEPS);
             keep_better(s, P, &least);
         }
     }

@@ -1,0 +1,117 @@
+/* Impulses of the contacts that act in one step. */
+
+typedef struct {
+    int m, n; /* contacts, their rows */
+    double *records;                              /* in the order of the contacts */
+    double *J, *X, *W;                            /* rows by velocities; L^-T J^T without what constraints take; X^T X */
+    double *before, *undisturbed, *after, *c, *P; /* velocities, what the laws start from, impulses */
+    double *friction, *arrive, *back, *out;
+    double *work;
+    int *rests, *numbers;
+} meeting;
+
+/* Impulses of the same pairs in the last step, places of one pair numbered. */
+static void recall(const eomgen_rigid *s, meeting *at, int *keys)
+{
+    int seek = 0;
+    for (int c = 0; c < at->m; c++) {
+        int *const key = keys + 3*c;
+        key[0] = (int)at->records[RECORD_OF*c], key[1] = (int)at->records[RECORD_OF*c + 1], key[2] = 0;
+        for (int other = c - 1; other >= 0; other--) {
+            if (keys[3*other] == key[0] && keys[3*other + 1] == key[1]) {
+                key[2] = keys[3*other + 2] + 1;
+                break;
+            }
+        }
+        for (int k = 0; k < s->d; k++) { at->P[c*s->d + k] = 0.0; }
+        for (int tried = 0; tried < s->known; tried++, seek++) { /* both are in nearly the same order */
+            seek = seek < s->known ? seek : 0;
+            if (memcmp(s->keys + 3*seek, key, 3*sizeof(int)) == 0) {
+                memcpy(at->P + c*s->d, s->last + 3*seek, (size_t)s->d*sizeof(double));
+                seek++;
+                break;
+            }
+        }
+    }
+}
+
+/* Impulses and velocities `out` after them for velocities `free` without; the residual of the step grows. */
+static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, const double *free, double h, double *out, eomgen_rigid *told)
+{
+    const int m = at->m, d = s->d, n = at->n;
+    double scale, residual = 0.0;
+    int rebounds = 0, count = 0;
+    across(s->n_v, n, at->J, free, at->undisturbed);
+    scale = fmax(largest_of(n, at->before, 1), largest_of(n, at->undisturbed, 1));
+    for (int c = 0; c < m; c++) {
+        const double gap = -at->records[RECORD_OF*c + 5], e = at->records[RECORD_OF*c + 13];
+        const double before = at->before[c*d], undisturbed = at->undisturbed[c*d];
+        const int strikes = before < -RIGID_RESTING*fabs(undisturbed - before) && e > 0.0 && gap + h*undisturbed < 0.0;
+        at->arrive[c] = gap > 0.0 ? -gap/h : 0.0;
+        at->back[c] = strikes ? -e*before - at->arrive[c] : 0.0;
+        at->rests[c] = !strikes;
+        rebounds = rebounds || at->back[c] != 0.0;
+    }
+    memcpy(at->out, at->P, (size_t)n*sizeof(double)); /* what the solution starts from */
+    for (int k = 0; k <= RIGID_GENTLER; k++) {
+        const double part = k == RIGID_GENTLER ? 0.0 : ldexp(1.0, -k);
+        double work = 0.0, moved = 0.0;
+        memcpy(at->c, at->undisturbed, (size_t)n*sizeof(double));
+        for (int c = 0; c < m; c++) { at->c[c*d] -= at->arrive[c] + part*at->back[c]; }
+        memcpy(at->P, at->out, (size_t)n*sizeof(double));
+        eomgen_solve_contacts(m, d, at->W, at->c, at->friction, at->P, s->tolerance*scale, s->most, at->work, at->numbers,
+                              &count, &residual);
+        if (!rebounds) {
+            break;
+        }
+        across(n, n, at->W, at->P, at->after);
+        for (int r = 0; r < n; r++) {
+            const double after = at->undisturbed[r] + at->after[r];
+            work += at->P[r]*(after + at->before[r]); /* twice: forces act with the velocity of the middle */
+            moved += fabs(at->P[r])*(fabs(after) + fabs(at->before[r]));
+        }
+        if (work <= RIGID_GROWN*moved) {
+            break; /* impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985) */
+        }
+    }
+    told->residual = fmax(told->residual, residual);
+    told->missed = told->missed || !(residual <= s->tolerance*scale);
+    told->iterations = count > told->iterations ? count : told->iterations;
+    along(s->n_v, n, at->X, at->P, out);
+    release(s->n_v, held->L, out);
+    for (int i = 0; i < s->n_v; i++) { out[i] += free[i]; }
+}
+
+/* A displacement that removes a part of the penetration of contacts that last; whether there is one. */
+static int push_out(const eomgen_rigid *s, const inertia *held, meeting *at, const double *next, double h, double *out)
+{
+    const int m = at->m, d = s->d, n = at->n;
+    double *const W = at->W, *const wanted = at->c, *const P = at->after;
+    double largest = 0.0, residual = 0.0;
+    int *const lasts = at->rests;
+    int count = 0, iterations = 0;
+    across(s->n_v, n, at->J, next, at->undisturbed);
+    for (int c = 0; c < m; c++) {
+        const double gap = -at->records[RECORD_OF*c + 5], removed = -RIGID_REMOVED*gap;
+        if (gap < 0.0 && at->rests[c] && (at->P[c*d] > 0.0 || h*at->undisturbed[c*d] < removed)) {
+            wanted[count] = -removed, P[count] = 0.0, at->before[count] = 0.0;
+            largest = fmax(largest, removed);
+            lasts[count++] = c;
+        }
+    }
+    if (!count) {
+        return 0;
+    }
+    for (int a = 0; a < count; a++) { /* in place: W is not needed any more */
+        for (int b = 0; b < count; b++) { W[a*count + b] = at->W[(ptrdiff_t)lasts[a]*d*n + lasts[b]*d]; }
+        W[a*count + a] *= 1.0 + RIGID_YIELDING;
+    }
+    eomgen_solve_contacts(count, 1, W, wanted, at->before, P, s->tolerance*largest, s->most, at->work, at->numbers, &iterations,
+                          &residual);
+    for (int i = 0; i < s->n_v; i++) {
+        out[i] = 0.0;
+        for (int a = 0; a < count; a++) { out[i] += at->X[(ptrdiff_t)i*n + lasts[a]*d]*P[a]; }
+    }
+    release(s->n_v, held->L, out);
+    return 1;
+}
