@@ -38,3 +38,6 @@ PIVOT = 1e-10
 #: A constraint row whose part beside the others is smaller than this holds nothing of its own: squares of it are the
 #: rounding, 1e-15, below which the pseudo-inverse of C M^-1 C^T leaves singular values out.
 DEPENDENT = 3e-8
+#: Times the tolerance to which impulses are found at first: they only say with which velocities forces act, and of an error
+#: in these no more than the change of forces within a step, a hundredth, comes back.
+ROUGH = 10.0

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import SimulationError
-from ..limits.rigid_contacts import GENTLER, GROWN, HALVINGS, REMOVED, RESTING, YIELDING
+from ..limits.rigid_contacts import GENTLER, GROWN, HALVINGS, REMOVED, RESTING, ROUGH, YIELDING
 from ..numeric import algebra
 from ..numeric.contact_impulses import ContactImpulses, ContactProblem, solve_contacts
 from ..numeric.scales import Array
@@ -146,12 +146,10 @@ class RigidSteps:
         free = held.free(v - h * (held.inverse @ bias))
         rows = self._near(self.contacts.rows(middle, q_m, u), v, free, h)
         meeting = _Meeting(held, rows, v, self._last) if rows.gaps.size else None
-        new, P = self._contact(meeting, free, h)
+        new, P = self._contact(meeting, free, h, ROUGH)
         x[n_q:] = 0.5 * (v + new)
-        again = self.bias(middle, x, u=u)
-        if not np.array_equal(again, bias):
-            free = held.free(v - h * (held.inverse @ again))
-            new, P = self._contact(meeting, free, h)
+        free = held.free(v - h * (held.inverse @ self.bias(middle, x, u=u)))
+        new, P = self._contact(meeting, free, h, 1.0)
         if self._passes(middle, q_m, new, u, 0.5 * h):
             return None
         position = self.move(q_m, 0.5 * h * new)
@@ -170,8 +168,8 @@ class RigidSteps:
         fastest = max(float(np.abs(rows.jacobian @ velocity).max()) for velocity in (v, free))
         return rows.chosen(np.flatnonzero(rows.gaps <= 2.0 * h * fastest))
 
-    def _contact(self, meeting: _Meeting | None, free: Array, h: float) -> tuple[Array, Array]:
-        """Velocities after the impulses of contacts, and these (m, d)."""
+    def _contact(self, meeting: _Meeting | None, free: Array, h: float, rough: float) -> tuple[Array, Array]:
+        """Velocities after the impulses of contacts, and these (m, d), to so many times the tolerance."""
         if meeting is None:
             return free, np.zeros((0, 2))
         rows, before, W = meeting.rows, meeting.before, meeting.compliance
@@ -185,7 +183,7 @@ class RigidSteps:
             part = 0.0 if k == GENTLER else 0.5**k
             c = undisturbed.copy()
             c[:, 0] -= arrive + part * back
-            found = self._impulses(W, c, rows.friction, meeting.start, self.tolerance * scale)
+            found = self._impulses(W, c, rows.friction, meeting.start, rough * self.tolerance * scale)
             P = found.impulses.ravel()
             after = undisturbed.ravel() + W @ P
             work = P @ after, P @ before.ravel()  # twice: forces act with the velocity of the middle
@@ -193,7 +191,8 @@ class RigidSteps:
                 np.abs(P) @ (np.abs(after) + np.abs(before.ravel()))
             ):
                 break  # impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985)
-        self._note(found, scale, len(rows.gaps))
+        if rough == 1.0:
+            self._note(found, scale, len(rows.gaps))
         self._rests = ~strikes
         self._last = dict(zip(meeting.keys, found.impulses, strict=True))
         meeting.start = found.impulses
