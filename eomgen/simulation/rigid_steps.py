@@ -57,6 +57,9 @@ class RigidSteps:
         The deepest penetration (m).
     taken : int
         Steps, those among them that others were divided into.
+    acting : list of (m, 14) arrays
+        Contacts of steps since the list was emptied: both shapes, normal (3), first direction across it (3), point (3),
+        impulses along the normal and across it (3), which act on the second shape.
     """
 
     def __init__(self, module: BoundModel, forcing: Forcing, tolerance: float, iterations: int) -> None:
@@ -66,6 +69,7 @@ class RigidSteps:
         self.bias = module.kernels.timed("bias_apart")
         self.residual, self.missed, self.iterations, self.most, self.depth = 0.0, 0, 0, 0, 0.0
         self.taken = 0
+        self.acting: list[Array] = []
         self._misses = False
         self._begins = True
         names = module.kernels.core.names
@@ -127,6 +131,7 @@ class RigidSteps:
             if status == TOO_LONG:
                 return None
             if status == DONE:
+                self.acting.append(self._in_c.contacts_of_step())
                 return x[: len(q)], x[len(q) :]
         return self._in_python(t, q, v, h)
 
@@ -154,6 +159,9 @@ class RigidSteps:
             return None
         position = self.move(q_m, 0.5 * h * new)
         self.missed += self._misses
+        pushed = np.zeros((len(P), 3))
+        pushed[:, : P.shape[1]] = P
+        self.acting.append(np.concatenate([rows.pairs, rows.places, pushed], axis=1))
         end = self.forcing(t + h, np.concatenate([position, new])) if self.forcing else None
         away = held.closing(position, t + h, end)
         if rows.gaps.size:
