@@ -137,9 +137,7 @@ class ContactForces:
 def forces_on_second(rows: Array) -> Array:
     """Forces (m, 3) on second shapes, of contacts (m, 14) with forces in place of impulses."""
     normal, first = rows[:, 2:5], rows[:, 5:8]
-    return np.asarray(
-        rows[:, 11:12] * normal + rows[:, 12:13] * first + rows[:, 13:14] * np.cross(normal, first)
-    )
+    return np.asarray(rows[:, 11:12] * normal + rows[:, 12:13] * first + rows[:, 13:14] * np.cross(normal, first))
 
 
 class ForceSums:

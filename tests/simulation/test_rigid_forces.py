@@ -1,4 +1,4 @@
-"""Mean forces of rigid contacts over steps: closed forms at rest and in sliding, momentum to rounding, MuJoCo's forces."""
+"""Mean forces of rigid contacts over steps: closed forms at rest and in sliding, momentum to rounding, MuJoCo."""
 
 from __future__ import annotations
 
@@ -42,7 +42,9 @@ def heap() -> Any:
         m.initial(**{f"j{k}_x": 0.21 * (k % 3) - 0.2, f"j{k}_y": 0.35 + 0.3 * (k // 3), f"j{k}_x_dot": 0.5 - 0.2 * k})
         m.initial(**{f"j{k}_3_dot": 1.0 - k})
         shapes.append(
-            {"shape": "circle", "radius": 0.1, "on": body} if k % 2 else {"shape": "box", "size": (0.2, 0.1), "on": body}
+            {"shape": "circle", "radius": 0.1, "on": body}
+            if k % 2
+            else {"shape": "box", "size": (0.2, 0.1), "on": body}
         )
     m.contacts("heap", shapes, law=rigid(friction=0.4, restitution=0.3))
     m.contacts("floor", shapes, {"shape": "half_plane", "on": m.ground}, rigid(friction=0.6))
