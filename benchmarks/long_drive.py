@@ -93,7 +93,7 @@ def run(quick: bool) -> Report:
         Limit("energy that no motor gave, over the kinetic one", found["gained"], 0.01),
     )
     notes = (
-        f"{seconds:g} s: forwards, {'' if quick else 'backwards, '}and to a stop; steps of 1 ms, CPU seconds of one core.",
+        f"{seconds:g} s: forwards, {'' if quick else 'backwards, '}and to a stop; steps of 1 ms; CPU time of one core.",
         "Penetration: the deepest of the run, its start among it, where shapes lie 3.6 mm in each other.",
         "Turns: the least number of turns of the line of pins around sprocket and idler.",
         "Farthest: distance of a pin from the nearest place of a pin at the start, seen from the frame.",
