@@ -36,11 +36,13 @@ LAYER = {
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
     "_contacts.pxi": ("cython/_contacts.pxi",),
     "eomgen_contacts.h": ("c/contacts/eomgen_contacts.h",),
-    "eomgen_contacts.c": (
+    "eomgen_contact_steps.h": (
         "c/contacts/maps.c",
         "c/steppers/lu.c",
         *(f"c/contacts/{name}.c" for name in ("newton", "rounded", "solve", "held", "near", "collide", "step")),
     ),
+    "eomgen_contacts.c": ("c/contacts/plain.c",),
+    "eomgen_wide_contacts.c": ("c/contacts/wide.c",),
     "eomgen_wide_steps.c": ("c/steppers/wide.c",),
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
     "eomgen_ensembles.c": ("c/ensembles/one_run.c", "c/ensembles/ensembles.c"),

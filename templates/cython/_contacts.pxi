@@ -53,7 +53,7 @@ cdef extern from "eomgen_contacts.h" nogil:
         double *u
         double *w
         double tolerance
-        int most, begins, room, needed
+        int most, begins, wide, room, needed
         int *numbers
         double *x
         double *x_m
@@ -66,6 +66,7 @@ cdef extern from "eomgen_contacts.h" nogil:
         double *acting
         double residual, depth
         int missed, iterations, contacts
+    int eomgen_contacts_wide()
     long eomgen_rigid_fixed(const eomgen_rigid *)
     long eomgen_rigid_further(const eomgen_rigid *)
     int eomgen_rigid_step(eomgen_rigid *, double, double)
@@ -154,6 +155,7 @@ cdef class RigidStepper:
         s.near, s.axes = source_of(sources, "near_pairs"), source_of(sources, "motion_axes")
         s.bias, s.meeting = source_of(sources, "bias_apart"), source_of(sources, "meeting_time")
         s.tolerance, s.most, s.begins, s.room = tolerance, most, 1, 0
+        s.wide = eomgen_contacts_wide()
         cdef cnp.npy_intp n = s.n_q + 2 * s.n_v
         length = 3 * n + s.n_u + n_work + eomgen_rigid_fixed(s)
         self.memory = cnp.PyArray_ZEROS(1, &length, cnp.NPY_DOUBLE, 0)

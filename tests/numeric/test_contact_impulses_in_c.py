@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import ctypes
+import subprocess
+from pathlib import Path
 from typing import Any
 
 import models
 import numpy as np
 import pytest
 
+from eomgen.compilation.compiler import find_compiler
+from eomgen.compilation.cython_layer import HEADERS
+from eomgen.compilation.options import stepper_flags
+from eomgen.layer import read_header, read_layer
 from eomgen.numeric.contact_impulses import ContactProblem, solve_contacts
 from eomgen.runtime.late import eager
+
+FILES = ("eomgen_contacts.c", "eomgen_wide_contacts.c")
 
 
 @pytest.fixture(scope="module")
@@ -83,3 +92,38 @@ def test_numbers_that_are_not_finite_are_told_by_the_residual(in_c: Any) -> None
     _, count, residual = in_c(given.W, given.c, given.mu, np.zeros((10, 2)), 1e-9, 50)
     assert not residual <= 1e-9
     assert count <= 50
+
+
+def test_bits_do_not_depend_on_the_width(tmp_path: Path) -> None:
+    """The text for processors with AVX2 finds the same impulses as that for any."""
+    texts = {**read_layer(), **{name: read_header(name) for name in HEADERS}}
+    for name in ("eomgen_contacts.h", "eomgen_contact_steps.h", *FILES, *HEADERS):
+        (tmp_path / name).write_text(texts[name], encoding="utf-8")
+    flags = [flag for flag in stepper_flags(find_compiler()) if flag != "-fvisibility=hidden"]
+    library = tmp_path / "contacts.so"
+    subprocess.run(
+        [*find_compiler().command, *flags, "-shared", *FILES, "-lm", "-o", str(library)], cwd=tmp_path, check=True
+    )
+    loaded = ctypes.CDLL(str(library))
+    if not loaded.eomgen_contacts_wide():
+        return  # a processor without, or a compiler that makes one text
+    rng = np.random.default_rng(8)
+    for m, d in ((3, 1), (9, 2), (14, 2), (10, 3)):
+        given = problem(rng, m, d, 15)
+        found = []
+        for width in ("plain", "wide"):
+            n = m * d
+            P, work, numbers = np.zeros((m, d)), np.empty(n * (n + 8) + 3 * m), np.empty(n + m, np.intc)
+            count, residual = ctypes.c_int(), ctypes.c_double()
+            getattr(loaded, f"eomgen_{width}_solve_contacts")(
+                m, d, *map(address, (given.W, given.c, given.mu, P)), ctypes.c_double(1e-10), 50,
+                address(work), address(numbers), ctypes.byref(count), ctypes.byref(residual),
+            )  # fmt: skip
+            found.append((P, count.value, residual.value))
+        np.testing.assert_array_equal(found[0][0], found[1][0])
+        assert found[0][0].any()
+        assert found[0][1:] == found[1][1:]
+
+
+def address(array: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)

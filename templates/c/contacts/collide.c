@@ -60,7 +60,7 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
         memcpy(at->c, at->undisturbed, (size_t)n*sizeof(double));
         for (int c = 0; c < m; c++) { at->c[c*d] -= at->arrive[c] + part*at->back[c]; }
         memcpy(at->P, at->out, (size_t)n*sizeof(double));
-        eomgen_solve_contacts(m, d, at->W, at->c, at->friction, at->P, rough*s->tolerance*scale, s->most, at->work, at->numbers,
+        CHOSEN(solve_contacts)(m, d, at->W, at->c, at->friction, at->P, rough*s->tolerance*scale, s->most, at->work, at->numbers,
                               &count, &residual);
         if (!rebounds) {
             break;
@@ -109,7 +109,7 @@ static int push_out(const eomgen_rigid *s, const inertia *held, meeting *at, con
         for (int b = 0; b < count; b++) { W[a*count + b] = at->W[(ptrdiff_t)lasts[a]*d*n + lasts[b]*d]; }
         W[a*count + a] *= 1.0 + RIGID_YIELDING;
     }
-    eomgen_solve_contacts(count, 1, W, wanted, at->before, P, s->tolerance*largest, s->most, at->work, at->numbers, &iterations,
+    CHOSEN(solve_contacts)(count, 1, W, wanted, at->before, P, s->tolerance*largest, s->most, at->work, at->numbers, &iterations,
                           &residual);
     for (int i = 0; i < s->n_v; i++) {
         out[i] = 0.0;

@@ -5,6 +5,18 @@
 
 #include "eomgen.h"
 
+/* Loops over rows of numbers pay for what it takes to go through several at a time. */
+#if defined(__GNUC__) && !defined(__clang__)
+#define DENSE __attribute__((optimize("O3")))
+#else
+#define DENSE
+#endif
+
+/* Whether there is a second text, for processors with AVX2. */
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(EOMGEN_PORTABLE)
+#define EOMGEN_TWO_WIDTHS
+#endif
+
 #if defined(__cplusplus) && !defined(restrict)
 #define restrict __restrict /* C++ has no such word */
 #endif
@@ -38,6 +50,7 @@ typedef struct {
     double tolerance; /* of the laws, part of the velocities of contacts */
     int most;         /* iterations */
     int begins;       /* nothing was stepped yet */
+    int wide;         /* whether the processor takes the second text: eomgen_contacts_wide */
     int room, needed; /* contacts */
     int *numbers;
     double *x, *x_m, *next, *held; /* states [q; v] before, in the middle and after; of eomgen_rigid_fixed */
@@ -50,11 +63,25 @@ typedef struct {
     int missed, iterations, contacts;
 } eomgen_rigid;
 
+int eomgen_contacts_wide(void);
+
 /* How many numbers a step works on whatever the contacts, and how many more for as many as there is room for. */
 long eomgen_rigid_fixed(const eomgen_rigid *s);
 long eomgen_rigid_further(const eomgen_rigid *s);
 
 /* A step from x at t over a time h, to next. `known` and what follows are of the last step that was done. */
 int eomgen_rigid_step(eomgen_rigid *s, double t, double h);
+
+/* Both texts. */
+void eomgen_plain_solve_contacts(int m, int d, const double *W, const double *c, const double *friction, double *P,
+                                 double tolerance, int most, double *work, int *numbers, int *count, double *residual);
+int eomgen_plain_rigid_step(eomgen_rigid *s, double t, double h);
+long eomgen_plain_rigid_fixed(const eomgen_rigid *s);
+long eomgen_plain_rigid_further(const eomgen_rigid *s);
+void eomgen_wide_solve_contacts(int m, int d, const double *W, const double *c, const double *friction, double *P,
+                                double tolerance, int most, double *work, int *numbers, int *count, double *residual);
+int eomgen_wide_rigid_step(eomgen_rigid *s, double t, double h);
+long eomgen_wide_rigid_fixed(const eomgen_rigid *s);
+long eomgen_wide_rigid_further(const eomgen_rigid *s);
 
 #endif

@@ -8,7 +8,7 @@ typedef struct {
 
 /* M = L^T L in place, reciprocals of the pivots on the diagonal; from the last row on, so that zeros between branches of a tree
    stay (Featherstone, 2008, section 6.5). 1 where a pivot is small beside its own diagonal. */
-EOMGEN_ROWS static int factor_inertia(int n, double *restrict M, double *restrict sizes)
+DENSE static int factor_inertia(int n, double *restrict M, double *restrict sizes)
 {
     for (int k = 0; k < n; k++) { sizes[k] = M[k*n + k]; }
     for (int k = n - 1; k >= 0; k--) {
@@ -29,7 +29,7 @@ EOMGEN_ROWS static int factor_inertia(int n, double *restrict M, double *restric
 }
 
 /* L^-T b in place: b has rows of as many columns. */
-EOMGEN_ROWS static void press(int n, const double *restrict L, int columns, double *restrict b)
+DENSE static void press(int n, const double *restrict L, int columns, double *restrict b)
 {
     for (int k = n - 1; k >= 0; k--) {
         double *restrict const from = b + (ptrdiff_t)k*columns;
@@ -43,7 +43,7 @@ EOMGEN_ROWS static void press(int n, const double *restrict L, int columns, doub
 }
 
 /* The same of one column. */
-EOMGEN_ROWS static void press_one(int n, const double *restrict L, double *restrict b)
+DENSE static void press_one(int n, const double *restrict L, double *restrict b)
 {
     for (int k = n - 1; k >= 0; k--) {
         const double x = b[k]*L[k*n + k];
@@ -90,7 +90,7 @@ static void hold(const inertia *at, double *z)
 }
 
 /* The same of columns; `parts` has as many numbers. */
-EOMGEN_ROWS static void hold_columns(int n, int n_c, const double *restrict Q, int columns, double *restrict X, double *restrict parts)
+DENSE static void hold_columns(int n, int n_c, const double *restrict Q, int columns, double *restrict X, double *restrict parts)
 {
     for (int r = 0; r < n_c; r++) {
         for (int l = 0; l < columns; l++) { parts[l] = 0.0; }
@@ -120,7 +120,7 @@ static void meet_rows(const inertia *at, int count, double *wanted, double *v)
 }
 
 /* W = X^T X. */
-EOMGEN_ROWS static void square(int n, int columns, const double *restrict X, double *restrict W)
+DENSE static void square(int n, int columns, const double *restrict X, double *restrict W)
 {
     for (int a = 0; a < columns; a++) {
         double *restrict const row = W + (ptrdiff_t)a*columns;
@@ -137,7 +137,7 @@ EOMGEN_ROWS static void square(int n, int columns, const double *restrict X, dou
 }
 
 /* y = x^T X of n rows; the other way to = X y. */
-EOMGEN_ROWS static void across(int n, int columns, const double *restrict X, const double *restrict x, double *restrict y)
+DENSE static void across(int n, int columns, const double *restrict X, const double *restrict x, double *restrict y)
 {
     for (int l = 0; l < columns; l++) { y[l] = 0.0; }
     for (int i = 0; i < n; i++) {

@@ -1,10 +1,4 @@
-/* The laws of contact as natural maps. */
-#include <float.h>
-#include <math.h>
-#include <stddef.h>
-#include <string.h>
-
-#include "eomgen_contacts.h"
+/* The laws of contact as natural maps. This and what follows is compiled twice: plain.c and wide.c say as what. */
 
 /* Contacts, n = m d rows; `more` is what the diagonal of W has besides, c the velocities that belong to it. */
 typedef struct {
@@ -41,7 +35,7 @@ static void soften(contacts *s, const double *P, double part)
 }
 
 /* y = c + W P + more P, by rows of W, which is symmetric. */
-EOMGEN_ROWS static void find_velocities(int n, const double *restrict W, const double *restrict c, const double *restrict more,
+DENSE static void find_velocities(int n, const double *restrict W, const double *restrict c, const double *restrict more,
                                         const double *restrict P, double *restrict y)
 {
     for (int k = 0; k < n; k++) { y[k] = c[k] + more[k]*P[k]; }
@@ -86,7 +80,7 @@ static double find_misses(contacts *s, const double *P)
 }
 
 /* Each contact for itself, one after the other, as given; y are the velocities for P and stay so. */
-EOMGEN_ROWS static void sweep_all(int m, int d, const double *restrict given, const double *restrict normal,
+DENSE static void sweep_all(int m, int d, const double *restrict given, const double *restrict normal,
                                   const double *restrict across, const double *restrict friction, double *restrict P,
                                   double *restrict y)
 {

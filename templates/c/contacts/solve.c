@@ -37,7 +37,7 @@ static int iterate(contacts *s, double *P, double tolerance, int most, double *r
     return count;
 }
 
-void eomgen_solve_contacts(int m, int d, const double *W, const double *c, const double *friction, double *P,
+void CHOSEN(solve_contacts)(int m, int d, const double *W, const double *c, const double *friction, double *P,
                            double tolerance, int most, double *work, int *numbers, int *count, double *residual)
 {
     const int n = m*d;

@@ -170,7 +170,7 @@ static void fixed_sizes(const eomgen_rigid *s, long sizes[FIXED])
     memcpy(sizes, found, sizeof found);
 }
 
-long eomgen_rigid_fixed(const eomgen_rigid *s)
+long CHOSEN(rigid_fixed)(const eomgen_rigid *s)
 {
     long sizes[FIXED];
     fixed_sizes(s, sizes);
@@ -178,7 +178,7 @@ long eomgen_rigid_fixed(const eomgen_rigid *s)
 }
 
 /* The same of contacts, with three directions. */
-long eomgen_rigid_further(const eomgen_rigid *s)
+long CHOSEN(rigid_further)(const eomgen_rigid *s)
 {
     const long m = s->room, n = 3*m;
     return 2*n*s->n_v + n*n + 6*n + 3*m + n*(n + 8) + 3*m;
@@ -195,7 +195,7 @@ static void place_meeting(const eomgen_rigid *s, meeting *at)
     at->rests = s->numbers + 3*m, at->numbers = s->numbers + 4*m;
 }
 
-int eomgen_rigid_step(eomgen_rigid *s, double t, double h)
+int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
 {
     const int n_q = s->n_q, n = s->n_v;
     const double middle = t + 0.5*h, *const v = s->x + n_q;
