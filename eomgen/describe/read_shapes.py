@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS
@@ -12,6 +11,9 @@ from ..forces.contact_shapes import ContactShape
 from ..forces.contact_states import POINTS, points_of_plate
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
+from ..numeric.outline_rules import sense_of_outline
+from ..numeric.value_ranges import Flaw
+from ..numeric.value_rules import OUTLINE, RISING
 from .checks import check_keys
 from .description import items
 from .names import nearest
@@ -125,10 +127,7 @@ def _profile(reader: Reader, path: str, given: Mapping[str, Any], least: int) ->
     if len(points) < len(read):
         return None
     for k, ((a, _), (b, _)) in enumerate(itertools.pairwise(points)):
-        left, right = reader.known(a), reader.known(b)
-        if left is not None and right is not None and left >= right:
-            message = f"has x = {right:g} after x = {left:g}: the profile turns back or crosses itself"
-            reader.faults.add(f"{place}[{k + 1}]", message, "give the points from left to right, each x once")
+        if reader.requirements.judge(f"{place}[{k + 1}]", RISING, [a, b]):
             return None
     if "depth" in given:
         depth = reader.expression(f"{path}.depth", given["depth"])
@@ -150,50 +149,11 @@ def _corners(reader: Reader, path: str, value: Any, convex: bool = True) -> tupl
         return None
     known = [(reader.known(x), reader.known(y)) for x, y in points]
     numbers = [(x, y) for x, y in known if x is not None and y is not None]
-    if len(numbers) == len(points):
-        turned = _outline(reader, path, numbers, convex)
-        if turned is None:
-            return None
-        if turned < 0:
-            points.reverse()
+    sense = sense_of_outline(numbers, convex) if len(numbers) == len(points) else 1
+    if isinstance(sense, Flaw):
+        reader.faults.add(path + sense.key, sense.message, sense.remedy)
+        return None
+    reader.requirements.keep(path, OUTLINE, [x for point in points for x in point], (convex, sense))
+    if sense < 0:
+        points.reverse()
     return tuple(x for point in points for x in point)
-
-
-def _outline(reader: Reader, path: str, points: Sequence[tuple[float, float]], convex: bool) -> int | None:
-    """1 where an outline runs counterclockwise, -1 where clockwise; None where something is wrong, which is noted."""
-    n, turns, total = len(points), set[bool](), 0.0
-    for k in range(n):
-        (x0, y0), (x1, y1), (x2, y2) = points[k - 1], points[k], points[(k + 1) % n]
-        a, b = (x1 - x0, y1 - y0), (x2 - x1, y2 - y1)
-        cross, along = a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]
-        if cross == 0 and (convex or along <= 0):
-            reader.faults.add(
-                f"{path}[{k}]", "lies on a line with the corners beside it, or on one of them", "leave it out"
-            )
-            return None
-        turns.add(cross > 0)
-        total += math.atan2(cross, along)
-    if crossing := _crossing(points):
-        message = f"the edges that begin at corners {crossing[0]} and {crossing[1]} cross each other"
-        reader.faults.add(path, message, "give the corners in their order around the outline")
-        return None
-    if convex and len(turns) > 1:
-        reader.faults.add(path, "is not convex", "give it as shape outline, which need not be")
-        return None
-    return 1 if total > 0 else -1
-
-
-def _crossing(points: Sequence[tuple[float, float]]) -> tuple[int, int] | None:
-    """The first two edges of an outline that cross."""
-    n = len(points)
-
-    def side(p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]) -> float:
-        return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
-
-    for i in range(n):
-        p, q = points[i], points[(i + 1) % n]
-        for j in range(i + 2, n - (i == 0)):
-            r, s = points[j], points[(j + 1) % n]
-            if side(p, q, r) * side(p, q, s) < 0 and side(r, s, p) * side(r, s, q) < 0:
-                return i, j
-    return None

@@ -48,6 +48,8 @@ METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", 
 SLIM_METHODS = ("x0", "assemble", "bind", "simulate")
 
 
+#: Of the metadata, what slim packages have not.
+WHOLE = ("rules",)
 #: Files of every package.
 ABOUT = ("LICENSE.txt", "PROVENANCE.md")
 
@@ -91,7 +93,8 @@ def emit_package(
     if precision != "double" and not row.precisions:
         raise UsageError(f"precision={precision!r} is for target c; packages of target {target} compute in double")
     made = {"target": target, "provenance": trace_provenance(program, target, asked or {})}
-    program = replace(program, metadata={**program.metadata, **made})
+    kept = {key: value for key, value in program.metadata.items() if not (slim and key in WHOLE)}
+    program = replace(program, metadata={**kept, **made})
     context = _context(program, slim) | {"precision": precision}
     about = {name: render(f"python/{name}.j2", context) for name in ABOUT}
     return SourceSet({"model.json": metadata_json(program), **about, **row.files(program, context)})

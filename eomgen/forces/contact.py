@@ -15,6 +15,7 @@ from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
 from ..records import dataclass
 from .force import Force, Load, MarkerLoad, Measured, View
 from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip, has_bristles, read_friction
@@ -194,9 +195,9 @@ def _two_spheres(e: Entry) -> SphereSphere | None:
     if pair is None or radii is None:
         return None
     for k, radius in enumerate(radii):
-        e.require(f"radii[{k}]", radius, lambda x: x >= 0, "a radius is 0 or greater")
+        e.require(f"radii[{k}]", radius, NOT_NEGATIVE, "a radius is 0 or greater")
         if isinstance(law, HertzBodies):
-            e.require(f"radii[{k}]", radius, lambda x: x > 0, "the law of Hertz from moduli needs both radii")
+            e.require(f"radii[{k}]", radius, POSITIVE, "the law of Hertz from moduli needs both radii")
     return SphereSphere(e.name, *pair, law.at(lambda: joint_radius(*radii)), friction, (radii[0], radii[1]))
 
 

@@ -9,6 +9,7 @@ from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
+from ..numeric.value_ranges import NOT_NEGATIVE, Range
 from .contact import CURVED
 from .contact_groups import ContactGroups
 from .contact_shape_fields import GROUNDS, PLANAR, SHAPE_FIELDS
@@ -72,10 +73,10 @@ def _rigid_law(e: Entry) -> RigidLaw:
     for key in ("friction", "restitution"):
         value = e.given(key)
         if value is not None:
-            e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
+            e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     restitution = e.given("restitution")
     if restitution is not None:
-        e.require("restitution", restitution, lambda x: x <= 1, "must be at most 1")
+        e.require("restitution", restitution, Range(high=1.0), "must be at most 1")
     return RigidLaw()
 
 

@@ -18,6 +18,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..limits.contacts import CAUGHT_UP
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Range
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .contact_states import WHEEL, given_groups
@@ -273,21 +274,21 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
     angle = number("friction_angle", soil and math.radians(soil.angle))
     modulus = number("shear_modulus", soil and soil.shear)
     for key, value in (("cohesive_modulus", cohesive), ("frictional_modulus", frictional), ("cohesion", cohesion)):
-        e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
+        e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     for key, value in (("sinkage_exponent", exponent), ("shear_modulus", modulus)):
-        e.require(key, value, lambda x: x > 0, "must be greater than 0")
-    e.require("friction_angle", angle, lambda x: 0 <= x < math.pi / 2, "is 0 or greater and below pi/2; it is in rad")
-    if "frictional_modulus" not in e.values or not frictional.is_zero:
-        pass
-    elif cohesive.is_zero:
-        e.fault("frictional_modulus", "is 0 as cohesive_modulus is", "give one that is greater than 0")
+        e.require(key, value, POSITIVE, "must be greater than 0")
+    acute = Range(0.0, math.pi / 2, below=True)
+    e.require("friction_angle", angle, acute, "is 0 or greater and below pi/2; it is in rad")
+    if "frictional_modulus" in e.values and not e.at_fault():
+        message, remedy = "is 0 as cohesive_modulus is", "give one that is greater than 0"
+        e.require("frictional_modulus", cohesive + frictional, POSITIVE, remedy, message)
     width = e.positive("contact_width") if "contact_width" in e.values else None
     rolls = any(shape.kind == WHEEL for group in given_groups(e.values) for shape in group)
     recovery = e.graph.one if rolls else number("recovery", soil and RECOVERY)
-    e.require("recovery", recovery, lambda x: x > 0, "must be greater than 0")
+    e.require("recovery", recovery, POSITIVE, "must be greater than 0")
     dissipation = e.given("dissipation")
     if dissipation is not None:
-        e.require("dissipation", dissipation, lambda x: x >= 0, "must be 0 or greater")
+        e.require("dissipation", dissipation, NOT_NEGATIVE, "must be 0 or greater")
     unloading, peak = _unloading(e), _peak(e)
     reversal = e.positive("reversal")
     if e.at_fault():
@@ -302,12 +303,12 @@ def _unloading(e: Entry) -> tuple[Expr | None, tuple[Expr, Expr] | None]:
     keys = ("unloading_stiffness", "unloading_rise")
     if not any(key in e.values for key in keys):
         part = e.law("rebound") if "rebound" in e.values else e.graph.constant(REBOUND)
-        e.require("rebound", part, lambda x: 0 < x <= 1, "is above 0 and at most 1")
+        e.require("rebound", part, Range(0.0, 1.0, above=True), "is above 0 and at most 1")
         return part, None
     e.refuse("rebound", f"follows from {' and '.join(keys)}")
     found = [e.law(key) if key in e.values else e.graph.zero for key in keys]
     for key, value in zip(keys, found, strict=True):
-        e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
+        e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     return None, (found[0], found[1])
 
 
@@ -316,8 +317,8 @@ def _peak(e: Entry) -> tuple[Expr, Expr] | None:
     pair = e.several("peak_angle", 2) if "peak_angle" in e.values else None
     if pair is None:
         return None
-    e.require("peak_angle[0]", pair[0], lambda c: 0 < c <= 1, "is above 0 and at most 1")
-    e.require("peak_angle[1]", pair[1], lambda c: c >= 0, "must be 0 or greater")
+    e.require("peak_angle[0]", pair[0], Range(0.0, 1.0, above=True), "is above 0 and at most 1")
+    e.require("peak_angle[1]", pair[1], NOT_NEGATIVE, "must be 0 or greater")
     for key in ("rebound", "unloading_stiffness", "unloading_rise"):
         e.refuse(key, "is of the rear of wheels without peak_angle, which gives the pressure of the whole arc")
     return pair[0], pair[1]

@@ -31,6 +31,7 @@ from .drawn import describe_picture
 from .event_terms import describe_events, resets
 from .factor import has_long_paths
 from .given_multipliers import multiplier_values
+from .kept_rules import keep_rules
 from .rolling_discs import describe_discs
 from .soundness import flag_forces, not_finite_where
 from .state_terms import with_states
@@ -229,6 +230,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         **({"velocity_outputs": moved} if (moved := [o.name for o in m.outputs if o.of_velocities]) else {}),
         "body_names": [b.name for b in m.bodies],
         "masses": dict(_mass_parameters(kinematics)),
+        **keep_rules(m.requirements, kinematics.parameter_names),
         "joint_names": [j.name for j in m.joints],
         "euler_angles": _euler_angles(kinematics),
         "rolling_discs": describe_discs(kinematics),

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import UsageError
 from ..kernel_table import NAMED, Sizes
 from ..numeric.scales import Array, Scales, Space
+from .allowed_parameters import require_allowed
 from .near_names import check_names, plain_name, without_dots
 from .room import read_number, read_numbers
 
@@ -122,6 +123,7 @@ class Layout:
         reference = data.get("q_reference")
         neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
         self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
+        self._allowed = b""  #: the last parameters that were allowed
         self.sizes = Sizes(**{name: getattr(self, name) for name in Sizes._fields})
 
     def sized(self, sizes: Array) -> Layout:
@@ -209,7 +211,8 @@ class Layout:
             result = read_numbers(f"the {what}s", given)
         if result.shape != (len(names),):
             raise UsageError(f"the {what}s must have shape ({len(names)},) ({', '.join(names)}), not {result.shape}")
-        self._check_masses(what, names, result)
+        if what == "parameter":
+            self.require_allowed(result)
         return result
 
     def explain_constants(self, message: str, p: Any) -> str:
@@ -229,15 +232,19 @@ class Layout:
         remedy = "look for a mass, an inertia or a length of 0, a root of a negative number or an overflow"
         return f"{head} with {', '.join(shown)}{which}{cause}; {remedy}"
 
-    def _check_masses(self, what: str, names: Sequence[str], values: Array) -> None:
-        """Refuse a negative value of a parameter that is a body's mass."""
-        for name, body in self.metadata.get("masses", {}).items() if what == "parameter" else ():
-            value = values[names.index(name)]
-            if value < 0.0:
-                raise UsageError(
-                    f"parameter {name} is the mass of body {body!r}, which must be 0 or positive, not {value:g}; "
-                    "write check_inertia: false in the model to allow negative masses"
-                )
+    def require_allowed(self, p: Array) -> None:
+        """Refuse parameters (n_p,), or (n_p, k) of many runs, that elements do not allow; the same again at no cost.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if p.ndim > 1:
+            return require_allowed(self.metadata, p)
+        given = p.tobytes()
+        if given != self._allowed:
+            require_allowed(self.metadata, p)
+            self._allowed = given
 
 
 def acceleration_name(velocity: str) -> str:

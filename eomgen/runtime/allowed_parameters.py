@@ -1,0 +1,48 @@
+"""Stage runtime: values of parameters -> what of them the elements of the model do not allow, all of it at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError, Problem
+from ..numeric.scales import Array
+from ..numeric.value_ranges import Flaw, Range, judge_range
+
+
+def require_allowed(metadata: Mapping[str, Any], p: Array) -> None:
+    """Refuse values of parameters (n_p,), or (n_p, k) of many runs, that the model itself could not declare.
+
+    Values that are not finite are told by whatever computes with them.
+
+    Raises
+    ------
+    ParameterError
+    """
+    columns, problems = p.reshape(len(p), -1), list[Problem]()
+    for k, path, *data in metadata.get("ranges", ()):
+        wrong = np.flatnonzero(~Range(*data[:4]).has(columns[k]) & np.isfinite(columns[k]))
+        if len(wrong):
+            flaws = judge_range(columns[k, wrong[:1]], *data)
+            problems += told(metadata, path, flaws, [k], p, wrong.tolist())
+    if "rules" in metadata:
+        from .late_rules import broken_rules
+
+        for path, flaws, used, runs in broken_rules(metadata["rules"], columns):
+            problems += told(metadata, path, flaws, used, p, runs)
+    if problems:
+        raise ParameterError(list(dict.fromkeys(problems)))
+
+
+def told(
+    metadata: Mapping[str, Any], path: str, flaws: Sequence[Flaw], used: Sequence[int], p: Array, runs: Sequence[int]
+) -> list[Problem]:
+    """Flaws of the first of the runs that break a rule, with the values of the parameters that it depends on."""
+    names, values = metadata["p_names"], p.reshape(len(p), -1)[:, runs[0]]
+    given = ", ".join(f"{names[k]} = {values[k]:.6g}" for k in used[:6]) + ", ..." * (len(used) > 6)
+    where = ""
+    if p.ndim > 1:
+        where = f" in run {runs[0]}" + f" and {len(runs) - 1} more" * (len(runs) > 1)
+    return [Problem(path + flaw.key, f"{flaw.message} with {given}{where}", flaw.remedy) for flaw in flaws]
