@@ -8,7 +8,7 @@ from typing import Any
 
 from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS
 from ..forces.contact_shapes import ContactShape
-from ..forces.contact_states import POINTS, points_of_plate
+from ..forces.contact_states import BED, MOST_PAIRS, POINTS, cells_of_bed, points_of_plate
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from ..numeric.outline_rules import sense_of_outline
@@ -86,6 +86,8 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         for k, x in enumerate(lengths or ()):
             positive(reader, f"{path}.{key}[{k}]", x)
         return None if lengths is None else tuple(lengths)
+    if kind == BED:
+        return _bed(reader, path, given)
     if kind == "plate":
         return _plate(reader, path, given)
     names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius", *(["width"] * ("width" in given)))
@@ -106,6 +108,16 @@ def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, .
         remedy = f"give a whole number from 1 to {POINTS}"
         reader.faults.add(f"{path}.points", f"is {shown(given['points'])}", remedy)
     return (*sizes, reader.graph.constant(float(count or 1)))
+
+
+def _bed(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+    """Length and number of cells of a bed."""
+    length = reader.expression(f"{path}.length", given["length"])
+    positive(reader, f"{path}.length", length)
+    count = cells_of_bed(given)
+    if count is None:
+        reader.faults.add(f"{path}.cells", f"is {shown(given['cells'])}", f"give a whole number from 1 to {MOST_PAIRS}")
+    return (length, reader.graph.constant(float(count or 1)))
 
 
 def _several(reader: Reader, path: str, value: Any, count: int) -> list[Expr] | None:

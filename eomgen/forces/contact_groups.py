@@ -20,11 +20,12 @@ from ..records import dataclass
 from .contact_pair_laws import PairLaw, pair_kind
 from .contact_shape_fields import PLANAR
 from .contact_shapes import PIECED, ContactShape, Feature, meet
-from .contact_states import POLYGON, alike, class_of, pair_states, part_of
+from .contact_states import BED, POLYGON, alike, class_of, pair_states, part_of
 from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw, RigidLaw
-from .soil_laws import SoilPressure
+from .soil_beds import COUNTS, bed_rates
+from .soil_laws import SoilPressure, SoilShear
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,9 @@ class ContactGroups(Force):
             return ()
         markers, results = self._results(view, "")
         found = results[6 * len(markers) + 1 :]
+        if self.on_bed:
+            assert isinstance(self.friction, SoilShear)
+            return tuple(bed_rates(self.states, found, self.friction.recovery))
         if self._slots > self._each:
             found = self._shared_out(found)
         return tuple(map(Expr.__add__, self._rates_apart(), found))
@@ -103,7 +107,14 @@ class ContactGroups(Force):
     @property
     def _slots(self) -> int:
         """How many numbers a pair has in the sum: its states, and where shapes have pieces how many of them touch."""
+        if self.on_bed:
+            return self._each + COUNTS
         return self._each + any(shape.kind in PIECED for shape in (*self.first, *self.second))
+
+    @property
+    def on_bed(self) -> bool:
+        """Whether the ground remembers by place."""
+        return any(shape.kind == BED for shape in (*self.first, *self.second))
 
     def remainder(self, view: View) -> list[Load]:
         return self._loads(view, LOSSES)
@@ -189,7 +200,9 @@ class ContactGroups(Force):
                     own, other = groups[g][first], groups[h][second]
                     sizes = len(own[0].feature.sizes), len(other[0].feature.sizes)
                     kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost)
-                    if self.states:
+                    if self.on_bed:
+                        kind = replace(kind, held=(tuple(self._slots * x.column for x in own), (0,) * len(other)))
+                    elif self.states:
                         block = blocks[g, h, class_of(first, second), part_of(second)]
                         rows = tuple(self._slots * block.of_first(x.number, x.column) for x in own)
                         columns = tuple(self._slots * block.places * x.column for x in other)

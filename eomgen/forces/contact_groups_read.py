@@ -14,9 +14,10 @@ from .contact import CURVED
 from .contact_groups import ContactGroups
 from .contact_shape_fields import GROUNDS, PLANAR, SHAPE_FIELDS
 from .contact_shapes import ContactShape
-from .contact_states import MOST_PAIRS, ShapeParts, given_groups, pair_states
+from .contact_states import BED, MOST_PAIRS, ShapeParts, cells_of, given_groups, pair_states
 from .friction_laws import DryFriction, has_bristles, read_friction
 from .normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, RigidLaw, read_normal_law
+from .soil_beds import STATES
 from .soil_laws import LATERAL, SOIL, read_soil, states_of_soil
 
 
@@ -32,6 +33,9 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
     _refuse_pairs(e, first, second)
     if soil:
         _refuse_on_soil(e, first, second)
+    bed = _is_bed(e, first, second, soil)
+    if bed:
+        first, second = (tuple(shape.on_bed() for shape in shapes) for shapes in (first, second))
     for key, shapes in (("first", first), ("second", second)):
         if not soil and any(shape.is_wheel for shape in shapes):
             e.fault(key, "has a circle with a width, which belongs to wheels on soil", "leave width out, or give soil")
@@ -45,11 +49,26 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         groups = given_groups(e.values)
         pairs = pair_states(groups)[1]
         axes = len(_axes(e.values, groups, lateral)) if pairs else 0
+        axes = len(STATES) - 1 if bed else axes
         if pairs > MOST_PAIRS:
             told = f"has {pairs} pairs with states; at most {MOST_PAIRS} may have them"
             remedy = "put only shapes that stick to each other into the groups, or use friction_law: brown_mcphee"
             e.fault("", told, remedy)
     return ContactGroups(e.name, first, second, law, friction, e.states(), axes, rigidly, e.given("restitution"))
+
+
+def _is_bed(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape], soil: bool) -> bool:
+    """Whether the ground is a bed, of which there is one, with soil; what is wrong is noted."""
+    beds = [(key, shapes) for key, shapes in (("first", first), ("second", second)) if any(x.kind == BED for x in shapes)]
+    for key, shapes in beds:
+        if len(shapes) > 1:
+            e.fault(key, "has a bed and more", "give one bed as all of a group, and contacts of their own to others")
+        if not soil:
+            e.fault(key, "has a bed, which belongs to soil", "give soil, or half_plane or a profile as the ground")
+    if beds:
+        for word in ("lateral", "peak_angle", "reversal"):
+            e.refuse(word, "has no meaning for a bed, whose cells are sheared along x")
+    return bool(beds)
 
 
 def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None] | None:
@@ -89,9 +108,10 @@ def _refuse_on_soil(e: Entry, first: Sequence[ContactShape], second: Sequence[Co
             if wrong:
                 remedy = "give plates: the undersides of links, soles, feet; or wheels: circles that have a width"
                 e.fault(key, f"a {wrong[0]} does not lie on soil", remedy)
-            elif 0 < len(wheels) < len(others):
+            elif 0 < len(wheels) < len(others) and not any(shape.kind == BED for shape in shapes):
                 e.fault(key, "has wheels and plates, which remember differently", "give each contacts of their own")
-            for word in ("recovery", "lateral") if wheels else ("peak_angle", "reversal"):
+            on_bed = any(shape.kind == BED for shape in shapes)  # whose cells remember
+            for word in ("recovery", "lateral") if wheels and not on_bed else ("peak_angle", "reversal"):
                 e.refuse(word, f"has no meaning for {'wheels' if wheels else 'plates'}")
             return
     e.fault("", "has soil, but no ground", "give half_plane or a profile as one group, plates or wheels as the other")
@@ -115,6 +135,8 @@ def _states(values: Mapping[str, Any]) -> dict[str, str]:
     if not soil and not has_bristles(values):
         return {}
     groups = given_groups(values)
+    if cells := cells_of(groups):
+        return {f"{name}_{k + 1}": "m" for k in range(cells) for name in STATES}
     axes = _axes(values, groups, values.get("lateral", True) is not False)
     names = states_of_soil(axes) if soil else tuple(f"bristle{axis}" for axis in axes)
     pairs = pair_states(groups)[1]
@@ -177,7 +199,7 @@ def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
     return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
 
 
-_UNDER_PLATES = ("half_plane", "profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
+_UNDER_PLATES = ("bed", "half_plane", "profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
 _CORNERED = (
     "box",
     "polygon",
@@ -191,7 +213,7 @@ _CLOSED = ("ellipsoid", "cuboid")  #: shapes that meet half-spaces and spheres a
 _OFF_CLOSED = ("capsule", *_CLOSED)
 _ALLOWED = (
     "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
-    "smooth_profile, which plates meet too; sphere and capsule meet each other and half_space; ellipsoid and cuboid "
+    "smooth_profile, which plates meet too; wheels and plates meet a bed; sphere and capsule meet each other and half_space; ellipsoid and cuboid "
     "meet half_space and sphere"
 )
 

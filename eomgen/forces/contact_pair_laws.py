@@ -23,10 +23,11 @@ from .branches import where
 from .contact import Contact, SpherePlane
 from .contact_rounds import AtHeight
 from .contact_shapes import ShapeMotion, touching, turning_radius
-from .contact_states import places_of
+from .contact_states import BED_CELL, places_of
 from .force import MarkerLoad, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw
+from .soil_beds import SoilCell, cell_of
 from .soil_wheels import SoilWheel
 
 
@@ -153,15 +154,22 @@ def pair_kind(
         held += states
         dry, push = law.holding(normal, friction, states[: law.each], lateral) if states else (friction, normal)
         bare = SpherePlane(law.name, *markers, push, dry, graph.zero)
-        contact = touching(kinds, markers, (given[0], given[1]), bare, spot)
-        if flat:
+        on_cell = kinds[0] == BED_CELL
+        if on_cell:
+            contact: Contact = cell_of(bare, given[1], given[0][0], kinds[1], pair.height() if flat else None)
+        else:
+            contact = touching(kinds, markers, (given[0], given[1]), bare, spot)
+        if flat and not on_cell:
             contact = AtHeight(law.name, *markers, contact.normal_law, contact.friction, contact, pair.height())
-        if kinds[1] == "rim":
+        if kinds[1] == "rim" and not on_cell:
             across = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2]
             contact = SoilWheel(law.name, *markers, push, dry, contact, given[1][0], given[1][1], across)
         exerted.append(_exerted(contact, view, lost))
-        if states:
-            rates += [graph.zero] * law.slots if lost else _rates(contact, view, law.slots > law.each)
+        if states and lost:
+            rates += [graph.zero] * law.slots
+        elif states:
+            on_bed = isinstance(contact, SoilCell)
+            rates += contact.sums(view) if on_bed else _rates(contact, view, law.slots > law.each)
         normal_of, depth, arm, _ = contact.touch(view)
         share = contact.share(view)
         touch = [*(contact.nearness(view)[0]), contact.nearness(view)[1], turning_radius(kinds[1], given[1], graph)]

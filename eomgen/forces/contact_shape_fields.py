@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..elements.dimensions import LENGTH, NONE
 from ..elements.field import NUMBER, Field, Fields
-from .contact_states import PLATE, POINTS
+from .contact_states import MOST_PAIRS, PLATE, POINTS
 
 CORNERS = 64  #: most corners of a polygon
 
@@ -65,6 +65,12 @@ _SIZES: dict[str, Fields] = {
         ),
     },
     "half_plane": {},
+    "bed": {
+        "length": Field(
+            "expression", "length of the strip from the marker on along its x axis (m)", required=True, dimension=LENGTH
+        ),
+        "cells": Field("count", f"of how many cells it is, 1 to {MOST_PAIRS}", required=True),
+    },
     "profile": _profile("", 2),
     "smooth_profile": _profile(", by a smooth curve of circular arcs", 3),
     "outline": _outline(", with straight edges between; it need not be convex"),
@@ -105,7 +111,7 @@ SHAPE_FIELDS: dict[str, Fields] = {kind: {**_ON, **sizes} for kind, sizes in _SI
 #: Shapes of mechanisms in the plane; the others are shapes in space.
 PLANAR = (
     *("circle", "segment", "box", "polygon", "outline", "smooth_outline", "sprocket", "plate"),
-    *("half_plane", "profile", "smooth_profile"),
+    *("half_plane", "profile", "smooth_profile", "bed"),
 )
-#: Shapes without an end, which do not meet each other.
-GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space")
+#: Shapes that are ground, which do not meet each other.
+GROUNDS = ("half_plane", "profile", "smooth_profile", "bed", "half_space")

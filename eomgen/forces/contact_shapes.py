@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import reduce
 from typing import NamedTuple
 
@@ -36,10 +37,11 @@ from .contact_profiles import (
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_shape_fields import GROUNDS
 from .contact_solids import BlockRound, EllipsoidPlane, EllipsoidRound, RodRod
-from .contact_states import BLOCK, MET, POLYGON, WHEEL, ShapeParts, part_of, parts_of
+from .contact_states import BED, BED_CELL, BLOCK, MET, POLYGON, WHEEL, ShapeParts, part_of, parts_of
 
 #: Shapes whose pieces are edges and arcs.
 PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
+SOLE = "sole"  #: a plate on a bed
 _SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
 _BOTH = (-1.0, 1.0)
 _STEPS = 24  #: lines of which the picture of an ellipse is made
@@ -84,7 +86,7 @@ class ContactShape:
         radius, and of a wheel on soil its width; length, radius; of a box or polygon x and y of its corners,
         counterclockwise; of a profile or an outline its depth and x and y of its points, of outlines clockwise; of a
         sprocket its depth, teeth, pitch, seat, tip radius and angle of a seat; half axes; lengths; of a plate length,
-        width and number of points.
+        width and number of points; of a bed length and number of cells.
     """
 
     kind: str
@@ -114,6 +116,10 @@ class ContactShape:
             ]
         if self.kind == "plate":
             return self._pads(frame)
+        if self.kind == SOLE:
+            return [Feature(SOLE, frame, self.sizes[:2], self.sizes[0], self.sizes[0])]
+        if self.kind == BED:
+            return self._cells(frame)
         if self.kind in ("segment", "capsule"):
             along = frame if self.kind == "segment" else _turned(frame, (2, 0, 1))
             half, radius = 0.5 * self.sizes[0], self.sizes[1]
@@ -145,7 +151,9 @@ class ContactShape:
         """How many parts of each class it has."""
         if self.is_wheel:
             return parts_of(WHEEL)
-        counts = {"polygon": len(self.sizes) // 2, "sprocket": self._whole(1), "plate": self._whole(2)}
+        counts = {
+            "polygon": len(self.sizes) // 2, "sprocket": self._whole(1), "plate": self._whole(2), BED: self._whole(1),
+        }  # fmt: skip
         return parts_of(self.kind, counts.get(self.kind, (len(self.sizes) - 1) // 2))
 
     def _whole(self, k: int) -> int:
@@ -165,6 +173,17 @@ class ContactShape:
             place = _moved(frame, (0.5 * float(x) * length, zero, zero))
             found.append(Feature("pad", place, (area, width), zero, length, len(found)))
         return found
+
+    def _cells(self, frame: Frame) -> list[Feature]:
+        """Cells of a bed, from the marker on."""
+        length, count = self.sizes[0], self._whole(1)
+        size, zero = length / float(count), length.graph.zero
+        places = (_moved(frame, ((k + 0.5) * size, zero, zero)) for k in range(count))
+        return [Feature(BED_CELL, place, (size,), zero, size, k) for k, place in enumerate(places)]
+
+    def on_bed(self) -> ContactShape:
+        """The shape as it lies on a bed: a plate as a whole."""
+        return replace(self, kind=SOLE) if self.kind == "plate" else self
 
     def _points(self) -> list[Point]:
         """Points of a profile or an outline."""
@@ -232,7 +251,11 @@ class ContactShape:
             found = [feature.frame for feature in self.features()[1:]]
             ways = ((0, 1, 3, 2, 0, 4, 5, 7, 6, 4), (1, 5), (2, 6), (3, 7))
             return [Drawn(tuple(Marker(marker.body, found[k], marker.label) for k in way)) for way in ways]
-        if self.kind == "plate":
+        if self.kind == BED:
+            zero = self.sizes[0].graph.zero
+            places = [_moved(marker.frame, (x, zero, zero)) for x in (zero, self.sizes[0])]
+            return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
+        if self.kind in ("plate", SOLE):
             half, zero = 0.5 * self.sizes[0], self.sizes[0].graph.zero
             places = [_moved(marker.frame, (x, zero, zero)) for x in (-half, half)]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
@@ -255,6 +278,8 @@ def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
         return _most(sizes)
     if part_of(kind) == POLYGON:
         return most_reach(sizes)
+    if kind == SOLE:
+        return sizes[0]
     return sizes[0] + sizes[1] if kind == "rod" else graph.zero
 
 

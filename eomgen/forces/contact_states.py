@@ -16,11 +16,13 @@ MOST_PAIRS = 2000  #: pairs that may have states: equations grow with states, an
 PLATE = 2  #: points of a plate unless given
 POINTS = 8  #: most points of a plate
 WHEEL = "wheel"  #: a circle with a width
+BED = "bed"  #: soil that remembers by place, in cells
+BED_CELL = "cell"  #: class of the cells, whose states belong to no pair
 TEETH = 3  #: fewest teeth of a sprocket
 #: Parts that meet surfaces, in the order in which their states stand.
 PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon")
 #: Parts that meet surfaces and have no states.
-STATELESS = ("rim",)
+STATELESS = ("rim", "sole")
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
 BLOCK = "block"  #: class of cuboids, which spheres meet
 _ROUND = ("round", "rod", POLYGON)
@@ -43,6 +45,7 @@ MET = {
     POLYGON: ("round", "corner", POLYGON),
     "ground": ("round", "corner", "vertex", "pad", "rim"),
     "half": ("round", "corner", "vertex", "end", "ellipsoid", "pad", "rim"),
+    BED_CELL: ("rim", "sole"),
 }
 
 
@@ -80,7 +83,7 @@ def parts_of(kind: str, points: int = 0) -> ShapeParts:
         "capsule": {"rod": 1, "end": 2}, "ellipsoid": {"ellipsoid": 1}, "cuboid": {"end": 8},
         "outline": {"corner": points}, "smooth_outline": {"corner": points},
         "sprocket": {"corner": 2 * points}, "plate": {"pad": points}, WHEEL: {"rim": 1},
-        "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2},
+        "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2}, BED: {BED_CELL: points},
     }  # fmt: skip
     return ShapeParts(kind, found.get(kind, {}))
 
@@ -133,6 +136,11 @@ def _meets(kind: str, first: str, second: str) -> bool:
     return own != "" and class_of(own, second) == first and second in MET[own]
 
 
+def cells_of(groups: Sequence[Sequence[ShapeParts]]) -> int:
+    """How many cells the beds of some groups have."""
+    return sum(shape.parts.get(BED_CELL, 0) for group in groups for shape in group)
+
+
 # -- from what the user gave ------------------------------------------------------------------------------------------
 def _whole(given: Any) -> int | None:
     """A whole number, also one that is written with decimals, such as 2.0; None if it is none."""
@@ -147,6 +155,12 @@ def points_of_plate(given: Mapping[str, Any]) -> int | None:
     """At how many points a plate is felt; None where that is no number."""
     count = _whole(given.get("points", PLATE))
     return count if count is not None and 1 <= count <= POINTS else None
+
+
+def cells_of_bed(given: Mapping[str, Any]) -> int | None:
+    """How many cells a bed has; None where that is no number."""
+    count = _whole(given.get("cells"))
+    return count if count is not None and 1 <= count <= MOST_PAIRS else None
 
 
 def teeth_of_sprocket(given: Mapping[str, Any]) -> int | None:
@@ -176,6 +190,8 @@ def _given_shapes(value: Any) -> list[ShapeParts]:
             count = points_of_plate(shape) or 0
         elif kind == "sprocket":
             count = teeth_of_sprocket(shape) or 0
+        elif kind == BED:
+            count = cells_of_bed(shape) or 0
         elif kind == "circle" and "width" in shape:
             kind, count = WHEEL, 1
         else:

@@ -21,7 +21,7 @@ from ..limits.contacts import CAUGHT_UP
 from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Range
 from ..records import dataclass
 from .branches import beyond_zero, where
-from .contact_states import WHEEL, given_groups
+from .contact_states import WHEEL, cells_of, given_groups
 from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip
 from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, NormalLaw
 from .soils import RECOVERY, SOILS
@@ -117,8 +117,8 @@ class SoilPressure(NormalLaw):
     def energy(self, depth: Expr) -> Expr:
         return depth.graph.zero
 
-    def rates(self, depth: Expr, rate: Expr) -> tuple[Expr, ...]:
-        """z_m' = z' while the sinkage grows beyond z_m; above the ground z_m fades.
+    def deepening(self, depth: Expr, rate: Expr) -> Expr:
+        """z_m' of what is in the ground: z' while the sinkage grows beyond z_m.
 
         Where a plate that has begun deeper than z_m rises, z_m catches up with z: dz_m / d|z| = (z - z_m) / (part z).
         """
@@ -126,8 +126,12 @@ class SoilPressure(NormalLaw):
         graph, deepest = depth.graph, self.deepest
         over = beyond_zero(depth, lambda z: 1.0 - deepest / z)
         change = where(graph.apply("lt", rate, 0.0), -over / CAUGHT_UP * rate, rate)
-        grows = where(graph.apply("le", deepest, depth), change, 0.0)
-        return (where(graph.apply("lt", 0.0, depth), grows, self.rates_apart()[0]),)
+        return where(graph.apply("lt", 0.0, depth), where(graph.apply("le", deepest, depth), change, 0.0), 0.0)
+
+    def rates(self, depth: Expr, rate: Expr) -> tuple[Expr, ...]:
+        """z_m' in the ground; above the ground z_m fades."""
+        inside = depth.graph.apply("lt", 0.0, depth)
+        return (where(inside, self.deepening(depth, rate), self.rates_apart()[0]),)
 
     def rates_apart(self) -> tuple[Expr, ...]:
         assert self.deepest is not None
@@ -283,7 +287,8 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
         message, remedy = "is 0 as cohesive_modulus is", "give one that is greater than 0"
         e.require("frictional_modulus", cohesive + frictional, POSITIVE, remedy, message)
     width = e.positive("contact_width") if "contact_width" in e.values else None
-    rolls = any(shape.kind == WHEEL for group in given_groups(e.values) for shape in group)
+    groups = given_groups(e.values)
+    rolls = any(shape.kind == WHEEL for group in groups for shape in group) and not cells_of(groups)
     recovery = e.graph.one if rolls else number("recovery", soil and RECOVERY)
     e.require("recovery", recovery, POSITIVE, "must be greater than 0")
     dissipation = e.given("dissipation")

@@ -37,3 +37,14 @@ NEAREST = 12
 #: inside are not unique: 1 / 1e-6 is lost of 16 digits there, and centres of spheres that touch it are outside or near
 #: its surface.
 FOCAL = 1e-6
+#: Part of a wheel's radius beside its axle where the rim still presses a cell of soil: at 0.98 the rim stands at 11
+#: degrees to the column, where the depth at which it crosses it changes five times as fast as the wheel moves ahead.
+BESIDE = 0.98
+#: Cosine of the inclination up to which a plate presses cells of soil, 34 degrees: the edges of 45 degrees stand at 11
+#: degrees to the column there, as rims at BESIDE do.
+UPRIGHT = 0.83
+#: Part of K over which shear of a cell of soil follows its sliding, and which it gives back: j lags by it, so that the
+#: stress is below 1 - exp(-j / K) by 0.04 exp(-j / K) at most, less UNSHEARED of the same.
+GRIP = 0.04
+#: Part of the strength of a cell of soil that is there before it has been sheared, so that u / T stays a number.
+UNSHEARED = 0.01
