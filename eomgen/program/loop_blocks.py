@@ -13,8 +13,9 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from ..graph.core import Expr
+from ..kinematics.row_groups import ALL, UNIT
 from ..limits.constraints import GENTLE, LEFT, TIKHONOV, UNMOVED
-from ..limits.crossings import NEAR_SQUARE
+from ..limits.crossings import NEAR_SQUARE, SMALL
 from ..limits.rounding import ROW
 from .sparse import Row, SparseFactor, dot, factorize, fill, gram, in_parts, rows_of, times, transpose
 from .terms import SystemTerms
@@ -236,12 +237,31 @@ class LoopBlocks(ABC):
             sound = condition if sound == self.terms.graph.one else self.terms.graph.apply("and", sound, condition)
         return sound
 
+    @property
+    def _groups(self) -> tuple[int, ...]:
+        return self.terms.row_groups or (ALL,) * len(self.J)
+
     def _separate_rows(self) -> Expr:
-        """Whether as many rows as the rank are neither short beside the longest nor near to those before them."""
+        """Whether as many rows as the rank are neither short beside their group nor near to those before them."""
         graph, pivots = self.terms.graph, self._factor[0].pivots
         squares = [graph.zero if (x := dot(row, row)) is None else x for row in self.J]
-        held, limit = graph.zero, largest(squares) * NEAR_SQUARE
-        for pivot, square in zip(pivots, squares, strict=True):
+        held, limits = graph.zero, self._shortest(squares)
+        for pivot, square, group in zip(pivots, squares, self._groups, strict=True):
             separate = graph.apply("lt", square * NEAR_SQUARE, pivot)
-            held = held + graph.apply("and", separate, graph.apply("lt", limit, square))
+            held = held + graph.apply("and", separate, graph.apply("lt", limits[group], square))
         return graph.apply("lt", self.terms.n_v - self.terms.n_dof - 0.5, held)
+
+    def _shortest(self, squares: Sequence[Expr]) -> dict[int, Expr]:
+        """Squares of the lengths at which rows of each group are short."""
+        graph, members = self.terms.graph, dict[int, list[Expr]]()
+        for square, group in zip(squares, self._groups, strict=True):
+            members.setdefault(group, []).append(square)
+        unit = graph.constant(1.0) / (self.unit * self.unit)
+        found = {}
+        for group, own in members.items():
+            if group == ALL:
+                size = largest(squares)
+            else:
+                size = unit if group == UNIT else graph.apply("max", largest(own), unit * (SMALL * SMALL))
+            found[group] = size * NEAR_SQUARE
+        return found
