@@ -2,7 +2,8 @@
 
 A gap of a joint or contact changes by about as much as the coordinates that make it: its size is that of its kind, the
 length scale of the mechanism or 1.  That of a loop far smaller than the mechanism, a thousandth or less, is the length
-of its own scaled gradient, or its rows would be lost beside the others.  A relation written by a user may be multiplied
+of its own scaled gradient, or its rows would be lost beside the others.  The three rows of a gap in a loop of many
+links have the typical length of their columns as their size, or all others would be lost beside them.  A relation written by a user may be multiplied
 by anything, areas in m^2 or numbers of teeth; its size is the length of its scaled gradient, so that a factor does not
 matter (row equilibration: A. van der Sluis, Numerische Mathematik 14, 1969).  A gradient that is not told from rounding
 of the terms that were added in it (:mod:`~..graph.rounding_bounds`) is no size: such a row counts as nothing beside
@@ -20,9 +21,10 @@ from ..graph.core import Expr
 from ..graph.rounding_bounds import is_rounding, terms_of, with_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from ..limits.descriptions import BY_CHANCE, SMALL_LOOP
+from ..limits.descriptions import BY_CHANCE, LARGE_LOOP, SMALL_LOOP
 from ..limits.rounding import ROUNDED, TINY_ROOT
 from .kinematics import Kinematics
+from .row_groups import row_groups
 
 PLAIN = 4.0  #: a row whose gradient is a number within this factor of the kind's size keeps that
 
@@ -74,6 +76,15 @@ def _find_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
         elif written or TINY_ROOT < largest < SMALL_LOOP * usual.value:
             place = places[first.value < BY_CHANCE * second.value]
             found[i] = _length(substitute(gradient, place))
+    for group in {g for g in row_groups(kinematics) if g > 0}:
+        rows = [i for i, g in enumerate(row_groups(kinematics)) if g == group and i in measured]
+        columns = sum(any(not c.jacobian[i][k].is_zero for i in rows) for k in range(len(kinematics.v)))
+        squares = [at_first[list(measured).index(i)].value ** 2 for i in rows]
+        if sum(squares) > columns * (LARGE_LOOP * usual.value) ** 2:
+            gradient = substitute([x for i in rows for x in measured[i]], places[0])
+            typical = _length(gradient) * (1.0 / columns**0.5)
+            for i in rows:
+                found[i] = typical
     return tuple(found)
 
 

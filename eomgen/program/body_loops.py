@@ -53,7 +53,7 @@ class BodyLoops(LoopBlocks):
         moving = zip(a[: terms.n_v - terms.n_states], self.s, strict=False)
         size = total_magnitude([*(x / s for x, s in moving), *(x * self.unit for x in pushed)])
         conditions.append(graph.apply("lt", total_magnitude(left) * self.unit, size * LEFT + NOTHING))
-        dz = times(transpose(self.J, terms.n_v), self._factor[0].solve(left))
+        dz = times(transpose(self.J, terms.n_v), self._solver[0].solve(left))
         a = [x - s * d for x, s, d in zip(a, self.s, dz, strict=True)]
         return a, []
 

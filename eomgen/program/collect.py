@@ -24,6 +24,7 @@ from ..kinematics.inertial_terms import inertial_terms
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
 from ..kinematics.near_pairs import describe_contacts, motion_axes, near_pairs
+from ..kinematics.row_groups import row_groups
 from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
@@ -78,6 +79,7 @@ def collect_terms(
         alignment=c.aligned,
         coordinate_scales=tuple(scale[kind] for kind in kinematics.velocity_kinds),
         constraint_scales=row_scales(kinematics),
+        row_groups=row_groups(kinematics),
         n_dof=mobility.n_dof,
         preferred=_independent(kinematics, mobility),
         parent=_pattern(kinematics),
@@ -246,6 +248,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
         "constraint_scales": list(mobility.row_scales),
+        **({"row_groups": list(groups)} if any(groups := row_groups(kinematics)) else {}),
         "alignment_labels": list(c.aligned_joints),
         "fragile_forces": [name for name, _ in flag_forces(kinematics)],
         **({"not_finite_where": where} if (where := not_finite_where(kinematics)) else {}),

@@ -100,7 +100,10 @@ class Layout:
         self.velocity_lengths = np.array([kind == "length" for kind in self.velocity_kinds], dtype=bool)
         self.length: float = float(data.get("length_scale") or 1.0)
         rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
-        self.scales = Scales.of_kinds(self.velocity_kinds, rows, self.length, self.space)
+        groups = data.get("row_groups")
+        self.scales = Scales.of_kinds(self.velocity_kinds, rows, self.length, self.space)._replace(
+            groups=np.array(groups, dtype=np.intp) if groups else None
+        )
         self.row_lengths = np.array([kind == "length" for kind in data.get("constraint_kinds", ())], dtype=bool)
         self.independent_moving = self.independent[self.independent < self.moving]  #: of the mechanism
         #: coordinates of the independent velocities, where each is the rate of one
