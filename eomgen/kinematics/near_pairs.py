@@ -37,7 +37,8 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
     """What is known of contacts beside their numbers.
 
     ``lists`` has name, numbers and shapes of each contact; ``moved_by`` the last velocity that moves each shape, -1 for
-    ground; ``parents`` the velocity before each towards ground.  ``rigid_only`` names contacts without a law of force.
+    ground; ``parents`` the velocity before each towards ground; ``bodies`` the body of each shape.  ``rigid_only`` names
+    contacts without a law of force.
     """
     forces = [force for force in kinematics.mechanism.forces if force.near(kinematics.motion)]
     if not forces:
@@ -58,6 +59,11 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
             "lists": listed,
             "moved_by": [last[body] for force in forces for body in force.met_bodies],
             "parents": parents,
+            "bodies": [_name(kinematics, body) for force in forces for body in force.met_bodies],
         },
         **({"rigid_only": rigid} if (rigid := [force.name for force in forces if force.is_rigid]) else {}),
     }
+
+
+def _name(kinematics: Kinematics, body: int) -> str:
+    return "ground" if body == GROUND else kinematics.mechanism.bodies[body].name

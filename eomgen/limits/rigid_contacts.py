@@ -32,9 +32,12 @@ GROWN = 1e-12  #: part of the energy that impacts move by which their sum may gr
 HALVINGS = 16
 #: Halvings of the restitution of one instant until impacts with friction take energy: below, it is 0.
 GENTLER = 4
-#: A pivot of the inertia below this part of its own diagonal is no more than rounding, 1e-16 times a condition of 1e6 as
-#: above: constraint rows then stand in for it.
+#: A pivot of the inertia below this part of its own diagonal is no more than rounding, 1e-16 times a condition of 1e6
+#: as above: constraint rows then stand in for it.
 PIVOT = 1e-10
 #: A constraint row whose part beside the others is smaller than this holds nothing of its own: squares of it are the
 #: rounding, 1e-15, below which the pseudo-inverse of C M^-1 C^T leaves singular values out.
 DEPENDENT = 3e-8
+#: Times the tolerance to which impulses are found at first: they only say with which velocities forces act, and of an
+#: error in these no more than the change of forces within a step, a hundredth, comes back.
+ROUGH = 10.0

@@ -41,6 +41,7 @@ class SolverOptions(BoundValues, total=False):
     min_step: float
     contact_tolerance: Number
     contact_iterations: int
+    contact_forces: bool
 
 
 class ReducedOptions(BoundValues, total=False):

@@ -20,20 +20,21 @@ from ..runtime.room import read_number, require_room, require_steps
 from ..runtime.signals import Forcing
 from ..texts import shown
 from .bound_run import watch_run
+from .contact_forces import ContactForces, ForceSums
 from .events import Events, calls_within, is_told_by_the_caller
 from .integrate import Solution
 from .meetings import deep_start
 from .recording import record
+from .rigid_run import RigidRun
 from .rigid_steps import RigidSteps
 from .run_arguments import find_span, find_state, ordered_times
 from .tolerances import check_step
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.trajectory import Trajectory
 
 NAME = "moreau"
-OWN = ("contact_tolerance", "contact_iterations")
+OWN = ("contact_tolerance", "contact_iterations", "contact_forces")
 
 
 class ContactWarning(UserWarning):
@@ -52,7 +53,7 @@ def step_rigidly(
     events: Any,
     progress: bool | None,
     options: Mapping[str, Any],
-) -> Trajectory:
+) -> RigidRun:
     """The motion of a mechanism whose contacts between groups are rigid.
 
     Raises
@@ -74,6 +75,9 @@ def step_rigidly(
     iterations = as_count(given.get("contact_iterations", ITERATIONS))
     if iterations is None or iterations < 1:
         raise UsageError(f"contact_iterations must be a whole number from 1, not {given['contact_iterations']}")
+    keep = given.get("contact_forces", False)
+    if keep is not True and keep is not False:
+        raise UsageError(f"contact_forces must be True or False, not {shown(keep)}")
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
     if end < start:
@@ -99,6 +103,7 @@ def step_rigidly(
     times[-1] = end
     states = np.empty((module.n_x, count + 1))
     states[:, 0] = x
+    sums = ForceSums(steps.contacts.lists, count, keep)
     n_q = module.n_q
     q, v = x[:n_q].copy(), x[n_q:].copy()
     try:
@@ -114,6 +119,7 @@ def step_rigidly(
                     "stiff forces are taken explicitly: try a smaller step"
                 )
             states[:n_q, k + 1], states[n_q:, k + 1] = q, v
+            sums.add(k, steps.acting, float(times[k + 1]) - t)
             if watch is not None:
                 watch(t)
     finally:
@@ -134,9 +140,11 @@ def step_rigidly(
     ends = (start, end)
     told, found_states = (times, states) if stored is None else (stored, _between(times, states, stored))
     solution = Solution(told, found_states, [], [], None, 0, "The end of the span is reached.", counts, ends)
-    return record(
-        bound, forcing, solution, NAME, {"step": h, "contact_tolerance": tolerance, "contact_iterations": iterations}
-    )
+    asked = {"step": h, "contact_tolerance": tolerance, "contact_iterations": iterations, "contact_forces": keep}
+    run = record(bound, forcing, solution, NAME, asked)
+    about = module.metadata
+    forces = ContactForces(about["rigid_contacts"], about["contact_shapes"], told, times[1:], sums.sums, sums.kept)
+    return RigidRun.beside(run, forces)
 
 
 def _between(times: Array, states: Array, wanted: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Simulation: the steps of a mechanism with rigid contacts in compiled code; what C does not manage is left to Python."""
+"""Simulation: a module and its forcing -> steps with rigid contacts in compiled code, where the module has it."""
 
 from __future__ import annotations
 

@@ -22,13 +22,14 @@ class RigidRows(NamedTuple):
     jacobian: Array  #: (m d, n_v): velocities along the normal and across it, of the second shape relative to the first
     friction: Array  #: (m,)
     restitution: Array  #: (m,)
+    places: Array  #: (m, 9): normal, first direction across, and point, in ground axes
 
     def chosen(self, which: Any) -> RigidRows:
         """Some of them."""
         m = len(self.gaps)
         rows = self.jacobian.reshape(m, -1, self.jacobian.shape[1])[which]
         given = (self.pairs[which], self.gaps[which], rows.reshape(-1, self.jacobian.shape[1]))
-        return RigidRows(*given, self.friction[which], self.restitution[which])
+        return RigidRows(*given, self.friction[which], self.restitution[which], self.places[which])
 
 
 class RigidContacts:
@@ -102,7 +103,9 @@ class RigidContacts:
         wrench = np.concatenate([np.cross(point[:, None], along), along], axis=2)
         apart = self.moves[pairs[:, 1]] - self.moves[pairs[:, 0]]
         jacobian = apart[:, None] * (wrench @ self.axes(q, u=u, t=t).T)
-        return RigidRows(pairs, -records[:, 5], jacobian.reshape(-1, apart.shape[1]), records[:, 12], records[:, 13])
+        laws = records[:, 12], records[:, 13]
+        places = np.concatenate([normal, first, point], axis=1)
+        return RigidRows(pairs, -records[:, 5], jacobian.reshape(-1, apart.shape[1]), *laws, places)
 
     def _require_law(self, records: Array) -> None:
         friction, restitution = records[:, 12], records[:, 13]

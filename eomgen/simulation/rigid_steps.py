@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import SimulationError
-from ..limits.rigid_contacts import GENTLER, GROWN, HALVINGS, REMOVED, RESTING, YIELDING
+from ..limits.rigid_contacts import GENTLER, GROWN, HALVINGS, REMOVED, RESTING, ROUGH, YIELDING
 from ..numeric import algebra
 from ..numeric.contact_impulses import ContactImpulses, ContactProblem, solve_contacts
 from ..numeric.scales import Array
@@ -57,6 +57,9 @@ class RigidSteps:
         The deepest penetration (m).
     taken : int
         Steps, those among them that others were divided into.
+    acting : list of (m, 14) arrays
+        Contacts of steps since the list was emptied: both shapes, normal (3), first direction across it (3), point (3),
+        impulses along the normal and across it (3), which act on the second shape.
     """
 
     def __init__(self, module: BoundModel, forcing: Forcing, tolerance: float, iterations: int) -> None:
@@ -66,6 +69,7 @@ class RigidSteps:
         self.bias = module.kernels.timed("bias_apart")
         self.residual, self.missed, self.iterations, self.most, self.depth = 0.0, 0, 0, 0, 0.0
         self.taken = 0
+        self.acting: list[Array] = []
         self._misses = False
         self._begins = True
         names = module.kernels.core.names
@@ -127,6 +131,7 @@ class RigidSteps:
             if status == TOO_LONG:
                 return None
             if status == DONE:
+                self.acting.append(self._in_c.contacts_of_step())
                 return x[: len(q)], x[len(q) :]
         return self._in_python(t, q, v, h)
 
@@ -146,16 +151,17 @@ class RigidSteps:
         free = held.free(v - h * (held.inverse @ bias))
         rows = self._near(self.contacts.rows(middle, q_m, u), v, free, h)
         meeting = _Meeting(held, rows, v, self._last) if rows.gaps.size else None
-        new, P = self._contact(meeting, free, h)
+        new, P = self._contact(meeting, free, h, ROUGH)
         x[n_q:] = 0.5 * (v + new)
-        again = self.bias(middle, x, u=u)
-        if not np.array_equal(again, bias):
-            free = held.free(v - h * (held.inverse @ again))
-            new, P = self._contact(meeting, free, h)
+        free = held.free(v - h * (held.inverse @ self.bias(middle, x, u=u)))
+        new, P = self._contact(meeting, free, h, 1.0)
         if self._passes(middle, q_m, new, u, 0.5 * h):
             return None
         position = self.move(q_m, 0.5 * h * new)
         self.missed += self._misses
+        pushed = np.zeros((len(P), 3))
+        pushed[:, : P.shape[1]] = P
+        self.acting.append(np.concatenate([rows.pairs, rows.places, pushed], axis=1))
         end = self.forcing(t + h, np.concatenate([position, new])) if self.forcing else None
         away = held.closing(position, t + h, end)
         if rows.gaps.size:
@@ -170,8 +176,8 @@ class RigidSteps:
         fastest = max(float(np.abs(rows.jacobian @ velocity).max()) for velocity in (v, free))
         return rows.chosen(np.flatnonzero(rows.gaps <= 2.0 * h * fastest))
 
-    def _contact(self, meeting: _Meeting | None, free: Array, h: float) -> tuple[Array, Array]:
-        """Velocities after the impulses of contacts, and these (m, d)."""
+    def _contact(self, meeting: _Meeting | None, free: Array, h: float, rough: float) -> tuple[Array, Array]:
+        """Velocities after the impulses of contacts, and these (m, d), to so many times the tolerance."""
         if meeting is None:
             return free, np.zeros((0, 2))
         rows, before, W = meeting.rows, meeting.before, meeting.compliance
@@ -185,7 +191,7 @@ class RigidSteps:
             part = 0.0 if k == GENTLER else 0.5**k
             c = undisturbed.copy()
             c[:, 0] -= arrive + part * back
-            found = self._impulses(W, c, rows.friction, meeting.start, self.tolerance * scale)
+            found = self._impulses(W, c, rows.friction, meeting.start, rough * self.tolerance * scale)
             P = found.impulses.ravel()
             after = undisturbed.ravel() + W @ P
             work = P @ after, P @ before.ravel()  # twice: forces act with the velocity of the middle
@@ -193,7 +199,8 @@ class RigidSteps:
                 np.abs(P) @ (np.abs(after) + np.abs(before.ravel()))
             ):
                 break  # impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985)
-        self._note(found, scale, len(rows.gaps))
+        if rough == 1.0:
+            self._note(found, scale, len(rows.gaps))
         self._rests = ~strikes
         self._last = dict(zip(meeting.keys, found.impulses, strict=True))
         meeting.start = found.impulses

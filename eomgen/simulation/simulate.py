@@ -109,8 +109,8 @@ def simulate(
     resume : bool, optional
         True: the file must be there; False: begin anew; by default go on if it is there.
     **options
-        Passed on to the solver; unknown ones are an error for SciPy's methods.  Of moreau ``contact_tolerance`` and
-        ``contact_iterations``.
+        Passed on to the solver; unknown ones are an error for SciPy's methods.  Of moreau ``contact_tolerance``,
+        ``contact_iterations`` and ``contact_forces``, True to keep the force of each contact.
 
     Returns
     -------

@@ -35,8 +35,9 @@ static void recall(const eomgen_rigid *s, meeting *at, int *keys)
     }
 }
 
-/* Impulses and velocities `out` after them for velocities `free` without; the residual of the step grows. */
-static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, const double *free, double h, double *out, eomgen_rigid *told)
+/* Impulses and velocities `out` after them for velocities `free` without, to a tolerance so many times as large; what was reached. */
+static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, const double *free, double h, double rough, double *out,
+                    eomgen_rigid *told)
 {
     const int m = at->m, d = s->d, n = at->n;
     double scale, residual = 0.0;
@@ -59,7 +60,7 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
         memcpy(at->c, at->undisturbed, (size_t)n*sizeof(double));
         for (int c = 0; c < m; c++) { at->c[c*d] -= at->arrive[c] + part*at->back[c]; }
         memcpy(at->P, at->out, (size_t)n*sizeof(double));
-        eomgen_solve_contacts(m, d, at->W, at->c, at->friction, at->P, s->tolerance*scale, s->most, at->work, at->numbers,
+        eomgen_solve_contacts(m, d, at->W, at->c, at->friction, at->P, rough*s->tolerance*scale, s->most, at->work, at->numbers,
                               &count, &residual);
         if (!rebounds) {
             break;
@@ -74,8 +75,8 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
             break; /* impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985) */
         }
     }
-    told->residual = fmax(told->residual, residual);
-    told->missed = told->missed || !(residual <= s->tolerance*scale);
+    told->residual = residual;
+    told->missed = !(residual <= s->tolerance*scale);
     told->iterations = count > told->iterations ? count : told->iterations;
     along(s->n_v, n, at->X, at->P, out);
     release(s->n_v, held->L, out);

@@ -93,14 +93,14 @@ EOMGEN_ROWS static void sweep_all(int m, int d, const double *restrict given, co
     const int n = m*d;
     for (int i = 0; i < m; i++) {
         const double *restrict const W = given + (ptrdiff_t)i*d*n;
-        double *restrict const p = P + i*d, change[3] = {0.0, 0.0, 0.0}, pulled[3], square = 0.0;
+        double *restrict const p = P + i*d, change[3] = {0.0, 0.0, 0.0}, pulled[3] = {0.0, 0.0, 0.0}, square = 0.0;
         const double pressed = p[0] - y[i*d]/normal[i], push = pressed > 0.0 ? pressed : 0.0, reach = friction[i]*push;
         change[0] = push - p[0];
         for (int k = 1; k < d; k++) {
             pulled[k] = p[k] - (y[i*d + k] + W[(ptrdiff_t)k*n + i*d]*change[0])/across[i];
             square += pulled[k]*pulled[k];
         }
-        const double size = sqrt(square), part = size > reach ? reach/size : 1.0;
+        const double size = d == 2 ? fabs(pulled[1]) : sqrt(square), part = size > reach ? reach/size : 1.0;
         p[0] = push;
         for (int k = 1; k < d; k++) {
             change[k] = pulled[k]*part - p[k];

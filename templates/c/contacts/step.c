@@ -234,16 +234,13 @@ int eomgen_rigid_step(eomgen_rigid *s, double t, double h)
     failed = find_contacts(s, middle, &held, h, part[OF_FREE], part[OF_SPOTS], part[OF_AXES], &at, keys, &told);
     for (int round = 0; round < 2 && !failed; round++) {
         if (at.m) {
-            collide(s, &held, &at, part[OF_FREE], h, part[OF_NEW], &told);
+            collide(s, &held, &at, part[OF_FREE], h, round ? 1.0 : RIGID_ROUGH, part[OF_NEW], &told);
         } else {
             memcpy(part[OF_NEW], part[OF_FREE], (size_t)n*sizeof(double));
         }
         if (round == 0) {
             for (int i = 0; i < n; i++) { x_m[n_q + i] = 0.5*(v[i] + part[OF_NEW][i]); }
             failed = call(s, &s->bias, middle, x_m, part[OF_AGAIN]);
-            if (memcmp(part[OF_AGAIN], part[OF_BIAS], (size_t)n*sizeof(double)) == 0) {
-                break;
-            }
             fall(&held, part[OF_C], s->rows, part[OF_DRIFT], v, h, part[OF_AGAIN], part[OF_WORK], part[OF_FREE]);
         }
     }
