@@ -36,6 +36,16 @@ def require_allowed(metadata: Mapping[str, Any], p: Array) -> None:
         raise ParameterError(list(dict.fromkeys(problems)))
 
 
+def bounds_of(metadata: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """The least and the greatest value of each parameter that is a number of an element by itself, as far as told."""
+    found: dict[str, tuple[float, float]] = {}
+    for k, _, low, high, *_ in metadata.get("ranges", ()):
+        least, most = found.get(metadata["p_names"][k], (-np.inf, np.inf))
+        least = least if low is None else max(least, low)
+        found[metadata["p_names"][k]] = (least, most if high is None else min(most, high))
+    return found
+
+
 def told(
     metadata: Mapping[str, Any], path: str, flaws: Sequence[Flaw], used: Sequence[int], p: Array, runs: Sequence[int]
 ) -> list[Problem]:
