@@ -13,7 +13,7 @@ from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from ..graph.vectors import Vec3
-from ..numeric.value_ranges import POSITIVE, Range
+from ..numeric.value_ranges import POSITIVE, Allowed
 from .build_cam_points import Contacts
 from .build_joints import Declared
 from .checks import check_keys
@@ -110,7 +110,7 @@ class ElementEntry:
         if key in self.values:
             self.fault(key, why, "leave it out")
 
-    def require(self, key: str, value: Expr, allowed: Range, rule: str, message: str = "") -> None:
+    def require(self, key: str, value: Expr, allowed: Allowed, rule: str, message: str = "") -> None:
         self.reader.requirements.inside(self._at(key), value, allowed, rule, message)
 
     def judge(

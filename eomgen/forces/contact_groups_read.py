@@ -9,7 +9,7 @@ from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Range
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from .contact import CURVED
 from .contact_groups import ContactGroups
 from .contact_shape_fields import GROUNDS, PLANAR, SHAPE_FIELDS
@@ -76,7 +76,7 @@ def _rigid_law(e: Entry) -> RigidLaw:
             e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     restitution = e.given("restitution")
     if restitution is not None:
-        e.require("restitution", restitution, Range(high=1.0), "must be at most 1")
+        e.require("restitution", restitution, Allowed(high=1.0), "must be at most 1")
     return RigidLaw()
 
 

@@ -16,7 +16,7 @@ from ..limits.descriptions import CLOSING, EDGE, LAW, PERPENDICULAR, SHARP, TENS
 from .outline_rules import judge_outline, judge_rising, judge_sprocket
 from .rigid_inertia import fault_of_inertia, inertia_scales, longest_within
 from .space import Array
-from .value_ranges import RANGE, Flaw, Range, judge_range
+from .value_ranges import RANGE, Allowed, Flaw, judge_range
 
 #: Normals at which a support is looked at: 7 degrees apart.
 NORMALS = 800
@@ -177,7 +177,7 @@ POINTS: Mapping[str, Callable[[], Array]] = {SUPPORT: spread_normals, TURN: turn
 def surely_right(rule: str, values: Array, data: Sequence[Any]) -> Any:
     """Whether numbers (n, k) of k sets of parameters keep a rule, a flag each; False where that takes a closer look."""
     if rule == RANGE:
-        return Range(*data[:4]).has(values[0])
+        return Allowed(*data[:4]).has(values[0])
     if rule == LIMITS:
         return values[0] <= values[1]
     if rule == NOT_ZERO:

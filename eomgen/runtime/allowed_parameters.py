@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import ParameterError, Problem
 from ..numeric.scales import Array
-from ..numeric.value_ranges import Flaw, Range, judge_range
+from ..numeric.value_ranges import Allowed, Flaw, judge_range
 
 
 def require_allowed(metadata: Mapping[str, Any], p: Array) -> None:
@@ -23,7 +23,7 @@ def require_allowed(metadata: Mapping[str, Any], p: Array) -> None:
     """
     columns, problems = p.reshape(len(p), -1), list[Problem]()
     for k, path, *data in metadata.get("ranges", ()):
-        wrong = np.flatnonzero(~Range(*data[:4]).has(columns[k]) & np.isfinite(columns[k]))
+        wrong = np.flatnonzero(~Allowed(*data[:4]).has(columns[k]) & np.isfinite(columns[k]))
         if len(wrong):
             flaws = judge_range(columns[k, wrong[:1]], *data)
             problems += told(metadata, path, flaws, [k], p, wrong.tolist())
