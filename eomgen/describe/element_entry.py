@@ -283,6 +283,22 @@ class ElementEntry:
     def symbol(self, found: Found) -> Expr:
         return self.graph.symbol(found.name)
 
+    def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
+        if key not in self.values:
+            return None
+        value = self.values[key]
+        joint = next((one for one in self.around.joints if one.entry.name == value), None)
+        if joint is None:
+            found = self._find(key, value)
+            return None if found is None else ((found.name, self.graph.symbol(f"{found.name}_dot"), found.kind),)
+        names = joint.coordinates
+        rates = [(names[v.of], f"{names[v.of]}_dot") if v.of is not None else (value + v.suffix,) * 2
+                 for v in joint.joint.velocities]  # fmt: skip
+        kinds = [velocity.kind for velocity in joint.joint.velocities]
+        if not rates:
+            self.fault(key, f"{value!r} has no coordinates to lock", "name a joint that has")
+        return tuple((label, self.graph.symbol(rate), k) for (label, rate), k in zip(rates, kinds, strict=True))
+
     def two_coordinates(self, key: str, kind: str = "") -> tuple[Found, Found] | None:
         if key not in self.values:
             return None

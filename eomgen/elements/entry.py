@@ -146,6 +146,9 @@ class Entry(Protocol):
     def symbol(self, found: Found) -> Expr:
         """The symbol of a coordinate."""
 
+    def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
+        """The velocities of a joint, or of one coordinate: the name, the symbol, and 'angle' or 'length'."""
+
     def two_coordinates(self, key: str, kind: str = "") -> tuple[Found, Found] | None:
         """Two different coordinates, measured from one body."""
 

@@ -139,11 +139,11 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
         if "plate" in own and (wrong := [kind for kind in met if kind not in _UNDER_PLATES]):
             e.fault(key, f"{wrong[0]} and plate do not meet", f"plates meet {', '.join(_UNDER_PLATES)}")
             break
-    for key, own, others in (("first", first, second or first), ("second", second, first)):
+    for key, group, others in (("first", first, second or first), ("second", second, first)):
         cornered = sorted({shape.kind for shape in others if shape.kind in _CORNERED or _is_thin(shape)})
         if cornered and (second or _differ_in_body(first)):
             told = f"corners of {cornered[0]} pass through a segment of radius 0, which has no inside"
-            for shape in own:
+            for shape in group:
                 if shape.kind == "segment":
                     e.require(key, shape.sizes[1], POSITIVE, "give the segment a radius greater than 0", told)
         if e.at_fault(key):

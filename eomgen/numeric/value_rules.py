@@ -68,7 +68,8 @@ def judge_bodies(values: Any, bodies: Sequence[Sequence[Any]]) -> list[Flaw]:
     bodies : sequence of (name, whether there is an axis, number of points, whether it is judged)
     """
     numbers, at = np.array(values, dtype=float), 0
-    masses, tensors, axes, points = [], [], [], []
+    masses, tensors, points = list[float](), list[Array](), list[list[Array]]()
+    axes = list[Array | None]()
     for _, has_axis, count, _ in bodies:
         ends = np.cumsum([at, 1, 9, 3 * has_axis, 3 * count])
         mass, tensor, axis, own = (numbers[a:b] for a, b in itertools.pairwise(ends.tolist()))
