@@ -85,9 +85,9 @@ def judge_bodies(values: Any, bodies: Sequence[Sequence[Any]]) -> list[Flaw]:
         longest_within(points),
     )
     found: list[Flaw] = []
-    for (name, _, _, judged), tensor, told, axis, scale in zip(bodies, tensors, known, axes, scales, strict=True):
+    for (name, _, _, judged), tensor, told, line, scale in zip(bodies, tensors, known, axes, scales, strict=True):
         if judged and told:
-            plane = None if axis is None or not np.isfinite(axis).all() else axis.tolist()
+            plane = None if line is None or not np.isfinite(line).all() else line.tolist()
             if fault := fault_of_inertia(tensor, plane, scale):
                 found.append(Flaw(f".{name}.inertia", *fault))
     return found
