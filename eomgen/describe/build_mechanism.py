@@ -35,6 +35,7 @@ from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
 from .joint_data import check_display
+from .joint_locks import with_locks
 from .mass_properties import read_body
 from .mechanism import SUMS, Body, CarriedQuantity, Mechanism, Simulation, WrenchQuantity
 from .names import fault_of_model_name, nearest
@@ -61,7 +62,7 @@ def build(description: Description) -> Mechanism:
     ModelError
         The description has faults; all of them are listed.
     """
-    description = undotted(description)
+    description = with_locks(undotted(description))
     faults = Faults(description)
     if description.incomplete:
         raise ModelError(faults.sorted())

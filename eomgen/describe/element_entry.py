@@ -13,7 +13,7 @@ from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from ..graph.vectors import Vec3
-from ..numeric.value_ranges import POSITIVE, Range
+from ..numeric.value_ranges import POSITIVE, Allowed
 from .build_cam_points import Contacts
 from .build_joints import Declared
 from .checks import check_keys
@@ -110,7 +110,7 @@ class ElementEntry:
         if key in self.values:
             self.fault(key, why, "leave it out")
 
-    def require(self, key: str, value: Expr, allowed: Range, rule: str, message: str = "") -> None:
+    def require(self, key: str, value: Expr, allowed: Allowed, rule: str, message: str = "") -> None:
         self.reader.requirements.inside(self._at(key), value, allowed, rule, message)
 
     def judge(
@@ -282,6 +282,22 @@ class ElementEntry:
 
     def symbol(self, found: Found) -> Expr:
         return self.graph.symbol(found.name)
+
+    def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
+        if key not in self.values:
+            return None
+        value = self.values[key]
+        joint = next((one for one in self.around.joints if one.entry.name == value), None)
+        if joint is None:
+            found = self._find(key, value)
+            return None if found is None else ((found.name, self.graph.symbol(f"{found.name}_dot"), found.kind),)
+        names = joint.coordinates
+        rates = [(names[v.of], f"{names[v.of]}_dot") if v.of is not None else (value + v.suffix,) * 2
+                 for v in joint.joint.velocities]  # fmt: skip
+        kinds = [velocity.kind for velocity in joint.joint.velocities]
+        if not rates:
+            self.fault(key, f"{value!r} has no coordinates to lock", "name a joint that has")
+        return tuple((label, self.graph.symbol(rate), k) for (label, rate), k in zip(rates, kinds, strict=True))
 
     def two_coordinates(self, key: str, kind: str = "") -> tuple[Found, Found] | None:
         if key not in self.values:

@@ -56,7 +56,7 @@ def check_bodies(
         elif body.check == "error":
             requirements.inside(f"{path}.mass", body.mass, NOT_NEGATIVE, remedy)
         if not faults.under(f"{path}.inertia"):
-            if not is_symmetric(body.inertia, tensor, COMPUTED * scale):
+            if not is_symmetric(body.inertia, None if tensor is None else tensor.tolist(), COMPUTED * scale):
                 found.append((f"{path}.inertia", *ASYMMETRIC))
             else:
                 found += [(path + ".inertia", *flaw[1:]) for flaw in flaws if flaw.key == f".{body.name}.inertia"]

@@ -15,7 +15,7 @@ from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
 from ..numeric.scales import Array
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, RANGE, Range
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, RANGE, Allowed
 from ..numeric.value_rules import LIMITS, NOT_ZERO, POINTS, RULES
 
 
@@ -86,7 +86,7 @@ class Requirements:
         return values if np.isfinite(values).all() else None
 
     # -- rules of one and two numbers -----------------------------------------------------------------------------
-    def inside(self, path: str, value: Expr, allowed: Range, remedy: str, message: str = "") -> bool:
+    def inside(self, path: str, value: Expr, allowed: Allowed, remedy: str, message: str = "") -> bool:
         """Require a number in a range; ``{:g}`` in a message of its own stands for it."""
         return self.judge(path, RANGE, [value], (*allowed, remedy, message))
 

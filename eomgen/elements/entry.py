@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
-from ..numeric.value_ranges import Range
+from ..numeric.value_ranges import Allowed
 from .field import Fields
 
 
@@ -72,7 +72,7 @@ class Entry(Protocol):
     def refuse(self, key: str, why: str) -> None:
         """Note a key that has no meaning beside the others, if it is given."""
 
-    def require(self, key: str, value: Expr, allowed: Range, rule: str, message: str = "") -> None:
+    def require(self, key: str, value: Expr, allowed: Allowed, rule: str, message: str = "") -> None:
         """Require an expression in a range, at the declared values of parameters and at those given later.
 
         ``rule`` says what is allowed; ``{:g}`` in a ``message`` of its own stands for the number.
@@ -145,6 +145,9 @@ class Entry(Protocol):
     # -- coordinates and names ------------------------------------------------------------------------------------
     def symbol(self, found: Found) -> Expr:
         """The symbol of a coordinate."""
+
+    def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
+        """The velocities of a joint, or of one coordinate: the name, the symbol, and 'angle' or 'length'."""
 
     def two_coordinates(self, key: str, kind: str = "") -> tuple[Found, Found] | None:
         """Two different coordinates, measured from one body."""

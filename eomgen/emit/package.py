@@ -48,8 +48,6 @@ METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", 
 SLIM_METHODS = ("x0", "assemble", "bind", "simulate")
 
 
-#: Of the metadata, what slim packages have not.
-WHOLE = ("rules",)
 #: Files of every package.
 ABOUT = ("LICENSE.txt", "PROVENANCE.md")
 
@@ -93,8 +91,7 @@ def emit_package(
     if precision != "double" and not row.precisions:
         raise UsageError(f"precision={precision!r} is for target c; packages of target {target} compute in double")
     made = {"target": target, "provenance": trace_provenance(program, target, asked or {})}
-    kept = {key: value for key, value in program.metadata.items() if not (slim and key in WHOLE)}
-    program = replace(program, metadata={**kept, **made})
+    program = replace(program, metadata={**program.metadata, **made})
     context = _context(program, slim) | {"precision": precision}
     about = {name: render(f"python/{name}.j2", context) for name in ABOUT}
     return SourceSet({"model.json": metadata_json(program), **about, **row.files(program, context)})

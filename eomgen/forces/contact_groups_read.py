@@ -9,7 +9,7 @@ from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
-from ..numeric.value_ranges import NOT_NEGATIVE, Range
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from .contact import CURVED
 from .contact_groups import ContactGroups
 from .contact_shape_fields import GROUNDS, PLANAR, SHAPE_FIELDS
@@ -95,7 +95,7 @@ def _rigid_law(e: Entry) -> RigidLaw:
             e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     restitution = e.given("restitution")
     if restitution is not None:
-        e.require("restitution", restitution, Range(high=1.0), "must be at most 1")
+        e.require("restitution", restitution, Allowed(high=1.0), "must be at most 1")
     return RigidLaw()
 
 
@@ -161,15 +161,14 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
         if "plate" in own and (wrong := [kind for kind in met if kind not in _UNDER_PLATES]):
             e.fault(key, f"{wrong[0]} and plate do not meet", f"plates meet {', '.join(_UNDER_PLATES)}")
             break
-    thin = [shape for shape in first if _is_thin(shape)], [shape for shape in second or first if _is_thin(shape)]
-    for k, others in enumerate((second or first, first)):
+    for key, group, others in (("first", first, second or first), ("second", second, first)):
         cornered = sorted({shape.kind for shape in others if shape.kind in _CORNERED or _is_thin(shape)})
-        if thin[k] and cornered and (second or _differ_in_body(first)):
-            e.fault(
-                ("first", "second")[k] if second else "first",
-                f"corners of {cornered[0]} pass through a segment of radius 0, which has no inside",
-                "give the segment a radius greater than 0",
-            )
+        if cornered and (second or _differ_in_body(first)):
+            told = f"corners of {cornered[0]} pass through a segment of radius 0, which has no inside"
+            for shape in group:
+                if shape.kind == "segment":
+                    e.require(key, shape.sizes[1], POSITIVE, "give the segment a radius greater than 0", told)
+        if e.at_fault(key):
             break
     for key, shapes in (("first", first), ("second", second)):
         if twice := [shape for k, shape in enumerate(shapes) if shape in shapes[:k]]:

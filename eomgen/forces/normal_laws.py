@@ -10,7 +10,7 @@ from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE
 from ..elements.entry import Entry
 from ..elements.field import EXPONENT, LINEAR, Field, Fields
 from ..graph.core import Expr, sqrt
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Range
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from ..records import dataclass
 from .branches import beyond_zero
 
@@ -254,7 +254,7 @@ def read_normal_law(e: Entry) -> NormalLaw:
         return _elastic(e, kind)
     _require_stiffness(e)
     stiffness, exponent = e.positive("stiffness"), e.law("exponent")
-    e.require("exponent", exponent, Range(1.0), "must be at least 1; above 1 the stiffness begins without a jump")
+    e.require("exponent", exponent, Allowed(1.0), "must be at least 1; above 1 the stiffness begins without a jump")
     return HuntCrossley(stiffness, exponent, _dissipation(e))
 
 
@@ -285,7 +285,7 @@ def _elastic(e: Entry, kind: str) -> NormalLaw:
             e.fault(key, "is missing", "give moduli and poisson together, two numbers each")
     for key, found, right, rule in (
         ("moduli", moduli, POSITIVE, "must be greater than 0"),
-        ("poisson", ratios, Range(-1.0, 0.5, above=True), "is above -1 and at most 0.5"),
+        ("poisson", ratios, Allowed(-1.0, 0.5, above=True), "is above -1 and at most 0.5"),
     ):
         for k, x in enumerate(found or ()):
             e.require(f"{key}[{k}]", x, right, rule)
@@ -317,6 +317,6 @@ def _dissipation(e: Entry) -> Expr:
             "velocity" if velocity is None else "restitution", "is missing", "give restitution and velocity together"
         )
         return e.stand_in
-    e.require("restitution", restitution, Range(0.0, 1.0, above=True), "must be greater than 0 and at most 1")
+    e.require("restitution", restitution, Allowed(0.0, 1.0, above=True), "must be greater than 0 and at most 1")
     e.require("velocity", velocity, POSITIVE, "must be greater than 0")
     return dissipation_of(restitution, velocity, formula)

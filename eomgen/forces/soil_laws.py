@@ -18,7 +18,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..limits.contacts import CAUGHT_UP
-from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Range
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .contact_states import WHEEL, cells_of, given_groups
@@ -281,7 +281,7 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
         e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     for key, value in (("sinkage_exponent", exponent), ("shear_modulus", modulus)):
         e.require(key, value, POSITIVE, "must be greater than 0")
-    acute = Range(0.0, math.pi / 2, below=True)
+    acute = Allowed(0.0, math.pi / 2, below=True)
     e.require("friction_angle", angle, acute, "is 0 or greater and below pi/2; it is in rad")
     if "frictional_modulus" in e.values and not e.at_fault():
         message, remedy = "is 0 as cohesive_modulus is", "give one that is greater than 0"
@@ -308,7 +308,7 @@ def _unloading(e: Entry) -> tuple[Expr | None, tuple[Expr, Expr] | None]:
     keys = ("unloading_stiffness", "unloading_rise")
     if not any(key in e.values for key in keys):
         part = e.law("rebound") if "rebound" in e.values else e.graph.constant(REBOUND)
-        e.require("rebound", part, Range(0.0, 1.0, above=True), "is above 0 and at most 1")
+        e.require("rebound", part, Allowed(0.0, 1.0, above=True), "is above 0 and at most 1")
         return part, None
     e.refuse("rebound", f"follows from {' and '.join(keys)}")
     found = [e.law(key) if key in e.values else e.graph.zero for key in keys]
@@ -322,7 +322,7 @@ def _peak(e: Entry) -> tuple[Expr, Expr] | None:
     pair = e.several("peak_angle", 2) if "peak_angle" in e.values else None
     if pair is None:
         return None
-    e.require("peak_angle[0]", pair[0], Range(0.0, 1.0, above=True), "is above 0 and at most 1")
+    e.require("peak_angle[0]", pair[0], Allowed(0.0, 1.0, above=True), "is above 0 and at most 1")
     e.require("peak_angle[1]", pair[1], NOT_NEGATIVE, "must be 0 or greater")
     for key in ("rebound", "unloading_stiffness", "unloading_rise"):
         e.refuse(key, "is of the rear of wheels without peak_angle, which gives the pressure of the whole arc")

@@ -13,7 +13,7 @@ class Flaw(NamedTuple):
     remedy: str
 
 
-class Range(NamedTuple):
+class Allowed(NamedTuple):
     """Numbers from ``low`` to ``high``, None where there is no bound; a bound itself may be excluded."""
 
     low: float | None = None
@@ -28,14 +28,14 @@ class Range(NamedTuple):
         return over & under
 
 
-POSITIVE = Range(0.0, above=True)
-NOT_NEGATIVE = Range(0.0)
+POSITIVE = Allowed(0.0, above=True)
+NOT_NEGATIVE = Allowed(0.0)
 RANGE = "range"  #: the rule of one number in a range
 
 
 def judge_range(values: Any, low: Any, high: Any, above: bool, below: bool, remedy: str, message: str) -> list[Flaw]:
     """The rule of one number, for which ``{:g}`` stands in the message; that it is so great by default."""
     number = float(values[0])
-    if Range(low, high, above, below).has(number):
+    if Allowed(low, high, above, below).has(number):
         return []
     return [Flaw("", (message or "is {:g}").format(number), remedy)]

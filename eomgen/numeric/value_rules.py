@@ -16,7 +16,7 @@ from ..limits.descriptions import CLOSING, EDGE, LAW, PERPENDICULAR, SHARP, TENS
 from .outline_rules import judge_outline, judge_rising, judge_sprocket
 from .rigid_inertia import fault_of_inertia, inertia_scales, longest_within
 from .space import Array
-from .value_ranges import RANGE, Flaw, Range, judge_range
+from .value_ranges import RANGE, Allowed, Flaw, judge_range
 
 #: Normals at which a support is looked at: 7 degrees apart.
 NORMALS = 800
@@ -68,7 +68,8 @@ def judge_bodies(values: Any, bodies: Sequence[Sequence[Any]]) -> list[Flaw]:
     bodies : sequence of (name, whether there is an axis, number of points, whether it is judged)
     """
     numbers, at = np.array(values, dtype=float), 0
-    masses, tensors, axes, points = [], [], [], []
+    masses, tensors, points = list[float](), list[Array](), list[list[Array]]()
+    axes = list[Array | None]()
     for _, has_axis, count, _ in bodies:
         ends = np.cumsum([at, 1, 9, 3 * has_axis, 3 * count])
         mass, tensor, axis, own = (numbers[a:b] for a, b in itertools.pairwise(ends.tolist()))
@@ -84,9 +85,9 @@ def judge_bodies(values: Any, bodies: Sequence[Sequence[Any]]) -> list[Flaw]:
         longest_within(points),
     )
     found: list[Flaw] = []
-    for (name, _, _, judged), tensor, told, axis, scale in zip(bodies, tensors, known, axes, scales, strict=True):
+    for (name, _, _, judged), tensor, told, line, scale in zip(bodies, tensors, known, axes, scales, strict=True):
         if judged and told:
-            plane = None if axis is None or not np.isfinite(axis).all() else axis.tolist()
+            plane = None if line is None or not np.isfinite(line).all() else line.tolist()
             if fault := fault_of_inertia(tensor, plane, scale):
                 found.append(Flaw(f".{name}.inertia", *fault))
     return found
@@ -177,7 +178,7 @@ POINTS: Mapping[str, Callable[[], Array]] = {SUPPORT: spread_normals, TURN: turn
 def surely_right(rule: str, values: Array, data: Sequence[Any]) -> Any:
     """Whether numbers (n, k) of k sets of parameters keep a rule, a flag each; False where that takes a closer look."""
     if rule == RANGE:
-        return Range(*data[:4]).has(values[0])
+        return Allowed(*data[:4]).has(values[0])
     if rule == LIMITS:
         return values[0] <= values[1]
     if rule == NOT_ZERO:

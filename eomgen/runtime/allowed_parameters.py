@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError, Problem
+from ..errors import ParameterError, Problem, UnavailableError
 from ..numeric.scales import Array
-from ..numeric.value_ranges import Flaw, Range, judge_range
+from ..numeric.value_ranges import Allowed, Flaw, judge_range
 
 
 def require_allowed(metadata: Mapping[str, Any], p: Array) -> None:
@@ -23,17 +24,27 @@ def require_allowed(metadata: Mapping[str, Any], p: Array) -> None:
     """
     columns, problems = p.reshape(len(p), -1), list[Problem]()
     for k, path, *data in metadata.get("ranges", ()):
-        wrong = np.flatnonzero(~Range(*data[:4]).has(columns[k]) & np.isfinite(columns[k]))
+        wrong = np.flatnonzero(~Allowed(*data[:4]).has(columns[k]) & np.isfinite(columns[k]))
         if len(wrong):
             flaws = judge_range(columns[k, wrong[:1]], *data)
             problems += told(metadata, path, flaws, [k], p, wrong.tolist())
-    if "rules" in metadata:
+    with suppress(UnavailableError):  # a slim package judges single parameters only
         from .late_rules import broken_rules
 
-        for path, flaws, used, runs in broken_rules(metadata["rules"], columns):
+        for path, flaws, used, runs in broken_rules(metadata.get("rules", ()), columns):
             problems += told(metadata, path, flaws, used, p, runs)
     if problems:
         raise ParameterError(list(dict.fromkeys(problems)))
+
+
+def bounds_of(metadata: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """The least and the greatest value of each parameter that is a number of an element by itself, as far as told."""
+    found: dict[str, tuple[float, float]] = {}
+    for k, _, low, high, *_ in metadata.get("ranges", ()):
+        least, most = found.get(metadata["p_names"][k], (-np.inf, np.inf))
+        least = least if low is None else max(least, low)
+        found[metadata["p_names"][k]] = (least, most if high is None else min(most, high))
+    return found
 
 
 def told(
