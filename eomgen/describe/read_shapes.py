@@ -5,8 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import Any
 
+from ..forces.contact_fields import PLACES
 from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS
 from ..forces.contact_shapes import ContactShape
 from ..forces.contact_states import POINTS, points_of_plate
@@ -17,6 +19,8 @@ from .description import items
 from .names import nearest
 from .read_outlines import outline_sizes, positive, sprocket_sizes
 from .values import Reader
+
+EDGES = 0.05  #: radius of the edges of a cuboid unless given, as a part of its least length
 
 
 def read_shapes(reader: Reader, path: str, value: Any) -> tuple[ContactShape, ...] | None:
@@ -83,7 +87,10 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         lengths = _several(reader, f"{path}.{key}", given[key], 3)
         for k, x in enumerate(lengths or ()):
             positive(reader, f"{path}.{key}[{k}]", x)
-        return None if lengths is None else tuple(lengths)
+        return None if lengths is None else (*lengths, *(_edge(reader, path, given, lengths) if kind == "cuboid" else ()))
+    if kind == "height_field":
+        local = {name: reader.graph.symbol(symbol) for name, symbol in PLACES.items()}
+        return (reader.expression(f"{path}.height", given["height"], local=local),)
     if kind == "plate":
         return _plate(reader, path, given)
     names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius", *(["width"] * ("width" in given)))
@@ -92,6 +99,19 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         if name in given:
             positive(reader, f"{path}.{name}", x, kind == "segment" and name == "radius")
     return tuple(sizes)
+
+
+def _edge(reader: Reader, path: str, given: Mapping[str, Any], size: Sequence[Expr]) -> tuple[Expr]:
+    """The radius of the edges of a cuboid."""
+    least = reduce(lambda a, b: a.graph.apply("min", a, b), size)
+    if "edge_radius" not in given:
+        return (EDGES * least,)
+    radius = reader.expression(f"{path}.edge_radius", given["edge_radius"])
+    positive(reader, f"{path}.edge_radius", radius)
+    known, most = reader.known(radius), reader.known(0.5 * least)
+    if known is not None and most is not None and known >= most > 0:
+        reader.faults.add(f"{path}.edge_radius", f"is {known:g}", f"must be less than half of its least length, {most:g}")
+    return (radius,)
 
 
 def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:

@@ -13,6 +13,7 @@ from ..graph.pair_calls import PairFunction, PairKind, PairPart
 from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
 from ..program import Program
+from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
 from .pair_statements import record_of
 from .pair_sums_used import UsedSum, sums_again, used_sums
@@ -79,6 +80,7 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
                 "held": kind.held,
             }
         )
+    calls = {op: call for kind in function.kinds for op, call in kind.calls}
     context = {
         "name": program.name,
         "sum": function.name,
@@ -95,6 +97,7 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
         "kinds": kinds,
         "functions": functions,
         "helpers": helpers,
+        "called": plain_declarations(program.name, calls.values()),
         "most": max((len(kind["second"]["rows"]) for kind in kinds if kind["sorted"]), default=0),
         "longest": max(table["length"] for table in tables),
         "apart": repr(APART),

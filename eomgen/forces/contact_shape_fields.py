@@ -9,6 +9,7 @@ from .contact_states import PLATE, POINTS
 CORNERS = 64  #: most corners of a polygon
 
 _RADIUS = Field("expression", "radius (m)", required=True, dimension=LENGTH)
+_PLACE = Field("expression", "", dimension=LENGTH)
 _ALONG = "length between the centres of its ends (m), along {} of the marker"
 
 
@@ -42,6 +43,7 @@ def _outline(how: str) -> Fields:
     }
 
 
+FIELD_SHAPE = "height_field"
 _SIZES: dict[str, Fields] = {
     "circle": {
         "radius": _RADIUS,
@@ -94,7 +96,24 @@ _SIZES: dict[str, Fields] = {
     "ellipsoid": {
         "semi_axes": Field("vector", "semi-axes along x, y and z (m)", required=True, dimension=LENGTH),
     },
-    "cuboid": {"size": Field("vector", "lengths along x, y and z (m)", required=True, dimension=LENGTH)},
+    "cuboid": {
+        "size": Field("vector", "lengths along x, y and z (m)", required=True, dimension=LENGTH),
+        "edge_radius": Field(
+            "expression",
+            "radius of its edges where it meets cuboids and capsules (m); a twentieth of its least length unless given",
+            dimension=LENGTH,
+        ),
+    },
+    FIELD_SHAPE: {
+        "height": Field(
+            "expression",
+            "height z (m) of the ground over the x-y plane of the marker, an expression of ``x``, ``y``, parameters and "
+            "tables",
+            required=True,
+            dimension=LENGTH,
+            local={"x": _PLACE, "y": _PLACE},
+        ),
+    },
 }
 _ON = {
     "shape": Field("choice", "kind of shape", required=True, choices=tuple(_SIZES)),
@@ -108,4 +127,4 @@ PLANAR = (
     *("half_plane", "profile", "smooth_profile"),
 )
 #: Shapes without an end, which do not meet each other.
-GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space")
+GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space", FIELD_SHAPE)

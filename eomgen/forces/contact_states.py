@@ -23,6 +23,8 @@ PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon
 STATELESS = ("rim",)
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
 BLOCK = "block"  #: class of cuboids, which spheres meet
+CORE = "core"  #: class of cuboids with rounded edges, which those of other cuboids and capsules meet
+FIELD = "field"  #: class of height fields, of which those of one height have one number
 _ROUND = ("round", "rod", POLYGON)
 #: Classes of first parts that are told apart; all others are surfaces.
 _APART = (*_ROUND, "ellipsoid", BLOCK)
@@ -31,14 +33,17 @@ _FIRST = {
     "circle": "round", "sphere": "round", "capsule": "rod", "segment": "segment", "box": POLYGON, "polygon": POLYGON,
     "profile": "ground", "smooth_profile": "ground", "outline": "ground", "smooth_outline": "ground",
     "sprocket": "ground", "half_plane": "half", "half_space": "half",
-    "ellipsoid": "ellipsoid", "cuboid": BLOCK,
+    "ellipsoid": "ellipsoid", "cuboid": BLOCK, "height_field": FIELD,
 }  # fmt: skip
 #: What is met by each of these.
 MET = {
     "round": ("round",),
     "rod": ("round", "rod"),
-    "ellipsoid": ("round",),
+    "ellipsoid": ("round", "rod", "ellipsoid"),
     BLOCK: ("round",),
+    CORE: ("knob", "tip"),
+    "brim": ("rod", "brim"),
+    FIELD: ("round", "end", "ellipsoid"),
     "segment": ("round", "corner", "vertex"),
     POLYGON: ("round", "corner", POLYGON),
     "ground": ("round", "corner", "vertex", "pad", "rim"),
