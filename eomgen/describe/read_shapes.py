@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Mapping, Sequence
 from functools import reduce
 from typing import Any
@@ -14,6 +15,7 @@ from ..forces.contact_shapes import ContactShape
 from ..forces.contact_states import POINTS, points_of_plate
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
+from .build_functions import read_table
 from .checks import check_keys
 from .description import items
 from .names import nearest
@@ -89,8 +91,7 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
             positive(reader, f"{path}.{key}[{k}]", x)
         return None if lengths is None else (*lengths, *(_edge(reader, path, given, lengths) if kind == "cuboid" else ()))
     if kind == "height_field":
-        local = {name: reader.graph.symbol(symbol) for name, symbol in PLACES.items()}
-        return (reader.expression(f"{path}.height", given["height"], local=local),)
+        return _height(reader, path, given)
     if kind == "plate":
         return _plate(reader, path, given)
     names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius", *(["width"] * ("width" in given)))
@@ -99,6 +100,29 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         if name in given:
             positive(reader, f"{path}.{name}", x, kind == "segment" and name == "radius")
     return tuple(sizes)
+
+
+def _height(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr] | None:
+    """The height of a field, as an expression or a table of its own."""
+    local = {name: reader.graph.symbol(symbol) for name, symbol in PLACES.items()}
+    table = {key: value for key, value in given.items() if key not in ("shape", "on", "height")}
+    if "height" in given:
+        for key in table:
+            reader.faults.add(f"{path}.{key}", "stands beside height", "give height, or x, y and z")
+        return (reader.expression(f"{path}.height", given["height"], local=local),)
+    if missing := [key for key in ("x", "y", "z") if key not in table]:
+        remedy = "give height, an expression of x and y, or the grid lines x and y and the heights z on them"
+        reader.faults.add(f"{path}.{missing[0]}", "is missing, and there is no height", remedy)
+        return None
+    taken = {f.name for f in (*reader.graph.functions.values(), *(f for f, _ in reader.graph.calls.values()))}
+    name = re.sub(r"\W+", "_", path).strip("_")
+    while name in taken:
+        name += "_"
+    function = read_table(reader, name, path, table)
+    if function is None:
+        return None
+    places = [local[axis].id for axis in ("x", "y")]
+    return (Expr(reader.graph, reader.graph.call(function, (0, 0), places)),)
 
 
 def _edge(reader: Reader, path: str, given: Mapping[str, Any], size: Sequence[Expr]) -> tuple[Expr]:

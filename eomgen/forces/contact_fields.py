@@ -10,6 +10,8 @@ from abc import abstractmethod
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, sqrt
 from ..graph.differentiate import gradient
@@ -18,6 +20,7 @@ from ..graph.traverse import reachable
 from ..graph.vectors import Mat3, Vec3
 from ..limits.contacts import ASTRAY, FOOT, STEEP
 from ..limits.runs import BEYOND, UP_TO
+from ..numeric.user_functions import Surface
 from ..records import dataclass
 from .branches import where
 from .contact import Contact, Touch
@@ -26,6 +29,7 @@ from .force import View
 
 #: Symbols of a place in the expression of a height, and the names by which texts know them.
 PLACES = {"x": "x[height]", "y": "y[height]"}
+_LINES = 13  #: lines each way of which the picture of a height field is made
 _TOO_BENT = 0.1  #: part of the plain step's determinant below which Newton's step is not taken
 
 
@@ -69,6 +73,26 @@ def planted(height: Expr, graph: Graph, own: Callable[[Expr], Expr]) -> HeightFi
     slopes = gradient(h, [x, y])
     (xx, xy), (_, yy) = (gradient(slope, [x, y]) for slope in slopes)
     return HeightField(x, y, (h, *slopes, xx, xy, yy))
+
+
+def field_lines(height: Expr) -> list[list[Vec3]]:
+    """Lines of a picture over the grid of a table of x and y that a height calls; none where it calls none."""
+    graph = height.graph
+    places = tuple(graph.symbol(name) for name in PLACES.values())
+    for i in reachable(graph, [height.id]):
+        operation, *ids = graph.nodes[i]
+        function = graph.calls[operation][0] if operation in graph.calls else None
+        surface = getattr(function, "evaluator", None)
+        if isinstance(surface, Surface) and ids == [place.id for place in places]:
+            break
+    else:
+        return []
+    x, y = (np.linspace(axis[0], axis[-1], _LINES) for axis in (surface.x, surface.y))
+    grid: list[list[Vec3]] = []
+    for a in x.tolist():
+        heights = [substitute([height], dict(zip(places, map(graph.constant, (a, b)), strict=True)))[0] for b in y.tolist()]
+        grid.append([(graph.constant(a), graph.constant(b), z) for b, z in zip(y.tolist(), heights, strict=True)])
+    return [*grid, *(list(line) for line in zip(*grid, strict=True))]
 
 
 @dataclass(frozen=True)

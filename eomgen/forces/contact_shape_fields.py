@@ -109,10 +109,14 @@ _SIZES: dict[str, Fields] = {
             "expression",
             "height z (m) of the ground over the x-y plane of the marker, an expression of ``x``, ``y``, parameters and "
             "tables",
-            required=True,
             dimension=LENGTH,
             local={"x": _PLACE, "y": _PLACE},
         ),
+        "x": Field("numbers", "instead of height: grid lines along x, strictly increasing (m)"),
+        "y": Field("numbers", "grid lines along y (m)"),
+        "z": Field("grid", "heights on the grid, a row for each x (m)"),
+        "kind": Field("choice", "interpolation between the points", choices=("cubic", "natural")),
+        "extrapolation": Field("choice", "beyond the grid: keep the slope or the height", choices=("linear", "constant")),
     },
 }
 _ON = {

@@ -21,7 +21,7 @@ from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .contact import Contact, SpherePlane, joint_radius
 from .contact_ellipsoids import EllipsoidEllipsoid, EllipsoidPlane, EllipsoidRod, EllipsoidRound
-from .contact_fields import FieldEllipsoid, FieldRound, HeightField
+from .contact_fields import FieldEllipsoid, FieldRound, HeightField, field_lines
 from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
 from .contact_polygons import PolygonPolygon, most_reach
 from .contact_profiles import (
@@ -232,7 +232,9 @@ class ContactShape:
         if self.kind == "ellipsoid":
             return [self._ellipse(i, j) for i, j in ((0, 1), (1, 2), (2, 0))]
         if self.kind == "height_field":
-            return [Drawn((marker,), about=PLANE)]
+            lines = [[_moved(marker.frame, place) for place in line] for line in field_lines(self.sizes[0])]
+            seen = [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in line)) for line in lines]
+            return [*seen] or [Drawn((marker,), about=PLANE)]
         if self.kind == "cuboid":
             found = [feature.frame for feature in self.features() if feature.kind == "end"]
             ways = ((0, 1, 3, 2, 0, 4, 5, 7, 6, 4), (1, 5), (2, 6), (3, 7))
