@@ -12,7 +12,7 @@ from ..elements.field import Field
 from .contact import CURVED
 from .contact_groups import ContactGroups
 from .contact_shape_fields import FIELD_SHAPE, GROUNDS, PLANAR, SHAPE_FIELDS
-from .contact_shapes import ContactShape
+from .contact_shapes import ContactShape, by_edges
 from .contact_states import MOST_PAIRS, ShapeParts, given_groups, pair_states
 from .friction_laws import DryFriction, has_bristles, read_friction
 from .normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, RigidLaw, read_normal_law
@@ -29,6 +29,8 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         return None
     law, friction = laws
     _refuse_pairs(e, first, second)
+    if not soil and not has_bristles(e.values):  # whose states are counted before shapes are known
+        first, second = by_edges(first, second)
     if has_bristles(e.values):
         _refuse_edges(e, first, second)
     if soil:

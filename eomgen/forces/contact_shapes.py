@@ -29,6 +29,8 @@ from .contact_profiles import (
     EdgeRound,
     Point,
     ProfilePart,
+    cross,
+    minus,
     peaks,
     smooth_pieces,
     solid_depth,
@@ -120,7 +122,8 @@ class ContactShape:
             half, radius = 0.5 * self.sizes[0], self.sizes[1]
             whole, *ends = ("segment", "corner") if self.kind == "segment" else ("rod", "end", "tip")
             thick = zero.graph.apply("max", 2.0 * radius, _SLIM * half)
-            return [Feature(whole, along, (half, radius), half + radius, thick)] + [
+            wholes = [whole] if self.kind == "segment" else [whole, "spine"]  # the same again, for edges of cuboids
+            return [Feature(one, along, (half, radius), half + radius, thick) for one in wholes] + [
                 Feature(end, _moved(along, (x, zero, zero)), (radius,), radius, thick, k)
                 for end in ends
                 for k, x in enumerate((-half, half))
@@ -143,6 +146,14 @@ class ContactShape:
     def is_wheel(self) -> bool:
         """Whether it is a circle with a width."""
         return self.kind == "circle" and len(self.sizes) > 1
+
+    def convex_corners(self) -> list[Point]:
+        """Corners, counterclockwise, of an outline whose points are numbers and which turns one way; else none."""
+        points = self._points() if self.kind == "outline" else []
+        around = zip([*points[-1:], *points[:-1]], points, [*points[1:], *points[:1]], strict=True)
+        turns = [(b, cross(minus(b, a), minus(c, b)).value) for a, b, c in around]
+        convex = all(turn is not None and turn <= 0.0 for _, turn in turns)
+        return [point for point, turn in reversed(turns) if turn != 0.0] if convex else []
 
     def parts(self) -> ShapeParts:
         """How many parts of each class it has."""
@@ -248,6 +259,27 @@ class ContactShape:
         return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in closed))]
 
 
+def by_edges(
+    first: Sequence[ContactShape], second: Sequence[ContactShape]
+) -> tuple[tuple[ContactShape, ...], tuple[ContactShape, ...]]:
+    """Groups in which convex outlines that meet polygons are polygons, which lie flush on each other by their edges.
+
+    Plates meet outlines only; where a group has some, outlines of the other stay what they are.
+    """
+
+    def changed(own: Sequence[ContactShape], other: Sequence[ContactShape]) -> tuple[ContactShape, ...]:
+        meets = any(shape.kind in ("box", "polygon") or shape.convex_corners() for shape in other)
+        if not meets or any(shape.kind == "plate" or shape.is_wheel for shape in other):
+            return tuple(own)
+        found = []
+        for shape in own:
+            corners = tuple(x for corner in shape.convex_corners() for x in corner)
+            found.append(ContactShape("polygon", shape.marker, corners) if corners else shape)
+        return tuple(found)
+
+    return changed(first, second or first), changed(second, first)
+
+
 def _most(sizes: Sequence[Expr]) -> Expr:
     return reduce(lambda a, b: a.graph.apply("max", a, b), sizes)
 
@@ -262,7 +294,7 @@ def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
         return _most(sizes)
     if part_of(kind) == POLYGON:
         return most_reach(sizes)
-    return sizes[0] + sizes[1] if kind in ("rod", "brim") else graph.zero
+    return sizes[0] + sizes[1] if kind in ("rod", "brim", "spine") else graph.zero
 
 
 def _width(edges: Sequence[Expr], corners: Sequence[tuple[Expr, Expr]]) -> Expr:

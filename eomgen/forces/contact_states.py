@@ -20,7 +20,7 @@ TEETH = 3  #: fewest teeth of a sprocket
 #: Parts that meet surfaces, in the order in which their states stand.
 PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon")
 #: Parts that meet surfaces and have no states.
-STATELESS = ("rim",)
+STATELESS = ("rim", "knob", "tip", "brim", "spine")
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
 BLOCK = "block"  #: class of cuboids, which spheres meet
 CORE = "core"  #: class of cuboids with rounded edges, which those of other cuboids and capsules meet
@@ -42,7 +42,7 @@ MET = {
     "ellipsoid": ("round", "rod", "ellipsoid"),
     BLOCK: ("round",),
     CORE: ("knob", "tip"),
-    "brim": ("rod", "brim"),
+    "brim": ("brim", "spine"),
     FIELD: ("round", "end", "ellipsoid"),
     "segment": ("round", "corner", "vertex"),
     POLYGON: ("round", "corner", POLYGON),
@@ -82,7 +82,7 @@ def parts_of(kind: str, points: int = 0) -> ShapeParts:
     found = {
         "circle": {"round": 1}, "sphere": {"round": 1}, "segment": {"corner": 2},
         "box": {POLYGON: 1, "vertex": 4}, "polygon": {POLYGON: 1, "vertex": points},
-        "capsule": {"rod": 1, "end": 2}, "ellipsoid": {"ellipsoid": 1}, "cuboid": {"end": 8},
+        "capsule": {"rod": 1, "end": 2, "tip": 2, "spine": 1}, "ellipsoid": {"ellipsoid": 1}, "cuboid": {"end": 8, "knob": 8, "brim": 12},
         "outline": {"corner": points}, "smooth_outline": {"corner": points},
         "sprocket": {"corner": 2 * points}, "plate": {"pad": points}, WHEEL: {"rim": 1},
         "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2},
