@@ -53,7 +53,9 @@ def _build(reader: Reader, entry: DescribedEntry) -> Function | None:
     check_keys(path, entry.values, function_fields(given), faults)
     if faults.under(path):
         return None
-    return build_native(reader, entry) if given == "native" else read_table(reader, entry.name, entry.path, entry.values)
+    return (
+        build_native(reader, entry) if given == "native" else read_table(reader, entry.name, entry.path, entry.values)
+    )
 
 
 def read_table(reader: Reader, name: str, path: str, values: Mapping[str, Any]) -> Function | None:

@@ -89,7 +89,9 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         lengths = _several(reader, f"{path}.{key}", given[key], 3)
         for k, x in enumerate(lengths or ()):
             positive(reader, f"{path}.{key}[{k}]", x)
-        return None if lengths is None else (*lengths, *(_edge(reader, path, given, lengths) if kind == "cuboid" else ()))
+        return (
+            None if lengths is None else (*lengths, *(_edge(reader, path, given, lengths) if kind == "cuboid" else ()))
+        )
     if kind == "height_field":
         return _height(reader, path, given)
     if kind == "plate":
@@ -134,7 +136,9 @@ def _edge(reader: Reader, path: str, given: Mapping[str, Any], size: Sequence[Ex
     positive(reader, f"{path}.edge_radius", radius)
     known, most = reader.known(radius), reader.known(0.5 * least)
     if known is not None and most is not None and known >= most > 0:
-        reader.faults.add(f"{path}.edge_radius", f"is {known:g}", f"must be less than half of its least length, {most:g}")
+        reader.faults.add(
+            f"{path}.edge_radius", f"is {known:g}", f"must be less than half of its least length, {most:g}"
+        )
     return (radius,)
 
 

@@ -68,7 +68,7 @@ class Contact(Force):
         return None
 
     def aside(self, view: View) -> Vec3 | None:
-        """A force on the second body that the energy has beside that along the normal; its opposite acts on the first."""
+        """A force on the second body that the energy has beside that along the normal; its opposite on the first."""
         return None
 
     def _shared(self, view: View, x: Expr) -> Expr:

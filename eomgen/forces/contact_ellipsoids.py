@@ -38,6 +38,13 @@ class EllipsoidPlane(Contact):
         return normal, depth, vec.add(reach, second), second
 
 
+def quadratic_form(R: Mat3, axes: tuple[Expr, Expr, Expr]) -> Mat3:
+    """R diag(a^2, b^2, c^2) R^T of an ellipsoid's half axes."""
+    a, b, c = (x * x for x in axes)
+    x, y, z = ((p * a, q * b, r * c) for p, q, r in R)
+    return vec.product((x, y, z), vec.transpose(R))
+
+
 def _nearest(view: View, axes: tuple[Expr, Expr, Expr], place: Vec3) -> tuple[Vec3, Expr]:
     """The outward normal at the point of an ellipsoid that is nearest to a place, and how far that is outside.
 
@@ -131,7 +138,9 @@ class EllipsoidRod(EllipsoidRound):
         square = r[0] * r[0] + r[1] * r[1]
         apart = graph.apply("lt", 0.0, square)
         far, nearest = sqrt(where(apart, square, 1.0)), bxx * byy - bxy * bxy
-        radial = far * sqrt(nearest / where(apart, byy * r[0] * r[0] - 2.0 * bxy * r[0] * r[1] + bxx * r[1] * r[1], 1.0))
+        radial = far * sqrt(
+            nearest / where(apart, byy * r[0] * r[0] - 2.0 * bxy * r[0] * r[1] + bxx * r[1] * r[1], 1.0)
+        )
         t = graph.apply("max", 0.0, radial * (far - radial))
         nx = where(apart, (byy + t) * r[0] - bxy * r[1], 1.0)
         ny = where(apart, (bxx + t) * r[1] - bxy * r[0], 0.0)
@@ -196,11 +205,8 @@ class EllipsoidEllipsoid(Contact):
 
     def touch(self, view: View) -> Touch:
         graph = view.graph
-        forms: list[Mat3] = []
-        for marker, axes in zip((self.first, self.second), self.axes, strict=True):
-            R = view.rotation(marker)
-            x, y, z = (tuple(k * a * a for k, a in zip(row, axes, strict=True)) for row in R)
-            forms.append(vec.product((x, y, z), vec.transpose(R)))
+        markers = zip((self.first, self.second), self.axes, strict=True)
+        forms = [quadratic_form(view.rotation(marker), axes) for marker, axes in markers]
         reach = vec.sub(view.position(self.second), view.position(self.first))
         apart = graph.apply("lt", 0.0, vec.dot(reach, reach))
         x, y, z = (where(apart, a, b) for a, b in zip(reach, along_axis(view, self.first, 0), strict=True))
@@ -237,7 +243,9 @@ class EllipsoidEllipsoid(Contact):
             own = vec.times(B, n)
             h = sqrt(vec.dot(n, own))
             gap = vec.sub(gap, vec.scale(1.0 / h, own))
-            bend = _weighed(graph.one, bend, graph.one, _weighed(1.0 / h, B, -1.0 / (h * h * h), _outer(graph.one, own)))
+            bend = _weighed(
+                graph.one, bend, graph.one, _weighed(1.0 / h, B, -1.0 / (h * h * h), _outer(graph.one, own))
+            )
         rise = vec.dot(n, gap)
         aside = vec.sub(gap, vec.scale(rise, n))
         more = _weighed(rise, vec.identity(graph), -rise, _outer(graph.one, n))

@@ -1,7 +1,7 @@
 """Force elements, contact with a height field: z(x, y) above the x-y plane of a marker -> where shapes touch it.
 
-The ground is z <= h(x, y).  A shape touches it where both have one normal; depths change with positions as if that point
-did not move, so that forces have a potential.
+The ground is z <= h(x, y).  A shape touches it where both have one normal; depths change with positions as if that
+point did not move, so that forces have a potential.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from ..numeric.user_functions import Surface
 from ..records import dataclass
 from .branches import where
 from .contact import Contact, Touch
+from .contact_ellipsoids import quadratic_form
 from .contact_rounds import seen_from, settled
 from .force import View
 
@@ -46,7 +47,7 @@ class HeightField(NamedTuple):
 
 
 def planted(height: Expr, graph: Graph, own: Callable[[Expr], Expr]) -> HeightField:
-    """A height field in the graph of a pair; ``own`` gives what does not depend on the place, from the graph of a model."""
+    """A height field in the graph of a pair; ``own`` brings what does not depend on the place from that of a model."""
     source = height.graph
     x, y = (graph.symbol(name) for name in PLACES.values())
     places = {source.symbol(name).id: symbol for name, symbol in zip(PLACES.values(), (x, y), strict=True)}
@@ -90,7 +91,9 @@ def field_lines(height: Expr) -> list[list[Vec3]]:
     x, y = (np.linspace(axis[0], axis[-1], _LINES) for axis in (surface.x, surface.y))
     grid: list[list[Vec3]] = []
     for a in x.tolist():
-        heights = [substitute([height], dict(zip(places, map(graph.constant, (a, b)), strict=True)))[0] for b in y.tolist()]
+        heights = [
+            substitute([height], dict(zip(places, map(graph.constant, (a, b)), strict=True)))[0] for b in y.tolist()
+        ]
         grid.append([(graph.constant(a), graph.constant(b), z) for b, z in zip(y.tolist(), heights, strict=True)])
     return [*grid, *(list(line) for line in zip(*grid, strict=True))]
 
@@ -122,14 +125,12 @@ class FieldContact(Contact):
         jxx, jxy, jyx, jyy = gxx + e[2] * xx - ax, gxy + e[2] * xy - bx, gxy + e[2] * xy - ay, gyy + e[2] * yy - by
         det, plain = jxx * jyy - jxy * jyx, gxx * gyy - gxy * gxy
         good = graph.apply("and", graph.apply("lt", _TOO_BENT * plain, det), graph.apply("lt", 0.0, jxx + jyy))
-        jxx, jxy, jyx, jyy = (
-            where(good, a, b) for a, b in ((jxx, gxx), (jxy, gxy), (jyx, gxy), (jyy, gyy))
-        )
+        jxx, jxy, jyx, jyy = (where(good, a, b) for a, b in ((jxx, gxx), (jxy, gxy), (jyx, gxy), (jyy, gyy)))
         det = where(good, det, plain)
         return x - (jyy * fx - jxy * fy) / det, y - (jxx * fy - jyx * fx) / det
 
     def _found(self, view: View) -> tuple[Vec3, Expr, Vec3, Vec3, Expr]:
-        """Normal, depth and the shape's point in axes of the first marker; from marker to marker; whether it is found."""
+        """Normal, depth and the shape's point, in axes of the first marker; the way between markers; whether found."""
         graph = view.graph
         reach, _, place = seen_from(self, view)
         lowest = vec.add(place, self._reach((graph.zero, graph.zero, graph.one), view))
@@ -206,8 +207,7 @@ class FieldEllipsoid(FieldContact):
 
     def _form(self, view: View) -> Mat3:
         R = vec.product(vec.transpose(view.rotation(self.first)), view.rotation(self.second))
-        x, y, z = (tuple(k * a * a for k, a in zip(row, self.axes, strict=True)) for row in R)
-        return vec.product((x, y, z), vec.transpose(R))
+        return quadratic_form(R, self.axes)
 
     def _reach(self, m: Vec3, view: View) -> Vec3:
         Bm = vec.times(self._form(view), m)

@@ -217,7 +217,9 @@ def pair_kind(
         tuple(seen),
         tuple(met),
         states=len(held),
-        calls=tuple((name, graph.calls[name]) for name in sorted({node[0] for node in nodes} & graph.calls.keys())),
+        calls=tuple(
+            (name, graph.calls[name]) for name in sorted(graph.calls.keys() & {str(node[0]) for node in nodes})
+        ),
     )
 
 

@@ -107,8 +107,8 @@ _SIZES: dict[str, Fields] = {
     FIELD_SHAPE: {
         "height": Field(
             "expression",
-            "height z (m) of the ground over the x-y plane of the marker, an expression of ``x``, ``y``, parameters and "
-            "tables",
+            "height z (m) of the ground over the x-y plane of the marker, an expression of ``x``, ``y``, parameters "
+            "and tables",
             dimension=LENGTH,
             local={"x": _PLACE, "y": _PLACE},
         ),
@@ -116,7 +116,9 @@ _SIZES: dict[str, Fields] = {
         "y": Field("numbers", "grid lines along y (m)"),
         "z": Field("grid", "heights on the grid, a row for each x (m)"),
         "kind": Field("choice", "interpolation between the points", choices=("cubic", "natural")),
-        "extrapolation": Field("choice", "beyond the grid: keep the slope or the height", choices=("linear", "constant")),
+        "extrapolation": Field(
+            "choice", "beyond the grid: keep the slope or the height", choices=("linear", "constant")
+        ),
     },
 }
 _ON = {

@@ -369,8 +369,10 @@ def touching(
         return FieldRound(*laws, field, radius)
     if kinds[0] == "ellipsoid":
         x, y, z = first
-        return EllipsoidRod(*laws, (x, y, z), sizes[1][1], radius) if kinds[1] == "rod" else (
-            EllipsoidRound(*laws, (x, y, z), radius)
+        return (
+            EllipsoidRod(*laws, (x, y, z), sizes[1][1], radius)
+            if kinds[1] == "rod"
+            else (EllipsoidRound(*laws, (x, y, z), radius))
         )
     if kinds[0] in (BLOCK, CORE):
         x, y, z, edge = first

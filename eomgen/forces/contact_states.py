@@ -82,7 +82,8 @@ def parts_of(kind: str, points: int = 0) -> ShapeParts:
     found = {
         "circle": {"round": 1}, "sphere": {"round": 1}, "segment": {"corner": 2},
         "box": {POLYGON: 1, "vertex": 4}, "polygon": {POLYGON: 1, "vertex": points},
-        "capsule": {"rod": 1, "end": 2, "tip": 2, "spine": 1}, "ellipsoid": {"ellipsoid": 1}, "cuboid": {"end": 8, "knob": 8, "brim": 12},
+        "capsule": {"rod": 1, "end": 2, "tip": 2, "spine": 1}, "ellipsoid": {"ellipsoid": 1},
+        "cuboid": {"end": 8, "knob": 8, "brim": 12},
         "outline": {"corner": points}, "smooth_outline": {"corner": points},
         "sprocket": {"corner": 2 * points}, "plate": {"pad": points}, WHEEL: {"rim": 1},
         "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2},
