@@ -172,7 +172,7 @@ def _refuse_edges(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
             kinds = {one.kind, other.kind}
             if one.marker.body != other.marker.body and kinds in ({"cuboid"}, {"cuboid", "capsule"}):
                 told = f"{one.kind} and {other.kind} have no states where their edges meet"
-                e.fault("friction_law", told, "use friction_law: tanh or brown_mcphee for cuboids among themselves")
+                e.fault("friction_law", told, "use friction_law: coulomb or brown_mcphee for cuboids among themselves")
                 return
 
 

@@ -29,6 +29,7 @@ from .contact_profiles import (
     EdgeRound,
     Point,
     ProfilePart,
+    arc_points,
     cross,
     minus,
     peaks,
@@ -239,6 +240,9 @@ class ContactShape:
             zero, points = self.sizes[0].graph.zero, self._points()
             line = points if self.kind in GROUNDS else [*points, points[0]]
             places = [_moved(marker.frame, (x, y, zero)) for x, y in line]
+            if self.kind in ("smooth_profile", "smooth_outline"):
+                arcs = [one for one in self._parts()[0] if one.kind == "arc"]
+                places = [_moved(one.frame(marker.frame), (x, y, zero)) for one in arcs for x, y in arc_points(one)]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
         if self.kind == "ellipsoid":
             return [self._ellipse(i, j) for i, j in ((0, 1), (1, 2), (2, 0))]
