@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..graph.pair_calls import PairFunction, PairKind, PairPart
+from ..graph.substitute import symbols_of
 from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
 from ..program import Program
@@ -64,12 +65,14 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
             text, needed = _law(program, kind, f"{named}{ending}", part, tables)
             functions.append(text)
             helpers += [helper for helper in needed if helper not in helpers]
+        touch = kind.expressions("touch")
         kinds.append(
             {
                 "n": len(kinds),
                 "name": kind.name,
                 "sorted": _is_sorted(function, kind),
-                "turns": not kind.expressions("touch")[-1].is_zero,
+                "turns": not touch[-1].is_zero,
+                "shaped": any(name.startswith("l") for name in symbols_of(touch)),  # by numbers behind the bodies
                 "function": named,
                 "first": tables[kind.first],
                 "second": tables[kind.second],

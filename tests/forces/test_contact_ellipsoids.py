@@ -62,7 +62,9 @@ def test_ellipsoids_of_equal_axes_are_spheres() -> None:
             for kind, r in ((first, 0.1), (second, 0.06))
         ]
         m, (a, b) = flying(2)
-        m.contacts("touch", {**shapes[0], "on": a}, {**shapes[1], "on": b}, ELASTIC, friction=0.3)
+        m.contacts(
+            "touch", {**shapes[0], "on": a}, {**shapes[1], "on": b}, {**ELASTIC, "friction": 0.3, "smoothing": 0.01}
+        )
         mod = m.compile(target="numpy")
         x = state(mod, [(0, 0, 0), (0.1, 0.05, 0.09)], [OWN, OWN.inv()])
         x[mod.n_q :] = np.linspace(-1, 1, 12)
@@ -80,14 +82,14 @@ def test_an_ellipsoid_and_a_capsule(swapped: bool) -> None:
     m.contacts("touch", *(groups[::-1] if swapped else groups), ELASTIC)
     mods = [m.compile(target=target) for target in ("numpy", "cython")]
     rng, met = np.random.default_rng(12), {"middle": 0, "end": 0}
-    for _ in range(120):
+    for _ in range(100):
         turns = [Rotation.random(random_state=rng.integers(1 << 30)) for _ in "ab"]
         frame = turns[0] * OWN
         way = rng.standard_normal(3)
         surface = frame.apply(AXES[0] * way / np.linalg.norm(way)) + turns[0].apply((0.03, 0.01, 0))
         out = frame.apply(way / AXES[0] / np.linalg.norm(way / AXES[0]))
         along = turns[1].apply((0, 0, 1))
-        place = surface + rng.uniform(0.01, 0.045) * out + rng.uniform(-0.19, 0.19) * along
+        place = surface + rng.uniform(0.01, 0.045) * out + rng.uniform(-0.25, 0.25) * along
 
         def square(
             s: np.ndarray, frame: Any = frame, turns: Any = turns, place: Any = place, along: Any = along
@@ -116,7 +118,7 @@ def test_an_ellipsoid_and_a_capsule(swapped: bool) -> None:
             check_slopes(mods[1], x)
             one, other = (mod.jacobian(0.0, x) for mod in mods)
             assert np.abs(one - other).max() <= 1e-9 * np.abs(other).max()
-        if sum(met.values()) > 25:
+        if sum(met.values()) > 30:
             break
     assert min(met.values()) >= 3
 

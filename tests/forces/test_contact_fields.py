@@ -161,12 +161,14 @@ def test_derivatives_parameters_and_targets(kind: str) -> None:
     assert felt >= 2
 
 
-def test_grids_lists_and_files_are_one() -> None:
+def test_grids_lists_and_files_are_one(tmp_path: Any) -> None:
     m, (body,) = flying(1, (0, 0, -9.81))
     grid = {"x": GRID.tolist(), "y": GRID.tolist(), "z": WAVES.tolist()}
     ball = {**SHAPES["sphere"], "on": body}
     m.contacts("floor", ball, {"shape": "height_field", "on": m.ground.at(0, 0, 0.1), **grid}, FELT)
-    again = eg.loads(m.to_yaml())
+    file = tmp_path / "grid.yaml"
+    file.write_text(m.to_yaml())
+    again = eg.load(file)
     mods = [one.compile(target="numpy") for one in (waves(SHAPES["sphere"]), m, again)]
     x = state(mods[0], [(0.3, 0.4, 0.2)], [TURNED])
     values = [mod.rhs(0.0, x) for mod in mods]
@@ -241,7 +243,7 @@ def test_a_ball_comes_to_rest_where_mujoco_puts_it() -> None:
     """In a pit beside the middle of a table, whose lowest point lies on the grid."""
     x = np.linspace(-1, 1, 41)
     z = 0.3 - 0.3 * np.exp(-((x[:, None] - 0.3) ** 2 + (x - 0.2) ** 2) / 0.3)
-    rows = " ".join(f"{value:.9f}" for value in (z.T / 0.3).ravel())
+    rows = " ".join(f"{value:.9f}" for value in (z.T[::-1] / 0.3).ravel())  # from above, as pictures
     world = mujoco.MjModel.from_xml_string(
         f'<mujoco><option timestep="1e-3"/><asset><hfield name="pit" nrow="41" ncol="41" size="1 1 0.3 0.1" '
         f'elevation="{rows}"/></asset><worldbody><geom type="hfield" hfield="pit"/>'
@@ -254,14 +256,15 @@ def test_a_ball_comes_to_rest_where_mujoco_puts_it() -> None:
     low = z.min()
     m, (body,) = flying(1, (0, 0, -9.81))
     pit = {"shape": "height_field", "on": m.ground, "x": x, "y": x, "z": z - low}
-    law = {"stiffness": 1e5, "exponent": 1, "dissipation": 1.0, "viscous_friction": 20.0}
-    m.contacts("pit", {**SHAPES["sphere"], "on": body}, pit, law)
+    m.contacts("pit", {**SHAPES["sphere"], "on": body}, pit, {"stiffness": 1e5, "exponent": 1, "dissipation": 1.0})
+    for axis in "xyz":
+        m.actuator(f"drag_{axis}", f"j0_{axis}", f"-2*j0_{axis}_dot")
     mod = m.compile()
-    traj = mod.simulate(25.0, initial={"j0_x": 0.1, "j0_z": 0.5}, method="Radau")
+    traj = mod.simulate(12.0, initial={"j0_x": 0.1, "j0_z": 0.5}, method="Radau")
     ends = traj.x[:3, -1]
     np.testing.assert_allclose(ends, [0.3, 0.2, 0.1], atol=2e-3)
-    np.testing.assert_allclose(data.qpos[:2], ends[:2], atol=0.03)
-    assert data.qpos[2] == pytest.approx(ends[2], abs=4e-3)
+    np.testing.assert_allclose(data.qpos[:2], ends[:2], atol=2e-3)
+    assert data.qpos[2] == pytest.approx(ends[2], abs=2e-3)
 
 
 @pytest.mark.parametrize(
