@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import Any
 
+from ..forces.contact_fields import PLACES
 from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS
 from ..forces.contact_shapes import ContactShape
 from ..forces.contact_states import BED, MOST_PAIRS, POINTS, cells_of_bed, points_of_plate
@@ -14,11 +17,14 @@ from ..graph.shown import quoted, shown
 from ..numeric.outline_rules import sense_of_outline
 from ..numeric.value_ranges import Flaw
 from ..numeric.value_rules import OUTLINE, RISING
+from .build_functions import read_table
 from .checks import check_keys
 from .description import items
 from .names import nearest
 from .read_outlines import outline_sizes, positive, sprocket_sizes
 from .values import Reader
+
+EDGES = 0.05  #: radius of the edges of a cuboid unless given, as a part of its least length
 
 
 def read_shapes(reader: Reader, path: str, value: Any) -> tuple[ContactShape, ...] | None:
@@ -85,7 +91,11 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         lengths = _several(reader, f"{path}.{key}", given[key], 3)
         for k, x in enumerate(lengths or ()):
             positive(reader, f"{path}.{key}[{k}]", x)
-        return None if lengths is None else tuple(lengths)
+        return (
+            None if lengths is None else (*lengths, *(_edge(reader, path, given, lengths) if kind == "cuboid" else ()))
+        )
+    if kind == "height_field":
+        return _height(reader, path, given)
     if kind == BED:
         return _bed(reader, path, given)
     if kind == "plate":
@@ -96,6 +106,44 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         if name in given:
             positive(reader, f"{path}.{name}", x, kind == "segment" and name == "radius")
     return tuple(sizes)
+
+
+def _height(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr] | None:
+    """The height of a field, as an expression or a table of its own."""
+    local = {name: reader.graph.symbol(symbol) for name, symbol in PLACES.items()}
+    table = {key: value for key, value in given.items() if key not in ("shape", "on", "height")}
+    if "height" in given:
+        for key in table:
+            reader.faults.add(f"{path}.{key}", "stands beside height", "give height, or x, y and z")
+        return (reader.expression(f"{path}.height", given["height"], local=local),)
+    if missing := [key for key in ("x", "y", "z") if key not in table]:
+        remedy = "give height, an expression of x and y, or the grid lines x and y and the heights z on them"
+        reader.faults.add(f"{path}.{missing[0]}", "is missing, and there is no height", remedy)
+        return None
+    taken = {f.name for f in (*reader.graph.functions.values(), *(f for f, _ in reader.graph.calls.values()))}
+    name = re.sub(r"\W+", "_", path).strip("_")
+    while name in taken:
+        name += "_"
+    function = read_table(reader, name, path, table)
+    if function is None:
+        return None
+    places = [local[axis].id for axis in ("x", "y")]
+    return (Expr(reader.graph, reader.graph.call(function, (0, 0), places)),)
+
+
+def _edge(reader: Reader, path: str, given: Mapping[str, Any], size: Sequence[Expr]) -> tuple[Expr]:
+    """The radius of the edges of a cuboid."""
+    least = reduce(lambda a, b: a.graph.apply("min", a, b), size)
+    if "edge_radius" not in given:
+        return (EDGES * least,)
+    radius = reader.expression(f"{path}.edge_radius", given["edge_radius"])
+    positive(reader, f"{path}.edge_radius", radius)
+    known, most = reader.known(radius), reader.known(0.5 * least)
+    if known is not None and most is not None and known >= most > 0:
+        reader.faults.add(
+            f"{path}.edge_radius", f"is {known:g}", f"must be less than half of its least length, {most:g}"
+        )
+    return (radius,)
 
 
 def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:

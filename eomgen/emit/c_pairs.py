@@ -10,9 +10,11 @@ from dataclasses import replace
 from typing import Any
 
 from ..graph.pair_calls import PairFunction, PairKind, PairPart
+from ..graph.substitute import symbols_of
 from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
 from ..program import Program
+from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
 from .pair_statements import record_of
 from .pair_sums_used import UsedSum, sums_again, used_sums
@@ -63,12 +65,14 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
             text, needed = _law(program, kind, f"{named}{ending}", part, tables)
             functions.append(text)
             helpers += [helper for helper in needed if helper not in helpers]
+        touch = kind.expressions("touch")
         kinds.append(
             {
                 "n": len(kinds),
                 "name": kind.name,
                 "sorted": _is_sorted(function, kind),
-                "turns": not kind.expressions("touch")[-1].is_zero,
+                "turns": not touch[-1].is_zero,
+                "shaped": any(name.startswith("l") for name in symbols_of(touch)),  # by numbers behind the bodies
                 "function": named,
                 "first": tables[kind.first],
                 "second": tables[kind.second],
@@ -79,6 +83,7 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
                 "held": kind.held,
             }
         )
+    calls = {op: call for kind in function.kinds for op, call in kind.calls}
     context = {
         "name": program.name,
         "sum": function.name,
@@ -95,6 +100,7 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
         "kinds": kinds,
         "functions": functions,
         "helpers": helpers,
+        "called": plain_declarations(program.name, calls.values()),
         "most": max((len(kind["second"]["rows"]) for kind in kinds if kind["sorted"]), default=0),
         "longest": max(table["length"] for table in tables),
         "apart": repr(APART),

@@ -68,6 +68,10 @@ class Contact(Force):
         """A couple on the second body that the energy has beside the force; its opposite acts on the first."""
         return None
 
+    def aside(self, view: View) -> Vec3 | None:
+        """A force on the second body that the energy has beside that along the normal; its opposite on the first."""
+        return None
+
     def _shared(self, view: View, x: Expr) -> Expr:
         share = self.share(view)
         return x if share is None else share * x
@@ -76,7 +80,8 @@ class Contact(Force):
         normal, depth, arms, sliding, rate = self._motion(view)
         push = self._shared(view, self.law_here(view).force(depth, rate))
         drag = self._drag(self._slip(view, normal, depth, sliding, push))
-        return self._pair(arms, vec.add(vec.scale(push, normal), drag), self.couple(view))
+        force, more = vec.add(vec.scale(push, normal), drag), self.aside(view)
+        return self._pair(arms, force if more is None else vec.add(force, more), self.couple(view))
 
     def potential(self, view: View) -> Expr | None:
         return self._shared(view, self.law_here(view).energy(self.touch(view)[1]))

@@ -20,7 +20,7 @@ from ..records import dataclass
 from .contact_pair_laws import PairLaw, pair_kind
 from .contact_shape_fields import PLANAR
 from .contact_shapes import PIECED, ContactShape, Feature, meet
-from .contact_states import BED, POLYGON, alike, class_of, pair_states, part_of
+from .contact_states import BED, FIELD, POLYGON, alike, class_of, pair_states, part_of
 from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw, RigidLaw
@@ -128,9 +128,19 @@ class ContactGroups(Force):
             for k, marker in enumerate(markers)
         ]
 
+    def _groups(self) -> list[dict[str, list[_Part]]]:
+        """Features of both groups, by class, of those classes that meet something."""
+        groups = [_features(group) for group in (self.first, self.second) if group]
+        met = set[tuple[int, str]]()
+        for g, own in enumerate(groups):
+            for h, other in enumerate(groups):
+                if g != h or len(groups) == 1:
+                    pairs = [(a, b) for a in own for b in other if meet((a, b))]
+                    met |= {(g, a) for a, _ in pairs} | {(h, b) for _, b in pairs}
+        return [{k: parts for k, parts in group.items() if (g, k) in met} for g, group in enumerate(groups)]
+
     def met_shapes(self) -> list[str]:
-        groups = [_features(self.first), *([_features(self.second)] if self.second else [])]
-        parts = [one.shape for group in groups for features in group.values() for one in features]
+        parts = [one.shape for group in self._groups() for features in group.values() for one in features]
         return [f"{shape.kind} on {shape.marker.label}" for shape in parts]
 
     def meeting(self, view: MovingView) -> list[Expr]:
@@ -145,8 +155,7 @@ class ContactGroups(Force):
 
     @property
     def met_bodies(self) -> list[int]:
-        groups = [_features(self.first), *([_features(self.second)] if self.second else [])]
-        return [one.shape.marker.body for group in groups for features in group.values() for one in features]
+        return [one.shape.marker.body for group in self._groups() for features in group.values() for one in features]
 
     @property
     def is_rigid(self) -> bool:
@@ -184,7 +193,7 @@ class ContactGroups(Force):
 
     def _function(self, name: str, bodies: Sequence[int], data: _SharedData, lost: bool) -> PairFunction:
         shapes = [self.first, self.second] if self.second else [self.first]
-        groups = [_features(group) for group in shapes]
+        groups = self._groups()
         place = {body: k for k, body in enumerate(bodies)}
         keys = [(g, kind) for g, group in enumerate(groups) for kind in group]
         tables = [tuple(data.row(place[one.shape.marker.body], one.feature) for one in groups[g][k]) for g, k in keys]
@@ -199,7 +208,8 @@ class ContactGroups(Force):
                 if apart and not twice and meet((first, second)):
                     own, other = groups[g][first], groups[h][second]
                     sizes = len(own[0].feature.sizes), len(other[0].feature.sizes)
-                    kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost)
+                    height = own[0].shape.sizes[0] if part_of(first) == FIELD else None
+                    kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost, height)
                     if self.on_bed:
                         kind = replace(kind, held=(tuple(self._slots * x.column for x in own), (0,) * len(other)))
                     elif self.states:
@@ -247,8 +257,12 @@ def _features(shapes: Sequence[ContactShape]) -> dict[str, list[_Part]]:
     """Features of shapes, by class; parts are numbered in this order."""
     found: dict[str, list[_Part]] = {}
     before: dict[str, int] = {}
+    heights: dict[Expr, str] = {}  # fields of one height are of one class
     for number, shape in enumerate(shapes):
         for feature in shape.features():
+            if feature.kind == FIELD:
+                kind = heights.setdefault(shape.sizes[0], f"{FIELD}{len(heights)}")
+                feature = feature._replace(kind=kind)
             column = before.get(feature.kind, 0) + feature.slot
             found.setdefault(feature.kind, []).append(_Part(shape, feature, number, column))
         for kind, count in shape.parts().parts.items():

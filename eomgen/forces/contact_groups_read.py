@@ -12,8 +12,8 @@ from ..elements.field import Field
 from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from .contact import CURVED
 from .contact_groups import ContactGroups
-from .contact_shape_fields import GROUNDS, PLANAR, SHAPE_FIELDS
-from .contact_shapes import ContactShape
+from .contact_shape_fields import FIELD_SHAPE, GROUNDS, PLANAR, SHAPE_FIELDS
+from .contact_shapes import ContactShape, by_edges
 from .contact_states import BED, MOST_PAIRS, ShapeParts, cells_of, given_groups, pair_states
 from .friction_laws import DryFriction, has_bristles, read_friction
 from .normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, RigidLaw, read_normal_law
@@ -31,6 +31,10 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         return None
     law, friction = laws
     _refuse_pairs(e, first, second)
+    if not soil and not has_bristles(e.values):  # whose states are counted before shapes are known
+        first, second = by_edges(first, second)
+    if has_bristles(e.values):
+        _refuse_edges(e, first, second)
     if soil:
         _refuse_on_soil(e, first, second)
     bed = _is_bed(e, first, second, soil)
@@ -59,7 +63,9 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
 
 def _is_bed(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape], soil: bool) -> bool:
     """Whether the ground is a bed, of which there is one, with soil; what is wrong is noted."""
-    beds = [(key, shapes) for key, shapes in (("first", first), ("second", second)) if any(x.kind == BED for x in shapes)]
+    beds = [
+        (key, shapes) for key, shapes in (("first", first), ("second", second)) if any(x.kind == BED for x in shapes)
+    ]
     for key, shapes in beds:
         if len(shapes) > 1:
             e.fault(key, "has a bed and more", "give one bed as all of a group, and contacts of their own to others")
@@ -125,7 +131,7 @@ def _axes(values: Mapping[str, Any], groups: Sequence[Sequence[ShapeParts]], lat
     kinds = {shape.kind for group in groups for shape in group}
     if kinds & set(PLANAR):
         return ("_x", "_z") if lateral else ("",)
-    round_pairs = any(first != "surface" for _, _, first, _ in pair_states(groups)[0])
+    round_pairs = FIELD_SHAPE in kinds or any(first != "surface" for _, _, first, _ in pair_states(groups)[0])
     return ("_x", "_y", "_z") if round_pairs else ("_x", "_y")
 
 
@@ -150,11 +156,9 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
         for b in kinds[1]:
             if (a in PLANAR) != (b in PLANAR):
                 e.fault("second", f"{a} and {b} do not meet", _ALLOWED)
-            elif (
-                (a in GROUNDS and b in GROUNDS)
-                or (a in _CLOSED and b in _OFF_CLOSED)
-                or (b in _CLOSED and a in _OFF_CLOSED)
-            ) and (second or a != b or _differ(first, a)):
+            elif ((a in GROUNDS and b in GROUNDS) or {a, b} == {"ellipsoid", "cuboid"}) and (
+                second or a != b or _differ(first, a)
+            ):
                 told = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
                 e.fault("second" if second else "first", told, _ALLOWED)
     for key, own, met in (("second", kinds[0], kinds[1]), ("first", kinds[1], kinds[0])):
@@ -185,6 +189,17 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
         e.fault("", "has shapes on one body only", "shapes of one body do not meet; give shapes on other bodies")
 
 
+def _refuse_edges(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
+    """Note cuboids that meet cuboids or capsules, where every pair of their edges would have states."""
+    for one in first:
+        for other in second or first:
+            kinds = {one.kind, other.kind}
+            if one.marker.body != other.marker.body and kinds in ({"cuboid"}, {"cuboid", "capsule"}):
+                told = f"{one.kind} and {other.kind} have no states where their edges meet"
+                e.fault("friction_law", told, "use friction_law: coulomb or brown_mcphee for cuboids among themselves")
+                return
+
+
 def _is_thin(shape: ContactShape) -> bool:
     return shape.kind == "segment" and shape.sizes[1].is_zero
 
@@ -208,12 +223,10 @@ _CORNERED = (
     "smooth_outline",
     "sprocket",
 )  #: shapes whose corners meet segments
-_CLOSED = ("ellipsoid", "cuboid")  #: shapes that meet half-spaces and spheres alone
-_OFF_CLOSED = ("capsule", *_CLOSED)
 _ALLOWED = (
     "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
-    "smooth_profile, which plates meet too; wheels and plates meet a bed; sphere and capsule meet each other and half_space; ellipsoid and cuboid "
-    "meet half_space and sphere"
+    "smooth_profile, which plates meet too; wheels and plates meet a bed; sphere, capsule, ellipsoid and cuboid meet "
+    "half_space, height_field and each other, but for ellipsoid and cuboid"
 )
 
 _NORMAL_LAW = CURVED["normal_law"]._replace(

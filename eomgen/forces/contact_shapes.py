@@ -6,7 +6,6 @@ shapes, which are round of radius 0 or of the shape's own.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,6 +21,8 @@ from ..graph.core import Expr, Graph, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .contact import Contact, SpherePlane, joint_radius
+from .contact_ellipsoids import EllipsoidEllipsoid, EllipsoidPlane, EllipsoidRod, EllipsoidRound
+from .contact_fields import FieldEllipsoid, FieldRound, HeightField, field_lines
 from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
 from .contact_polygons import PolygonPolygon, most_reach
 from .contact_profiles import (
@@ -29,6 +30,9 @@ from .contact_profiles import (
     EdgeRound,
     Point,
     ProfilePart,
+    arc_points,
+    cross,
+    minus,
     peaks,
     smooth_pieces,
     solid_depth,
@@ -36,14 +40,13 @@ from .contact_profiles import (
 )
 from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_shape_fields import GROUNDS
-from .contact_solids import BlockRound, EllipsoidPlane, EllipsoidRound, RodRod
-from .contact_states import BED, BED_CELL, BLOCK, MET, POLYGON, WHEEL, ShapeParts, part_of, parts_of
+from .contact_solids import BlockRound, EdgeRod, RodRod, cuboid_parts
+from .contact_states import BED, BED_CELL, BLOCK, CORE, FIELD, MET, POLYGON, WHEEL, ShapeParts, part_of, parts_of
 
 #: Shapes whose pieces are edges and arcs.
 PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
 SOLE = "sole"  #: a plate on a bed
 _SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
-_BOTH = (-1.0, 1.0)
 _STEPS = 24  #: lines of which the picture of an ellipse is made
 
 
@@ -85,8 +88,9 @@ class ContactShape:
     sizes : tuple of Expr
         radius, and of a wheel on soil its width; length, radius; of a box or polygon x and y of its corners,
         counterclockwise; of a profile or an outline its depth and x and y of its points, of outlines clockwise; of a
-        sprocket its depth, teeth, pitch, seat, tip radius and angle of a seat; half axes; lengths; of a plate length,
-        width and number of points; of a bed length and number of cells.
+        sprocket its depth, teeth, pitch, seat, tip radius and angle of a seat; half axes; lengths, and the radius of
+        edges; of a plate length, width and number of points; of a bed length and number of cells; of a height field
+        z(x, y).
     """
 
     kind: str
@@ -107,13 +111,14 @@ class ContactShape:
         if self.kind == "ellipsoid":
             return [Feature("ellipsoid", frame, self.sizes, _most(self.sizes), 2.0 * _least(self.sizes))]
         if self.kind == "cuboid":
-            x, y, z = (0.5 * size for size in self.sizes)
-            thick = _least(self.sizes)
-            ways = enumerate(itertools.product(_BOTH, repeat=3))
-            block = Feature(BLOCK, frame, (x, y, z), sqrt(x * x + y * y + z * z), thick)
-            return [block] + [
-                Feature("end", _moved(frame, (i * x, j * y, k * z)), (zero,), zero, thick, n) for n, (i, j, k) in ways
+            *size, edge = self.sizes
+            thick = _least(size)
+            return [
+                Feature(kind, _turned(_moved(frame, place), order), sizes, bound, thick, k)
+                for kind, place, order, sizes, bound, k in cuboid_parts(size, edge)
             ]
+        if self.kind == "height_field":
+            return [Feature(FIELD, frame, (), None, zero)]
         if self.kind == "plate":
             return self._pads(frame)
         if self.kind == SOLE:
@@ -123,11 +128,14 @@ class ContactShape:
         if self.kind in ("segment", "capsule"):
             along = frame if self.kind == "segment" else _turned(frame, (2, 0, 1))
             half, radius = 0.5 * self.sizes[0], self.sizes[1]
-            whole, end = ("segment", "corner") if self.kind == "segment" else ("rod", "end")
+            whole, *ends = ("segment", "corner") if self.kind == "segment" else ("rod", "end", "tip")
             thick = zero.graph.apply("max", 2.0 * radius, _SLIM * half)
-            sides = enumerate((-half, half))
-            ends = [Feature(end, _moved(along, (x, zero, zero)), (radius,), radius, thick, k) for k, x in sides]
-            return [Feature(whole, along, (half, radius), half + radius, thick), *ends]
+            wholes = [whole] if self.kind == "segment" else [whole, "spine"]  # the same again, for edges of cuboids
+            return [Feature(one, along, (half, radius), half + radius, thick) for one in wholes] + [
+                Feature(end, _moved(along, (x, zero, zero)), (radius,), radius, thick, k)
+                for end in ends
+                for k, x in enumerate((-half, half))
+            ]
         corners = list(zip(self.sizes[::2], self.sizes[1::2], strict=True))
         edges: list[Expr] = []
         reach = zero
@@ -146,6 +154,14 @@ class ContactShape:
     def is_wheel(self) -> bool:
         """Whether it is a circle with a width."""
         return self.kind == "circle" and len(self.sizes) > 1
+
+    def convex_corners(self) -> list[Point]:
+        """Corners, counterclockwise, of an outline whose points are numbers and which turns one way; else none."""
+        points = self._points() if self.kind == "outline" else []
+        around = zip([*points[-1:], *points[:-1]], points, [*points[1:], *points[:1]], strict=True)
+        turns = [(b, cross(minus(b, a), minus(c, b)).value) for a, b, c in around]
+        convex = all(turn is not None and turn <= 0.0 for _, turn in turns)
+        return [point for point, turn in reversed(turns) if turn != 0.0] if convex else []
 
     def parts(self) -> ShapeParts:
         """How many parts of each class it has."""
@@ -244,11 +260,18 @@ class ContactShape:
             zero, points = self.sizes[0].graph.zero, self._points()
             line = points if self.kind in GROUNDS else [*points, points[0]]
             places = [_moved(marker.frame, (x, y, zero)) for x, y in line]
+            if self.kind in ("smooth_profile", "smooth_outline"):
+                arcs = [one for one in self._parts()[0] if one.kind == "arc"]
+                places = [_moved(one.frame(marker.frame), (x, y, zero)) for one in arcs for x, y in arc_points(one)]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
         if self.kind == "ellipsoid":
             return [self._ellipse(i, j) for i, j in ((0, 1), (1, 2), (2, 0))]
+        if self.kind == "height_field":
+            lines = [[_moved(marker.frame, place) for place in line] for line in field_lines(self.sizes[0])]
+            seen = [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in line)) for line in lines]
+            return [*seen] or [Drawn((marker,), about=PLANE)]
         if self.kind == "cuboid":
-            found = [feature.frame for feature in self.features()[1:]]
+            found = [feature.frame for feature in self.features() if feature.kind == "end"]
             ways = ((0, 1, 3, 2, 0, 4, 5, 7, 6, 4), (1, 5), (2, 6), (3, 7))
             return [Drawn(tuple(Marker(marker.body, found[k], marker.label) for k in way)) for way in ways]
         if self.kind == BED:
@@ -259,9 +282,30 @@ class ContactShape:
             half, zero = 0.5 * self.sizes[0], self.sizes[0].graph.zero
             places = [_moved(marker.frame, (x, zero, zero)) for x in (-half, half)]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
-        frames = [feature.frame for feature in self.features()[1:]]
+        frames = [feature.frame for feature in self.features() if feature.kind in ("corner", "end", "vertex")]
         closed = frames if self.kind in ("segment", "capsule") else [*frames, frames[0]]
         return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in closed))]
+
+
+def by_edges(
+    first: Sequence[ContactShape], second: Sequence[ContactShape]
+) -> tuple[tuple[ContactShape, ...], tuple[ContactShape, ...]]:
+    """Groups in which convex outlines that meet polygons are polygons, which lie flush on each other by their edges.
+
+    Plates meet outlines only; where a group has some, outlines of the other stay what they are.
+    """
+
+    def changed(own: Sequence[ContactShape], other: Sequence[ContactShape]) -> tuple[ContactShape, ...]:
+        meets = any(shape.kind in ("box", "polygon") or shape.convex_corners() for shape in other)
+        if not meets or any(shape.kind == "plate" or shape.is_wheel for shape in other):
+            return tuple(own)
+        found = []
+        for shape in own:
+            corners = tuple(x for corner in shape.convex_corners() for x in corner)
+            found.append(ContactShape("polygon", shape.marker, corners) if corners else shape)
+        return tuple(found)
+
+    return changed(first, second or first), changed(second, first)
 
 
 def _most(sizes: Sequence[Expr]) -> Expr:
@@ -280,7 +324,7 @@ def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
         return most_reach(sizes)
     if kind == SOLE:
         return sizes[0]
-    return sizes[0] + sizes[1] if kind == "rod" else graph.zero
+    return sizes[0] + sizes[1] if kind in ("rod", "brim", "spine") else graph.zero
 
 
 def _width(edges: Sequence[Expr], corners: Sequence[tuple[Expr, Expr]]) -> Expr:
@@ -329,6 +373,7 @@ def touching(
     sizes: tuple[tuple[Expr, ...], tuple[Expr, ...]],
     law: Contact,
     spot: int = 0,
+    field: HeightField | None = None,
 ) -> Contact:
     """The contact of one feature with another at one of its places; ``law`` has the laws."""
     first, radius = sizes[0], sizes[1][0]
@@ -343,12 +388,27 @@ def touching(
         return RoundRound(*laws, (first[0], radius))
     if part_of(kinds[1]) == POLYGON:
         return PolygonPolygon(*laws, first, sizes[1], spot)
-    if kinds[0] in ("ellipsoid", BLOCK):
-        x, y, z = first
-        return (BlockRound if kinds[0] == BLOCK else EllipsoidRound)(*laws, (x, y, z), radius)
     if kinds[1] == "ellipsoid":
         x, y, z = sizes[1]
-        return EllipsoidPlane(*laws, (x, y, z))
+        if field is not None:
+            return FieldEllipsoid(*laws, field, (x, y, z))
+        if kinds[0] == "half":
+            return EllipsoidPlane(*laws, (x, y, z))
+        return EllipsoidEllipsoid(*laws, ((first[0], first[1], first[2]), (x, y, z)))
+    if field is not None:
+        return FieldRound(*laws, field, radius)
+    if kinds[0] == "ellipsoid":
+        x, y, z = first
+        return (
+            EllipsoidRod(*laws, (x, y, z), sizes[1][1], radius)
+            if kinds[1] == "rod"
+            else (EllipsoidRound(*laws, (x, y, z), radius))
+        )
+    if kinds[0] in (BLOCK, CORE):
+        x, y, z, edge = first
+        return BlockRound(*laws, (x, y, z), edge, radius)
+    if kinds[0] == "brim":
+        return EdgeRod(*laws, (first[0], sizes[1][0]), (first[1], sizes[1][1]))
     if kinds[1] == "rod":
         return RodRod(*laws, (first[0], sizes[1][0]), (first[1], sizes[1][1]))
     if kinds[0] == "half":

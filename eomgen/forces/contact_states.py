@@ -22,9 +22,11 @@ TEETH = 3  #: fewest teeth of a sprocket
 #: Parts that meet surfaces, in the order in which their states stand.
 PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon")
 #: Parts that meet surfaces and have no states.
-STATELESS = ("rim", "sole")
+STATELESS = ("rim", "sole", "knob", "tip", "brim", "spine")
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
 BLOCK = "block"  #: class of cuboids, which spheres meet
+CORE = "core"  #: class of cuboids with rounded edges, which those of other cuboids and capsules meet
+FIELD = "field"  #: class of height fields, of which those of one height have one number
 _ROUND = ("round", "rod", POLYGON)
 #: Classes of first parts that are told apart; all others are surfaces.
 _APART = (*_ROUND, "ellipsoid", BLOCK)
@@ -33,14 +35,17 @@ _FIRST = {
     "circle": "round", "sphere": "round", "capsule": "rod", "segment": "segment", "box": POLYGON, "polygon": POLYGON,
     "profile": "ground", "smooth_profile": "ground", "outline": "ground", "smooth_outline": "ground",
     "sprocket": "ground", "half_plane": "half", "half_space": "half",
-    "ellipsoid": "ellipsoid", "cuboid": BLOCK,
+    "ellipsoid": "ellipsoid", "cuboid": BLOCK, "height_field": FIELD,
 }  # fmt: skip
 #: What is met by each of these.
 MET = {
     "round": ("round",),
     "rod": ("round", "rod"),
-    "ellipsoid": ("round",),
+    "ellipsoid": ("round", "rod", "ellipsoid"),
     BLOCK: ("round",),
+    CORE: ("knob", "tip"),
+    "brim": ("brim", "spine"),
+    FIELD: ("round", "end", "ellipsoid"),
     "segment": ("round", "corner", "vertex"),
     POLYGON: ("round", "corner", POLYGON),
     "ground": ("round", "corner", "vertex", "pad", "rim"),
@@ -80,7 +85,8 @@ def parts_of(kind: str, points: int = 0) -> ShapeParts:
     found = {
         "circle": {"round": 1}, "sphere": {"round": 1}, "segment": {"corner": 2},
         "box": {POLYGON: 1, "vertex": 4}, "polygon": {POLYGON: 1, "vertex": points},
-        "capsule": {"rod": 1, "end": 2}, "ellipsoid": {"ellipsoid": 1}, "cuboid": {"end": 8},
+        "capsule": {"rod": 1, "end": 2, "tip": 2, "spine": 1}, "ellipsoid": {"ellipsoid": 1},
+        "cuboid": {"end": 8, "knob": 8, "brim": 12},
         "outline": {"corner": points}, "smooth_outline": {"corner": points},
         "sprocket": {"corner": 2 * points}, "plate": {"pad": points}, WHEEL: {"rim": 1},
         "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2}, BED: {BED_CELL: points},

@@ -17,6 +17,7 @@ from ..errors import UsageError
 from ..numeric.pair_sums import MEETING, MOTION, POSE, RECORD, SPOT, PairSum, pairs_of_rows
 from ..records import dataclass
 from .core import Expr, Graph
+from .functions import Function
 from .nodes import Node
 from .substitute import substitute
 from .traverse import reachable
@@ -61,6 +62,8 @@ class PairKind:
         How many states a pair has.  What it adds to their rates stands behind the results.  A number that is only
         summed, such as how many pieces of a shape touch, is one of them: 0 is given for it, and its sum stands in the
         place of its rate.
+    calls : tuple of (operation, (function, orders))
+        What nodes that call declared functions mean, as in a graph.
     """
 
     name: str
@@ -76,12 +79,14 @@ class PairKind:
     spot: tuple[int, ...]
     held: tuple[tuple[int, ...], ...] = ()
     states: int = 0
+    calls: tuple[tuple[str, tuple[Function, tuple[int, ...]]], ...] = ()
 
     def graph(self) -> Graph:
         """Its nodes as a graph."""
         graph = Graph()
         graph.nodes = list(self.nodes)
         graph._ids = {node: i for i, node in enumerate(self.nodes)}
+        graph.calls = dict(self.calls)
         return graph
 
     def expressions(self, what: PairPart = "outputs") -> list[Expr]:

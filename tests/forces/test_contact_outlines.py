@@ -288,3 +288,35 @@ def test_sizes_of_a_sprocket_are_parameters() -> None:
             np.testing.assert_allclose(found, (late[1] - late[0]) / (2 * h), rtol=1e-3, atol=atol)
         pushed += np.abs(all_rates[0]).max() > 100
     assert pushed > 5
+
+
+@pytest.mark.parametrize("other", ["box", "outline"])
+def test_a_convex_outline_lies_flush_as_a_polygon_does(other: str) -> None:
+    """Of exactly one width, with a point on the middle of an edge; forces are those of the polygon."""
+    corners = scenes.rectangle(0.2, 0.1)
+    found = []
+    for kind in ("outline", "polygon"):
+        m, (body,) = scenes.planar("flush", 1)
+        points = [*corners, (-0.1, 0.0)] if kind == "outline" else corners
+        base = {"shape": kind, "points": points, "on": m.ground}
+        upper = {"shape": "box", "size": (0.2, 0.1)} if other == "box" else {"shape": "outline", "points": corners}
+        m.contacts("touch", {**upper, "on": body}, base, {**LAW, "dissipation": 20.0})
+        m.initial(j0_y=0.1)
+        mod = m.compile(target="numpy")
+        found.append([*mod.rhs(0.0, [0.003, 0.0995, 0.001, 0.1, -0.2, 0.3]), *mod.rhs(0.0, [0, 0.09, 0, 0, 0, 0])])
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9, atol=1e-9)
+    assert found[0][10] > 0.0  # pushed up
+    drawn = m.mechanism().forces[0].drawn()
+    assert len(drawn) == 2
+
+
+def test_smooth_outlines_are_drawn_as_arcs() -> None:
+    """Points of a circle: all points of the line lie on it."""
+    m, (body,) = scenes.planar("round", 1)
+    around = [(0.3 * np.cos(t), 0.3 * np.sin(t)) for t in 2 * np.pi * np.arange(7) / 7]
+    ring = {"shape": "smooth_outline", "points": around, "on": body}
+    m.contacts("touch", ring, {"shape": "half_plane", "on": m.ground}, ELASTIC)
+    line = m.mechanism().forces[0].drawn()[0].stops
+    radii = [np.hypot(*(marker.frame.position[k].value for k in (0, 1))) for marker in line]
+    assert len(radii) > 50
+    np.testing.assert_allclose(radii, 0.3, rtol=1e-12)

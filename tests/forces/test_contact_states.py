@@ -253,6 +253,7 @@ SIZES: dict[str, dict[str, Any]] = {
     "half_space": {},
     "ellipsoid": {"semi_axes": (0.1, 0.2, 0.3)},
     "cuboid": {"size": (0.1, 0.2, 0.3)},
+    "height_field": {"height": "0.1*x*y"},
 }
 
 
