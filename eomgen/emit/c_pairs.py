@@ -14,27 +14,25 @@ from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
 from ..program import Program
 from .c_text import print_pieces, used_helpers
-from .pair_statements import record_of
+from .pair_statements import placed_length, plain_numbers, record_of
 from .pair_sums_used import UsedSum, sums_again, used_sums
+from .row_runs import written
 from .sources import render
 from .straight import cut
 
 
-def _table(k: int, rows: Sequence[Sequence[int]], start: int) -> dict[str, Any]:
-    sizes = len(rows[0]) - PLACE - REST
-    length = POSE + sizes + 4
-    return {"k": k, "rows": rows, "columns": len(rows[0]), "sizes": sizes, "length": length, "start": start}
-
-
 def _tables(function: PairFunction) -> list[dict[str, Any]]:
-    """The tables of shapes, and where the shapes stand in the work array."""
+    """The tables of shapes, and where the shapes stand in the work array; places count from behind the bodies."""
     found: list[dict[str, Any]] = []
-    start = 0
-    number = 0
+    start = number = 0
+    begun = POSE * function.bodies
     for k, rows in enumerate(function.tables):
-        found.append({**_table(k, rows, start), "number": number})
+        table = written([(row[0], *(x - begun if x >= 0 else x for x in row[1:])) for row in rows])
+        sizes, length = len(rows[0]) - PLACE - REST, placed_length(rows)
+        own = {"k": k, "count": len(rows), "columns": len(rows[0]), "sizes": sizes, "length": length}
+        found.append({**table, **own, "start": start, "number": number})
         number += len(rows)
-        start += len(rows) * found[-1]["length"]
+        start += len(rows) * length
     return found
 
 
@@ -76,7 +74,7 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
                 "law": kind.law,
                 "states": kind.states,
                 "places": len(kind.spot) // SPOT,
-                "held": kind.held,
+                "held": [written([(at,) for at in places]) for places in kind.held],
             }
         )
     context = {
@@ -90,12 +88,13 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
         "results": function.results,
         "states": function.states,
         "first_state": function.first_state,
-        "numbers": [repr(0.0 if x is None else x) for x in function.data] or ["0.0"],
+        "numbers": [repr(x) for x in plain_numbers(function)] or ["0.0"],
         "tables": tables,
         "kinds": kinds,
         "functions": functions,
         "helpers": helpers,
-        "most": max((len(kind["second"]["rows"]) for kind in kinds if kind["sorted"]), default=0),
+        "moving": len(function.data) - function.states,
+        "most": max((kind["second"]["count"] for kind in kinds if kind["sorted"]), default=0),
         "longest": max(table["length"] for table in tables),
         "apart": repr(APART),
         "sums": used.sums,
@@ -116,7 +115,7 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
         "again": again,
         "kept": record_of(function),
         "shapes": sum(map(len, function.tables)),
-        "scratch": sum(len(table["rows"]) * table["length"] for table in tables),
+        "scratch": sum(table["count"] * table["length"] for table in tables),
     }
     return render("c/pairs.c.j2", context)
 
@@ -158,7 +157,7 @@ def _declared(program: str, used: UsedSum, again: bool) -> str:
     function = used.function
     prefix, n, results = f"{program}_pairs_{function.name}", function.count, function.results
     text = f"#define pairs_{function.name}_numbers {prefix}_numbers\n"
-    text += f"EOMGEN_PIECE extern const double {prefix}_numbers[{max(1, len(function.data))}];\n"
+    text += f"EOMGEN_PIECE extern const double {prefix}_numbers[{max(1, len(plain_numbers(function)))}];\n"
     if used.sums:
         text += f"EOMGEN_PIECE void {prefix}_sum(const double *given, double *out, double *work);\n"
         text += _each(f"pairs_{function.name}_sum", f"{prefix}_sum", (n, 0, results))

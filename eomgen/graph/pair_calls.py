@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from operator import itemgetter
 from typing import Any, Literal
 
 from ..errors import UsageError
@@ -236,7 +237,7 @@ class PairCall:
 
     def implementation(self, orders: tuple[int, ...]) -> Callable[..., Any]:
         """Its value as a function of floats or arrays."""
-        return self.on_numbers(self.function.in_floats)
+        return itemgetter(self.numbers[0]) if self.part == "item" else self.on_numbers(self.function.in_floats)
 
     def on_numbers(self, loops: PairSum) -> Callable[..., Any]:
         """Its value as a function of numbers, by given loops."""
@@ -254,7 +255,7 @@ class PairCall:
 
         made: dict[str, Callable[..., Any]] = {"given": given, "sum": loops, "slope": slope, "meeting": meeting}
         made["spots"] = loops.spots
-        return made[self.part] if self.part in made else lambda listed: listed[self.numbers[0]]
+        return made[self.part] if self.part in made else itemgetter(self.numbers[0])
 
 
 def _unpacked(operands: Sequence[Any]) -> Sequence[Any]:
