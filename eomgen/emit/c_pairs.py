@@ -12,6 +12,7 @@ from typing import Any
 from ..graph.pair_calls import PairFunction, PairKind, PairPart
 from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
+from ..numeric.polygon_edges import OTHER, OWN
 from ..program import Program
 from .c_text import print_pieces, used_helpers
 from .pair_statements import placed_length, plain_numbers, record_of
@@ -58,8 +59,11 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
     for kind in function.kinds:
         named = f"{function.name}_{kind.name}"
         for part, ending in parts:
-            text, needed = _law(program, kind, f"{named}{ending}", part, tables)
+            name = f"{named}{ending}"
+            text, needed = _law(program, kind, f"{name}_facing" if kind.corners else name, part, tables)
             functions.append(text)
+            if kind.corners:
+                functions.append(_facing(kind, name, part, tables))
             helpers += [helper for helper in needed if helper not in helpers]
         kinds.append(
             {
@@ -92,6 +96,9 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
         "tables": tables,
         "kinds": kinds,
         "functions": functions,
+        "polygons": max((max(kind.corners) for kind in function.kinds if kind.corners), default=0),
+        "own": OWN,
+        "other": OTHER,
         "helpers": helpers,
         "moving": len(function.data) - function.states,
         "most": max((kind["second"]["count"] for kind in kinds if kind["sorted"]), default=0),
@@ -139,12 +146,22 @@ def _law(
         plain = symbol.removeprefix("d_")
         letter, number = plain[0], int(plain[1:])
         own = len(kind.law) + kind.states  # states stand behind the numbers of the law
-        step = own if letter in "ls" else tables[kind.first if letter == "a" else kind.second]["length"]
+        shape = tables[kind.first if letter == "a" else kind.second]["length"]
+        if kind.corners:
+            shape = POSE + (OWN if letter == "a" else OTHER)
+        step = own if letter in "ls" else shape
         number += len(kind.law) * (letter == "s")
         places[graph.symbol(symbol).id] = f"{'xucc'['abls'.index(letter)]}[{number + rate * step}]"
     alone = replace(program, graph=graph)
     pieces = cut(graph, outputs, (), frozenset(), len(graph.nodes) + 1)
     return print_pieces(alone, name, pieces, places).text, used_helpers(alone, outputs)
+
+
+def _facing(kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[str, Any]]) -> str:
+    """The function of two polygons, which calls that of the edges and corners that matter."""
+    first, second = tables[kind.first], tables[kind.second]
+    context = {"name": name, "first": first["length"], "second": second["length"], "corners": kind.corners}
+    return render("c/pairs_facing.c.j2", {**context, "own": OWN, "other": OTHER, "sloped": part == "slopes"})
 
 
 def pair_declarations(program: Program) -> list[str]:

@@ -22,7 +22,7 @@ from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .contact import Contact, SpherePlane, joint_radius
 from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
-from .contact_polygons import PolygonPolygon, most_reach
+from .contact_polygons import PolygonPolygon
 from .contact_profiles import (
     ArcRound,
     EdgeRound,
@@ -254,7 +254,7 @@ def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
     if kind == "ellipsoid":
         return _most(sizes)
     if part_of(kind) == POLYGON:
-        return most_reach(sizes)
+        return sizes[-1]  # of the numbers that matter, see PolygonPolygon
     return sizes[0] + sizes[1] if kind == "rod" else graph.zero
 
 

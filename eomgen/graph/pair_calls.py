@@ -16,6 +16,7 @@ from typing import Any, Literal
 
 from ..errors import UsageError
 from ..numeric.pair_sums import MEETING, MOTION, POSE, RECORD, SPOT, PairSum, pairs_of_rows
+from ..numeric.polygon_edges import facing
 from ..records import dataclass
 from .core import Expr, Graph
 from .nodes import Node
@@ -62,6 +63,9 @@ class PairKind:
         How many states a pair has.  What it adds to their rates stands behind the results.  A number that is only
         summed, such as how many pieces of a shape touch, is one of them: 0 is given for it, and its sum stands in the
         place of its rate.
+    corners : tuple of two int
+        Of two polygons: how many corners they have.  The numbers of the shapes are those that matter then, which
+        :mod:`~eomgen.numeric.polygon_edges` finds.
     """
 
     name: str
@@ -77,6 +81,7 @@ class PairKind:
     spot: tuple[int, ...]
     held: tuple[tuple[int, ...], ...] = ()
     states: int = 0
+    corners: tuple[int, ...] = ()
 
     def graph(self) -> Graph:
         """Its nodes as a graph."""
@@ -191,13 +196,18 @@ class PairFunction:
         kinds = [
             (
                 *(k.first, k.second, k.planar, k.law),
-                *(made(k.expressions(), k.plain), made(k.expressions("slopes"), k.symbols)),
-                *(made(k.expressions("touch"), k.plain), made(k.expressions("spot"), k.plain)),
+                *(self._law(k, part, made) for part in ("outputs", "slopes", "touch", "spot")),
                 *k.beside,
             )
             for k in self.kinds
         ]
         return PairSum(self.bodies, self.tables, kinds, self.room, self.states)
+
+    @staticmethod
+    def _law(kind: PairKind, part: PairPart, made: Callable[[list[Expr], Sequence[str]], Callable[[Any], Any]]) -> Any:
+        sloped = part == "slopes"
+        law = made(kind.expressions(part), kind.symbols if sloped else kind.plain)
+        return facing(law, (kind.corners[0], kind.corners[1]), sloped) if kind.corners else law
 
     def __getstate__(self) -> dict[str, Any]:
         return {
