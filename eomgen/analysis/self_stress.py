@@ -98,7 +98,7 @@ def remove_self_stress(
     joints = bases(table, geometry, length)
     ends = np.cumsum([0, *(B.shape[2] for B in joints), len(element_rows)])
     elements = element_wrenches(states, table, geometry) / sizes[:, None, None, None]
-    N = _self_stresses(table, geometry, joints, elements, length)
+    N = self_stresses(table, geometry, joints, elements, length)
     scaled = np.moveaxis(reactions * per[:, None], -1, 0)
     forces = [np.einsum("kij,ki->kj", B, scaled[:, j]) for j, B in enumerate(joints)]
     forces.append((multipliers[element_rows] * sizes[:, None]).T)
@@ -111,7 +111,7 @@ def remove_self_stress(
     return result, flags
 
 
-def _self_stresses(
+def self_stresses(
     table: dict[str, Any], geometry: Geometry, joints: Sequence[Array], elements: Array, length: float
 ) -> Array:
     """Orthonormal rows (k, r, n) of what joints (in their bases) and elements exert in balance; rows of zeros as well.
@@ -158,13 +158,3 @@ def _self_stresses(
     null = np.ones(Vt.shape[:2], dtype=bool)
     null[:, : missing.shape[1]] = missing <= RANK
     return (Vt * null[:, :, None]) @ np.swapaxes(Q[:, :n], 1, 2)
-
-
-def _shifts(arm: Array) -> Array:
-    """Matrices (k, 6, 6) that take wrenches to a point from which they act at ``arm`` (3, k)."""
-    x, y, z = arm
-    result = np.zeros((arm.shape[1], 6, 6))
-    result[:, range(6), range(6)] = 1.0
-    for row, column, value in ((3, 1, -z), (3, 2, y), (4, 0, z), (4, 2, -x), (5, 0, -y), (5, 1, x)):
-        result[:, row, column] = value
-    return result

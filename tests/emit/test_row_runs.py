@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import contact_scenes as scenes
 import numpy as np
 import pytest
@@ -53,3 +55,16 @@ def test_text_of_contacts_does_not_grow_with_bodies() -> None:
         sources = emit_c(pipeline.build(m.derive(), "c", ["rhs", "jacobian"]))
         sizes.append(len(sources["many_pairs_floor.c"]))
     assert sizes[1] < 1.01 * sizes[0]
+
+
+def test_text_of_polygons_does_not_grow_with_corners() -> None:
+    """Of two polygons: as long for 24 corners each as for 6, apart from tables of numbers."""
+    sizes = []
+    for corners in (6, 24):
+        m, bodies = scenes.planar("two", 2)
+        turns = 2.0 * np.pi * np.arange(corners) / corners
+        points = [(0.2 * np.cos(turn), 0.1 * np.sin(turn)) for turn in turns.tolist()]
+        m.contacts("touch", [{"shape": "polygon", "on": body, "points": points} for body in bodies], law=LAW)
+        text = emit_c(pipeline.build(m.derive(), "c", ["rhs", "jacobian"]))["two_pairs_touch.c"]
+        sizes.append(len(re.sub(r"(?s)(static )?const \w+ \w+\[\d+\](\[\d+\])? = \{.*?\n\};", "", text)))
+    assert sizes[1] < 1.2 * sizes[0]
