@@ -19,6 +19,7 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, sqrt
 from ..graph.vectors import Mat3, Vec3
+from ..numeric.polygon_edges import EDGE
 from ..records import dataclass
 from .contact import Contact, SpherePlane, joint_radius
 from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
@@ -33,7 +34,7 @@ from .contact_profiles import (
     solid_depth,
     straight_pieces,
 )
-from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
+from .contact_rounds import PolygonRound, RoundRound, SegmentRound
 from .contact_shape_fields import GROUNDS
 from .contact_solids import BlockRound, EllipsoidPlane, EllipsoidRound, RodRod
 from .contact_states import BLOCK, MET, POLYGON, WHEEL, ShapeParts, part_of, parts_of

@@ -1,4 +1,4 @@
-"""The implicit stepper's parts in plain C: a long system whose coordinates hardly drift by themselves, by parts and whole."""
+"""The implicit stepper in plain C: a long system whose coordinates hardly drift by themselves, by parts and whole."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ static int travel(double drift, int n_q)
         atol[i] = 1e-9, memory[i] = cos(i);
         for (int k = 0; k < N; k++) { A[i][k] = entry(i, k, drift); }
     }
-    eomgen_run run = {.rhs = slope, .jacobian = jacobian, .c = c, .n = N, .n_q = n_q, .rtol = 1e-7, .max_step = INFINITY,
-        .t_bound = 0.2, .direction = 1.0, .atol = atol};
+    eomgen_run run = {.rhs = slope, .jacobian = jacobian, .c = c, .n = N, .n_q = n_q, .rtol = 1e-7,
+        .max_step = INFINITY, .t_bound = 0.2, .direction = 1.0, .atol = atol};
     run.y = memory, run.y_old = memory + N, run.f = memory + 2 * N, run.failure_state = memory + 3 * N;
     run.K = memory + 4 * N;
     run.F = run.K + N * method->rows_K + method->squares * N * N + 16 + N;
