@@ -21,12 +21,13 @@ from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..limits.contacts import NOWHERE
 from ..numeric.pair_sums import POSE
+from ..numeric.polygon_edges import EDGE, OTHER, OWN
 from .branches import where
 from .contact import Contact, SpherePlane
 from .contact_fields import planted
 from .contact_rounds import AtHeight
 from .contact_shapes import ShapeMotion, touching, turning_radius
-from .contact_states import BED_CELL, places_of
+from .contact_states import BED_CELL, POLYGON, part_of, places_of
 from .force import MarkerLoad, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw
@@ -165,6 +166,9 @@ def pair_kind(
     field = None if height is None else planted(height, graph, own)
     markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
     lateral = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2] if law.planar else None
+    polygons = part_of(kinds[0]) == part_of(kinds[1]) == POLYGON
+    corners = (sizes[0] // EDGE, sizes[1] // EDGE) if polygons else ()
+    sizes = (OWN, OTHER) if polygons else sizes
     given = [
         tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
     ]
@@ -228,6 +232,7 @@ def pair_kind(
         calls=tuple(
             (name, graph.calls[name]) for name in sorted(graph.calls.keys() & {str(node[0]) for node in nodes})
         ),
+        corners=corners,
     )
 
 

@@ -6,13 +6,12 @@ from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Mat3, Vec3
+from ..numeric.polygon_edges import EDGE
 from ..records import dataclass
 from .branches import where
 from .contact import Contact, SphereSphere, Touch
 from .force import View
 from .normal_laws import NormalLaw
-
-EDGE = 5  #: numbers of an edge of a polygon: its first corner, its outward normal, its length
 
 
 def direction(reach: Vec3, otherwise: Vec3) -> tuple[Vec3, Expr]:

@@ -19,12 +19,13 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, sqrt
 from ..graph.vectors import Mat3, Vec3
+from ..numeric.polygon_edges import EDGE
 from ..records import dataclass
 from .contact import Contact, SpherePlane, joint_radius
 from .contact_ellipsoids import EllipsoidEllipsoid, EllipsoidPlane, EllipsoidRod, EllipsoidRound
 from .contact_fields import FieldEllipsoid, FieldRound, HeightField, field_lines
 from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
-from .contact_polygons import PolygonPolygon, most_reach
+from .contact_polygons import PolygonPolygon
 from .contact_profiles import (
     ArcRound,
     EdgeRound,
@@ -38,7 +39,7 @@ from .contact_profiles import (
     solid_depth,
     straight_pieces,
 )
-from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
+from .contact_rounds import PolygonRound, RoundRound, SegmentRound
 from .contact_shape_fields import GROUNDS
 from .contact_solids import BlockRound, EdgeRod, RodRod, cuboid_parts
 from .contact_states import BED, BED_CELL, BLOCK, CORE, FIELD, MET, POLYGON, WHEEL, ShapeParts, part_of, parts_of
@@ -321,7 +322,7 @@ def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
     if kind == "ellipsoid":
         return _most(sizes)
     if part_of(kind) == POLYGON:
-        return most_reach(sizes)
+        return sizes[-1]  # of the numbers that matter, see PolygonPolygon
     if kind == SOLE:
         return sizes[0]
     return sizes[0] + sizes[1] if kind in ("rod", "brim", "spine") else graph.zero

@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from operator import itemgetter
 from typing import Any, Literal
 
 from ..errors import UsageError
 from ..numeric.pair_sums import MEETING, MOTION, POSE, RECORD, SPOT, PairSum, pairs_of_rows
+from ..numeric.polygon_edges import facing
 from ..records import dataclass
 from .core import Expr, Graph
 from .functions import Function
@@ -64,6 +66,9 @@ class PairKind:
         place of its rate.
     calls : tuple of (operation, (function, orders))
         What nodes that call declared functions mean, as in a graph.
+    corners : tuple of two int
+        Of two polygons: how many corners they have.  The numbers of the shapes are those that matter then, which
+        :mod:`~eomgen.numeric.polygon_edges` finds.
     """
 
     name: str
@@ -80,6 +85,7 @@ class PairKind:
     held: tuple[tuple[int, ...], ...] = ()
     states: int = 0
     calls: tuple[tuple[str, tuple[Function, tuple[int, ...]]], ...] = ()
+    corners: tuple[int, ...] = ()
 
     def graph(self) -> Graph:
         """Its nodes as a graph."""
@@ -195,13 +201,18 @@ class PairFunction:
         kinds = [
             (
                 *(k.first, k.second, k.planar, k.law),
-                *(made(k.expressions(), k.plain), made(k.expressions("slopes"), k.symbols)),
-                *(made(k.expressions("touch"), k.plain), made(k.expressions("spot"), k.plain)),
+                *(self._law(k, part, made) for part in ("outputs", "slopes", "touch", "spot")),
                 *k.beside,
             )
             for k in self.kinds
         ]
         return PairSum(self.bodies, self.tables, kinds, self.room, self.states)
+
+    @staticmethod
+    def _law(kind: PairKind, part: PairPart, made: Callable[[list[Expr], Sequence[str]], Callable[[Any], Any]]) -> Any:
+        sloped = part == "slopes"
+        law = made(kind.expressions(part), kind.symbols if sloped else kind.plain)
+        return facing(law, (kind.corners[0], kind.corners[1]), sloped) if kind.corners else law
 
     def __getstate__(self) -> dict[str, Any]:
         return {
@@ -241,7 +252,7 @@ class PairCall:
 
     def implementation(self, orders: tuple[int, ...]) -> Callable[..., Any]:
         """Its value as a function of floats or arrays."""
-        return self.on_numbers(self.function.in_floats)
+        return itemgetter(self.numbers[0]) if self.part == "item" else self.on_numbers(self.function.in_floats)
 
     def on_numbers(self, loops: PairSum) -> Callable[..., Any]:
         """Its value as a function of numbers, by given loops."""
@@ -259,7 +270,7 @@ class PairCall:
 
         made: dict[str, Callable[..., Any]] = {"given": given, "sum": loops, "slope": slope, "meeting": meeting}
         made["spots"] = loops.spots
-        return made[self.part] if self.part in made else lambda listed: listed[self.numbers[0]]
+        return made[self.part] if self.part in made else itemgetter(self.numbers[0])
 
 
 def _unpacked(operands: Sequence[Any]) -> Sequence[Any]:

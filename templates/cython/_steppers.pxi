@@ -232,7 +232,8 @@ cdef class Stepper:
         if self.method.squares > 0:
             self.run.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
         if "meeting_time" in names:
-            self.run.meeting, self.run.n_q = MODEL.kernels[find("meeting_time", ValueError)].call, _FACTS["n_q"]
+            self.run.meeting = MODEL.kernels[find("meeting_time", ValueError)].call
+        self.run.n_q = _FACTS.get("n_q", 0)
         cdef const eomgen_series *series = seen_series(SERIES)
         self.run.series = series
         length += eomgen_further(self.method, n, series)
