@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..graph.core import Expr
-from ..graph.rounding_bounds import is_rounding, terms_of, with_bounds
+from ..graph.rounding_bounds import is_rounding, terms_of, with_bounds, with_likely_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from ..limits.descriptions import BY_CHANCE, LARGE_LOOP, SMALL_LOOP
@@ -76,16 +76,26 @@ def _find_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
         elif written or TINY_ROOT < largest < SMALL_LOOP * usual.value:
             place = places[first.value < BY_CHANCE * second.value]
             found[i] = _length(substitute(gradient, place))
-    for group in {g for g in row_groups(kinematics) if g > 0}:
-        rows = [i for i, g in enumerate(row_groups(kinematics)) if g == group and i in measured]
-        columns = sum(any(not c.jacobian[i][k].is_zero for i in rows) for k in range(len(kinematics.v)))
-        squares = [at_first[list(measured).index(i)].value ** 2 for i in rows]
-        if sum(squares) > columns * (LARGE_LOOP * usual.value) ** 2:
-            gradient = substitute([x for i in rows for x in measured[i]], places[0])
-            typical = _length(gradient) * (1.0 / columns**0.5)
+    lengths = dict(zip(measured, at_first, strict=True))
+    for rows in _gaps(kinematics, measured):
+        total = sum(lengths[i].value ** 2 for i in rows)
+        if total <= (LARGE_LOOP * usual.value) ** 2:
+            continue
+        columns = len({k for i in rows for k, x in enumerate(c.jacobian[i]) if not x.is_zero})
+        if total > columns * (LARGE_LOOP * usual.value) ** 2:
+            typical = _length(substitute([x for i in rows for x in measured[i]], places[0])) * (1.0 / columns**0.5)
             for i in rows:
                 found[i] = typical
     return tuple(found)
+
+
+def _gaps(kinematics: Kinematics, measured: Mapping[int, object]) -> list[list[int]]:
+    """The measured rows of each gap."""
+    members: dict[int, list[int]] = {}
+    for i, group in enumerate(row_groups(kinematics)):
+        if group > 0 and i in measured:
+            members.setdefault(group, []).append(i)
+    return list(members.values())
 
 
 def _moves(kinematics: Kinematics, row: Sequence[Expr]) -> bool:
@@ -141,7 +151,7 @@ def _numbers(kinematics: Kinematics, place: Mapping[Expr, Expr]) -> dict[str, fl
 
 def _lengths_at(gradients: Sequence[Sequence[Expr]], numbers: Mapping[str, float]) -> list[Length]:
     """The lengths of some gradients at one place; what they share is evaluated once."""
-    values, bounds = with_bounds([x for gradient in gradients for x in gradient], numbers)
+    values, bounds = with_likely_bounds([x for gradient in gradients for x in gradient], numbers)
     ends = np.cumsum([len(gradient) for gradient in gradients])[:-1]
     return [_length_of(*parts) for parts in zip(np.split(values, ends), np.split(bounds, ends), strict=True)]
 

@@ -132,7 +132,8 @@ class Layout:
     def sized(self, sizes: Array) -> Layout:
         """The same with typical sizes of velocities and constraint rows (n_v + n_c,) at parameters of other values.
 
-        The length scale stays as declared where no velocity is one of length and no row is a gap.
+        The length scale stays as declared where no velocity is one of length and no row is a gap; gaps that have sizes
+        of their own change it in proportion.
         """
         s_q, s_c = sizes[: self.n_v], sizes[self.n_v :]
         if np.array_equal(s_q, self.scales.q) and np.array_equal(s_c, self.scales.c):
@@ -141,6 +142,9 @@ class Layout:
         usual = self.row_lengths & (self.scales.c == self.length)  # other rows have sizes of their own
         lengths = [*s_q[self.velocity_lengths], *s_c[usual]]
         found.length = float(lengths[0]) if lengths else self.length
+        gaps = np.flatnonzero(self.scales.groups > 0) if self.scales.groups is not None else ()
+        if not lengths and len(gaps):  # of large loops, which grow with the links
+            found.length = float(self.length * s_c[gaps[0]] / self.scales.c[gaps[0]])
         found.scales = self.scales._replace(q=s_q, c=s_c)
         found.place_scales = found.scales
         if self.given_rates:
