@@ -58,7 +58,9 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
 
 def _is_bed(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape], soil: bool) -> bool:
     """Whether the ground is a bed, of which there is one, with soil; what is wrong is noted."""
-    beds = [(key, shapes) for key, shapes in (("first", first), ("second", second)) if any(x.kind == BED for x in shapes)]
+    beds = [
+        (key, shapes) for key, shapes in (("first", first), ("second", second)) if any(x.kind == BED for x in shapes)
+    ]
     for key, shapes in beds:
         if len(shapes) > 1:
             e.fault(key, "has a bed and more", "give one bed as all of a group, and contacts of their own to others")
@@ -212,8 +214,8 @@ _CLOSED = ("ellipsoid", "cuboid")  #: shapes that meet half-spaces and spheres a
 _OFF_CLOSED = ("capsule", *_CLOSED)
 _ALLOWED = (
     "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
-    "smooth_profile, which plates meet too; wheels and plates meet a bed; sphere and capsule meet each other and half_space; ellipsoid and cuboid "
-    "meet half_space and sphere"
+    "smooth_profile, which plates meet too; wheels and plates meet a bed; sphere and capsule meet each other and "
+    "half_space; ellipsoid and cuboid meet half_space and sphere"
 )
 
 _NORMAL_LAW = CURVED["normal_law"]._replace(
