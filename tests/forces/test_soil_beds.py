@@ -225,12 +225,12 @@ def test_each_wheel_deepens_the_rut_of_those_before_it(convoy: eg.Module) -> Non
     deeper = depth_in_rut(100 * G, rut)
     assert first == pytest.approx(rut, rel=2e-3)
     assert second == pytest.approx(deeper, rel=2e-3)
-    assert heavy == pytest.approx(depth_in_rut(160 * G, deeper), rel=0.01)
+    assert heavy == pytest.approx(depth_in_rut(160 * G, rut), rel=2e-3)  # which the first has not run in
     assert second - rut < 0.25 * first
     cells = np.array([traj[f"soil_sinkage_{k + 1}"] for k in range(TRAIN)])
     assert (np.diff(cells, axis=1) >= -1e-8).all()
     place = (np.arange(TRAIN) + 0.5) * 0.03
-    for below, above, depth in ((2.55, 2.7, rut), (1.75, 2.1, deeper), (1.3, 1.45, heavy)):
+    for below, above, depth in ((2.55, 2.7, rut), (2.05, 2.2, deeper), (1.3, 1.45, heavy)):
         np.testing.assert_allclose(cells[(place > below) & (place < above), -1], depth, rtol=0.01)
 
 
