@@ -57,10 +57,10 @@ class SoilCell(Contact):
         z_m' = z' where z = z_m and z' > 0, else 0                       the greatest sinkage at this place
         d' = v - |v| d / K                                               shear displacement (Janosi and Hanamoto)
         S = (c_0 + p tan phi) a b / c,  T = S (e + (1 - e) |d| / K)
-        F_t = -max(-T, min(T, sqrt(S S_0) u / l)),  u' = sqrt(S / S_0) v - |v| u / (l T / S),  l = K / 25, e = 0.01
+        F_t = -max(-T, min(T, sqrt(S S_0) u / l)),  u' = sqrt(S / S_0) v - |v| u / (l T / S),  l = K / 50, e = 0.01
 
     of the velocity v of the underside along itself.  F_n is dual to z, F_n = -p a b dz/dx, so that its power is
-    -p a b z'.  p is that of an elastic store which falls where z_m grows, and S_0 u^2 / (2 l^2) l is the most that u can
+    -p a b z'.  p is that of an elastic store which falls where z_m grows, and S_0 u^2 / (2 l) is the most that u can
     give back, whatever the load does: no cycle of load, sinkage and sliding gains energy, with any number of wheels.
     S_0 is the strength of a cell as wide as it is long at the sinkage K.
     """
@@ -127,7 +127,8 @@ class SoilCell(Contact):
         """S_0."""
         law, shear = self._laws()
         stress = shear.cohesion + law.modulus_of(self.size) * shear.modulus**law.exponent * shear.slope
-        return stress * self.size * self.size
+        strength = stress * self.size * self.size
+        return where(strength.graph.apply("lt", 0.0, strength), strength, 1.0)  # without strength any number will do
 
     def _part(self) -> Expr:
         """T / S."""
@@ -208,7 +209,7 @@ def _under_sole(length: Expr, x: Expr, y: Expr, axis: tuple[Expr, Expr]) -> _Col
 def bed_rates(states: Sequence[Expr], sums: Sequence[Expr], recovery: Expr) -> list[Expr]:
     """Rates of the states of all cells, from the sums over what presses them.
 
-    Shear is forgotten where nothing presses; the greatest sinkage stays, and grows with the mean of what presses deeper.
+    Shear is forgotten where nothing presses; the greatest sinkage stays, and grows with the mean of what deepens it.
     """
     found: list[Expr] = []
     each, slots = len(STATES), len(STATES) + COUNTS
