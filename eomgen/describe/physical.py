@@ -39,8 +39,9 @@ def check_bodies(
     faults = requirements.faults
     masses = [requirements.known([body.mass]) for body in bodies]
     tensors = [requirements.known(_entries(body)) for body in bodies]
-    data, expressions, values = _of_all(bodies, joints, requirements)
-    flaws = judge_bodies(values, [(*one[:3], True) for one in data])
+    numbers = [_numbers_of(body, points) for body, points in zip(bodies, _points(bodies, joints), strict=True)]
+    values = [x for own in numbers for group in own for x in _known(requirements, group)]
+    flaws = judge_bodies(values, [_described(*one, True) for one in zip(bodies, numbers, strict=True)])
     scales = inertia_scales(
         [0.0 if mass is None else mass[0] for mass in masses],
         [np.zeros((3, 3)) if tensor is None else tensor.reshape(3, 3) for tensor in tensors],
@@ -69,24 +70,27 @@ def check_bodies(
                 if body.check == "note":
                     notes.append(f"{place}: {message}; it is used as given")
     if any(symbols_of(_entries(body)) for body in bodies if body.check == "error"):
-        requirements.keep("bodies", BODIES, expressions, (data,))
+        alike = {}  # of links that are alike the first stands for all
+        for body, own in zip(bodies, numbers, strict=True):
+            alike.setdefault((body.check, *(tuple(x.id for x in group) for group in own)), (body, own))
+        data = [_described(body, own, body.check == "error") for body, own in alike.values()]
+        requirements.keep("bodies", BODIES, [x for _, own in alike.values() for g in own for x in g], (data,))
     return tuple(negative), tuple(notes)
 
 
-def _of_all(
-    bodies: Sequence[Body], joints: Sequence[JointSpec], requirements: Requirements
-) -> tuple[list[tuple[str, bool, int, bool]], list[Expr], list[float]]:
-    """What :func:`~..numeric.value_rules.judge_bodies` takes: the data, and the numbers as expressions and values."""
-    data, expressions, values = [], list[Expr](), list[float]()
-    for body, points in zip(bodies, _points(bodies, joints), strict=True):
-        axis = () if body.plane is None else body.plane
-        groups: list[Sequence[Expr]] = [[body.mass], _entries(body), axis, *points]
-        for group in groups:
-            found = requirements.known(group)
-            values += [math.nan] * len(group) if found is None else found.tolist()
-            expressions += group
-        data.append((body.name, body.plane is not None, len(points), body.check == "error"))
-    return data, expressions, values
+def _numbers_of(body: Body, points: Sequence[Vec3]) -> list[Sequence[Expr]]:
+    """Mass, tensor, axis of the one moment that was given, and points: what judges bodies, in this order."""
+    return [[body.mass], _entries(body), () if body.plane is None else body.plane, *points]
+
+
+def _described(body: Body, numbers: Sequence[Sequence[Expr]], judged: bool) -> tuple[str, bool, int, bool]:
+    """What :func:`~..numeric.value_rules.judge_bodies` takes beside the numbers."""
+    return body.name, body.plane is not None, len(numbers) - 3, judged
+
+
+def _known(requirements: Requirements, group: Sequence[Expr]) -> list[float]:
+    found = requirements.known(group)
+    return [math.nan] * len(group) if found is None else found.tolist()
 
 
 def _entries(body: Body) -> list[Expr]:
