@@ -91,7 +91,9 @@ class BodyLoops(LoopBlocks):
             else:
                 size, part, _ = apart(*(left[m].get(c, self.terms.graph.zero) for m in rows for c in columns))
                 squares = [dot(self.J[m], self.J[m]) for m in rows]
-                usual = largest([x * (1.0 / len(self.J[m])) for m, x in zip(rows, squares, strict=True) if x is not None])
+                usual = largest(
+                    [x * (1.0 / len(self.J[m])) for m, x in zip(rows, squares, strict=True) if x is not None]
+                )
                 # columns that are short beside the usual entry have no angle but that of their rounding
                 angles.append((self.terms.graph.apply("max", size, usual * usual * NEAR_SQUARE), part))
         return angles

@@ -166,7 +166,10 @@ def test_long_products_of_rotations_are_told_from_nothing(n: int) -> None:
     total = ((one, zero, zero), (zero, one, zero), (zero, zero, one))
     for k in range(n):
         c, s = cos(graph.symbol(f"q{k}")), sin(graph.symbol(f"q{k}"))
-        about_z, about_y = ((c, -s, zero), (s, c, zero), (zero, zero, one)), ((c, zero, s), (zero, one, zero), (-s, zero, c))
+        about_z, about_y = (
+            ((c, -s, zero), (s, c, zero), (zero, zero, one)),
+            ((c, zero, s), (zero, one, zero), (-s, zero, c)),
+        )
         turn = about_z if k % 3 else about_y
         total = product(total, turn)
     unit = product(total, transpose(total))
