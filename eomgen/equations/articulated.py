@@ -363,7 +363,7 @@ class ArticulatedBodies:
 
 
 def _with_released(wrench: Wrench, column: Twist, entry: Expr | None) -> Wrench:
-    """What is carried past a free column s along one axis: there it is the row's own entry c alone, as s . K + c = 0."""
+    """What is carried past a free column s along one axis: along s it is the row's own entry, as s . K + c = 0."""
     axes = [(half, k) for half in range(2) for k in range(3) if not column[half][k].is_zero]
     if len(axes) != 1 or column[axes[0][0]][axes[0][1]].value != 1.0:
         return wrench

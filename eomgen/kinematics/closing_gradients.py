@@ -8,7 +8,7 @@ cut joint, times the wrench by which the equation acts there.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from ..describe.mechanism import JointSpec
 from ..graph import vectors as vec
@@ -23,6 +23,7 @@ from .kinematics import Kinematics
 
 #: Rows by twists are taken where they and the constraints are shorter than this times those of derivatives.
 SHORTER = 0.9
+Turns: TypeAlias = tuple[Expr, list[tuple[int, float]]]
 COMMON = ("r_x", "r_y", "r_z")  #: rows along axes that both chains share (see close_loop)
 
 
@@ -72,9 +73,9 @@ def pose_equations(kinematics: Kinematics, spec: JointSpec) -> PoseEquations:
     return PoseEquations(tuple(row.label for row in rows), expressions, R, r, turn, true, turns is not None)
 
 
-def turns_about_z(kinematics: Kinematics, spec: JointSpec) -> tuple[Expr, Expr] | None:
+def turns_about_z(kinematics: Kinematics, spec: JointSpec) -> Turns | None:
     """What :func:`.angle_sums.sum_of_turns` finds of a cut joint with one angle, looked for once."""
-    kept: dict[str, tuple[Expr, Expr] | None] = vars(kinematics).setdefault("_turns_about_z", {})
+    kept: dict[str, Turns | None] = vars(kinematics).setdefault("_turns_about_z", {})
     if spec.name not in kept:
         alone = sum(coordinate.kind == "angle" for coordinate in spec.joint.coordinates) == 1
         rotation = kinematics.poses.relative(spec.predecessor, spec.successor).rotation

@@ -3,11 +3,11 @@
 A gap of a joint or contact changes by about as much as the coordinates that make it: its size is that of its kind, the
 length scale of the mechanism or 1.  That of a loop far smaller than the mechanism, a thousandth or less, is the length
 of its own scaled gradient, or its rows would be lost beside the others.  The three rows of a gap in a loop of many
-links have the typical length of their columns as their size, or all others would be lost beside them.  A relation written by a user may be multiplied
-by anything, areas in m^2 or numbers of teeth; its size is the length of its scaled gradient, so that a factor does not
-matter (row equilibration: A. van der Sluis, Numerische Mathematik 14, 1969).  A gradient that is not told from rounding
-of the terms that were added in it (:mod:`~..graph.rounding_bounds`) is no size: such a row counts as nothing beside
-those terms.  Factors that are parameters stay symbols.
+links have the typical length of their columns as their size, or all others would be lost beside them.  A relation
+written by a user may be multiplied by anything, areas in m^2 or numbers of teeth; its size is the length of its scaled
+gradient, so that a factor does not matter (row equilibration: A. van der Sluis, Numerische Mathematik 14, 1969).  A
+gradient that is not told from rounding of the terms that were added in it (:mod:`~..graph.rounding_bounds`) is no size:
+such a row counts as nothing beside those terms.  Factors that are parameters stay symbols.
 """
 
 from __future__ import annotations

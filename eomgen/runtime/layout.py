@@ -142,9 +142,9 @@ class Layout:
         usual = self.row_lengths & (self.scales.c == self.length)  # other rows have sizes of their own
         lengths = [*s_q[self.velocity_lengths], *s_c[usual]]
         found.length = float(lengths[0]) if lengths else self.length
-        gaps = np.flatnonzero(self.scales.groups > 0) if self.scales.groups is not None else ()
-        if not lengths and len(gaps):  # of large loops, which grow with the links
-            found.length = float(self.length * s_c[gaps[0]] / self.scales.c[gaps[0]])
+        if not lengths and self.scales.groups is not None and (self.scales.groups > 0).any():
+            gap = int(np.argmax(self.scales.groups > 0))  # of a large loop, which grows with its links
+            found.length = float(self.length * s_c[gap] / self.scales.c[gap])
         found.scales = self.scales._replace(q=s_q, c=s_c)
         found.place_scales = found.scales
         if self.given_rates:
