@@ -115,7 +115,7 @@ class LoopBlocks(ABC):
             term = graph.apply("select", graph.apply("lt", graph.constant(UNMOVED * UNMOVED), size), term, graph.one)
         for i, row in enumerate(G):
             row[i] = row.get(i, graph.zero) + term
-        return factorize(G), term
+        return factorize(G, term), term
 
     # -- position -------------------------------------------------------------------------------------------------
     def closing(self) -> list[Expr]:
@@ -157,11 +157,7 @@ class LoopBlocks(ABC):
         Velocities are of order 1, accelerations of order 2.
         """
         factor, passes = self._factor
-        columns = transpose(self.J, self.terms.n_v)
-        for _ in range(passes[order - 1]):
-            e = [a + b for a, b in zip(r, times(self.rows, x), strict=True)]
-            dz = times(columns, factor.solve(e))
-            x = [a - s * b for a, s, b in in_parts(list(zip(x, self.s, dz, strict=True)), x)]
+        x = self.nearest(x, r, len(self.J), factor, passes[order - 1])
         if self.gentle:
             graph = self.terms.graph
             left = total_magnitude([a + b for a, b in zip(r, times(self.rows, x), strict=True)]) * self.unit
@@ -171,12 +167,16 @@ class LoopBlocks(ABC):
         return x
 
     def nearest(self, x: Sequence[Expr], r: Sequence[Expr], rows: int, factor: SparseFactor, passes: int) -> list[Expr]:
-        """The nearest x with C_q x + r = 0 of so many rows, r scaled as they are, by passes with their factor."""
+        """The nearest x with C_q x + r = 0 of so many rows, r scaled as they are, by passes with their factor.
+
+        All but the last are taken at once, of what each leaves, which needs no rows; what rounding leaves of these the
+        last one mends.
+        """
         x, J = list(x), self.J[:rows]
         columns = transpose(J, self.terms.n_v)
-        for _ in range(passes):
+        for together in (passes - 1, 1) if passes > 1 else (1,):
             e = [a + b for a, b in zip(r, times(self.rows[:rows], x), strict=True)]
-            dz = times(columns, factor.solve(e))
+            dz = times(columns, factor.settle(e, together))
             x = [a - k * b for a, k, b in in_parts(list(zip(x, self.s, dz, strict=True)), x)]
         return x
 
