@@ -116,7 +116,7 @@ class LoopBlocks(ABC):
             term = graph.apply("select", graph.apply("lt", graph.constant(UNMOVED * UNMOVED), size), term, graph.one)
         for i, row in enumerate(G):
             row[i] = row.get(i, graph.zero) + term
-        return factorize(G), term
+        return factorize(G, term), term
 
     # -- position -------------------------------------------------------------------------------------------------
     def closing(self) -> list[Expr]:
@@ -144,27 +144,22 @@ class LoopBlocks(ABC):
 
     # -- velocity and acceleration --------------------------------------------------------------------------------
     @cached_property
-    def _solver(self) -> tuple[SparseFactor, Expr, tuple[int, int]]:
-        """The factor of J J^T, the term added to it, and how many passes of both corrections leave no trace of that."""
+    def _solver(self) -> tuple[SparseFactor, tuple[int, int]]:
+        """The factor of J J^T and a term, and how many passes of both corrections leave no trace of that."""
         if self.gentle:
-            return *self._regularised(self.J, GENTLE), self.passes
+            return self._regularised(self.J, GENTLE)[0], self.passes
         if self.redundant:
-            return *self._regularised(self.J, self.term), (self.solutions, self.solutions)
-        return factorize(gram(self.J)), self.terms.graph.zero, (1, 1)
+            return self._regularised(self.J, self.term)[0], (self.solutions, self.solutions)
+        return factorize(gram(self.J)), (1, 1)
 
     def _corrected(self, x: list[Expr], r: Sequence[Expr], conditions: list[Expr], order: int = 1) -> list[Expr]:
         """The nearest x with C_q x + r = 0; where configurations may lose rank, that nothing is left is a condition.
 
         Velocities are of order 1, accelerations of order 2.
         """
-        factor, term, passes = self._solver
-        columns = transpose(self.J, self.terms.n_v)
+        factor, passes = self._solver
         e = [a + b for a, b in zip(r, times(self.rows, x), strict=True)]
-        total = z = factor.solve(e)
-        for _ in range(passes[order - 1] - 1):  # of e, a pass leaves J J^T z - e = term z, with no look at the rows
-            z = factor.solve([term * y for y in z])
-            total = [a + b for a, b in zip(total, z, strict=True)]
-        dz = times(columns, total)
+        dz = times(transpose(self.J, self.terms.n_v), factor.settle(e, passes[order - 1]))
         x = [a - s * b for a, s, b in in_parts(list(zip(x, self.s, dz, strict=True)), x)]
         if self.gentle:
             graph = self.terms.graph
@@ -175,12 +170,16 @@ class LoopBlocks(ABC):
         return x
 
     def nearest(self, x: Sequence[Expr], r: Sequence[Expr], rows: int, factor: SparseFactor, passes: int) -> list[Expr]:
-        """The nearest x with C_q x + r = 0 of so many rows, r scaled as they are, by passes with their factor."""
+        """The nearest x with C_q x + r = 0 of so many rows, r scaled as they are, by passes with their factor.
+
+        All but the last are taken at once, of what each leaves, which needs no rows; what rounding leaves of these the
+        last one mends.
+        """
         x, J = list(x), self.J[:rows]
         columns = transpose(J, self.terms.n_v)
-        for _ in range(passes):
+        for together in (passes - 1, 1) if passes > 1 else (1,):
             e = [a + b for a, b in zip(r, times(self.rows[:rows], x), strict=True)]
-            dz = times(columns, factor.solve(e))
+            dz = times(columns, factor.settle(e, together))
             x = [a - k * b for a, k, b in in_parts(list(zip(x, self.s, dz, strict=True)), x)]
         return x
 
@@ -199,7 +198,7 @@ class LoopBlocks(ABC):
     @property
     def corrections(self) -> int:
         """Passes by it after which velocities are projected."""
-        return self._solver[2][0]
+        return self._solver[1][0]
 
     def regularised(self, rows: Sequence[Row]) -> SparseFactor:
         """The factor of J J^T of some rows, which may depend on each other."""

@@ -193,14 +193,17 @@ def project(
     if led and forcing is not None and forcing.feedback:
         here = forcing.sample(t, x)
         x = module.project(x, t=t, u=here)
-    if raw.size <= FEW:
-        return partial(_residuals, module, t, raw, x, u, here), x
+    if raw.size <= FEW and u is None:
+        return partial(_residuals, module, t.copy(), raw), x  # the user may change what he is given
     return _residuals(module, t, raw, x, u, here), x
 
 
-def _residuals(module: BoundModel, t: Array, raw: Array, x: Array, u: Array | None, here: Array | None) -> Residuals:
+def _residuals(
+    module: BoundModel, t: Array, raw: Array, x: Array | None = None, u: Array | None = None, here: Array | None = None
+) -> Residuals:
     """How far raw states and projected ones are from the constraints, at the inputs of each."""
     n = module.n_q
+    x = module.project.kernel(raw, None, None, None, t) if x is None else x
     position = module.constraints.every
     velocity = module.velocity_constraints.every
     correction = np.abs(x - raw)

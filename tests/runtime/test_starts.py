@@ -92,5 +92,9 @@ def test_residuals_asked_for_late_are_those_of_the_run() -> None:
     assert run.residuals.position == position
     assert run.metadata["residuals"]["position"] == position
     assert run.residuals.raw_position >= position
+    changed = module.simulate(1.0)
+    changed.x[:] = 0.0
+    changed.t[:] = 0.0
+    assert changed.residuals == run.residuals
     long = module.simulate(1.0, t_eval=np.linspace(0.0, 1.0, 3000))  # too many numbers to keep them twice
     assert long.residuals.position == np.abs(module.constraints(long.x[: module.n_q], t=long.t, rows="all")).max()
