@@ -37,8 +37,8 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
     """What is known of contacts beside their numbers.
 
     ``lists`` has name, numbers and shapes of each contact; ``moved_by`` the last velocity that moves each shape, -1 for
-    ground; ``parents`` the velocity before each towards ground; ``bodies`` the body of each shape.  ``rigid_only`` names
-    contacts without a law of force.
+    ground; ``parents`` the velocity before each towards ground; ``bodies`` the body of each shape.  ``rigid_only``
+    names contacts without a law of force.
     """
     forces = [force for force in kinematics.mechanism.forces if force.near(kinematics.motion)]
     if not forces:

@@ -23,8 +23,8 @@ class RigidRun(Trajectory):
     Attributes
     ----------
     contact_forces : ContactForces
-        These and, of runs with ``contact_forces=True``, single contacts and forces on bodies.  Pickles have it; of saved
-        runs the columns remain.
+        These and, of runs with ``contact_forces=True``, single contacts and forces on bodies.  Pickles have it; of
+        saved runs the columns remain.
     """
 
     contact_forces: ContactForces
