@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from ..graph.pair_calls import PairFunction, PairKind, PairPart
+from ..graph.pair_calls import PairFunction
+from ..graph.pair_kinds import PairKind, PairPart
 from ..graph.substitute import symbols_of
 from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..graph.pair_calls import PairCall, PairFunction, PairPart, pair_call
+from ..graph.pair_calls import PairCall, PairFunction, pair_call
+from ..graph.pair_kinds import PairPart
 from ..graph.substitute import symbols_of
 from ..operations import CONDITION, OPERATIONS
 from ..program import Block, Program

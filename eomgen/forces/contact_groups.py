@@ -19,8 +19,9 @@ from ..graph.vectors import Vec3
 from ..records import dataclass
 from .contact_pair_laws import PairLaw, pair_kind
 from .contact_shape_fields import PLANAR
-from .contact_shapes import PIECED, ContactShape, Feature, meet
+from .contact_shapes import PIECED, ContactShape, Feature
 from .contact_states import BED, FIELD, POLYGON, alike, class_of, pair_states, part_of
+from .contact_touch import meet
 from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw, RigidLaw

@@ -15,7 +15,7 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
-from ..graph.pair_calls import PairKind
+from ..graph.pair_kinds import PairKind
 from ..graph.substitute import substitute
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
@@ -26,8 +26,8 @@ from .branches import where
 from .contact import Contact, SpherePlane
 from .contact_fields import planted
 from .contact_rounds import AtHeight
-from .contact_shapes import ShapeMotion, touching, turning_radius
 from .contact_states import BED_CELL, POLYGON, part_of, places_of
+from .contact_touch import ShapeMotion, touching, turning_radius
 from .force import MarkerLoad, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw
@@ -197,8 +197,9 @@ def pair_kind(
         if states and lost:
             rates += [graph.zero] * law.slots
         elif states:
-            on_bed = isinstance(contact, SoilCell)
-            rates += contact.sums(view) if on_bed else _rates(contact, view, law.slots > law.each)
+            rates += (
+                contact.sums(view) if isinstance(contact, SoilCell) else _rates(contact, view, law.slots > law.each)
+            )
         normal_of, depth, arm, _ = contact.touch(view)
         share = contact.share(view)
         touch = [*(contact.nearness(view)[0]), contact.nearness(view)[1], turning_radius(kinds[1], given[1], graph)]

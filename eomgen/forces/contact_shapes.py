@@ -17,18 +17,13 @@ import numpy as np
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr, Graph, sqrt
-from ..graph.vectors import Mat3, Vec3
+from ..graph.core import Expr, sqrt
+from ..graph.vectors import Vec3
 from ..numeric.polygon_edges import EDGE
 from ..records import dataclass
-from .contact import Contact, SpherePlane, joint_radius
-from .contact_ellipsoids import EllipsoidEllipsoid, EllipsoidPlane, EllipsoidRod, EllipsoidRound
-from .contact_fields import FieldEllipsoid, FieldRound, HeightField, field_lines
+from .contact_fields import field_lines
 from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
-from .contact_polygons import PolygonPolygon
 from .contact_profiles import (
-    ArcRound,
-    EdgeRound,
     Point,
     ProfilePart,
     arc_points,
@@ -39,10 +34,9 @@ from .contact_profiles import (
     solid_depth,
     straight_pieces,
 )
-from .contact_rounds import PolygonRound, RoundRound, SegmentRound
 from .contact_shape_fields import GROUNDS
-from .contact_solids import BlockRound, EdgeRod, RodRod, cuboid_parts
-from .contact_states import BED, BED_CELL, BLOCK, CORE, FIELD, MET, POLYGON, WHEEL, ShapeParts, part_of, parts_of
+from .contact_solids import cuboid_parts
+from .contact_states import BED, BED_CELL, FIELD, WHEEL, ShapeParts, parts_of
 
 #: Shapes whose pieces are edges and arcs.
 PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
@@ -110,7 +104,7 @@ class ContactShape:
         if self.kind in PIECED:
             return self._pieces(frame)
         if self.kind == "ellipsoid":
-            return [Feature("ellipsoid", frame, self.sizes, _most(self.sizes), 2.0 * _least(self.sizes))]
+            return [Feature("ellipsoid", frame, self.sizes, greatest(self.sizes), 2.0 * _least(self.sizes))]
         if self.kind == "cuboid":
             *size, edge = self.sizes
             thick = _least(size)
@@ -309,23 +303,13 @@ def by_edges(
     return changed(first, second or first), changed(second, first)
 
 
-def _most(sizes: Sequence[Expr]) -> Expr:
+def greatest(sizes: Sequence[Expr]) -> Expr:
+    """The greatest of several lengths."""
     return reduce(lambda a, b: a.graph.apply("max", a, b), sizes)
 
 
 def _least(sizes: Sequence[Expr]) -> Expr:
     return reduce(lambda a, b: a.graph.apply("min", a, b), sizes)
-
-
-def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
-    """How far points of a feature are from its centre that its turning moves along a normal; 0 of what is round."""
-    if kind == "ellipsoid":
-        return _most(sizes)
-    if part_of(kind) == POLYGON:
-        return sizes[-1]  # of the numbers that matter, see PolygonPolygon
-    if kind == SOLE:
-        return sizes[0]
-    return sizes[0] + sizes[1] if kind in ("rod", "brim", "spine") else graph.zero
 
 
 def _width(edges: Sequence[Expr], corners: Sequence[tuple[Expr, Expr]]) -> Expr:
@@ -334,7 +318,7 @@ def _width(edges: Sequence[Expr], corners: Sequence[tuple[Expr, Expr]]) -> Expr:
     for k in range(0, len(edges), EDGE):
         px, py, nx, ny, _ = edges[k : k + EDGE]
         across = [nx * (px - x) + ny * (py - y) for x, y in corners]
-        widths.append(_most(across))
+        widths.append(greatest(across))
     return _least(widths)
 
 
@@ -346,76 +330,3 @@ def _turned(frame: Frame, columns: tuple[int, int, int]) -> Frame:
     """A frame whose axes are x, y and z of another in another order."""
     rows = tuple((row[columns[0]], row[columns[1]], row[columns[2]]) for row in frame.rotation)
     return Frame((rows[0], rows[1], rows[2]), frame.position)
-
-
-#: Features of the first shapes of :data:`~.contact_states.MET` that have several.
-_SURFACES = {"ground": ("edge", "arc")}
-#: Classes of features that meet: the first is a surface, or both are of one class.
-MEETINGS = tuple((one, soft) for own, met in MET.items() for one in _SURFACES.get(own, (own,)) for soft in met)
-
-
-def meet(kinds: tuple[str, str]) -> bool:
-    """Whether features of two classes meet, in this order."""
-    return (part_of(kinds[0]), part_of(kinds[1])) in MEETINGS
-
-
-class ShapeMotion(NamedTuple):
-    """A shape's place and motion, ground axes."""
-
-    position: Vec3
-    rotation: Mat3
-    velocity: Vec3
-    angular_velocity: Vec3
-
-
-def touching(
-    kinds: tuple[str, str],
-    markers: tuple[Marker, Marker],
-    sizes: tuple[tuple[Expr, ...], tuple[Expr, ...]],
-    law: Contact,
-    spot: int = 0,
-    field: HeightField | None = None,
-) -> Contact:
-    """The contact of one feature with another at one of its places; ``law`` has the laws."""
-    first, radius = sizes[0], sizes[1][0]
-    normal = law.normal_law.at(lambda: joint_radius(first[0], radius) if kinds[0] == "round" else radius)
-    friction = law.friction
-    if kinds[1] == "pad":
-        area, width = sizes[1]
-        normal, radius = normal.on_pad(area, width), radius.graph.zero
-        friction = None if friction is None else friction.on_pad(area)
-    laws = (law.name, *markers, normal, friction)
-    if kinds[0] == "round":
-        return RoundRound(*laws, (first[0], radius))
-    if part_of(kinds[1]) == POLYGON:
-        return PolygonPolygon(*laws, first, sizes[1], spot)
-    if kinds[1] == "ellipsoid":
-        x, y, z = sizes[1]
-        if field is not None:
-            return FieldEllipsoid(*laws, field, (x, y, z))
-        if kinds[0] == "half":
-            return EllipsoidPlane(*laws, (x, y, z))
-        return EllipsoidEllipsoid(*laws, ((first[0], first[1], first[2]), (x, y, z)))
-    if field is not None:
-        return FieldRound(*laws, field, radius)
-    if kinds[0] == "ellipsoid":
-        x, y, z = first
-        return (
-            EllipsoidRod(*laws, (x, y, z), sizes[1][1], radius)
-            if kinds[1] == "rod"
-            else (EllipsoidRound(*laws, (x, y, z), radius))
-        )
-    if kinds[0] in (BLOCK, CORE):
-        x, y, z, edge = first
-        return BlockRound(*laws, (x, y, z), edge, radius)
-    if kinds[0] == "brim":
-        return EdgeRod(*laws, (first[0], sizes[1][0]), (first[1], sizes[1][1]))
-    if kinds[1] == "rod":
-        return RodRod(*laws, (first[0], sizes[1][0]), (first[1], sizes[1][1]))
-    if kinds[0] == "half":
-        return SpherePlane(*laws, radius)
-    if kinds[0] in ("edge", "arc"):
-        return (EdgeRound if kinds[0] == "edge" else ArcRound)(*laws, first, radius)
-    if kinds[0] in ("segment", "rod"):
-        return SegmentRound(*laws, first[0], (first[1], radius))
-    return PolygonRound(*laws, first, radius)

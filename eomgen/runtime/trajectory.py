@@ -72,9 +72,8 @@ class Trajectory:
         sample: Callable[[Array], Trajectory] | None = None,
         described: Callable[[], dict[str, Any]] = dict,
     ) -> None:
-        self.t, self.x = t, x
+        self.t, self.x, self.names = t, x, columns.names
         self._columns, self._header, self._described = columns, header, described
-        self.names = columns.names
         self.units: dict[str, str] = header.get("units", {})
         self._times, self._states, self._sample = t_events, x_events, sample
 

@@ -16,8 +16,8 @@ from eomgen.errors import ModelError
 from eomgen.forces.contact_groups import _SharedData
 from eomgen.forces.contact_shape_fields import GROUNDS, SHAPE_FIELDS
 from eomgen.forces.contact_shape_fields import PLANAR as PLANE
-from eomgen.forces.contact_shapes import MEETINGS, meet
 from eomgen.forces.contact_states import PARTS, STATELESS, ShapeParts, class_of, given_groups, pair_states, part_of
+from eomgen.forces.contact_touch import MEETINGS, meet
 from eomgen.generation import generate
 
 LUGRE = {
