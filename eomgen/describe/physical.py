@@ -71,7 +71,7 @@ def check_bodies(
                 if body.check == "note":
                     notes.append(f"{place}: {message}; it is used as given")
     if any(symbols_of(_entries(body)) for body in bodies if body.check == "error"):
-        alike: dict[Any, Any] = {}  # of links that are alike the first stands for all
+        alike: dict[Any, tuple[Body, list[Sequence[Expr]]]] = {}  # of bodies that are alike the first stands for all
         for body, own in zip(bodies, numbers, strict=True):
             alike.setdefault((body.check, *(tuple(x.id for x in group) for group in own)), (body, own))
         data = [_described(body, own, body.check == "error") for body, own in alike.values()]
