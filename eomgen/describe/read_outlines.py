@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..forces.contact_outlines import half_gap, half_tip
+from ..forces.contact_outlines import half_gap, half_tooth
 from ..forces.contact_states import TEETH, teeth_of_sprocket
 from ..graph.core import Expr
 from ..graph.shown import shown
@@ -54,5 +54,5 @@ def sprocket_sizes(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple
         depth = reader.expression(f"{path}.depth", given["depth"])
         positive(reader, f"{path}.depth", depth)
     else:
-        depth = half_tip(teeth, *sizes)
+        depth = half_tooth(teeth, *sizes)
     return (depth, reader.graph.constant(float(teeth)), *sizes)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from ..graph.core import Expr, cos, sin, sqrt
 from ..limits.contacts import SHARED
+from .branches import where
 from .contact_profiles import Point, ProfilePart, arc, biarcs, edge, length, minus, tangent, times, unit
 
 Pair = tuple[float, float]
@@ -54,10 +55,14 @@ def _tooth(teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr) -> Tooth
     return Tooth((x, y), (s, c), flank, (x + flank * s, y + flank * c))
 
 
-def half_tip(teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr) -> Expr:
-    """Half of the width of the tips of a sprocket."""
+def half_tooth(teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr) -> Expr:
+    """Half of the width of the teeth of a sprocket at their narrowest: at the tip, or between the seats.
+
+    Arcs that reach the line between neighbouring pins are nearest there, and the flanks part from it outwards.
+    """
     corner, half = _tooth(teeth, pitch, seat, tip, angle).tip, math.pi / teeth
-    return corner[0] * math.sin(half) - corner[1] * math.cos(half)
+    at_tip = corner[0] * math.sin(half) - corner[1] * math.cos(half)
+    return where(pitch.graph.apply("lt", math.pi - 2.0 * half, angle), 0.5 * pitch - seat, at_tip)
 
 
 def sprocket_ring(

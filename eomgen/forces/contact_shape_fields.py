@@ -89,7 +89,7 @@ _SIZES: dict[str, Fields] = {
         ),
         "depth": Field(
             "expression",
-            "how far inside the teeth what has passed them is pushed out (m); half of the tips unless given",
+            "how far inside the teeth what has passed them is pushed out (m); half of their least width unless given",
             dimension=LENGTH,
         ),
     },
