@@ -151,10 +151,15 @@ class RigidSteps:
         free = held.free(v - h * (held.inverse @ bias))
         rows = self._near(self.contacts.rows(middle, q_m, u), v, free, h)
         meeting = _Meeting(held, rows, v, self._last) if rows.gaps.size else None
-        new, P = self._contact(meeting, free, h, ROUGH)
+        x[n_q:] = 0.5 * (v + free)
+        # forces that do not change with velocities need one solution, which then is the one that counts
+        rough = 1.0 if np.array_equal(self.bias(middle, x, u=u), bias) else ROUGH
+        new, P = self._contact(meeting, free, h, rough)
         x[n_q:] = 0.5 * (v + new)
-        free = held.free(v - h * (held.inverse @ self.bias(middle, x, u=u)))
-        new, P = self._contact(meeting, free, h, 1.0)
+        again = self.bias(middle, x, u=u)
+        if rough != 1.0 or not np.array_equal(again, bias):
+            free = held.free(v - h * (held.inverse @ again))
+            new, P = self._contact(meeting, free, h, 1.0)
         if self._passes(middle, q_m, new, u, 0.5 * h):
             return None
         position = self.move(q_m, 0.5 * h * new)
@@ -199,8 +204,7 @@ class RigidSteps:
                 np.abs(P) @ (np.abs(after) + np.abs(before.ravel()))
             ):
                 break  # impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985)
-        if rough == 1.0:
-            self._note(found, scale, len(rows.gaps))
+        self._note(found, scale, rough)
         self._rests = ~strikes
         self._last = dict(zip(meeting.keys, found.impulses, strict=True))
         meeting.start = found.impulses
@@ -211,10 +215,11 @@ class RigidSteps:
             return solve_contacts(ContactProblem(W, c, friction), start, tolerance, self.allowed)
         return ContactImpulses(*self._solve(W, c, friction, start, tolerance, self.allowed))
 
-    def _note(self, found: ContactImpulses, scale: float, m: int) -> None:
-        self.residual = max(self.residual, found.residual)
-        self._misses = self._misses or found.residual > self.tolerance * scale
-        self.iterations, self.most = max(self.iterations, found.iterations), max(self.most, m)
+    def _note(self, found: ContactImpulses, scale: float, rough: float) -> None:
+        if rough == 1.0:
+            self.residual = max(self.residual, found.residual)
+            self._misses = self._misses or found.residual > self.tolerance * scale
+        self.iterations, self.most = max(self.iterations, found.iterations), max(self.most, len(found.impulses))
 
     def _out(self, held: _Held, rows: RigidRows, P: Array, new: Array, h: float) -> Array:
         """A displacement (n_v,) that removes a part of the penetration of contacts that last, with load or without."""

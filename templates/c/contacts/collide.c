@@ -75,8 +75,10 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
             break; /* impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985) */
         }
     }
-    told->residual = residual;
-    told->missed = !(residual <= s->tolerance*scale);
+    if (rough == 1.0) {
+        told->residual = fmax(told->residual, residual);
+        told->missed = told->missed || !(residual <= s->tolerance*scale);
+    }
     told->iterations = count > told->iterations ? count : told->iterations;
     along(s->n_v, n, at->X, at->P, out);
     release(s->n_v, held->L, out);

@@ -199,7 +199,7 @@ int eomgen_rigid_step(eomgen_rigid *s, double t, double h)
 {
     const int n_q = s->n_q, n = s->n_v;
     const double middle = t + 0.5*h, *const v = s->x + n_q;
-    double *part[FIXED], *next = s->held, *const x_m = s->x_m;
+    double *part[FIXED], *next = s->held, *const x_m = s->x_m, rough;
     long sizes[FIXED];
     eomgen_rigid told = *s;
     inertia held;
@@ -232,15 +232,22 @@ int eomgen_rigid_step(eomgen_rigid *s, double t, double h)
     }
     fall(&held, part[OF_C], s->rows, part[OF_DRIFT], v, h, part[OF_BIAS], part[OF_WORK], part[OF_FREE]);
     failed = find_contacts(s, middle, &held, h, part[OF_FREE], part[OF_SPOTS], part[OF_AXES], &at, keys, &told);
+    for (int i = 0; i < n; i++) { x_m[n_q + i] = 0.5*(v[i] + part[OF_FREE][i]); }
+    failed = failed ? failed : call(s, &s->bias, middle, x_m, part[OF_AGAIN]);
+    /* forces that do not change with velocities need one solution, which then is the one that counts */
+    rough = memcmp(part[OF_AGAIN], part[OF_BIAS], (size_t)n*sizeof(double)) ? RIGID_ROUGH : 1.0;
     for (int round = 0; round < 2 && !failed; round++) {
         if (at.m) {
-            collide(s, &held, &at, part[OF_FREE], h, round ? 1.0 : RIGID_ROUGH, part[OF_NEW], &told);
+            collide(s, &held, &at, part[OF_FREE], h, round ? 1.0 : rough, part[OF_NEW], &told);
         } else {
             memcpy(part[OF_NEW], part[OF_FREE], (size_t)n*sizeof(double));
         }
         if (round == 0) {
             for (int i = 0; i < n; i++) { x_m[n_q + i] = 0.5*(v[i] + part[OF_NEW][i]); }
             failed = call(s, &s->bias, middle, x_m, part[OF_AGAIN]);
+            if (rough == 1.0 && memcmp(part[OF_AGAIN], part[OF_BIAS], (size_t)n*sizeof(double)) == 0) {
+                break;
+            }
             fall(&held, part[OF_C], s->rows, part[OF_DRIFT], v, h, part[OF_AGAIN], part[OF_WORK], part[OF_FREE]);
         }
     }
