@@ -167,6 +167,7 @@ CASES: tuple[Judged, ...] = (
     shape("width", 0.1, NOT_POSITIVE, **{**PLATE, "width": "@"}),
     shape("semi_axes[2]", 0.1, NOT_POSITIVE, shape="ellipsoid", on="a", semi_axes=[0.1, 0.2, "@"]),
     shape("size[0]", 0.1, NOT_POSITIVE, shape="cuboid", on="a", size=["@", 0.2, 0.1]),
+    shape("edge_radius", 0.02, (*NOT_POSITIVE, 0.06), shape="cuboid", on="a", size=[0.3, 0.2, 0.1], edge_radius="@"),
     shape("points[1]", 0.5, (0.0, -1.0), shape="profile", on="ground", points=[[0, 0], ["@", 0], [1, 0]]),
     shape("points[2]", 0.8, (0.5, 0.2), shape="smooth_profile", on="ground", points=[[0, 0], [0.5, 0], ["@", 0]]),
     shape("depth", 0.1, NOT_POSITIVE, shape="profile", on="ground", points=[[0, 0], [1, 0]], depth="@"),

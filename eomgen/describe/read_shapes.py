@@ -16,7 +16,7 @@ from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from ..numeric.outline_rules import sense_of_outline
 from ..numeric.value_ranges import Flaw
-from ..numeric.value_rules import OUTLINE, RISING
+from ..numeric.value_rules import BELOW, OUTLINE, RISING
 from .build_functions import read_table
 from .checks import check_keys
 from .description import items
@@ -138,11 +138,8 @@ def _edge(reader: Reader, path: str, given: Mapping[str, Any], size: Sequence[Ex
         return (EDGES * least,)
     radius = reader.expression(f"{path}.edge_radius", given["edge_radius"])
     positive(reader, f"{path}.edge_radius", radius)
-    known, most = reader.known(radius), reader.known(0.5 * least)
-    if known is not None and most is not None and known >= most > 0:
-        reader.faults.add(
-            f"{path}.edge_radius", f"is {known:g}", f"must be less than half of its least length, {most:g}"
-        )
+    told = ("is {:g}", "must be less than half of its least length, {1:g}")
+    reader.requirements.judge(f"{path}.edge_radius", BELOW, [radius, 0.5 * least], told)
     return (radius,)
 
 

@@ -32,6 +32,12 @@ def _limits(values: Any, message: str, remedy: str) -> list[Flaw]:
     return [] if first <= second else [Flaw("", message.format(first, second), remedy)]
 
 
+def _below(values: Any, message: str, remedy: str) -> list[Flaw]:
+    """Two numbers, of which the first must be less than the second; message and remedy may have both."""
+    first, second = (float(x) for x in values)
+    return [] if first < second else [Flaw("", message.format(first, second), remedy.format(first, second))]
+
+
 def _not_zero(values: Any, message: str, remedy: str) -> list[Flaw]:
     return [Flaw("", message, remedy)] if float(values[0]) == 0.0 else []
 
@@ -155,11 +161,12 @@ def radii_of_curvature(normals: Array, found: Array) -> Array:
     return np.array([trace - apart, trace + apart]) / 2.0
 
 
-BODIES, LIMITS, NOT_ZERO, OUTLINE, RISING = "bodies", "limits", "not zero", "outline", "rising"
+BELOW, BODIES, LIMITS, NOT_ZERO, OUTLINE, RISING = "below", "bodies", "limits", "not zero", "outline", "rising"
 ROTATION, SPROCKET, SUPPORT, TURN, WHEELS = "rotation", "sprocket", "support", "turn", "wheels"
 #: Name of a rule -> what judges numbers by it.
 RULES: Mapping[str, Callable[..., list[Flaw]]] = {
     RANGE: judge_range,
+    BELOW: _below,
     BODIES: judge_bodies,
     LIMITS: _limits,
     NOT_ZERO: _not_zero,
@@ -183,6 +190,6 @@ def surely_right(rule: str, values: Array, data: Sequence[Any]) -> Any:
         return values[0] <= values[1]
     if rule == NOT_ZERO:
         return values[0] != 0.0
-    if rule == RISING:
+    if rule in (RISING, BELOW):
         return values[0] < values[1]
     return np.zeros(values.shape[-1], dtype=bool)
