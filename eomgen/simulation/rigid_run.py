@@ -64,5 +64,11 @@ class ColumnsWithForces:
         found: Array = getattr(self.forces, what)(contacts)
         return found
 
+    @property
+    def change_points(self) -> Any:
+        """Those of the others."""
+        columns: Any = self.others
+        return columns.change_points
+
     def __getattr__(self, name: str) -> Any:
         return getattr(self.others, name)
