@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, cast
 
 from ..numeric.scales import Array
+from ..runtime.columns import Columns
 from ..runtime.trajectory import Trajectory
 from .contact_forces import ContactForces
-
-if TYPE_CHECKING:
-    from ..runtime.protocols import Source
 
 MEANS = {"normal": "N", "friction": "N"}  #: columns of each of the contacts between groups, and their units
 
@@ -39,7 +37,7 @@ class RigidRun(Trajectory):
     @classmethod
     def beside(cls, run: Trajectory, forces: ContactForces) -> RigidRun:
         """The same run with forces."""
-        columns = ColumnsWithForces(run.columns, forces)
+        columns = ColumnsWithForces(cast("Columns", run.columns), forces)
         header = run._header | {"units": run.units | columns.units}
         return cls.of((run.t, run.x, columns, header, (), (), None, run._described), forces)
 
@@ -48,27 +46,19 @@ class RigidRun(Trajectory):
         return type(self).of, (parts, self.contact_forces)
 
 
-class ColumnsWithForces:
+class ColumnsWithForces(Columns):
     """The columns of a run, and behind them those of its contact forces."""
 
-    def __init__(self, others: Source, forces: ContactForces) -> None:
-        self.others, self.forces = others, forces
-        self._own = {f"{what}({name})": (what, name) for name in forces.names for what in MEANS}
-        self.names = (*others.names, *(name for name in self._own if name not in others.names))
+    def __init__(self, others: Columns, forces: ContactForces) -> None:
+        super().__init__(others.module, others.t, others.x, others.u, others._steps)
+        own = {f"{what}({name})": (what, name) for name in forces.names for what in MEANS}
+        self.forces, self._own = forces, {name: what for name, what in own.items() if name not in self.names}
+        self.names = (*self.names, *self._own)
         self.units = {name: MEANS[what] for name, (what, _) in self._own.items()}
 
     def __getitem__(self, name: str) -> Array:
-        if name in self.others.names:
-            return self.others[name]
+        if name not in self._own:
+            return super().__getitem__(name)
         what, contacts = self._own[name]
         found: Array = getattr(self.forces, what)(contacts)
         return found
-
-    @property
-    def change_points(self) -> Any:
-        """Those of the others."""
-        columns: Any = self.others
-        return columns.change_points
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.others, name)

@@ -137,6 +137,7 @@ def test_stored_copied_and_asked_for_wrongly(tmp_path: Path) -> None:
     inside = ball.simulate(0.5, {"j_y": 0.4}, t_eval=[whole.t[hit] - 4e-4, whole.t[hit] + 4e-4], **options)
     np.testing.assert_array_equal(inside["normal(c)"], whole["normal(c)"][[hit, hit + 1]])
     assert whole.contact_forces.count("c")[hit] == 1.0
+    assert whole.change_points == []
     again = pickle.loads(pickle.dumps(whole))
     np.testing.assert_array_equal(again["normal(c)"], whole["normal(c)"])
     np.testing.assert_array_equal(again.contact_forces.friction("c"), whole["friction(c)"])
