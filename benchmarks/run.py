@@ -29,7 +29,7 @@ BENCHMARKS = (
         "fit",
     ),
     *("operation_counts", "rhs", "robot_kernels", "derivatives", "grid_robots", "lanes", "loop_lanes", "ensembles"),
-    *("device", "equilibria", "tracks", "rigid_tracks", "long_drive"),
+    *("device", "equilibria", "tracks", "track_contacts", "rigid_tracks", "long_drive"),
 )
 APART = ("swing_up",)  #: need packages that the tests have not; by name only
 EVERY = (*BENCHMARKS, *APART)

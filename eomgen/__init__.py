@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .errors import ModelError as ModelError
     from .errors import NoDerivativeError as NoDerivativeError
     from .errors import NonFiniteError as NonFiniteError
+    from .errors import ParameterError as ParameterError
     from .errors import PartitionError as PartitionError
     from .errors import ProjectionError as ProjectionError
     from .errors import SimulationError as SimulationError
@@ -53,6 +54,7 @@ _ERRORS = (
     "ModelError",
     "NoDerivativeError",
     "NonFiniteError",
+    "ParameterError",
     "PartitionError",
     "ProjectionError",
     "SimulationError",

@@ -4,6 +4,7 @@
 
     EomgenError
     |- ModelError            the description is wrong; .problems lists every fault found
+    |  '- ParameterError            values given to parameters are not allowed; a UsageError too
     |- ExpressionError       a text is not an allowed expression; .column says where
     |- AssemblyError         the loops do not close at the given coordinates, or the given values contradict each other
     |- EvaluationError       a kernel could not be evaluated; .time and .state say where
@@ -140,6 +141,18 @@ class AssemblyError(EomgenError):
 
 class UsageError(EomgenError, ValueError):
     """A call names something the model does not have, or passes an array of the wrong shape."""
+
+
+class ParameterError(ModelError, UsageError):
+    """Values given to the parameters of a module, such as a negative radius, that its elements do not allow.
+
+    It is a :class:`ModelError`, as a model that declares these values is, and a :class:`UsageError`, as it ends a call.
+
+    Attributes
+    ----------
+    problems : tuple of Problem
+        Every fault found, at the place of the element in the model.
+    """
 
 
 class UnavailableError(UsageError, AttributeError):

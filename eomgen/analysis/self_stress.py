@@ -9,6 +9,7 @@ equations that the mechanism's symmetry makes vanish, so that it does not matter
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -93,22 +94,11 @@ def remove_self_stress(
     """
     length, scales = states.module.layout.length, states.module.layout.scales
     element_rows = [i for i, joint in enumerate(table["rows"]) if joint == GROUND]
-    sizes = scales.c[element_rows] / length
-    per, n_b, count = _per(length), len(geometry.origins), reactions.shape[-1]
+    sizes, per = scales.c[element_rows] / length, _per(length)
     joints = bases(table, geometry, length)
     ends = np.cumsum([0, *(B.shape[2] for B in joints), len(element_rows)])
-    A = np.zeros((count, n_b, 6, ends[-1]))
-    for j, B in enumerate(joints):
-        for body, sign in zip(table["ends"][j], (-1.0, 1.0), strict=True):
-            if body != GROUND:
-                arm = (geometry.points[j] - geometry.origins[body]) / length
-                A[:, body, :, ends[j] : ends[j + 1]] += sign * (_shifts(arm) @ B)
-    elements = element_wrenches(states, table, geometry) * per[:, None] / sizes[:, None, None, None]
-    A[..., ends[-2] :] = -np.moveaxis(elements, (0, 3), (3, 0))
-    _, found, Vt = algebra.svd(A.reshape(count, 6 * n_b, ends[-1]))
-    null = np.ones(Vt.shape[:2], dtype=bool)
-    null[:, : found.shape[1]] = found <= RANK * found.max(axis=1, initial=0.0)[:, None]
-    N = Vt * null[:, :, None]  # its rows span the self-stresses
+    elements = element_wrenches(states, table, geometry) / sizes[:, None, None, None]
+    N = self_stresses(table, geometry, joints, elements, length)
     scaled = np.moveaxis(reactions * per[:, None], -1, 0)
     forces = [np.einsum("kij,ki->kj", B, scaled[:, j]) for j, B in enumerate(joints)]
     forces.append((multipliers[element_rows] * sizes[:, None]).T)
@@ -121,11 +111,50 @@ def remove_self_stress(
     return result, flags
 
 
-def _shifts(arm: Array) -> Array:
-    """Matrices (k, 6, 6) that take wrenches to a point from which they act at ``arm`` (3, k)."""
-    x, y, z = arm
-    result = np.zeros((arm.shape[1], 6, 6))
-    result[:, range(6), range(6)] = 1.0
-    for row, column, value in ((3, 1, -z), (3, 2, y), (4, 0, z), (4, 2, -x), (5, 0, -y), (5, 1, x)):
-        result[:, row, column] = value
-    return result
+def self_stresses(
+    table: dict[str, Any], geometry: Geometry, joints: Sequence[Array], elements: Array, length: float
+) -> Array:
+    """Orthonormal rows (k, r, n) of what joints (in their bases) and elements exert in balance; rows of zeros as well.
+
+    Any wrenches of the cut joints and any multipliers are balanced by wrenches of the joints of the tree, of which only
+    those along their bases can be exerted: the rest has to vanish.  So the rank is that of a matrix of as many columns
+    as cut joints and elements have reactions, not of one of all joints.
+    """
+    inside = [joint for _, _, joint, _ in table["tree"]]
+    cut = [joint for joint in range(len(joints)) if joint not in set(inside)]
+    starts = np.cumsum([0, *(joints[joint].shape[2] for joint in cut), len(elements)])
+    count, width = geometry.points.shape[-1], int(starts[-1])
+    if not width:
+        return np.zeros((count, 0, sum(B.shape[2] for B in joints)))
+    wide = geometry._replace(  # one column for each state and each of these reactions
+        points=np.repeat(geometry.points, width, axis=-1), origins=np.repeat(geometry.origins, width, axis=-1)
+    )
+    per = _per(length)
+    needed = np.zeros((len(geometry.origins), 6, count, width))
+    for n, joint in enumerate(cut):
+        wrench = np.zeros((6, count, width))
+        wrench[..., starts[n] : starts[n + 1]] = np.moveaxis(joints[joint] / per[:, None], 0, 1)
+        for body, sign in zip(table["ends"][joint], (-1.0, 1.0), strict=True):
+            if body != GROUND:
+                moved = shift(wrench.reshape(6, -1), wide.points[joint], wide.origins[body])
+                needed[body] -= sign * moved.reshape(wrench.shape)
+    needed[..., starts[-2] :] += np.moveaxis(elements, 0, -1)
+    passed = transmitted(table, wide, needed.reshape(len(needed), 6, -1)).reshape(-1, 6, count, width)
+    found, rest = [], []
+    for joint, B in enumerate(joints):
+        if joint in cut:
+            n = cut.index(joint)
+            found.append(np.broadcast_to(np.eye(width)[starts[n] : starts[n + 1]], (count, B.shape[2], width)))
+        else:
+            scaled = np.moveaxis(passed[joint] * per[:, None, None], 1, 0)
+            along = np.swapaxes(B, 1, 2) @ scaled
+            found.append(along)
+            rest.append(scaled - B @ along)
+    found.append(np.broadcast_to(np.eye(width)[starts[-2] :], (count, len(elements), width)))
+    own = np.concatenate(found, axis=1)
+    Q = algebra.qr(np.concatenate([own, *rest], axis=1))[0]
+    n = own.shape[1]
+    _, missing, Vt = algebra.svd(algebra.qr(Q[:, n:])[1])
+    null = np.ones(Vt.shape[:2], dtype=bool)
+    null[:, : missing.shape[1]] = missing <= RANK
+    return (Vt * null[:, :, None]) @ np.swapaxes(Q[:, :n], 1, 2)

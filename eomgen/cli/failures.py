@@ -13,6 +13,7 @@ from ..errors import (
     EvaluationError,
     MissingDependencyError,
     ModelError,
+    ParameterError,
     SimulationError,
     ToolchainError,
     UsageError,
@@ -37,6 +38,8 @@ Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 def exit_code(error: BaseException) -> int:
     """The exit code that says which kind of failure this is."""
+    if isinstance(error, ParameterError):
+        return MODEL
     if isinstance(error, UsageError | OSError):
         return USAGE
     if isinstance(error, ToolchainError | MissingDependencyError):

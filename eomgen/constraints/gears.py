@@ -10,6 +10,7 @@ from ..elements.entry import Entry
 from ..elements.field import Field
 from ..elements.looks import PitchCircles, RackAndPinion, Seen
 from ..graph.core import Expr, sin
+from ..numeric.value_ranges import POSITIVE
 from ..records import dataclass
 from .constraint import Condition, Constraint, ConstraintView
 
@@ -82,7 +83,7 @@ def _ratio(e: Entry) -> Expr | None:
     key = next((key for key in ("radii", "teeth", "cones") if key in e.values), "radii")
     sizes = e.several(key, 2)
     for k, size in enumerate(sizes or ()):
-        e.require(f"{key}[{k}]", size, lambda x: x > 0, "give a size greater than 0")
+        e.require(f"{key}[{k}]", size, POSITIVE, "give a size greater than 0")
     if sizes is None or e.at_fault(key):
         return None
     a, b = (sin(x) for x in sizes) if key == "cones" else sizes

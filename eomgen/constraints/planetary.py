@@ -11,7 +11,7 @@ from ..elements.entry import Entry, Found
 from ..elements.field import Field
 from ..elements.looks import PitchCircles, Seen
 from ..graph.core import Expr
-from ..limits.descriptions import TENSOR
+from ..numeric.value_rules import WHEELS as WHEELS_FIT
 from ..records import dataclass
 from .constraint import Condition, Constraint, ConstraintView
 
@@ -90,7 +90,7 @@ def _planetary(e: Entry) -> Planetary | None:
     sizes = e.sizes(key, WHEELS)
     found = {part: e.coordinate(part, "angle") for part in ("sun", "ring", "carrier", "planet") if part in e.values}
     if sizes is not None:
-        _fit(e, key, sizes)
+        e.judge(key, WHEELS_FIT, [*sizes.values()], ([*sizes],))
     if any(x is None for x in found.values()) or sizes is None or e.at_fault():
         return None
     parts: dict[str, Found] = {part: x for part, x in found.items() if x is not None}
@@ -112,17 +112,6 @@ def _planetary(e: Entry) -> Planetary | None:
     sun, ring, carrier = (e.symbol(parts[p]) if p in parts else e.graph.zero for p in ("sun", "ring", "carrier"))
     r_s, r_r, r_p = (sizes.get(wheel) for wheel in ("sun", "ring", "planet"))
     return Planetary(e.name, sun, ring, carrier, _planet(e, parts, carrier), r_s, r_r, r_p, e.law("phase"))
-
-
-def _fit(e: Entry, key: str, sizes: Mapping[str, Expr]) -> None:
-    """Note numbers of wheels that do not fit into each other."""
-    numbers = {wheel: size.value for wheel, size in sizes.items() if size.value is not None}
-    if {"sun", "ring"} <= numbers.keys() and numbers["ring"] <= numbers["sun"]:
-        message = f"ring {numbers['ring']:g} is not larger than sun {numbers['sun']:g}"
-        e.fault(key, message, "the sun must be smaller than the ring")
-    elif len(numbers) == 3 and abs(numbers["ring"] - numbers["sun"] - 2 * numbers["planet"]) > TENSOR * numbers["ring"]:
-        message = f"ring {numbers['ring']:g} is not sun {numbers['sun']:g} + 2 planet {numbers['planet']:g}"
-        e.fault(key, message, "the sizes must fit (ring = sun + 2 planet); leave one of them out")
 
 
 def _planet(e: Entry, parts: Mapping[str, Found], carrier: Expr) -> Expr | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from ..graph.core import Expr, atan2, cos, sin
 from ..graph.differentiate import jvp
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute, symbols_of
-from ..limits.descriptions import CLOSING, EDGE, LAW, ZERO
+from ..limits.descriptions import ZERO
 from ..records import dataclass
 
 TRIALS = 5
@@ -49,27 +48,12 @@ class Profile:
     def _insert(self, expression: Expr, angle: Expr) -> Expr:
         return substitute([expression], {self.local: angle})[0]
 
-    def gap(self, values: Mapping[str, float]) -> tuple[str, float, float] | None:
-        """What a turn does not close: "value" or "slope", at its beginning and at its end; None where both agree.
-
-        Parameters
-        ----------
-        values : mapping
-            Numbers of all parameters.
-        """
+    def over_a_turn(self) -> tuple[list[Expr], str] | None:
+        """Value and slope, which close after a turn, and the name of their angle; None where they need not."""
+        if not self.periodic:
+            return None
         (name,) = symbols_of([self.local])
-        theta = np.concatenate([[EDGE, math.tau - EDGE], np.linspace(EDGE, math.tau - EDGE, 100)])
-        laws = [self.expression, *jvp([self.expression], {self.local: self.local.graph.one})]
-        with np.errstate(all="ignore"):
-            found = [np.broadcast_to(f, theta.shape) for f in evaluate(laws, {**values, name: theta})]
-        if not np.isfinite(found).all():
-            return None  # what it is elsewhere is judged elsewhere
-        rounding = LAW * float(np.abs(found[0]).max())
-        for what, f, size in (("value", found[0], np.ptp(found[0])), ("slope", found[1], np.abs(found[1]).max())):
-            first, last = (0.0 if abs(x) < ZERO * size else float(x) for x in f[:2])
-            if abs(last - first) > CLOSING * float(size) + rounding:
-                return what, first, last
-        return None
+        return [self.expression, *jvp([self.expression], {self.local: self.local.graph.one})], name
 
     def repeats(self) -> bool:
         """Whether the expression repeats every turn of itself, tried at random values of all symbols."""

@@ -6,6 +6,7 @@ from ..elements.dimensions import LENGTH, NONE
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
+from ..numeric.value_ranges import POSITIVE
 from .constraint import Constraint, on_two_bodies
 from .convex_rolling import NORMAL, RollingConvex, ellipsoid_support
 from .convex_support import require_convex
@@ -46,7 +47,7 @@ def _rolling(e: Entry) -> Constraint | None:
         return RollingConvex(e.name, wheel, plane, support, local)
     a, b, c = e.vector("semi_axes")
     for k, x in enumerate((a, b, c)):
-        e.require(f"semi_axes[{k}]", x, lambda x: x > 0, "must be greater than 0")
+        e.require(f"semi_axes[{k}]", x, POSITIVE, "must be greater than 0")
     return RollingConvex(e.name, wheel, plane, ellipsoid_support(local, (a, b, c)), local)
 
 

@@ -24,10 +24,10 @@ SWITCHING: Fields = {
     ),
 }
 
-#: How a joint that holds for a time is written.
+#: How a condition of a joint without coordinates is written that holds for a time.
 IN_PLACE_OF_JOINTS = (
-    "joints hold for good; for a time use a constraint of type hold: axes: xyz, turning: xyz holds as a weld, axes: "
-    "xyz alone as a ball joint, axes: xy, turning: z in the plane"
+    "joints without coordinates hold for good, save for welds; for a time use a constraint of type hold: axes: xyz, "
+    "turning: xyz holds as a weld, axes: xyz alone as a ball joint, axes: xy, turning: z in the plane"
 )
 
 

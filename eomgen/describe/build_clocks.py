@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ..graph.core import Expr
-from ..graph.shown import shown
 from ..graph.substitute import substitute
+from ..numeric.value_ranges import POSITIVE
 from .description import DescribedEntry
 from .mechanism import Clock, Event
 from .values import Reader
@@ -79,8 +79,9 @@ def _times(reader: Reader, timing: Timing) -> tuple[Expr, Expr]:
         if given is None:
             reader.faults.add(path, "is missing", "give the time from one sampling time to the next, in s")
         period = reader.stand_in if given is None else reader.expression(path, given)
-        if period.value is not None and not period.value > 0.0 and given is not None:
-            reader.faults.add(path, f"{shown(given)} is not positive", "give the time between samples, in s")
+        if given is not None:
+            remedy = "give the time between samples, in s"
+            reader.requirements.inside(path, period, POSITIVE, remedy, "{:g} is not positive")
         found.append((period, reader.expression(f"{entry.path}.offset", entry.values.get("offset", 0.0))))
     return found[0]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -52,11 +53,14 @@ def _build(reader: Reader, entry: DescribedEntry) -> Function | None:
     check_keys(path, entry.values, function_fields(given), faults)
     if faults.under(path):
         return None
-    return build_native(reader, entry) if given == "native" else _table(reader, entry)
+    return (
+        build_native(reader, entry) if given == "native" else read_table(reader, entry.name, entry.path, entry.values)
+    )
 
 
-def _table(reader: Reader, entry: DescribedEntry) -> Function | None:
-    faults, path, values = reader.faults, entry.path, entry.values
+def read_table(reader: Reader, name: str, path: str, values: Mapping[str, Any]) -> Function | None:
+    """A table of one or two arguments; None where something is wrong with it, which is noted."""
+    faults = reader.faults
     fields = FUNCTION["table"]
     kind = reader.choice(f"{path}.kind", values.get("kind", fields["kind"].default), fields["kind"])
     beyond = reader.choice(
@@ -77,7 +81,7 @@ def _table(reader: Reader, entry: DescribedEntry) -> Function | None:
             return None
         with np.errstate(all="ignore"):
             nodes = surface_nodes(x, y, z, kind)
-        function = Function(entry.name, 2, Surface(x, y, nodes, float(beyond == "linear")))
+        function = Function(name, 2, Surface(x, y, nodes, float(beyond == "linear")))
         return _finite(reader, path, function, nodes)
     if len(y) != len(x):
         faults.add(f"{path}.y", f"has {len(y)} values for {len(x)} points", "give one for each x")
@@ -96,7 +100,7 @@ def _table(reader: Reader, entry: DescribedEntry) -> Function | None:
     if faults.under(path):
         return None
     with np.errstate(all="ignore"):
-        curve = curve_function(entry.name, x, y, kind, beyond == "linear")
+        curve = curve_function(name, x, y, kind, beyond == "linear")
     assert isinstance(curve.evaluator, Curve)
     return _finite(reader, path, curve, curve.evaluator.coefficients)
 

@@ -13,6 +13,7 @@ from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3
 from ..joints import JOINTS, Joint, Shape
+from ..numeric.value_ranges import NOT_NEGATIVE
 from ..records import dataclass
 from .checks import check_names, unknown_key
 from .description import DescribedEntry, items
@@ -202,10 +203,10 @@ def _with_expressions(reader: Reader, declared: Declared) -> Joint:
             found[option] = _shape(reader, path, entry.values[option], field, declared.coordinates[: field.own])
             continue
         found[option] = reader.expression(path, entry.values[option])
-        if found[option].is_zero and field.not_zero:
-            reader.faults.add(path, "is 0", f"{field.doc}; {field.not_zero}")
-        elif option == "length" and (found[option].value or 0.0) < 0.0:
-            reader.faults.add(path, f"is {found[option].value:g}", "give a length greater than 0")
+        if field.not_zero:
+            reader.requirements.not_zero(path, found[option], f"{field.doc}; {field.not_zero}")
+        if option == "length":
+            reader.requirements.inside(path, found[option], NOT_NEGATIVE, "give a length greater than 0")
     return replace(joint, **found)
 
 

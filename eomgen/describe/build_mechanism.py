@@ -35,6 +35,7 @@ from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
 from .joint_data import check_display
+from .joint_locks import with_locks
 from .mass_properties import read_body
 from .mechanism import SUMS, Body, CarriedQuantity, Mechanism, Simulation, WrenchQuantity
 from .names import fault_of_model_name, nearest
@@ -61,7 +62,7 @@ def build(description: Description) -> Mechanism:
     ModelError
         The description has faults; all of them are listed.
     """
-    description = undotted(description)
+    description = with_locks(undotted(description))
     faults = Faults(description)
     if description.incomplete:
         raise ModelError(faults.sorted())
@@ -79,7 +80,7 @@ def build(description: Description) -> Mechanism:
         faults.add("attachments", "attachments stand for markers of another model", remedy)
     parameters = tuple(read_parameter(reader, entry) for entry in sections["parameters"])
     inputs = tuple(read_input(reader, entry) for entry in sections["inputs"])
-    numbers = reader.numbers = {p.name: p.value for p in parameters if p.value is not None}
+    reader.requirements.declare({p.name: p.value for p in parameters})
     build_functions(reader, sections["functions"])
     specs = declare_coordinates(reader, sections["joints"])
     contacts = declare_contacts(reader, sections["constraints"])
@@ -124,8 +125,8 @@ def build(description: Description) -> Mechanism:
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
     _check_mass(reader, bodies)
-    negative, inertia_notes = check_bodies(bodies, joints, numbers, faults)
-    check_turns(constraints, numbers, faults)
+    negative, inertia_notes = check_bodies(bodies, joints, reader.requirements)
+    check_turns(constraints, reader.requirements)
     check_energies(given, outputs, faults)
     _check_asked(reader, forces)
     if not faults:
@@ -181,6 +182,7 @@ def build(description: Description) -> Mechanism:
         ),
         added_bodies=tuple(range(described, len(bodies))),
         notes=inertia_notes,
+        requirements=tuple(reader.requirements.all),
     )
 
 

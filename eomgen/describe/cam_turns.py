@@ -2,37 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 
 from ..constraints import Constraint
 from ..constraints.profiles import Profile
 from ..errors import ModelError
 from ..graph.substitute import symbols_of
-from .description import Faults
-
-REMEDY = (
-    "make value and slope at 2 pi equal to those at 0, with pieces or a table of kind periodic; give periodic: false "
-    "for a cam that stays within one turn"
-)
+from ..numeric.value_rules import TURN
+from .requirements import Requirements
 
 
-def check_turns(constraints: Sequence[Constraint], values: Mapping[str, float], faults: Faults) -> None:
-    """Note periodic profiles that jump where a turn ends, as far as the declared values of parameters tell."""
+def check_turns(constraints: Sequence[Constraint], requirements: Requirements) -> None:
+    """Note periodic profiles that jump where a turn ends, as far as the values of parameters tell."""
     for constraint in constraints:
         for field in fields(constraint):
             profile = getattr(constraint, field.name)
-            if not isinstance(profile, Profile) or not profile.periodic:
+            turn = profile.over_a_turn() if isinstance(profile, Profile) else None
+            if turn is None:
                 continue
-            names = symbols_of([profile.expression]) - symbols_of([profile.local])
-            if not names <= values.keys():
-                continue
+            laws, angle = turn
+            end = " at the declared values" if symbols_of(laws) - {angle} else ""
             try:
-                gap = profile.gap(values)
+                requirements.judge(f"constraints.{constraint.name}.{field.name}", TURN, laws, (end,), [angle])
             except ModelError:  # native code without a twin in Python
                 continue
-            if gap is not None:
-                what, first, last = gap
-                message = f"does not close after a turn: its {what} is {first:.6g} at theta = 0 and {last:.6g} at 2 pi"
-                at = " at the declared values" if names else ""
-                faults.add(f"constraints.{constraint.name}.{field.name}", message + at, REMEDY)

@@ -157,7 +157,7 @@ class Faults:
 
     def sorted(self) -> list[Problem]:
         """All problems; those of a file in the order of its lines, one of several instances once."""
-        return sorted(self._told_once(), key=lambda p: (p.file, p.line))
+        return list_names_once(sorted(self._told_once(), key=lambda p: (p.file, p.line)))
 
     def _told_once(self) -> list[Problem]:
         """Problems of what instances brought, at the entry of the component, with the names of the instances."""
@@ -174,6 +174,23 @@ class Faults:
             first = problem._replace(path=path)
             found.setdefault((path, *alike, *problem[3:]), (first, []))[1].append(origin.instance)
         return [p._replace(message=p.message + _in_instances(names)) if names else p for p, names in found.values()]
+
+
+def list_names_once(problems: Sequence[Problem]) -> list[Problem]:
+    """The same problems, of which only the first that lists certain names does so; the others refer to it."""
+    told: set[str] = set()
+    result = []
+    for problem in problems:
+        for names in _LISTED.findall(problem.remedy):
+            if names in told:
+                problem = problem._replace(remedy=problem.remedy.replace(names, "those listed above", 1))
+            told.add(names)
+        result.append(problem)
+    return result
+
+
+#: Four names or more behind what they are: ``bodies: ground, rod, ...``.
+_LISTED = re.compile(r"(?<=: )(?:[\w.]+, ){3,}[\w.]+")
 
 
 def _in_instances(names: Sequence[str]) -> str:

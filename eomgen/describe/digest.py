@@ -37,6 +37,7 @@ ASIDE = frozenset(
         "added_bodies",
         "limits_told",
         "of_velocities",
+        "requirements",
     }
 )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ..elements.element_type import ElementType, Types
@@ -13,7 +13,7 @@ from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from ..graph.vectors import Vec3
-from ..numeric.scales import Array
+from ..numeric.value_ranges import POSITIVE, Allowed
 from .build_cam_points import Contacts
 from .build_joints import Declared
 from .checks import check_keys
@@ -110,13 +110,13 @@ class ElementEntry:
         if key in self.values:
             self.fault(key, why, "leave it out")
 
-    def require(self, key: str, value: Expr, right: Callable[[float], bool], rule: str) -> None:
-        number = self.reader.known(value)
-        if number is not None and not right(number):
-            self.fault(key, f"is {number:g}", rule)
+    def require(self, key: str, value: Expr, allowed: Allowed, rule: str, message: str = "") -> None:
+        self.reader.requirements.inside(self._at(key), value, allowed, rule, message)
 
-    def at(self, values: Sequence[Expr], local: Mapping[str, Array]) -> Array | None:
-        return self.reader.known_at(values, local)
+    def judge(
+        self, key: str, rule: str, values: Sequence[Expr], data: Sequence[Any] = (), local: Sequence[str] = ()
+    ) -> None:
+        self.reader.requirements.judge(self._at(key), rule, values, data, local)
 
     # -- values ---------------------------------------------------------------------------------------------------
     def law(self, key: str, local: Mapping[str, Expr] | None = None, exclusive: bool = True) -> Expr:
@@ -131,7 +131,7 @@ class ElementEntry:
 
     def positive(self, key: str) -> Expr:
         value = self.law(key)
-        self.require(key, value, lambda x: x > 0, "must be greater than 0")
+        self.reader.requirements.positive(self._at(key), value)
         return value
 
     def several(self, key: str, count: int) -> tuple[Expr, ...] | None:
@@ -154,7 +154,7 @@ class ElementEntry:
                 self.fault(f"{key}.{name}", "unknown key", nearest(str(name), names, "allowed"))
         found = {name: self.reader.expression(f"{path}.{name}", given[name]) for name in names if name in given}
         for name, size in found.items():
-            self.require(f"{key}.{name}", size, lambda x: x > 0, "give a size greater than 0")
+            self.require(f"{key}.{name}", size, POSITIVE, "give a size greater than 0")
         return found
 
     def vector(self, key: str) -> Vec3:
@@ -233,8 +233,7 @@ class ElementEntry:
             return None
         marker = reader.marker(f"{path}.around", value["around"])
         radius = reader.expression(f"{path}.radius", value["radius"])
-        if radius.value is not None and radius.value <= 0:
-            reader.faults.add(f"{path}.radius", f"is {radius.value:g}", "must be greater than 0")
+        reader.requirements.positive(f"{path}.radius", radius)
         field = CYLINDER["sense"]
         sense = reader.choice(f"{path}.sense", value.get("sense", field.default), field)
         rubbing = self._rubbing(path, value)
@@ -250,11 +249,8 @@ class ElementEntry:
                 self.reader.faults.add(f"{path}.{missing[0]}", "is missing", remedy)
             return None, None
         friction, smoothing = (self.reader.expression(f"{path}.{key}", value[key]) for key in keys)
-        known = self.reader.known(friction), self.reader.known(smoothing)
-        if known[0] is not None and known[0] < 0:
-            self.reader.faults.add(f"{path}.friction", f"is {known[0]:g}", "must be 0 or greater")
-        if known[1] is not None and known[1] <= 0:
-            self.reader.faults.add(f"{path}.smoothing", f"is {known[1]:g}", "must be greater than 0")
+        self.reader.requirements.positive(f"{path}.friction", friction, or_zero=True)
+        self.reader.requirements.positive(f"{path}.smoothing", smoothing)
         return friction, smoothing
 
     def shapes(self, key: str) -> tuple[ContactShape, ...] | None:
@@ -286,6 +282,22 @@ class ElementEntry:
 
     def symbol(self, found: Found) -> Expr:
         return self.graph.symbol(found.name)
+
+    def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
+        if key not in self.values:
+            return None
+        value = self.values[key]
+        joint = next((one for one in self.around.joints if one.entry.name == value), None)
+        if joint is None:
+            found = self._find(key, value)
+            return None if found is None else ((found.name, self.graph.symbol(f"{found.name}_dot"), found.kind),)
+        names = joint.coordinates
+        rates = [(names[v.of], f"{names[v.of]}_dot") if v.of is not None else (value + v.suffix,) * 2
+                 for v in joint.joint.velocities]  # fmt: skip
+        kinds = [velocity.kind for velocity in joint.joint.velocities]
+        if not rates:
+            self.fault(key, f"{value!r} has no coordinates to lock", "name a joint that has")
+        return tuple((label, self.graph.symbol(rate), k) for (label, rate), k in zip(rates, kinds, strict=True))
 
     def two_coordinates(self, key: str, kind: str = "") -> tuple[Found, Found] | None:
         if key not in self.values:

@@ -19,79 +19,95 @@ class ElementMethods(Described):
     def revolute(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinate: Any = None, coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
         dry_friction: float | None = None, armature: Value = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
+        closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type revolute: S turns about the common z axis; the origins coincide."""
     def continuous(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinate: Any = None, coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
         dry_friction: float | None = None, armature: Value = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
+        closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type continuous: A revolute joint without limits, as URDF calls it."""
     def prismatic(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinate: Any = None, coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
         dry_friction: float | None = None, armature: Value = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
+        closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type prismatic: S slides along the common z axis without turning."""
     def screw(self, name: str, predecessor: Any, successor: Any, pitch: Value,
         axis: str | Sequence[float] | None = None, coordinate: Any = None, coordinates: Sequence[Any] | None = None,
         limits: Mapping[str, float] | None = None, dry_friction: float | None = None, armature: Value = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
+        closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type screw: S turns about the common z axis and slides along it by ``pitch`` (m) per turn."""
     def cylindrical(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
+        closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type cylindrical: S slides along the common z axis and turns about it."""
     def universal(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         axes: Sequence[Any] | None = None, coordinates: Sequence[Any] | None = None,
-        limits: Mapping[str, float] | None = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None, latex: str | Sequence[str] | Mapping[str, str] | None = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Any = None,
+        stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type universal: A cross turns about the axis {x} of P and the axis {y} of S, which stay
         perpendicular."""
     def constant_velocity(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
+        closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type constant_velocity: The shaft bends in any direction, and S turns exactly as fast as P."""
     def spherical(self, name: str, predecessor: Any, successor: Any, sequence: str | None = None,
         coordinates: Sequence[Any] | None = None, rotation: str | None = None,
-        limits: Mapping[str, float] | None = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None, latex: str | Sequence[str] | Mapping[str, str] | None = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Any = None,
+        stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type spherical: S turns freely about the common origin."""
     def planar(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
+        closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type planar: S moves in the x-y plane of P and turns about z."""
     def translational(self, name: str, predecessor: Any, successor: Any, coordinates: Sequence[Any] | None = None,
-        limits: Mapping[str, float] | None = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None, latex: str | Sequence[str] | Mapping[str, str] | None = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Any = None,
+        stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type translational: S slides along x, y and z of P without turning."""
     def curve_slider(self, name: str, predecessor: Any, successor: Any, curve: Sequence[Value], coordinate: Any = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
         dry_friction: float | None = None, armature: Value = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
+        closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type curve_slider: The origin of S slides along a curve of P, without turning: a bead on a
         wire."""
     def surface_slider(self, name: str, predecessor: Any, successor: Any, surface: Sequence[Value],
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        latex: str | Sequence[str] | Mapping[str, str] | None = None, closes: Value = None, opens: Value = None,
+        closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type surface_slider: The origin of S slides on a surface of P, without turning: a particle in
         a bowl."""
     def point_on_curve(self, name: str, predecessor: Any, successor: Any, curve: Sequence[Value],
         sequence: str | None = None, coordinates: Sequence[Any] | None = None,
-        limits: Mapping[str, float] | None = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None, latex: str | Sequence[str] | Mapping[str, str] | None = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Any = None,
+        stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type point_on_curve: The origin of S slides along a curve of P; S turns freely, in Euler
         angles."""
     def point_on_surface(self, name: str, predecessor: Any, successor: Any, surface: Sequence[Value],
         sequence: str | None = None, coordinates: Sequence[Any] | None = None,
-        limits: Mapping[str, float] | None = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None, latex: str | Sequence[str] | Mapping[str, str] | None = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Any = None,
+        stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type point_on_surface: The origin of S slides on a surface of P; S turns freely, in Euler
         angles."""
     def free(self, name: str, predecessor: Any, successor: Any, sequence: str | None = None,
         coordinates: Sequence[Any] | None = None, rotation: str | None = None,
-        limits: Mapping[str, float] | None = None,
-        latex: str | Sequence[str] | Mapping[str, str] | None = None) -> JointHandle:
+        limits: Mapping[str, float] | None = None, latex: str | Sequence[str] | Mapping[str, str] | None = None,
+        closes: Value = None, opens: Value = None, closed: bool | None = None, releases: Any = None,
+        stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type free: S moves freely: three coordinates of its position in P axes, then its rotation."""
-    def weld(self, name: str, predecessor: Any, successor: Any) -> JointHandle:
+    def weld(self, name: str, predecessor: Any, successor: Any, closes: Value = None, opens: Value = None,
+        closed: bool | None = None, releases: Any = None, stabilisation: Value = 10) -> JointHandle:
         """Add a joint of type weld: S is fixed to P."""
     def distance(self, name: str, predecessor: Any, successor: Any, length: Value) -> JointHandle:
         """Add a joint of type distance: A massless rod with a ball joint at each end: the origins stay ``length``
@@ -259,3 +275,7 @@ class ElementMethods(Described):
         opens: Value = None, closed: bool | None = None, releases: Any = None,
         stabilisation: Value = 10) -> ConstraintHandle:
         """Add a marker held where it is on another body while it is closed: a foot on the ground, a grasp, a clutch."""
+    def lock(self, name: str, joint: Any, closes: Value = None, opens: Value = None, closed: bool | None = None,
+        releases: Any = None, stabilisation: Value = 10) -> ConstraintHandle:
+        """Add a joint whose coordinates stay where they are while it is closed: a clutch, a brake, the latch of a
+        door."""

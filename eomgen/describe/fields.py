@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 from ..constraints import CONSTRAINTS
+from ..constraints.switching import SWITCHING
 from ..elements.dimensions import ACCELERATION, ENERGY, LENGTH, MASS, NONE, REACH, TIME, Dimension
 from ..elements.dimensions import INERTIA as MOMENT_OF_INERTIA
 from ..elements.element_type import ElementType
@@ -340,7 +341,7 @@ def joint_fields(type_name: str) -> Fields:
         fields |= JOINT_DATA
     if joint.coordinates:
         fields["latex"] = _LATEXES
-    return fields
+    return fields | SWITCHING if joint.coordinates or type_name == "weld" else fields
 
 
 def fields_of(section: str, values: Mapping[str, Any]) -> Fields:

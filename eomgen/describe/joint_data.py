@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..graph.core import Expr
+from ..numeric.value_ranges import NOT_NEGATIVE
 from .checks import check_keys
 from .description import items
 from .fields import DISPLAY, LIMITS
@@ -62,8 +63,7 @@ def read_dry_friction(reader: Reader, path: str, given: Any) -> float:
 def read_armature(reader: Reader, path: str, given: Any) -> Expr:
     """Inertia of a drive, as the coordinate of its joint feels it (kg m^2 or kg)."""
     value = reader.expression(path, given)
-    if value.value is not None and value.value < 0:
-        reader.faults.add(path, f"is {value.value:g}", "an inertia must be 0 or positive")
+    reader.requirements.inside(path, value, NOT_NEGATIVE, "an inertia must be 0 or positive")
     return value
 
 

@@ -21,6 +21,7 @@ from ..limits.runs import ATOL, RTOL
 from ..records import dataclass
 from .description import place_of
 from .placement import TURNS, Columns
+from .requirements import Requirement
 
 if TYPE_CHECKING:
     from ..constraints.constraint import Constraint
@@ -338,6 +339,7 @@ class Mechanism:
     body_shapes: tuple[BodyShape, ...] = ()  #: for pictures
     added_bodies: tuple[int, ...] = ()  #: that no one described: points of contact of cams
     notes: tuple[str, ...] = ()  #: what was taken though it is not possible, where it is only to be noted
+    requirements: tuple[Requirement, ...] = ()  #: rules that parameters keep, whatever their values are
 
     @property
     def bare(self) -> bool:

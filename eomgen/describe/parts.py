@@ -11,6 +11,7 @@ from ..frames import Frame
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.tensors import rotate_symmetric
+from ..numeric.value_ranges import NOT_NEGATIVE
 from ..solids import SOLIDS, MassProperties, point
 from ..solids.mesh import measure_mesh
 from .checks import check_keys, unknown_key
@@ -104,14 +105,13 @@ def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> M
             lengths[key] = reader.vector(place, values[key])
         else:
             lengths[key] = (reader.expression(place, values[key]),) * 3
-        known = [reader.known(x) for x in lengths[key]]
-        if any(x is not None and x < 0.0 for x in known):
-            reader.faults.add(place, f"{values[key]!r} is negative", "a length must be 0 or positive")
-    inner, outer = (lengths[key][0].value if key in lengths else None for key in ("inner_radius", "outer_radius"))
-    if inner is not None and outer is not None and inner > outer:
-        reader.faults.add(
-            f"{path}.inner_radius", f"{inner:g} exceeds the outer radius {outer:g}", "give a smaller inner radius"
-        )
+        for x in dict.fromkeys(lengths[key]):
+            told = f"{values[key]!r} is negative".replace("{", "{{").replace("}", "}}")
+            reader.requirements.inside(place, x, NOT_NEGATIVE, "a length must be 0 or positive", told)
+    if "inner_radius" in lengths and "outer_radius" in lengths:
+        inner, outer = (lengths[key][0] for key in ("inner_radius", "outer_radius"))
+        message, remedy = "{:g} exceeds the outer radius {:g}", "give a smaller inner radius"
+        reader.requirements.in_order(f"{path}.inner_radius", inner, outer, message, remedy)
     made, o = solid(lengths), graph.zero
     a, b, c = made.gyration()
     return MassProperties(made.content(), made.centre(), ((a, o, o), (o, b, o), (o, o, c)))
@@ -126,11 +126,12 @@ def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | No
     if file is None:
         return None
     graph = reader.graph
-    size = None if scale is None else reader.known(scale)
-    if size is not None and size <= 0.0:
-        why = "is negative, which would mirror the mesh" if size < 0.0 else "leaves nothing of the mesh"
-        reader.faults.add(f"{path}.scale", f"{size:g} {why}", "give a scale greater than 0; mirror the file itself")
-        return None
+    if scale is not None:
+        size, need = f"{path}.scale", reader.requirements
+        remedy = "give a scale greater than 0; mirror the file itself"
+        mirrored, nothing = "{:g} is negative, which would mirror the mesh", "0 leaves nothing of the mesh"
+        if need.inside(size, scale, NOT_NEGATIVE, remedy, mirrored) or need.not_zero(size, scale, remedy, nothing):
+            return None
     try:
         found = measure_mesh(_locate(reader, file))
     except UsageError as error:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,15 +15,18 @@ from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
 from ..limits.descriptions import TENSOR, TENSOR_TERMS
 from ..limits.inertia import COMPUTED
-from ..numeric.rigid_inertia import EXCESS, SWITCH, fault_of_inertia, inertia_scales, longest_within
-from .description import Faults
+from ..numeric.rigid_inertia import EXCESS, SWITCH, inertia_scales, longest_within
+from ..numeric.scales import Array
+from ..numeric.value_ranges import NOT_NEGATIVE
+from ..numeric.value_rules import BODIES, judge_bodies
 from .mechanism import Body, JointSpec
+from .requirements import Requirements
 
 
 def check_bodies(
-    bodies: Sequence[Body], joints: Sequence[JointSpec], values: Mapping[str, float], faults: Faults
+    bodies: Sequence[Body], joints: Sequence[JointSpec], requirements: Requirements
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Note masses and inertias that no body can have, as far as the declared values of parameters tell.
+    """Note masses and inertias that no body can have, as far as the values of parameters tell.
 
     Returns
     -------
@@ -32,42 +37,69 @@ def check_bodies(
     """
     notes: list[str] = []
     negative: dict[str, None] = {}
-    masses = [_numbers([body.mass], values) for body in bodies]
-    tensors = [_numbers([entry for row in body.inertia for entry in row], values) for body in bodies]
+    faults = requirements.faults
+    masses = [requirements.known([body.mass]) for body in bodies]
+    tensors = [requirements.known(_entries(body)) for body in bodies]
+    numbers = [_numbers_of(body, points) for body, points in zip(bodies, _points(bodies, joints), strict=True)]
+    values = [x for own in numbers for group in own for x in _known(requirements, group)]
+    flaws = judge_bodies(values, [_described(*one, True) for one in zip(bodies, numbers, strict=True)])
     scales = inertia_scales(
         [0.0 if mass is None else mass[0] for mass in masses],
-        [np.reshape(tensor or np.zeros(9), (3, 3)) for tensor in tensors],
-        _longest(bodies, joints, values),
+        [np.zeros((3, 3)) if tensor is None else tensor.reshape(3, 3) for tensor in tensors],
+        longest_within(_known_points(requirements, points) for points in _points(bodies, joints)),
     )
     for body, mass, tensor, scale in zip(bodies, masses, tensors, scales, strict=True):
         path = f"bodies.{body.name}"
         found: list[tuple[str, str, str]] = []
+        remedy = f"give a mass of 0 or more, {SWITCH}"
         if mass is not None and mass[0] < 0:
             how = "" if body.mass.value is not None else " at the declared values"
-            found.append((f"{path}.mass", f"is {mass[0]:g}{how}", f"give a mass of 0 or more, {SWITCH}"))
+            found.append((f"{path}.mass", f"is {mass[0]:g}{how}", remedy))
+        elif body.check == "error":
+            requirements.inside(f"{path}.mass", body.mass, NOT_NEGATIVE, remedy)
         if not faults.under(f"{path}.inertia"):
-            if not is_symmetric(body.inertia, tensor, COMPUTED * scale):
+            if not is_symmetric(body.inertia, None if tensor is None else tensor.tolist(), COMPUTED * scale):
                 found.append((f"{path}.inertia", *ASYMMETRIC))
-            elif tensor is not None:
-                plane = None if body.plane is None else _numbers(body.plane, values)
-                if fault := fault_of_inertia(tensor, plane, scale):
-                    found.append((f"{path}.inertia", *fault))
-        for place, message, remedy in found:
-            if body.check == "error":
-                faults.add(place, message, remedy)
             else:
-                if remedy not in (EXCESS, ASYMMETRIC[1]):
+                found += [(path + ".inertia", *flaw[1:]) for flaw in flaws if flaw.key == f".{body.name}.inertia"]
+        for place, message, told in found:
+            if body.check == "error":
+                faults.add(place, message, told)
+            else:
+                if told not in (EXCESS, ASYMMETRIC[1]):
                     negative[body.name] = None
                 if body.check == "note":
                     notes.append(f"{place}: {message}; it is used as given")
+    if any(symbols_of(_entries(body)) for body in bodies if body.check == "error"):
+        alike: dict[Any, tuple[Body, list[Sequence[Expr]]]] = {}  # of bodies that are alike the first stands for all
+        for body, own in zip(bodies, numbers, strict=True):
+            alike.setdefault((body.check, *(tuple(x.id for x in group) for group in own)), (body, own))
+        data = [_described(body, own, body.check == "error") for body, own in alike.values()]
+        requirements.keep("bodies", BODIES, [x for _, own in alike.values() for g in own for x in g], (data,))
     return tuple(negative), tuple(notes)
 
 
-def _longest(bodies: Sequence[Body], joints: Sequence[JointSpec], values: Mapping[str, float]) -> float:
-    """The longest distance (m) within a body of its centre of mass, its joints and the point its inertia is about.
+def _numbers_of(body: Body, points: Sequence[Vec3]) -> list[Sequence[Expr]]:
+    """Mass, tensor, axis of the one moment that was given, and points: what judges bodies, in this order."""
+    return [[body.mass], _entries(body), () if body.plane is None else body.plane, *points]
 
-    Points that are not known at the declared values, and the centre of no mass, do not count.
-    """
+
+def _described(body: Body, numbers: Sequence[Sequence[Expr]], judged: bool) -> tuple[str, bool, int, bool]:
+    """What :func:`~..numeric.value_rules.judge_bodies` takes beside the numbers."""
+    return body.name, body.plane is not None, len(numbers) - 3, judged
+
+
+def _known(requirements: Requirements, group: Sequence[Expr]) -> list[float]:
+    found = requirements.known(group)
+    return [math.nan] * len(group) if found is None else found.tolist()
+
+
+def _entries(body: Body) -> list[Expr]:
+    return [entry for row in body.inertia for entry in row]
+
+
+def _points(bodies: Sequence[Body], joints: Sequence[JointSpec]) -> list[list[Vec3]]:
+    """Centre of mass, joints and the point of the inertia of each body; the centre of no mass does not count."""
     points: list[list[Vec3]] = [[] if body.mass.is_zero else [body.com] for body in bodies]
     for own, body in zip(points, bodies, strict=True):
         own += [] if body.about is None else [body.about]
@@ -75,15 +107,12 @@ def _longest(bodies: Sequence[Body], joints: Sequence[JointSpec], values: Mappin
         for marker in (spec.predecessor, spec.successor):
             if marker.body != GROUND:
                 points[marker.body].append(marker.frame.position)
-    known = [[_numbers(point, values) for point in own] for own in points]
-    return longest_within([point for point in own if point is not None] for own in known)
+    return points
 
 
-def _numbers(expressions: Sequence[Expr], values: Mapping[str, float]) -> list[float] | None:
-    if not symbols_of(expressions) <= values.keys():
-        return None
-    result = [float(x) for x in evaluate(expressions, values)]
-    return result if np.all(np.isfinite(result)) else None
+def _known_points(requirements: Requirements, points: Sequence[Vec3]) -> list[Array]:
+    found = [requirements.known(point) for point in points]
+    return [point for point in found if point is not None]
 
 
 ASYMMETRIC = ("the tensor is not symmetric", "entries [i][j] and [j][i] must be equal")

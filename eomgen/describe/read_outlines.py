@@ -6,20 +6,19 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..forces.contact_outlines import half_gap, half_tip, sprocket_fault
+from ..forces.contact_outlines import half_gap, half_tooth
 from ..forces.contact_states import TEETH, teeth_of_sprocket
 from ..graph.core import Expr
 from ..graph.shown import shown
+from ..numeric.value_rules import SPROCKET
 from .values import Reader
 
 SEAT_ANGLE = math.radians(130)  #: ISO 606 allows 120 to 140 degrees
 
 
 def positive(reader: Reader, path: str, x: Expr, or_zero: bool = False) -> None:
-    """Note a number that is not greater than 0."""
-    number = reader.known(x)
-    if number is not None and (number < 0 if or_zero else number <= 0):
-        reader.faults.add(path, f"is {number:g}", "must be 0 or greater" if or_zero else "must be greater than 0")
+    """Require a number greater than 0, or 0 too."""
+    reader.requirements.positive(path, x, or_zero)
 
 
 def outline_sizes(reader: Reader, path: str, given: Mapping[str, Any], corners: Sequence[Expr]) -> tuple[Expr, ...]:
@@ -49,17 +48,11 @@ def sprocket_sizes(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple
     for key, x in zip(keys, sizes, strict=True):
         positive(reader, f"{path}.{key}", x)
     sizes.append(reader.expression(f"{path}.seat_angle", given.get("seat_angle", SEAT_ANGLE)))
-    numbers = [reader.known(x) for x in sizes]
-    known = [x for x in numbers if x is not None]
-    if reader.faults.under(path):
-        return ()
-    if len(known) == len(sizes) and (fault := sprocket_fault(teeth, *known)) is not None:
-        key, message, remedy = fault
-        reader.faults.add(f"{path}.{key}", message, remedy)
+    if reader.faults.under(path) or reader.requirements.judge(path, SPROCKET, sizes, (teeth,)):
         return ()
     if "depth" in given:
         depth = reader.expression(f"{path}.depth", given["depth"])
         positive(reader, f"{path}.depth", depth)
     else:
-        depth = half_tip(teeth, *sizes)
+        depth = half_tooth(teeth, *sizes)
     return (depth, reader.graph.constant(float(teeth)), *sizes)

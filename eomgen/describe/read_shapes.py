@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import itertools
-import math
+import re
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import Any
 
+from ..forces.contact_fields import PLACES
 from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS
 from ..forces.contact_shapes import ContactShape
-from ..forces.contact_states import POINTS, points_of_plate
+from ..forces.contact_states import BED, MOST_PAIRS, POINTS, cells_of_bed, points_of_plate
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
+from ..numeric.outline_rules import sense_of_outline
+from ..numeric.value_ranges import Flaw
+from ..numeric.value_rules import BELOW, OUTLINE, RISING
+from .build_functions import read_table
 from .checks import check_keys
 from .description import items
 from .names import nearest
 from .read_outlines import outline_sizes, positive, sprocket_sizes
 from .values import Reader
+
+EDGES = 0.05  #: radius of the edges of a cuboid unless given, as a part of its least length
 
 
 def read_shapes(reader: Reader, path: str, value: Any) -> tuple[ContactShape, ...] | None:
@@ -83,7 +91,13 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         lengths = _several(reader, f"{path}.{key}", given[key], 3)
         for k, x in enumerate(lengths or ()):
             positive(reader, f"{path}.{key}[{k}]", x)
-        return None if lengths is None else tuple(lengths)
+        return (
+            None if lengths is None else (*lengths, *(_edge(reader, path, given, lengths) if kind == "cuboid" else ()))
+        )
+    if kind == "height_field":
+        return _height(reader, path, given)
+    if kind == BED:
+        return _bed(reader, path, given)
     if kind == "plate":
         return _plate(reader, path, given)
     names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius", *(["width"] * ("width" in given)))
@@ -92,6 +106,41 @@ def _sizes(reader: Reader, path: str, kind: str, given: Mapping[str, Any]) -> tu
         if name in given:
             positive(reader, f"{path}.{name}", x, kind == "segment" and name == "radius")
     return tuple(sizes)
+
+
+def _height(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr] | None:
+    """The height of a field, as an expression or a table of its own."""
+    local = {name: reader.graph.symbol(symbol) for name, symbol in PLACES.items()}
+    table = {key: value for key, value in given.items() if key not in ("shape", "on", "height")}
+    if "height" in given:
+        for key in table:
+            reader.faults.add(f"{path}.{key}", "stands beside height", "give height, or x, y and z")
+        return (reader.expression(f"{path}.height", given["height"], local=local),)
+    if missing := [key for key in ("x", "y", "z") if key not in table]:
+        remedy = "give height, an expression of x and y, or the grid lines x and y and the heights z on them"
+        reader.faults.add(f"{path}.{missing[0]}", "is missing, and there is no height", remedy)
+        return None
+    taken = {f.name for f in (*reader.graph.functions.values(), *(f for f, _ in reader.graph.calls.values()))}
+    name = re.sub(r"\W+", "_", path).strip("_")
+    while name in taken:
+        name += "_"
+    function = read_table(reader, name, path, table)
+    if function is None:
+        return None
+    places = [local[axis].id for axis in ("x", "y")]
+    return (Expr(reader.graph, reader.graph.call(function, (0, 0), places)),)
+
+
+def _edge(reader: Reader, path: str, given: Mapping[str, Any], size: Sequence[Expr]) -> tuple[Expr]:
+    """The radius of the edges of a cuboid."""
+    least = reduce(lambda a, b: a.graph.apply("min", a, b), size)
+    if "edge_radius" not in given:
+        return (EDGES * least,)
+    radius = reader.expression(f"{path}.edge_radius", given["edge_radius"])
+    positive(reader, f"{path}.edge_radius", radius)
+    told = ("is {:g}", "must be less than half of its least length, {1:g}")
+    reader.requirements.judge(f"{path}.edge_radius", BELOW, [radius, 0.5 * least], told)
+    return (radius,)
 
 
 def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
@@ -104,6 +153,16 @@ def _plate(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, .
         remedy = f"give a whole number from 1 to {POINTS}"
         reader.faults.add(f"{path}.points", f"is {shown(given['points'])}", remedy)
     return (*sizes, reader.graph.constant(float(count or 1)))
+
+
+def _bed(reader: Reader, path: str, given: Mapping[str, Any]) -> tuple[Expr, ...]:
+    """Length and number of cells of a bed."""
+    length = reader.expression(f"{path}.length", given["length"])
+    positive(reader, f"{path}.length", length)
+    count = cells_of_bed(given)
+    if count is None:
+        reader.faults.add(f"{path}.cells", f"is {shown(given['cells'])}", f"give a whole number from 1 to {MOST_PAIRS}")
+    return (length, reader.graph.constant(float(count or 1)))
 
 
 def _several(reader: Reader, path: str, value: Any, count: int) -> list[Expr] | None:
@@ -125,10 +184,7 @@ def _profile(reader: Reader, path: str, given: Mapping[str, Any], least: int) ->
     if len(points) < len(read):
         return None
     for k, ((a, _), (b, _)) in enumerate(itertools.pairwise(points)):
-        left, right = reader.known(a), reader.known(b)
-        if left is not None and right is not None and left >= right:
-            message = f"has x = {right:g} after x = {left:g}: the profile turns back or crosses itself"
-            reader.faults.add(f"{place}[{k + 1}]", message, "give the points from left to right, each x once")
+        if reader.requirements.judge(f"{place}[{k + 1}]", RISING, [a, b]):
             return None
     if "depth" in given:
         depth = reader.expression(f"{path}.depth", given["depth"])
@@ -150,50 +206,11 @@ def _corners(reader: Reader, path: str, value: Any, convex: bool = True) -> tupl
         return None
     known = [(reader.known(x), reader.known(y)) for x, y in points]
     numbers = [(x, y) for x, y in known if x is not None and y is not None]
-    if len(numbers) == len(points):
-        turned = _outline(reader, path, numbers, convex)
-        if turned is None:
-            return None
-        if turned < 0:
-            points.reverse()
+    sense = sense_of_outline(numbers, convex) if len(numbers) == len(points) else 1
+    if isinstance(sense, Flaw):
+        reader.faults.add(path + sense.key, sense.message, sense.remedy)
+        return None
+    reader.requirements.keep(path, OUTLINE, [x for point in points for x in point], (convex, sense))
+    if sense < 0:
+        points.reverse()
     return tuple(x for point in points for x in point)
-
-
-def _outline(reader: Reader, path: str, points: Sequence[tuple[float, float]], convex: bool) -> int | None:
-    """1 where an outline runs counterclockwise, -1 where clockwise; None where something is wrong, which is noted."""
-    n, turns, total = len(points), set[bool](), 0.0
-    for k in range(n):
-        (x0, y0), (x1, y1), (x2, y2) = points[k - 1], points[k], points[(k + 1) % n]
-        a, b = (x1 - x0, y1 - y0), (x2 - x1, y2 - y1)
-        cross, along = a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]
-        if cross == 0 and (convex or along <= 0):
-            reader.faults.add(
-                f"{path}[{k}]", "lies on a line with the corners beside it, or on one of them", "leave it out"
-            )
-            return None
-        turns.add(cross > 0)
-        total += math.atan2(cross, along)
-    if crossing := _crossing(points):
-        message = f"the edges that begin at corners {crossing[0]} and {crossing[1]} cross each other"
-        reader.faults.add(path, message, "give the corners in their order around the outline")
-        return None
-    if convex and len(turns) > 1:
-        reader.faults.add(path, "is not convex", "give it as shape outline, which need not be")
-        return None
-    return 1 if total > 0 else -1
-
-
-def _crossing(points: Sequence[tuple[float, float]]) -> tuple[int, int] | None:
-    """The first two edges of an outline that cross."""
-    n = len(points)
-
-    def side(p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]) -> float:
-        return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
-
-    for i in range(n):
-        p, q = points[i], points[(i + 1) % n]
-        for j in range(i + 2, n - (i == 0)):
-            r, s = points[j], points[(j + 1) % n]
-            if side(p, q, r) * side(p, q, s) < 0 and side(r, s, p) * side(r, s, q) < 0:
-                return i, j
-    return None

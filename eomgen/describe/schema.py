@@ -8,7 +8,7 @@ from ..constraints import CONSTRAINTS
 from ..constraints.planetary import WHEELS
 from ..elements.element_type import Types
 from ..forces import FORCES
-from ..forces.contact_shape_fields import CORNERS, SHAPE_FIELDS
+from ..forces.contact_shape_fields import CORNERS, FIELD_SHAPE, SHAPE_FIELDS
 from ..joints import JOINTS
 from ..numeric.rigid_inertia import CHECKS
 from .fields import (
@@ -247,6 +247,8 @@ def _typed(fields: Fields, type_name: str) -> Schema:
 def _contact_shape(kind: str) -> Schema:
     schema = _table(SHAPE_FIELDS[kind])
     schema["properties"]["shape"] = {"const": kind}
+    if kind == FIELD_SHAPE:
+        schema["oneOf"] = [{"required": ["height"]}, {"required": ["x", "y", "z"]}]
     return schema
 
 

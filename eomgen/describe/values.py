@@ -9,23 +9,19 @@ from __future__ import annotations
 import math
 import numbers
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
-
-import numpy as np
 
 from ..errors import ExpressionError
 from ..files.path_names import usable_name
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
-from ..graph.evaluate import evaluate
 from ..graph.shown import quoted, shown
-from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
 from ..limits.descriptions import PERPENDICULAR
 from ..numeric.rigid_inertia import word_of_check
-from ..numeric.scales import Array
+from ..numeric.value_rules import ROTATION
 from ..suggestions import hint
 from ..texts import WHOLE, join_surrogates, lone_surrogate
 from .checks import check_keys
@@ -36,6 +32,7 @@ from .marker_quantities import ElementQuantity
 from .mechanism import Quantity
 from .names import nearest
 from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
+from .requirements import Requirements
 from .scope import Namespace, Scope
 from .sympy_face import is_sympy, lower_sympy
 from .units import Unit
@@ -68,7 +65,7 @@ class Reader:
         self.asked: dict[ElementQuantity, str] = {}  # what force elements do, and where that is used first
         self.output: Callable[[str], Expr] = graph.symbol  # the expression of an output
         self.stand_in = graph.symbol("?")
-        self.numbers: dict[str, float] = {}  # declared values of parameters
+        self.requirements = Requirements(faults)  # with the declared values of parameters
         self.units: dict[str, Unit] = {}  # by path of the parameter, input or output
         self.latex: dict[str, str] = {}  # by name, where it is given
         self.expressions: list[tuple[str, Expr, Mapping[str, Expr]]] = []  # path, expression, names of its own
@@ -101,19 +98,8 @@ class Reader:
 
     def known(self, expression: Expr) -> float | None:
         """The value of an expression at the declared values of parameters, None if they do not tell."""
-        if expression.value is None and not symbols_of([expression]) <= self.numbers.keys():
-            return None
-        value = float(evaluate([expression], self.numbers)[0])
-        return value if math.isfinite(value) else None
-
-    def known_at(self, expressions: Sequence[Expr], points: Mapping[str, Array]) -> Array | None:
-        """Values at points of more symbols and the declared values of parameters, None if they do not tell."""
-        values = {**self.numbers, **points}
-        if not symbols_of(expressions) <= values.keys():
-            return None
-        with np.errstate(all="ignore"):
-            found = evaluate(expressions, values)
-        return np.array(np.broadcast_arrays(*found, *points.values())[: len(found)], dtype=float)
+        found = self.requirements.known([expression])
+        return None if found is None else float(found[0])
 
     def wrong(self, path: str, value: object, kind: str) -> None:
         """Note that a value is not of a kind."""
@@ -293,12 +279,7 @@ class Reader:
             self.wrong(path, value, "matrix")
             return self.identity
         x, y, z = (self.vector(f"{path}[{k}]", row) for k, row in enumerate(rows))
-        known = [[self.known(entry) for entry in row] for row in (x, y, z)]
-        if all(entry is not None for row in known for entry in row):
-            numbers = np.array(known, dtype=float)
-            if np.abs(numbers @ numbers.T - np.eye(3)).max() > PERPENDICULAR or np.linalg.det(numbers) < 0.0:
-                remedy = "its columns must be three axes of length 1 at right angles, right-handed"
-                self.faults.add(path, "is not a rotation matrix", remedy)
+        self.requirements.judge(path, ROTATION, [*x, *y, *z])
         return (x, y, z)
 
     def moving(self, label: str) -> Marker:

@@ -5,13 +5,13 @@ The reader itself is :class:`~eomgen.describe.element_entry.ElementEntry`; eleme
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
-from ..numeric.space import Array
+from ..numeric.value_ranges import Allowed
 from .field import Fields
 
 
@@ -72,11 +72,19 @@ class Entry(Protocol):
     def refuse(self, key: str, why: str) -> None:
         """Note a key that has no meaning beside the others, if it is given."""
 
-    def require(self, key: str, value: Expr, right: Callable[[float], bool], rule: str) -> None:
-        """Note an expression whose number, as far as the declared values of parameters tell, breaks a rule."""
+    def require(self, key: str, value: Expr, allowed: Allowed, rule: str, message: str = "") -> None:
+        """Require an expression in a range, at the declared values of parameters and at those given later.
 
-    def at(self, values: Sequence[Expr], local: Mapping[str, Array]) -> Array | None:
-        """Expressions, a row each, at points of their local names, as far as declared values of parameters tell."""
+        ``rule`` says what is allowed; ``{:g}`` in a ``message`` of its own stands for the number.
+        """
+
+    def judge(
+        self, key: str, rule: str, values: Sequence[Expr], data: Sequence[Any] = (), local: Sequence[str] = ()
+    ) -> None:
+        """Require that expressions keep a rule of :mod:`~eomgen.numeric.value_rules`, in the same way.
+
+        ``data`` is what the rule takes beside them, ``local`` the names that stand for the points at which it looks.
+        """
 
     # -- values ---------------------------------------------------------------------------------------------------
     def law(self, key: str, local: Mapping[str, Expr] | None = None, exclusive: bool = True) -> Expr:
@@ -137,6 +145,9 @@ class Entry(Protocol):
     # -- coordinates and names ------------------------------------------------------------------------------------
     def symbol(self, found: Found) -> Expr:
         """The symbol of a coordinate."""
+
+    def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
+        """The velocities of a joint, or of one coordinate: the name, the symbol, and 'angle' or 'length'."""
 
     def two_coordinates(self, key: str, kind: str = "") -> tuple[Found, Found] | None:
         """Two different coordinates, measured from one body."""

@@ -155,6 +155,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "areas": areas,
         "order": [*program.preferred, *others],
         "dependent": [int(i in others) for i in range(sizes.n_v)],
+        "row_groups": program.metadata.get("row_groups") or [0] * sizes.n_c,
         "parent": program.parent,
         "n_states": program.n_states,
         "quaternion_slots": program.quaternion_slots,

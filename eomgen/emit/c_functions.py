@@ -29,7 +29,10 @@ def used_calls(program: Program) -> Calls:
     roots = [y.id for block in program.blocks for y in (*block.outputs, *block.checks)]
     operations = {graph.nodes[i][0] for i in reachable(graph, roots)} & set(graph.calls)
     found: Calls = {}
+    pairs = {call.function.name: call.function for op in operations if (call := pair_call(graph, op)) is not None}
     called = [graph.calls[op] for op in operations if pair_call(graph, op) is None]
+    inner = {op: call for f in pairs.values() for kind in f.kinds for op, call in kind.calls}
+    called += [call for op, call in inner.items() if op not in operations]
     for function, orders in sorted(called, key=lambda call: (call[0].name, call[1])):
         found.setdefault(function.name, (function, []))[1].append(orders)
     return found
@@ -71,6 +74,15 @@ def declarations(program: Program, calls: Calls) -> list[str]:
         for orders in used
     ]
     return ["".join(lines)] if lines else []
+
+
+def plain_declarations(program: str, called: Iterable[tuple[Function, Orders]]) -> list[str]:
+    """Declarations of calls for a file that computes with doubles alone, by the names that blocks have for them."""
+    found = []
+    for f, orders in called:
+        name, each = c_name(program, f.name, orders), each_name(f.name, orders)
+        found.append(f"EOMGEN_PIECE {_head(name, f.arity)};\n#define {each} {name}")
+    return found
 
 
 def function_files(program: Program, calls: Calls) -> dict[str, str]:

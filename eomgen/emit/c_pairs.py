@@ -9,32 +9,34 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from ..graph.pair_calls import PairFunction, PairKind, PairPart
+from ..graph.pair_calls import PairFunction
+from ..graph.pair_kinds import PairKind, PairPart
+from ..graph.substitute import symbols_of
 from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
+from ..numeric.polygon_edges import OTHER, OWN
 from ..program import Program
+from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
-from .pair_statements import record_of
+from .pair_statements import placed_length, plain_numbers, record_of
 from .pair_sums_used import UsedSum, sums_again, used_sums
+from .row_runs import written
 from .sources import render
 from .straight import cut
 
 
-def _table(k: int, rows: Sequence[Sequence[int]], start: int) -> dict[str, Any]:
-    sizes = len(rows[0]) - PLACE - REST
-    length = POSE + sizes + 4
-    return {"k": k, "rows": rows, "columns": len(rows[0]), "sizes": sizes, "length": length, "start": start}
-
-
 def _tables(function: PairFunction) -> list[dict[str, Any]]:
-    """The tables of shapes, and where the shapes stand in the work array."""
+    """The tables of shapes, and where the shapes stand in the work array; places count from behind the bodies."""
     found: list[dict[str, Any]] = []
-    start = 0
-    number = 0
+    start = number = 0
+    begun = POSE * function.bodies
     for k, rows in enumerate(function.tables):
-        found.append({**_table(k, rows, start), "number": number})
+        table = written([(row[0], *(x - begun if x >= 0 else x for x in row[1:])) for row in rows])
+        sizes, length = len(rows[0]) - PLACE - REST, placed_length(rows)
+        own = {"k": k, "count": len(rows), "columns": len(rows[0]), "sizes": sizes, "length": length}
+        found.append({**table, **own, "start": start, "number": number})
         number += len(rows)
-        start += len(rows) * found[-1]["length"]
+        start += len(rows) * length
     return found
 
 
@@ -60,15 +62,20 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
     for kind in function.kinds:
         named = f"{function.name}_{kind.name}"
         for part, ending in parts:
-            text, needed = _law(program, kind, f"{named}{ending}", part, tables)
+            name = f"{named}{ending}"
+            text, needed = _law(program, kind, f"{name}_facing" if kind.corners else name, part, tables)
             functions.append(text)
+            if kind.corners:
+                functions.append(_facing(kind, name, part, tables))
             helpers += [helper for helper in needed if helper not in helpers]
+        touch = kind.expressions("touch")
         kinds.append(
             {
                 "n": len(kinds),
                 "name": kind.name,
                 "sorted": _is_sorted(function, kind),
-                "turns": not kind.expressions("touch")[-1].is_zero,
+                "turns": not touch[-1].is_zero,
+                "shaped": any(name.startswith("l") for name in symbols_of(touch)),  # by numbers behind the bodies
                 "function": named,
                 "first": tables[kind.first],
                 "second": tables[kind.second],
@@ -76,9 +83,10 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
                 "law": kind.law,
                 "states": kind.states,
                 "places": len(kind.spot) // SPOT,
-                "held": kind.held,
+                "held": [written([(at,) for at in places]) for places in kind.held],
             }
         )
+    calls = {op: call for kind in function.kinds for op, call in kind.calls}
     context = {
         "name": program.name,
         "sum": function.name,
@@ -90,12 +98,17 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
         "results": function.results,
         "states": function.states,
         "first_state": function.first_state,
-        "numbers": [repr(0.0 if x is None else x) for x in function.data] or ["0.0"],
+        "numbers": [repr(x) for x in plain_numbers(function)] or ["0.0"],
         "tables": tables,
         "kinds": kinds,
         "functions": functions,
+        "polygons": max((max(kind.corners) for kind in function.kinds if kind.corners), default=0),
+        "own": OWN,
+        "other": OTHER,
         "helpers": helpers,
-        "most": max((len(kind["second"]["rows"]) for kind in kinds if kind["sorted"]), default=0),
+        "called": plain_declarations(program.name, calls.values()),
+        "moving": len(function.data) - function.states,
+        "most": max((kind["second"]["count"] for kind in kinds if kind["sorted"]), default=0),
         "longest": max(table["length"] for table in tables),
         "apart": repr(APART),
         "sums": used.sums,
@@ -116,7 +129,7 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
         "again": again,
         "kept": record_of(function),
         "shapes": sum(map(len, function.tables)),
-        "scratch": sum(len(table["rows"]) * table["length"] for table in tables),
+        "scratch": sum(table["count"] * table["length"] for table in tables),
     }
     return render("c/pairs.c.j2", context)
 
@@ -140,12 +153,22 @@ def _law(
         plain = symbol.removeprefix("d_")
         letter, number = plain[0], int(plain[1:])
         own = len(kind.law) + kind.states  # states stand behind the numbers of the law
-        step = own if letter in "ls" else tables[kind.first if letter == "a" else kind.second]["length"]
+        shape = tables[kind.first if letter == "a" else kind.second]["length"]
+        if kind.corners:
+            shape = POSE + (OWN if letter == "a" else OTHER)
+        step = own if letter in "ls" else shape
         number += len(kind.law) * (letter == "s")
         places[graph.symbol(symbol).id] = f"{'xucc'['abls'.index(letter)]}[{number + rate * step}]"
     alone = replace(program, graph=graph)
     pieces = cut(graph, outputs, (), frozenset(), len(graph.nodes) + 1)
     return print_pieces(alone, name, pieces, places).text, used_helpers(alone, outputs)
+
+
+def _facing(kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[str, Any]]) -> str:
+    """The function of two polygons, which calls that of the edges and corners that matter."""
+    first, second = tables[kind.first], tables[kind.second]
+    context = {"name": name, "first": first["length"], "second": second["length"], "corners": kind.corners}
+    return render("c/pairs_facing.c.j2", {**context, "own": OWN, "other": OTHER, "sloped": part == "slopes"})
 
 
 def pair_declarations(program: Program) -> list[str]:
@@ -158,7 +181,7 @@ def _declared(program: str, used: UsedSum, again: bool) -> str:
     function = used.function
     prefix, n, results = f"{program}_pairs_{function.name}", function.count, function.results
     text = f"#define pairs_{function.name}_numbers {prefix}_numbers\n"
-    text += f"EOMGEN_PIECE extern const double {prefix}_numbers[{max(1, len(function.data))}];\n"
+    text += f"EOMGEN_PIECE extern const double {prefix}_numbers[{max(1, len(plain_numbers(function)))}];\n"
     if used.sums:
         text += f"EOMGEN_PIECE void {prefix}_sum(const double *given, double *out, double *work);\n"
         text += _each(f"pairs_{function.name}_sum", f"{prefix}_sum", (n, 0, results))

@@ -220,12 +220,12 @@ def print_pieces(
 
 
 def direct_results(printer: BlockPrinter, pieces: Pieces) -> list[str]:
-    """Results that need no statement; a long run of zeros becomes a loop that later results overwrite."""
+    """Results that need no statement; a long run of zeros is cleared at once, and later results overwrite."""
     zero, direct = printer.zero, pieces.direct
     zeros = [k for k, i in direct if i == zero]
     lines = []
     if len(zeros) >= FILLED:
-        lines.append(f"for (int i = {zeros[0]}; i <= {zeros[-1]}; i++) {{ out[i] = same(0.0); }}")
+        lines.append(f"memset(out + {zeros[0]}, 0, {zeros[-1] - zeros[0] + 1} * sizeof *out);")
         direct = tuple((k, i) for k, i in direct if i != zero)
     return lines + [f"out[{k}] = {printer.real(i)};" for k, i in direct]
 

@@ -40,6 +40,8 @@ def define_functions(program: Program, bundled: bool) -> tuple[list[str], list[s
     sums = used_sums(program)
     if sums:
         imports.append("from .numeric.pair_sums import PairSum")
+        if any(kind.corners for function, *_ in sums for kind in function.kinds):
+            imports.append("from .numeric.polygon_edges import facing")
         definitions += [print_pair_sum(program, function) for function, *_ in sums]
     return imports, definitions
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..graph.pair_calls import PairCall, PairFunction, PairPart, pair_call
+from ..graph.pair_calls import PairCall, PairFunction, pair_call
+from ..graph.pair_kinds import PairPart
 from ..graph.substitute import symbols_of
 from ..operations import CONDITION, OPERATIONS
 from ..program import Block, Program
@@ -97,7 +98,8 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
             start = ["t = u = c = None", f"out = [0.0] * {len(outputs)}"]
             text = _print_pieces(printer, name, f"A pair {kind.name}.", pieces, start, ["return out"], by_entry=True)
             texts.append(text.replace(f"def {name}(t, x, u, c):", f"def {name}(x):"))
-            names.append(name)
+            sloped = ", True" if part == "slopes" else ""
+            names.append(f"facing({name}, {kind.corners!r}{sloped})" if kind.corners else name)
         row = (kind.first, kind.second, kind.planar, kind.law)
         kinds.append(f"        ({', '.join([*map(repr, row), *names, *map(repr, kind.beside)])}),\n")
     tables = "".join(f"        {table!r},\n" for table in function.tables)

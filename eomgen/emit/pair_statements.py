@@ -37,15 +37,25 @@ def copied_runs(graph: Graph, outputs: Sequence[Expr]) -> list[CopiedRun]:
     return [run for run in runs if run.length >= COPIED]
 
 
+def placed_length(table: Sequence[Sequence[int]]) -> int:
+    """Numbers of a shape as placed: motion, sizes, bounding radius, arm from the body's origin, thickness, body."""
+    return POSE + len(table[0]) - PLACE - REST + 6
+
+
+def plain_numbers(function: PairFunction) -> list[float]:
+    """What is given behind the bodies before the states of pairs; 0 where an operand is an expression."""
+    return [0.0 if x is None else x for x in function.data[: len(function.data) - function.states]]
+
+
 def work_of(function: PairFunction) -> int:
     """Numbers that a sum works with: its shapes and their rates, and in lanes copies of what is given and found."""
-    shapes = sum(len(rows) * (POSE + len(rows[0]) - PLACE - REST + 4) for rows in function.tables)
+    shapes = sum(len(rows) * placed_length(rows) for rows in function.tables)
     return 2 * shapes + 2 * function.count + max(function.results, function.spots)
 
 
 def kept_of(function: PairFunction) -> int:
     """Numbers that derivatives at one place keep: shapes, their rates, and each near pair with what it exerts."""
-    shapes = sum(len(rows) * (POSE + len(rows[0]) - PLACE - REST + 4) for rows in function.tables)
+    shapes = sum(len(rows) * placed_length(rows) for rows in function.tables)
     return 2 * shapes + record_of(function) * function.room
 
 
@@ -144,10 +154,13 @@ class PairLists:
         assert call is not None
         function, place, work = call.function, self._places[i], self._work
         if call.part == "given":
-            start = POSE * function.bodies
-            numbers = f"pairs_{function.name}_numbers[i]"
-            head = f"for (int i = 0; i < {len(function.data)}; i++) {{ w[{place + start} + i] = same({numbers}); }}"
-            return [head, *filled]
+            start, count = place + POSE * function.bodies, len(plain_numbers(function))
+            heads = [
+                f"for (int i = 0; i < {count}; i++) {{ w[{start} + i] = same(pairs_{function.name}_numbers[i]); }}"
+            ]
+            if any(x is not None for x in function.data[count:]):  # counts of pieces that touch, among states
+                heads.append(f"for (int i = 0; i < {function.states}; i++) {{ w[{start + count} + i] = same(0.0); }}")
+            return [*heads, *filled]
         given = self._places[operands[0]]
         if call.part == "spots":
             return [f"pairs_{function.name}_spots(w + {given}, w + {place}, w + {work});"]

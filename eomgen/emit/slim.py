@@ -17,6 +17,7 @@ LEFT_OUT = {
     "numeric/nearest_branch": "positions near a guess",
     "numeric/splines": "cubic tables",
     "runtime/culprit": "the cause of a failure",
+    "runtime/late_rules": "rules of several parameters",
     "runtime/origin": "the origin of a result",
     "runtime/rate_checks": "inputs whose rates are in the equations",
     "runtime/signal_rates": "rates of inputs",

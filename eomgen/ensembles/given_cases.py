@@ -253,10 +253,17 @@ def _shared(cases: Cases) -> dict[str, Any]:
 
 def _bound(what: str, module: BoundModel, given: Any, lengths: dict[str, int]) -> Array:
     """Values (n,) or (n, k) of parameters or inputs; those not given keep the bound ones."""
+    if given is None:
+        return module.p if what == "parameter" else module.u
+    found = _read_bound(what, module, given, lengths)
+    if what == "parameter":
+        module.layout.require_allowed(found)
+    return found
+
+
+def _read_bound(what: str, module: BoundModel, given: Any, lengths: dict[str, int]) -> Array:
     layout = module.layout
     names, base = (layout.p, module.p) if what == "parameter" else (layout.u, module.u)
-    if given is None:
-        return base
     if not isinstance(given, Mapping):
         return _columns(f"{what}s", given, names, lengths)
     given = without_dots(given, layout.instances)

@@ -182,6 +182,8 @@ class ArticulatedBodies:
         self.forces, self.drives, self.rows, self.term = forces, drives, rows, term
         self.bodies = [Articulated.rigid(i) for i in inertias]
         self.wrenches = list(loads)
+        if rows:
+            self._begin_at_rest(inertias)
         self.carried: list[dict[int, Wrench]] = [{} for _ in links]
         self.rests = [row.rest for row in rows]
         self.coupling: list[dict[int, Expr]] = [{} for _ in rows]  #: G without its diagonal
@@ -194,6 +196,16 @@ class ArticulatedBodies:
         self.row_pivots = [graph.one for _ in rows]
         self.multipliers = [graph.zero for _ in rows]
         self._find_places()
+
+    def _begin_at_rest(self, inertias: Sequence[SpatialInertia]) -> None:
+        """Count accelerations from those at v' = 0: rows have no part in these, and links their own inertia alone."""
+        still = vec.zero(self.graph), vec.zero(self.graph)
+        rest: list[Twist] = []
+        for k, link in self.graph.marked(enumerate(self.links)):
+            above = rest[link.parent] if link.parent != GROUND else self.base[k]
+            rest.append(add(link.down_twist(above), self.products[k]))
+            self.wrenches[k] = add(self.wrenches[k], inertias[k].times(*rest[k]))
+        self.products = self.base = [still] * len(self.links)
 
     def _find_places(self) -> None:
         """Where each row has all its joints: the link on which they hang, or behind the joint of that link itself."""
@@ -290,6 +302,8 @@ class ArticulatedBodies:
                 share = push * reciprocal
                 still = vec.zero(self.graph)
                 carried[i] = add(carried.get(i, (still, still)), scaled(-share, felt))
+                if not drive:
+                    carried[i] = _with_released(carried[i], column, self.rows[i].entries.get(index))
                 self.rests[i] = self.rests[i] + push * rate
                 self.own[i] = self.own[i] + push * share
                 self.sizes[i] = self.sizes[i] + push * share
@@ -346,6 +360,17 @@ class ArticulatedBodies:
             for j, entry in one.others.items():
                 value = value - entry * self.multipliers[j]
             self.multipliers[one.row] = value * one.reciprocal
+
+
+def _with_released(wrench: Wrench, column: Twist, entry: Expr | None) -> Wrench:
+    """What is carried past a free column s along one axis: along s it is the row's own entry, as s . K + c = 0."""
+    axes = [(half, k) for half in range(2) for k in range(3) if not column[half][k].is_zero]
+    if len(axes) != 1 or column[axes[0][0]][axes[0][1]].value != 1.0:
+        return wrench
+    (half, place) = axes[0]
+    halves = [list(wrench[0]), list(wrench[1])]
+    halves[half][place] = column[half][place].graph.zero if entry is None else -entry
+    return (halves[0][0], halves[0][1], halves[0][2]), (halves[1][0], halves[1][1], halves[1][2])
 
 
 def _matrix(rows: Sequence[Sequence[Expr]]) -> Mat3:

@@ -15,6 +15,7 @@ from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
+from ..numeric.value_ranges import Allowed
 from ..records import dataclass
 from .force import Force, Load, MarkerLoad, View
 from .paths import BETWEEN
@@ -138,7 +139,7 @@ def _bushing(e: Entry) -> Bushing | None:
             e.require(
                 f"stiffness[{j}][{i}]",
                 difference,
-                lambda x: x == 0,
+                Allowed(0.0, 0.0),
                 "this is its difference from [j][i]; both must be equal",
             )
     if pair is None or stiffness is None or damping is None:

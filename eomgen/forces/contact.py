@@ -15,6 +15,7 @@ from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
 from ..records import dataclass
 from .force import Force, Load, MarkerLoad, Measured, View
 from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip, has_bristles, read_friction
@@ -67,6 +68,10 @@ class Contact(Force):
         """A couple on the second body that the energy has beside the force; its opposite acts on the first."""
         return None
 
+    def aside(self, view: View) -> Vec3 | None:
+        """A force on the second body that the energy has beside that along the normal; its opposite on the first."""
+        return None
+
     def _shared(self, view: View, x: Expr) -> Expr:
         share = self.share(view)
         return x if share is None else share * x
@@ -75,7 +80,8 @@ class Contact(Force):
         normal, depth, arms, sliding, rate = self._motion(view)
         push = self._shared(view, self.law_here(view).force(depth, rate))
         drag = self._drag(self._slip(view, normal, depth, sliding, push))
-        return self._pair(arms, vec.add(vec.scale(push, normal), drag), self.couple(view))
+        force, more = vec.add(vec.scale(push, normal), drag), self.aside(view)
+        return self._pair(arms, force if more is None else vec.add(force, more), self.couple(view))
 
     def potential(self, view: View) -> Expr | None:
         return self._shared(view, self.law_here(view).energy(self.touch(view)[1]))
@@ -194,9 +200,9 @@ def _two_spheres(e: Entry) -> SphereSphere | None:
     if pair is None or radii is None:
         return None
     for k, radius in enumerate(radii):
-        e.require(f"radii[{k}]", radius, lambda x: x >= 0, "a radius is 0 or greater")
+        e.require(f"radii[{k}]", radius, NOT_NEGATIVE, "a radius is 0 or greater")
         if isinstance(law, HertzBodies):
-            e.require(f"radii[{k}]", radius, lambda x: x > 0, "the law of Hertz from moduli needs both radii")
+            e.require(f"radii[{k}]", radius, POSITIVE, "the law of Hertz from moduli needs both radii")
     return SphereSphere(e.name, *pair, law.at(lambda: joint_radius(*radii)), friction, (radii[0], radii[1]))
 
 

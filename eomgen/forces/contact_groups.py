@@ -19,12 +19,14 @@ from ..graph.vectors import Vec3
 from ..records import dataclass
 from .contact_pair_laws import PairLaw, pair_kind
 from .contact_shape_fields import PLANAR
-from .contact_shapes import PIECED, ContactShape, Feature, meet
-from .contact_states import POLYGON, alike, class_of, pair_states, part_of
+from .contact_shapes import PIECED, ContactShape, Feature
+from .contact_states import BED, FIELD, POLYGON, alike, class_of, pair_states, part_of
+from .contact_touch import meet
 from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw, RigidLaw
-from .soil_laws import SoilPressure
+from .soil_beds import COUNTS, bed_rates
+from .soil_laws import SoilPressure, SoilShear
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,9 @@ class ContactGroups(Force):
             return ()
         markers, results = self._results(view, "")
         found = results[6 * len(markers) + 1 :]
+        if self.on_bed:
+            assert isinstance(self.friction, SoilShear)
+            return tuple(bed_rates(self.states, found, self.friction.recovery))
         if self._slots > self._each:
             found = self._shared_out(found)
         return tuple(map(Expr.__add__, self._rates_apart(), found))
@@ -103,7 +108,14 @@ class ContactGroups(Force):
     @property
     def _slots(self) -> int:
         """How many numbers a pair has in the sum: its states, and where shapes have pieces how many of them touch."""
+        if self.on_bed:
+            return self._each + COUNTS
         return self._each + any(shape.kind in PIECED for shape in (*self.first, *self.second))
+
+    @property
+    def on_bed(self) -> bool:
+        """Whether the ground remembers by place."""
+        return any(shape.kind == BED for shape in (*self.first, *self.second))
 
     def remainder(self, view: View) -> list[Load]:
         return self._loads(view, LOSSES)
@@ -117,9 +129,19 @@ class ContactGroups(Force):
             for k, marker in enumerate(markers)
         ]
 
+    def _groups(self) -> list[dict[str, list[_Part]]]:
+        """Features of both groups, by class, of those classes that meet something."""
+        groups = [_features(group) for group in (self.first, self.second) if group]
+        met = set[tuple[int, str]]()
+        for g, own in enumerate(groups):
+            for h, other in enumerate(groups):
+                if g != h or len(groups) == 1:
+                    pairs = [(a, b) for a in own for b in other if meet((a, b))]
+                    met |= {(g, a) for a, _ in pairs} | {(h, b) for _, b in pairs}
+        return [{k: parts for k, parts in group.items() if (g, k) in met} for g, group in enumerate(groups)]
+
     def met_shapes(self) -> list[str]:
-        groups = [_features(self.first), *([_features(self.second)] if self.second else [])]
-        parts = [one.shape for group in groups for features in group.values() for one in features]
+        parts = [one.shape for group in self._groups() for features in group.values() for one in features]
         return [f"{shape.kind} on {shape.marker.label}" for shape in parts]
 
     def meeting(self, view: MovingView) -> list[Expr]:
@@ -134,8 +156,7 @@ class ContactGroups(Force):
 
     @property
     def met_bodies(self) -> list[int]:
-        groups = [_features(self.first), *([_features(self.second)] if self.second else [])]
-        return [one.shape.marker.body for group in groups for features in group.values() for one in features]
+        return [one.shape.marker.body for group in self._groups() for features in group.values() for one in features]
 
     @property
     def is_rigid(self) -> bool:
@@ -173,7 +194,7 @@ class ContactGroups(Force):
 
     def _function(self, name: str, bodies: Sequence[int], data: _SharedData, lost: bool) -> PairFunction:
         shapes = [self.first, self.second] if self.second else [self.first]
-        groups = [_features(group) for group in shapes]
+        groups = self._groups()
         place = {body: k for k, body in enumerate(bodies)}
         keys = [(g, kind) for g, group in enumerate(groups) for kind in group]
         tables = [tuple(data.row(place[one.shape.marker.body], one.feature) for one in groups[g][k]) for g, k in keys]
@@ -188,8 +209,11 @@ class ContactGroups(Force):
                 if apart and not twice and meet((first, second)):
                     own, other = groups[g][first], groups[h][second]
                     sizes = len(own[0].feature.sizes), len(other[0].feature.sizes)
-                    kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost)
-                    if self.states:
+                    height = own[0].shape.sizes[0] if part_of(first) == FIELD else None
+                    kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost, height)
+                    if self.on_bed:
+                        kind = replace(kind, held=(tuple(self._slots * x.column for x in own), (0,) * len(other)))
+                    elif self.states:
                         block = blocks[g, h, class_of(first, second), part_of(second)]
                         rows = tuple(self._slots * block.of_first(x.number, x.column) for x in own)
                         columns = tuple(self._slots * block.places * x.column for x in other)
@@ -234,8 +258,12 @@ def _features(shapes: Sequence[ContactShape]) -> dict[str, list[_Part]]:
     """Features of shapes, by class; parts are numbered in this order."""
     found: dict[str, list[_Part]] = {}
     before: dict[str, int] = {}
+    heights: dict[Expr, str] = {}  # fields of one height are of one class
     for number, shape in enumerate(shapes):
         for feature in shape.features():
+            if feature.kind == FIELD:
+                kind = heights.setdefault(shape.sizes[0], f"{FIELD}{len(heights)}")
+                feature = feature._replace(kind=kind)
             column = before.get(feature.kind, 0) + feature.slot
             found.setdefault(feature.kind, []).append(_Part(shape, feature, number, column))
         for kind, count in shape.parts().parts.items():

@@ -9,13 +9,15 @@ from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from .contact import CURVED
 from .contact_groups import ContactGroups
-from .contact_shape_fields import GROUNDS, PLANAR, SHAPE_FIELDS
-from .contact_shapes import ContactShape
-from .contact_states import MOST_PAIRS, ShapeParts, given_groups, pair_states
+from .contact_shape_fields import FIELD_SHAPE, GROUNDS, PLANAR, SHAPE_FIELDS
+from .contact_shapes import ContactShape, by_edges
+from .contact_states import BED, MOST_PAIRS, ShapeParts, cells_of, given_groups, pair_states
 from .friction_laws import DryFriction, has_bristles, read_friction
 from .normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, RigidLaw, read_normal_law
+from .soil_beds import STATES
 from .soil_laws import LATERAL, SOIL, read_soil, states_of_soil
 
 
@@ -29,8 +31,15 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         return None
     law, friction = laws
     _refuse_pairs(e, first, second)
+    if not soil and not has_bristles(e.values):  # whose states are counted before shapes are known
+        first, second = by_edges(first, second)
+    if has_bristles(e.values):
+        _refuse_edges(e, first, second)
     if soil:
         _refuse_on_soil(e, first, second)
+    bed = _is_bed(e, first, second, soil)
+    if bed:
+        first, second = (tuple(shape.on_bed() for shape in shapes) for shapes in (first, second))
     for key, shapes in (("first", first), ("second", second)):
         if not soil and any(shape.is_wheel for shape in shapes):
             e.fault(key, "has a circle with a width, which belongs to wheels on soil", "leave width out, or give soil")
@@ -44,11 +53,28 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
         groups = given_groups(e.values)
         pairs = pair_states(groups)[1]
         axes = len(_axes(e.values, groups, lateral)) if pairs else 0
+        axes = len(STATES) - 1 if bed else axes
         if pairs > MOST_PAIRS:
             told = f"has {pairs} pairs with states; at most {MOST_PAIRS} may have them"
             remedy = "put only shapes that stick to each other into the groups, or use friction_law: brown_mcphee"
             e.fault("", told, remedy)
     return ContactGroups(e.name, first, second, law, friction, e.states(), axes, rigidly, e.given("restitution"))
+
+
+def _is_bed(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape], soil: bool) -> bool:
+    """Whether the ground is a bed, of which there is one, with soil; what is wrong is noted."""
+    beds = [
+        (key, shapes) for key, shapes in (("first", first), ("second", second)) if any(x.kind == BED for x in shapes)
+    ]
+    for key, shapes in beds:
+        if len(shapes) > 1:
+            e.fault(key, "has a bed and more", "give one bed as all of a group, and contacts of their own to others")
+        if not soil:
+            e.fault(key, "has a bed, which belongs to soil", "give soil, or half_plane or a profile as the ground")
+    if beds:
+        for word in ("lateral", "peak_angle", "reversal"):
+            e.refuse(word, "has no meaning for a bed, whose cells are sheared along x")
+    return bool(beds)
 
 
 def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None] | None:
@@ -72,10 +98,10 @@ def _rigid_law(e: Entry) -> RigidLaw:
     for key in ("friction", "restitution"):
         value = e.given(key)
         if value is not None:
-            e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
+            e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     restitution = e.given("restitution")
     if restitution is not None:
-        e.require("restitution", restitution, lambda x: x <= 1, "must be at most 1")
+        e.require("restitution", restitution, Allowed(high=1.0), "must be at most 1")
     return RigidLaw()
 
 
@@ -88,9 +114,10 @@ def _refuse_on_soil(e: Entry, first: Sequence[ContactShape], second: Sequence[Co
             if wrong:
                 remedy = "give plates: the undersides of links, soles, feet; or wheels: circles that have a width"
                 e.fault(key, f"a {wrong[0]} does not lie on soil", remedy)
-            elif 0 < len(wheels) < len(others):
+            elif 0 < len(wheels) < len(others) and not any(shape.kind == BED for shape in shapes):
                 e.fault(key, "has wheels and plates, which remember differently", "give each contacts of their own")
-            for word in ("recovery", "lateral") if wheels else ("peak_angle", "reversal"):
+            on_bed = any(shape.kind == BED for shape in shapes)  # whose cells remember
+            for word in ("recovery", "lateral") if wheels and not on_bed else ("peak_angle", "reversal"):
                 e.refuse(word, f"has no meaning for {'wheels' if wheels else 'plates'}")
             return
     e.fault("", "has soil, but no ground", "give half_plane or a profile as one group, plates or wheels as the other")
@@ -104,7 +131,7 @@ def _axes(values: Mapping[str, Any], groups: Sequence[Sequence[ShapeParts]], lat
     kinds = {shape.kind for group in groups for shape in group}
     if kinds & set(PLANAR):
         return ("_x", "_z") if lateral else ("",)
-    round_pairs = any(first != "surface" for _, _, first, _ in pair_states(groups)[0])
+    round_pairs = FIELD_SHAPE in kinds or any(first != "surface" for _, _, first, _ in pair_states(groups)[0])
     return ("_x", "_y", "_z") if round_pairs else ("_x", "_y")
 
 
@@ -114,6 +141,8 @@ def _states(values: Mapping[str, Any]) -> dict[str, str]:
     if not soil and not has_bristles(values):
         return {}
     groups = given_groups(values)
+    if cells := cells_of(groups):
+        return {f"{name}_{k + 1}": "m" for k in range(cells) for name in STATES}
     axes = _axes(values, groups, values.get("lateral", True) is not False)
     names = states_of_soil(axes) if soil else tuple(f"bristle{axis}" for axis in axes)
     pairs = pair_states(groups)[1]
@@ -127,26 +156,23 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
         for b in kinds[1]:
             if (a in PLANAR) != (b in PLANAR):
                 e.fault("second", f"{a} and {b} do not meet", _ALLOWED)
-            elif (
-                (a in GROUNDS and b in GROUNDS)
-                or (a in _CLOSED and b in _OFF_CLOSED)
-                or (b in _CLOSED and a in _OFF_CLOSED)
-            ) and (second or a != b or _differ(first, a)):
+            elif ((a in GROUNDS and b in GROUNDS) or {a, b} == {"ellipsoid", "cuboid"}) and (
+                second or a != b or _differ(first, a)
+            ):
                 told = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
                 e.fault("second" if second else "first", told, _ALLOWED)
     for key, own, met in (("second", kinds[0], kinds[1]), ("first", kinds[1], kinds[0])):
         if "plate" in own and (wrong := [kind for kind in met if kind not in _UNDER_PLATES]):
             e.fault(key, f"{wrong[0]} and plate do not meet", f"plates meet {', '.join(_UNDER_PLATES)}")
             break
-    thin = [shape for shape in first if _is_thin(shape)], [shape for shape in second or first if _is_thin(shape)]
-    for k, others in enumerate((second or first, first)):
+    for key, group, others in (("first", first, second or first), ("second", second, first)):
         cornered = sorted({shape.kind for shape in others if shape.kind in _CORNERED or _is_thin(shape)})
-        if thin[k] and cornered and (second or _differ_in_body(first)):
-            e.fault(
-                ("first", "second")[k] if second else "first",
-                f"corners of {cornered[0]} pass through a segment of radius 0, which has no inside",
-                "give the segment a radius greater than 0",
-            )
+        if cornered and (second or _differ_in_body(first)):
+            told = f"corners of {cornered[0]} pass through a segment of radius 0, which has no inside"
+            for shape in group:
+                if shape.kind == "segment":
+                    e.require(key, shape.sizes[1], POSITIVE, "give the segment a radius greater than 0", told)
+        if e.at_fault(key):
             break
     for key, shapes in (("first", first), ("second", second)):
         if twice := [shape for k, shape in enumerate(shapes) if shape in shapes[:k]]:
@@ -163,6 +189,17 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
         e.fault("", "has shapes on one body only", "shapes of one body do not meet; give shapes on other bodies")
 
 
+def _refuse_edges(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
+    """Note cuboids that meet cuboids or capsules, where every pair of their edges would have states."""
+    for one in first:
+        for other in second or first:
+            kinds = {one.kind, other.kind}
+            if one.marker.body != other.marker.body and kinds in ({"cuboid"}, {"cuboid", "capsule"}):
+                told = f"{one.kind} and {other.kind} have no states where their edges meet"
+                e.fault("friction_law", told, "use friction_law: coulomb or brown_mcphee for cuboids among themselves")
+                return
+
+
 def _is_thin(shape: ContactShape) -> bool:
     return shape.kind == "segment" and shape.sizes[1].is_zero
 
@@ -176,7 +213,7 @@ def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
     return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
 
 
-_UNDER_PLATES = ("half_plane", "profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
+_UNDER_PLATES = ("bed", "half_plane", "profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
 _CORNERED = (
     "box",
     "polygon",
@@ -186,12 +223,10 @@ _CORNERED = (
     "smooth_outline",
     "sprocket",
 )  #: shapes whose corners meet segments
-_CLOSED = ("ellipsoid", "cuboid")  #: shapes that meet half-spaces and spheres alone
-_OFF_CLOSED = ("capsule", *_CLOSED)
 _ALLOWED = (
     "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
-    "smooth_profile, which plates meet too; sphere and capsule meet each other and half_space; ellipsoid and cuboid "
-    "meet half_space and sphere"
+    "smooth_profile, which plates meet too; wheels and plates meet a bed; sphere, capsule, ellipsoid and cuboid meet "
+    "half_space, height_field and each other, but for ellipsoid and cuboid"
 )
 
 _NORMAL_LAW = CURVED["normal_law"]._replace(

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from ..graph.core import Expr, cos, sin, sqrt
 from ..limits.contacts import SHARED
+from .branches import where
 from .contact_profiles import Point, ProfilePart, arc, biarcs, edge, length, minus, tangent, times, unit
 
 Pair = tuple[float, float]
@@ -54,10 +55,14 @@ def _tooth(teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr) -> Tooth
     return Tooth((x, y), (s, c), flank, (x + flank * s, y + flank * c))
 
 
-def half_tip(teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr) -> Expr:
-    """Half of the width of the tips of a sprocket."""
+def half_tooth(teeth: int, pitch: Expr, seat: Expr, tip: Expr, angle: Expr) -> Expr:
+    """Half of the width of the teeth of a sprocket at their narrowest: at the tip, or between the seats.
+
+    Arcs that reach the line between neighbouring pins are nearest there, and the flanks part from it outwards.
+    """
     corner, half = _tooth(teeth, pitch, seat, tip, angle).tip, math.pi / teeth
-    return corner[0] * math.sin(half) - corner[1] * math.cos(half)
+    at_tip = corner[0] * math.sin(half) - corner[1] * math.cos(half)
+    return where(pitch.graph.apply("lt", math.pi - 2.0 * half, angle), 0.5 * pitch - seat, at_tip)
 
 
 def sprocket_ring(
@@ -107,30 +112,6 @@ def sprocket_ring(
 
 def _pitch_radius(teeth: int, pitch: Expr) -> Expr:
     return pitch / (2.0 * math.sin(math.pi / teeth))
-
-
-def sprocket_fault(teeth: int, pitch: float, seat: float, tip: float, angle: float) -> tuple[str, str, str] | None:
-    """The key, message and remedy of what is wrong with sizes of a sprocket, in numbers; None where nothing is."""
-    if not 0.0 < angle < math.pi:
-        return "seat_angle", f"is {angle:g} rad", "give more than 0 and less than pi, such as 130 deg"
-    if 2.0 * seat >= pitch:
-        return "seat", f"is {seat:g}, so that seats overlap", f"give less than half of the pitch, {0.5 * pitch:g}"
-    reach = pitch / (2.0 * math.sin(math.pi / teeth))
-    c, s = math.cos(0.5 * angle), math.sin(0.5 * angle)
-    x, y = reach - seat * c, seat * s
-    if seat >= reach:
-        return "seat", f"is {seat:g}, which reaches the axis", f"give less than the pitch radius, {reach:g}"
-    if math.hypot(x, y) >= tip:
-        return "tip_radius", f"is {tip:g}, inside the ends of the seats", f"give more than {math.hypot(x, y):g}"
-    along = x * s + y * c
-    flank = math.sqrt(along * along + tip * tip - x * x - y * y) - along
-    if math.atan2(y + flank * c, x + flank * s) >= math.pi / teeth:
-        # the flanks of neighbouring seats meet on the line between them, at the angle pi / teeth
-        a, b = math.cos(math.pi / teeth), math.sin(math.pi / teeth)
-        run = (x * b - y * a) / (c * a - s * b)
-        most = math.hypot(x + run * s, y + run * c)
-        return "tip_radius", f"is {tip:g}, beyond the points of the teeth", f"give less than {most:g}"
-    return None
 
 
 def half_gap(points: Sequence[Pair]) -> float:

@@ -5,6 +5,7 @@ Its results, their directional derivative, what tells when shapes meet, and wher
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from functools import reduce
 from operator import add
@@ -14,19 +15,23 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
-from ..graph.pair_calls import PairKind
+from ..graph.pair_kinds import PairKind
+from ..graph.substitute import substitute
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..limits.contacts import NOWHERE
 from ..numeric.pair_sums import POSE
+from ..numeric.polygon_edges import EDGE, OTHER, OWN
 from .branches import where
 from .contact import Contact, SpherePlane
+from .contact_fields import planted
 from .contact_rounds import AtHeight
-from .contact_shapes import ShapeMotion, touching, turning_radius
-from .contact_states import places_of
+from .contact_states import BED_CELL, POLYGON, part_of, places_of
+from .contact_touch import ShapeMotion, touching, turning_radius
 from .force import MarkerLoad, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw
+from .soil_beds import SoilCell, cell_of
 from .soil_wheels import SoilWheel
 
 
@@ -36,6 +41,24 @@ class _PairView:
     def __init__(self, graph: Graph, planar: bool) -> None:
         self.graph, self._planar = graph, planar
         self._poses = [self._pose(letter) for letter in "ab"]
+        self._settled: dict[Expr, Expr] = {}
+
+    def settled(self, x: Expr) -> Expr:
+        """A symbol for a number to which iterations came; see :func:`~.contact_rounds.settled`."""
+        if x.value is not None:
+            return x
+        found = next((symbol for symbol, known in self._settled.items() if known.id == x.id), None)
+        if found is None:
+            found = self.graph.symbol(f"settled{len(self._settled)}")
+            self._settled[found] = x
+        return found
+
+    def unsettled(self, results: Sequence[Expr]) -> list[Expr]:
+        """Expressions with the numbers themselves in the places of their symbols."""
+        known: dict[Expr, Expr] = {}
+        for symbol, x in self._settled.items():  # later ones may hold earlier ones
+            known[symbol] = substitute([x], known)[0]
+        return substitute(results, known)
 
     def _pose(self, letter: str) -> ShapeMotion:
         x = [self.graph.symbol(f"{letter}{k}") for k in range(POSE)]
@@ -108,6 +131,7 @@ def pair_kind(
     sizes: tuple[int, int],
     place: Callable[[Expr], int],
     lost: bool,
+    height: Expr | None = None,
 ) -> PairKind:
     """How features of two classes act on each other.
 
@@ -120,6 +144,8 @@ def pair_kind(
         Gives an expression of the model a place behind the poses of the bodies.
     lost : bool
         Whether only what is taken from the energy counts.
+    height : Expr, optional
+        Of a height field, which is the first of the two.
     """
     graph = Graph()
     flat = law.planar and kinds[0] != "half"  # which has no extent along its normal to leave out
@@ -137,8 +163,12 @@ def pair_kind(
     normal = law.normal.mapped(own)
     rigid = [graph.zero if x is None else own(x) for x in law.rigid]
     friction = None if law.friction is None else law.friction.mapped(own)
+    field = None if height is None else planted(height, graph, own)
     markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
     lateral = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2] if law.planar else None
+    polygons = part_of(kinds[0]) == part_of(kinds[1]) == POLYGON
+    corners = (sizes[0] // EDGE, sizes[1] // EDGE) if polygons else ()
+    sizes = (OWN, OTHER) if polygons else sizes
     given = [
         tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
     ]
@@ -153,15 +183,23 @@ def pair_kind(
         held += states
         dry, push = law.holding(normal, friction, states[: law.each], lateral) if states else (friction, normal)
         bare = SpherePlane(law.name, *markers, push, dry, graph.zero)
-        contact = touching(kinds, markers, (given[0], given[1]), bare, spot)
-        if flat:
+        on_cell = kinds[0] == BED_CELL
+        if on_cell:
+            contact: Contact = cell_of(bare, given[1], given[0][0], kinds[1], pair.height() if flat else None)
+        else:
+            contact = touching(kinds, markers, (given[0], given[1]), bare, spot, field)
+        if flat and not on_cell:
             contact = AtHeight(law.name, *markers, contact.normal_law, contact.friction, contact, pair.height())
-        if kinds[1] == "rim":
+        if kinds[1] == "rim" and not on_cell:
             across = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2]
             contact = SoilWheel(law.name, *markers, push, dry, contact, given[1][0], given[1][1], across)
         exerted.append(_exerted(contact, view, lost))
-        if states:
-            rates += [graph.zero] * law.slots if lost else _rates(contact, view, law.slots > law.each)
+        if states and lost:
+            rates += [graph.zero] * law.slots
+        elif states:
+            rates += (
+                contact.sums(view) if isinstance(contact, SoilCell) else _rates(contact, view, law.slots > law.each)
+            )
         normal_of, depth, arm, _ = contact.touch(view)
         share = contact.share(view)
         touch = [*(contact.nearness(view)[0]), contact.nearness(view)[1], turning_radius(kinds[1], given[1], graph)]
@@ -174,7 +212,10 @@ def pair_kind(
     names = [f"a{k}" for k in range(POSE + sizes[0])] + [f"b{k}" for k in range(POSE + sizes[1])]
     names += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]
     seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in names}
-    slopes = jvp(results, seeds)
+    counts = [len(found) for found in (results, results, touch, spots)]
+    every = pair.unsettled([*results, *jvp(results, seeds), *touch, *spots])
+    starts = [0, *itertools.accumulate(counts)]
+    results, slopes, touch, spots = (every[a:b] for a, b in itertools.pairwise(starts))
     nodes, renamed = _kept(graph, [*results, *slopes, *touch, *spots])
     ids, seen, met = ([renamed[x.id] for x in found] for found in ((*results, *slopes), touch, spots))
     return PairKind(
@@ -189,6 +230,10 @@ def pair_kind(
         tuple(seen),
         tuple(met),
         states=len(held),
+        calls=tuple(
+            (name, graph.calls[name]) for name in sorted(graph.calls.keys() & {str(node[0]) for node in nodes})
+        ),
+        corners=corners,
     )
 
 

@@ -17,18 +17,17 @@ the lesser, the second spot lies at the edge of O and the deeper spot pushes so 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
 from typing import NamedTuple
 
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..limits.contacts import FLAT_CORNER, NOWHERE
+from ..numeric.polygon_edges import FACING, OWN
 from ..records import dataclass
 from .branches import where
 from .contact import Contact, Touch
 from .contact_profiles import Point, dot, minus, times, unit
-from .contact_rounds import EDGE
 from .force import View
 from .normal_laws import NormalLaw, PartOfLaw
 
@@ -39,7 +38,7 @@ class _Edge(NamedTuple):
     """An edge of a polygon, counterclockwise.
 
     Its corners, the outward normal (shorter where bodies tilt), by how much it rises out of the plane along its
-    direction, the cosine of the angle to the neighbour whose direction is nearest, its number.
+    direction, the cosine of the angle to the neighbour whose direction is nearest.
     """
 
     start: Point
@@ -47,7 +46,6 @@ class _Edge(NamedTuple):
     normal: Point
     rise: Expr
     bend: Expr
-    number: Expr
 
 
 class _Spot(NamedTuple):
@@ -67,62 +65,27 @@ def _either(condition: Expr, yes: Point, no: Point) -> Point:
     return where(condition, yes[0], no[0]), where(condition, yes[1], no[1])
 
 
-def _chosen(condition: Expr, a: _Edge, b: _Edge) -> _Edge:
-    start, end, normal = (_either(condition, p, q) for p, q in zip(a[:3], b[:3], strict=True))
-    rise, bend, number = (where(condition, p, q) for p, q in zip(a[3:], b[3:], strict=True))
-    return _Edge(start, end, normal, rise, bend, number)
-
-
 def _spot_of(condition: Expr, a: _Spot, b: _Spot) -> _Spot:
     place, normal = _either(condition, a.place, b.place), _either(condition, a.normal, b.normal)
     return _Spot(place, normal, where(condition, a.own, b.own), where(condition, a.depth, b.depth))
 
 
-def _edges(sizes: Sequence[Expr]) -> list[_Edge]:
-    """Edges of a polygon in its own axes."""
+class _Matter(NamedTuple):
+    """What of a polygon matters: the edge that faces the other one, corners and edges of the least and next overlap."""
+
+    edge: _Edge
+    corner: Point
+    next_corner: Point
+    next_start: Point
+    next_normal: Point
+
+
+def _matter(sizes: Sequence[Expr]) -> _Matter:
+    """The numbers of :mod:`~eomgen.numeric.polygon_edges` in the polygon's own axes."""
     graph = sizes[0].graph
-    starts = list(zip(sizes[::EDGE], sizes[1::EDGE], strict=True))
-    normals = list(zip(sizes[2::EDGE], sizes[3::EDGE], strict=True))
-    turns = [dot(a, b) for a, b in zip(normals, [*normals[1:], normals[0]], strict=True)]
-    bends = [graph.apply("max", a, b) for a, b in zip(turns, [turns[-1], *turns], strict=False)]
-    found = zip(starts, [*starts[1:], starts[0]], normals, bends, strict=True)
-    return [_Edge(a, b, n, graph.zero, bend, graph.constant(k)) for k, (a, b, n, bend) in enumerate(found)]
-
-
-def _first_least(found: Sequence[tuple[Expr, _Edge]]) -> tuple[Expr, _Edge]:
-    """The edge of the least of some numbers."""
-
-    def lesser(best: tuple[Expr, _Edge], new: tuple[Expr, _Edge]) -> tuple[Expr, _Edge]:
-        less = new[0].graph.apply("lt", new[0], best[0])
-        return where(less, new[0], best[0]), _chosen(less, new[1], best[1])
-
-    return reduce(lesser, found)
-
-
-def _overlap(edge: _Edge, corners: Sequence[Point]) -> Expr:
-    """How deep the deepest of some corners is below an edge."""
-    depths = [dot(edge.normal, minus(edge.start, corner)) for corner in corners]
-    return reduce(lambda a, b: a.graph.apply("max", a, b), depths)
-
-
-def _deepest(edge: _Edge, corners: Sequence[Point]) -> Point:
-    """The deepest of some corners below an edge."""
-    best, place = dot(edge.normal, minus(edge.start, corners[0])), corners[0]
-    for corner in corners[1:]:
-        depth = dot(edge.normal, minus(edge.start, corner))
-        deeper = best.graph.apply("lt", best, depth)
-        best, place = where(deeper, depth, best), _either(deeper, corner, place)
-    return place
-
-
-def _without(found: Sequence[tuple[Expr, _Edge]], left_out: _Edge) -> list[tuple[Expr, _Edge]]:
-    """Overlaps along edges but one."""
-    graph = left_out.number.graph
-    known: list[tuple[Expr, _Edge]] = []
-    for k, (overlap, edge) in enumerate(found):
-        other = graph.apply("lt", left_out.number, k - 0.5), graph.apply("lt", k + 0.5, left_out.number)
-        known.append((where(other[0], overlap, where(other[1], overlap, NOWHERE)), edge))
-    return known
+    start, end, normal, before, after, *others = zip(sizes[0 : FACING + 8 : 2], sizes[1 : FACING + 8 : 2], strict=True)
+    bend = graph.apply("max", dot(normal, after), dot(before, normal))
+    return _Matter(_Edge(start, end, normal, graph.zero, bend), *others)
 
 
 class _Facing(NamedTuple):
@@ -148,7 +111,7 @@ class _Parts(NamedTuple):
 class PolygonPolygon(Contact):
     """A convex polygon about the second marker on one about the first, in whose x-y plane both lie: one of two spots.
 
-    ``edges`` and ``others`` are the edges of both as in :class:`~.contact_rounds.PolygonRound`; ``spot`` is 0 or 1.
+    ``edges`` and ``others`` are what of both matters (:mod:`~eomgen.numeric.polygon_edges`); ``spot`` is 0 or 1.
     """
 
     edges: tuple[Expr, ...]
@@ -241,34 +204,26 @@ class PolygonPolygon(Contact):
         def placed(p: Point) -> Point:
             return x + xx * p[0] + xy * p[1], y + yx * p[0] + yy * p[1]
 
-        own = _edges(self.edges)
-        others = []
-        for edge in _edges(self.others):
-            nx, ny = edge.normal
-            across = (yy * nx - yx * ny, xx * ny - xy * nx)  # of the edge as placed
-            moved = (placed(edge.start), placed(edge.end), across, zy * nx - zx * ny)
-            others.append(_Edge(*moved, edge.bend, edge.number))
-        starts, corners = [edge.start for edge in others], [edge.start for edge in own]
-        overlaps_a = [(_overlap(edge, starts), edge) for edge in own]
-        overlaps_b = [(_overlap(edge, corners), edge) for edge in others]
+        def turned(n: Point) -> Point:  # of an edge as placed
+            return yy * n[0] - yx * n[1], xx * n[1] - xy * n[0]
 
-        def least_of(a: tuple[Expr, _Edge], b: tuple[Expr, _Edge]) -> tuple[Expr, _Spot]:
-            of_second, out = graph.apply("lt", b[0], a[0]), unit(b[1].normal)
-            place = _either(of_second, _deepest(b[1], corners), _deepest(a[1], starts))
-            normal = _either(of_second, times(out, -graph.one), a[1].normal)
-            return of_second, _Spot(place, normal, of_second, where(of_second, b[0], a[0]))
+        own, other = _matter(self.edges), _matter(self.others)
+        nx, ny = other.edge.normal
+        a = own.edge
+        b = _Edge(
+            placed(other.edge.start), placed(other.edge.end), turned((nx, ny)), zy * nx - zx * ny, other.edge.bend
+        )
+        flags = self.edges[FACING + 8 : OWN]
 
-        best = _first_least(overlaps_a), _first_least(overlaps_b)
-        of_second, least = least_of(*best)
-        a, b = best[0][1], best[1][1]
-        _, facing_a = _first_least([(dot(edge.normal, b.normal), edge) for edge in own])
-        _, facing_b = _first_least([(dot(edge.normal, a.normal), edge) for edge in others])
-        first, second = _chosen(of_second, facing_a, a), _chosen(of_second, b, facing_b)
-        rest = _first_least(_without(overlaps_a, first)), _first_least(_without(overlaps_b, second))
-        return _Facing(first, second, least, least_of(*rest)[1])
+        def spot(told: Expr, one: tuple[Point, Point], two: tuple[Point, Point], corners: tuple[Point, Point]) -> _Spot:
+            """Of the edge of the first polygon or the second, by start and normal, the deepest corner of the other."""
+            of_second = graph.apply("lt", 0.5, told)
+            place = _either(of_second, *corners)
+            normal = _either(of_second, times(unit(two[1]), -graph.one), one[1])
+            depths = dot(two[1], minus(two[0], corners[0])), dot(one[1], minus(one[0], corners[1]))
+            return _Spot(place, normal, of_second, where(of_second, *depths))
 
-
-def most_reach(sizes: Sequence[Expr]) -> Expr:
-    """How far the corners of a polygon are from its marker."""
-    squares = [x * x + y * y for x, y in zip(sizes[::EDGE], sizes[1::EDGE], strict=True)]
-    return sqrt(reduce(lambda a, b: a.graph.apply("max", a, b), squares))
+        least = spot(flags[0], (a.start, a.normal), (b.start, b.normal), (own.corner, placed(other.corner)))
+        next_b = placed(other.next_start), turned(other.next_normal)
+        corners = own.next_corner, placed(other.next_corner)
+        return _Facing(a, b, least, spot(flags[1], (own.next_start, own.next_normal), next_b, corners))

@@ -148,6 +148,16 @@ def arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: P
     )
 
 
+def arc_points(one: ProfilePart) -> list[Point]:
+    """Points along a circular arc in its own axes, from left to right, for pictures."""
+    bend, half = one.sizes[:2]
+    found = []
+    for part in (-1.0, -0.85, -0.5, 0.0, 0.5, 0.85, 1.0):
+        x = part * half
+        found.append((x, bend * x * x / (1.0 + sqrt(half.graph.apply("max", 0.0, 1.0 - bend * bend * x * x)))))
+    return found
+
+
 def peaks(points: Sequence[Point]) -> list[tuple[int, Point]]:
     """Inner points, numbered, at which the profile turns down, as far as numbers tell: they meet what is flat."""
     found = []

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
-from ..graph.vectors import Vec3
+from ..graph.vectors import Mat3, Vec3
+from ..numeric.polygon_edges import EDGE
 from ..records import dataclass
 from .branches import where
 from .contact import Contact, SphereSphere, Touch
 from .force import View
 from .normal_laws import NormalLaw
-
-EDGE = 5  #: numbers of an edge of a polygon: its first corner, its outward normal, its length
 
 
 def direction(reach: Vec3, otherwise: Vec3) -> tuple[Vec3, Expr]:
@@ -21,6 +21,28 @@ def direction(reach: Vec3, otherwise: Vec3) -> tuple[Vec3, Expr]:
     length = sqrt(where(apart, square, 1.0))
     x, y, z = (where(apart, a / length, b) for a, b in zip(reach, otherwise, strict=True))
     return (x, y, z), where(apart, length, 0.0)
+
+
+def seen_from(contact: Contact, view: View) -> tuple[Vec3, Mat3, Vec3]:
+    """From the first marker to the second in ground axes, the rotation of the first, and the same in its axes."""
+    R = view.rotation(contact.first)
+    reach = vec.sub(view.position(contact.second), view.position(contact.first))
+    return reach, R, vec.transpose_times(R, reach)
+
+
+def along_axis(view: View, marker: Marker, k: int) -> Vec3:
+    """One of the axes of a marker."""
+    return vec.transpose(view.rotation(marker))[k]
+
+
+def settled(view: View, x: Expr) -> Expr:
+    """A number to which iterations came, before the last of Newton's steps.
+
+    At a solution the derivative of that step does not depend on where it began, so that the iterations before it need
+    none: a view of pairs puts a symbol in the place of the number until derivatives are made.
+    """
+    keep = getattr(view, "settled", None)
+    return x if keep is None else keep(x)
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from ..elements.dimensions import LENGTH, NONE
 from ..elements.field import NUMBER, Field, Fields
-from .contact_states import PLATE, POINTS
+from .contact_states import MOST_PAIRS, PLATE, POINTS
 
 CORNERS = 64  #: most corners of a polygon
 
 _RADIUS = Field("expression", "radius (m)", required=True, dimension=LENGTH)
+_PLACE = Field("expression", "", dimension=LENGTH)
 _ALONG = "length between the centres of its ends (m), along {} of the marker"
 
 
@@ -42,6 +43,7 @@ def _outline(how: str) -> Fields:
     }
 
 
+FIELD_SHAPE = "height_field"
 _SIZES: dict[str, Fields] = {
     "circle": {
         "radius": _RADIUS,
@@ -65,6 +67,12 @@ _SIZES: dict[str, Fields] = {
         ),
     },
     "half_plane": {},
+    "bed": {
+        "length": Field(
+            "expression", "length of the strip from the marker on along its x axis (m)", required=True, dimension=LENGTH
+        ),
+        "cells": Field("count", f"of how many cells it is, 1 to {MOST_PAIRS}", required=True),
+    },
     "profile": _profile("", 2),
     "smooth_profile": _profile(", by a smooth curve of circular arcs", 3),
     "outline": _outline(", with straight edges between; it need not be convex"),
@@ -81,7 +89,7 @@ _SIZES: dict[str, Fields] = {
         ),
         "depth": Field(
             "expression",
-            "how far inside the teeth what has passed them is pushed out (m); half of the tips unless given",
+            "how far inside the teeth what has passed them is pushed out (m); half of their least width unless given",
             dimension=LENGTH,
         ),
     },
@@ -94,7 +102,30 @@ _SIZES: dict[str, Fields] = {
     "ellipsoid": {
         "semi_axes": Field("vector", "semi-axes along x, y and z (m)", required=True, dimension=LENGTH),
     },
-    "cuboid": {"size": Field("vector", "lengths along x, y and z (m)", required=True, dimension=LENGTH)},
+    "cuboid": {
+        "size": Field("vector", "lengths along x, y and z (m)", required=True, dimension=LENGTH),
+        "edge_radius": Field(
+            "expression",
+            "radius of its edges where it meets cuboids and capsules (m); a twentieth of its least length unless given",
+            dimension=LENGTH,
+        ),
+    },
+    FIELD_SHAPE: {
+        "height": Field(
+            "expression",
+            "height z (m) of the ground over the x-y plane of the marker, an expression of ``x``, ``y``, parameters "
+            "and tables",
+            dimension=LENGTH,
+            local={"x": _PLACE, "y": _PLACE},
+        ),
+        "x": Field("numbers", "instead of height: grid lines along x, strictly increasing (m)"),
+        "y": Field("numbers", "grid lines along y (m)"),
+        "z": Field("grid", "heights on the grid, a row for each x (m)"),
+        "kind": Field("choice", "interpolation between the points", choices=("cubic", "natural")),
+        "extrapolation": Field(
+            "choice", "beyond the grid: keep the slope or the height", choices=("linear", "constant")
+        ),
+    },
 }
 _ON = {
     "shape": Field("choice", "kind of shape", required=True, choices=tuple(_SIZES)),
@@ -105,7 +136,7 @@ SHAPE_FIELDS: dict[str, Fields] = {kind: {**_ON, **sizes} for kind, sizes in _SI
 #: Shapes of mechanisms in the plane; the others are shapes in space.
 PLANAR = (
     *("circle", "segment", "box", "polygon", "outline", "smooth_outline", "sprocket", "plate"),
-    *("half_plane", "profile", "smooth_profile"),
+    *("half_plane", "profile", "smooth_profile", "bed"),
 )
-#: Shapes without an end, which do not meet each other.
-GROUNDS = ("half_plane", "profile", "smooth_profile", "half_space")
+#: Shapes without an end or that are ground, which do not meet each other.
+GROUNDS = ("half_plane", "profile", "smooth_profile", "bed", "half_space", FIELD_SHAPE)

@@ -6,9 +6,9 @@ shapes, which are round of radius 0 or of the shape's own.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import reduce
 from typing import NamedTuple
 
@@ -17,31 +17,31 @@ import numpy as np
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr, Graph, sqrt
-from ..graph.vectors import Mat3, Vec3
+from ..graph.core import Expr, sqrt
+from ..graph.vectors import Vec3
+from ..numeric.polygon_edges import EDGE
 from ..records import dataclass
-from .contact import Contact, SpherePlane, joint_radius
+from .contact_fields import field_lines
 from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
-from .contact_polygons import PolygonPolygon, most_reach
 from .contact_profiles import (
-    ArcRound,
-    EdgeRound,
     Point,
     ProfilePart,
+    arc_points,
+    cross,
+    minus,
     peaks,
     smooth_pieces,
     solid_depth,
     straight_pieces,
 )
-from .contact_rounds import EDGE, PolygonRound, RoundRound, SegmentRound
 from .contact_shape_fields import GROUNDS
-from .contact_solids import BlockRound, EllipsoidPlane, EllipsoidRound, RodRod
-from .contact_states import BLOCK, MET, POLYGON, WHEEL, ShapeParts, part_of, parts_of
+from .contact_solids import cuboid_parts
+from .contact_states import BED, BED_CELL, FIELD, WHEEL, ShapeParts, parts_of
 
 #: Shapes whose pieces are edges and arcs.
 PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
+SOLE = "sole"  #: a plate on a bed
 _SLIM = 2e-3  #: part of half its length that a segment without a radius counts as thick
-_BOTH = (-1.0, 1.0)
 _STEPS = 24  #: lines of which the picture of an ellipse is made
 
 
@@ -83,8 +83,9 @@ class ContactShape:
     sizes : tuple of Expr
         radius, and of a wheel on soil its width; length, radius; of a box or polygon x and y of its corners,
         counterclockwise; of a profile or an outline its depth and x and y of its points, of outlines clockwise; of a
-        sprocket its depth, teeth, pitch, seat, tip radius and angle of a seat; half axes; lengths; of a plate length,
-        width and number of points.
+        sprocket its depth, teeth, pitch, seat, tip radius and angle of a seat; half axes; lengths, and the radius of
+        edges; of a plate length, width and number of points; of a bed length and number of cells; of a height field
+        z(x, y).
     """
 
     kind: str
@@ -103,25 +104,33 @@ class ContactShape:
         if self.kind in PIECED:
             return self._pieces(frame)
         if self.kind == "ellipsoid":
-            return [Feature("ellipsoid", frame, self.sizes, _most(self.sizes), 2.0 * _least(self.sizes))]
+            return [Feature("ellipsoid", frame, self.sizes, greatest(self.sizes), 2.0 * _least(self.sizes))]
         if self.kind == "cuboid":
-            x, y, z = (0.5 * size for size in self.sizes)
-            thick = _least(self.sizes)
-            ways = enumerate(itertools.product(_BOTH, repeat=3))
-            block = Feature(BLOCK, frame, (x, y, z), sqrt(x * x + y * y + z * z), thick)
-            return [block] + [
-                Feature("end", _moved(frame, (i * x, j * y, k * z)), (zero,), zero, thick, n) for n, (i, j, k) in ways
+            *size, edge = self.sizes
+            thick = _least(size)
+            return [
+                Feature(kind, _turned(_moved(frame, place), order), sizes, bound, thick, k)
+                for kind, place, order, sizes, bound, k in cuboid_parts(size, edge)
             ]
+        if self.kind == "height_field":
+            return [Feature(FIELD, frame, (), None, zero)]
         if self.kind == "plate":
             return self._pads(frame)
+        if self.kind == SOLE:
+            return [Feature(SOLE, frame, self.sizes[:2], self.sizes[0], self.sizes[0])]
+        if self.kind == BED:
+            return self._cells(frame)
         if self.kind in ("segment", "capsule"):
             along = frame if self.kind == "segment" else _turned(frame, (2, 0, 1))
             half, radius = 0.5 * self.sizes[0], self.sizes[1]
-            whole, end = ("segment", "corner") if self.kind == "segment" else ("rod", "end")
+            whole, *ends = ("segment", "corner") if self.kind == "segment" else ("rod", "end", "tip")
             thick = zero.graph.apply("max", 2.0 * radius, _SLIM * half)
-            sides = enumerate((-half, half))
-            ends = [Feature(end, _moved(along, (x, zero, zero)), (radius,), radius, thick, k) for k, x in sides]
-            return [Feature(whole, along, (half, radius), half + radius, thick), *ends]
+            wholes = [whole] if self.kind == "segment" else [whole, "spine"]  # the same again, for edges of cuboids
+            return [Feature(one, along, (half, radius), half + radius, thick) for one in wholes] + [
+                Feature(end, _moved(along, (x, zero, zero)), (radius,), radius, thick, k)
+                for end in ends
+                for k, x in enumerate((-half, half))
+            ]
         corners = list(zip(self.sizes[::2], self.sizes[1::2], strict=True))
         edges: list[Expr] = []
         reach = zero
@@ -141,11 +150,21 @@ class ContactShape:
         """Whether it is a circle with a width."""
         return self.kind == "circle" and len(self.sizes) > 1
 
+    def convex_corners(self) -> list[Point]:
+        """Corners, counterclockwise, of an outline whose points are numbers and which turns one way; else none."""
+        points = self._points() if self.kind == "outline" else []
+        around = zip([*points[-1:], *points[:-1]], points, [*points[1:], *points[:1]], strict=True)
+        turns = [(b, cross(minus(b, a), minus(c, b)).value) for a, b, c in around]
+        convex = all(turn is not None and turn <= 0.0 for _, turn in turns)
+        return [point for point, turn in reversed(turns) if turn != 0.0] if convex else []
+
     def parts(self) -> ShapeParts:
         """How many parts of each class it has."""
         if self.is_wheel:
             return parts_of(WHEEL)
-        counts = {"polygon": len(self.sizes) // 2, "sprocket": self._whole(1), "plate": self._whole(2)}
+        counts = {
+            "polygon": len(self.sizes) // 2, "sprocket": self._whole(1), "plate": self._whole(2), BED: self._whole(1),
+        }  # fmt: skip
         return parts_of(self.kind, counts.get(self.kind, (len(self.sizes) - 1) // 2))
 
     def _whole(self, k: int) -> int:
@@ -165,6 +184,17 @@ class ContactShape:
             place = _moved(frame, (0.5 * float(x) * length, zero, zero))
             found.append(Feature("pad", place, (area, width), zero, length, len(found)))
         return found
+
+    def _cells(self, frame: Frame) -> list[Feature]:
+        """Cells of a bed, from the marker on."""
+        length, count = self.sizes[0], self._whole(1)
+        size, zero = length / float(count), length.graph.zero
+        places = (_moved(frame, ((k + 0.5) * size, zero, zero)) for k in range(count))
+        return [Feature(BED_CELL, place, (size,), zero, size, k) for k, place in enumerate(places)]
+
+    def on_bed(self) -> ContactShape:
+        """The shape as it lies on a bed: a plate as a whole."""
+        return replace(self, kind=SOLE) if self.kind == "plate" else self
 
     def _points(self) -> list[Point]:
         """Points of a profile or an outline."""
@@ -225,37 +255,61 @@ class ContactShape:
             zero, points = self.sizes[0].graph.zero, self._points()
             line = points if self.kind in GROUNDS else [*points, points[0]]
             places = [_moved(marker.frame, (x, y, zero)) for x, y in line]
+            if self.kind in ("smooth_profile", "smooth_outline"):
+                arcs = [one for one in self._parts()[0] if one.kind == "arc"]
+                places = [_moved(one.frame(marker.frame), (x, y, zero)) for one in arcs for x, y in arc_points(one)]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
         if self.kind == "ellipsoid":
             return [self._ellipse(i, j) for i, j in ((0, 1), (1, 2), (2, 0))]
+        if self.kind == "height_field":
+            lines = [[_moved(marker.frame, place) for place in line] for line in field_lines(self.sizes[0])]
+            seen = [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in line)) for line in lines]
+            return [*seen] or [Drawn((marker,), about=PLANE)]
         if self.kind == "cuboid":
-            found = [feature.frame for feature in self.features()[1:]]
+            found = [feature.frame for feature in self.features() if feature.kind == "end"]
             ways = ((0, 1, 3, 2, 0, 4, 5, 7, 6, 4), (1, 5), (2, 6), (3, 7))
             return [Drawn(tuple(Marker(marker.body, found[k], marker.label) for k in way)) for way in ways]
-        if self.kind == "plate":
+        if self.kind == BED:
+            zero = self.sizes[0].graph.zero
+            places = [_moved(marker.frame, (x, zero, zero)) for x in (zero, self.sizes[0])]
+            return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
+        if self.kind in ("plate", SOLE):
             half, zero = 0.5 * self.sizes[0], self.sizes[0].graph.zero
             places = [_moved(marker.frame, (x, zero, zero)) for x in (-half, half)]
             return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in places))]
-        frames = [feature.frame for feature in self.features()[1:]]
+        frames = [feature.frame for feature in self.features() if feature.kind in ("corner", "end", "vertex")]
         closed = frames if self.kind in ("segment", "capsule") else [*frames, frames[0]]
         return [Drawn(tuple(Marker(marker.body, frame, marker.label) for frame in closed))]
 
 
-def _most(sizes: Sequence[Expr]) -> Expr:
+def by_edges(
+    first: Sequence[ContactShape], second: Sequence[ContactShape]
+) -> tuple[tuple[ContactShape, ...], tuple[ContactShape, ...]]:
+    """Groups in which convex outlines that meet polygons are polygons, which lie flush on each other by their edges.
+
+    Plates meet outlines only; where a group has some, outlines of the other stay what they are.
+    """
+
+    def changed(own: Sequence[ContactShape], other: Sequence[ContactShape]) -> tuple[ContactShape, ...]:
+        meets = any(shape.kind in ("box", "polygon") or shape.convex_corners() for shape in other)
+        if not meets or any(shape.kind == "plate" or shape.is_wheel for shape in other):
+            return tuple(own)
+        found = []
+        for shape in own:
+            corners = tuple(x for corner in shape.convex_corners() for x in corner)
+            found.append(ContactShape("polygon", shape.marker, corners) if corners else shape)
+        return tuple(found)
+
+    return changed(first, second or first), changed(second, first)
+
+
+def greatest(sizes: Sequence[Expr]) -> Expr:
+    """The greatest of several lengths."""
     return reduce(lambda a, b: a.graph.apply("max", a, b), sizes)
 
 
 def _least(sizes: Sequence[Expr]) -> Expr:
     return reduce(lambda a, b: a.graph.apply("min", a, b), sizes)
-
-
-def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
-    """How far points of a feature are from its centre that its turning moves along a normal; 0 of what is round."""
-    if kind == "ellipsoid":
-        return _most(sizes)
-    if part_of(kind) == POLYGON:
-        return most_reach(sizes)
-    return sizes[0] + sizes[1] if kind == "rod" else graph.zero
 
 
 def _width(edges: Sequence[Expr], corners: Sequence[tuple[Expr, Expr]]) -> Expr:
@@ -264,7 +318,7 @@ def _width(edges: Sequence[Expr], corners: Sequence[tuple[Expr, Expr]]) -> Expr:
     for k in range(0, len(edges), EDGE):
         px, py, nx, ny, _ = edges[k : k + EDGE]
         across = [nx * (px - x) + ny * (py - y) for x, y in corners]
-        widths.append(_most(across))
+        widths.append(greatest(across))
     return _least(widths)
 
 
@@ -276,60 +330,3 @@ def _turned(frame: Frame, columns: tuple[int, int, int]) -> Frame:
     """A frame whose axes are x, y and z of another in another order."""
     rows = tuple((row[columns[0]], row[columns[1]], row[columns[2]]) for row in frame.rotation)
     return Frame((rows[0], rows[1], rows[2]), frame.position)
-
-
-#: Features of the first shapes of :data:`~.contact_states.MET` that have several.
-_SURFACES = {"ground": ("edge", "arc")}
-#: Classes of features that meet: the first is a surface, or both are of one class.
-MEETINGS = tuple((one, soft) for own, met in MET.items() for one in _SURFACES.get(own, (own,)) for soft in met)
-
-
-def meet(kinds: tuple[str, str]) -> bool:
-    """Whether features of two classes meet, in this order."""
-    return (part_of(kinds[0]), part_of(kinds[1])) in MEETINGS
-
-
-class ShapeMotion(NamedTuple):
-    """A shape's place and motion, ground axes."""
-
-    position: Vec3
-    rotation: Mat3
-    velocity: Vec3
-    angular_velocity: Vec3
-
-
-def touching(
-    kinds: tuple[str, str],
-    markers: tuple[Marker, Marker],
-    sizes: tuple[tuple[Expr, ...], tuple[Expr, ...]],
-    law: Contact,
-    spot: int = 0,
-) -> Contact:
-    """The contact of one feature with another at one of its places; ``law`` has the laws."""
-    first, radius = sizes[0], sizes[1][0]
-    normal = law.normal_law.at(lambda: joint_radius(first[0], radius) if kinds[0] == "round" else radius)
-    friction = law.friction
-    if kinds[1] == "pad":
-        area, width = sizes[1]
-        normal, radius = normal.on_pad(area, width), radius.graph.zero
-        friction = None if friction is None else friction.on_pad(area)
-    laws = (law.name, *markers, normal, friction)
-    if kinds[0] == "round":
-        return RoundRound(*laws, (first[0], radius))
-    if part_of(kinds[1]) == POLYGON:
-        return PolygonPolygon(*laws, first, sizes[1], spot)
-    if kinds[0] in ("ellipsoid", BLOCK):
-        x, y, z = first
-        return (BlockRound if kinds[0] == BLOCK else EllipsoidRound)(*laws, (x, y, z), radius)
-    if kinds[1] == "ellipsoid":
-        x, y, z = sizes[1]
-        return EllipsoidPlane(*laws, (x, y, z))
-    if kinds[1] == "rod":
-        return RodRod(*laws, (first[0], sizes[1][0]), (first[1], sizes[1][1]))
-    if kinds[0] == "half":
-        return SpherePlane(*laws, radius)
-    if kinds[0] in ("edge", "arc"):
-        return (EdgeRound if kinds[0] == "edge" else ArcRound)(*laws, first, radius)
-    if kinds[0] in ("segment", "rod"):
-        return SegmentRound(*laws, first[0], (first[1], radius))
-    return PolygonRound(*laws, first, radius)

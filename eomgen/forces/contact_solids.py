@@ -1,15 +1,20 @@
-"""Force elements, contact of shapes in space: rods, ellipsoids on a plane, spheres on ellipsoids and cuboids."""
+"""Force elements, contact of shapes in space: rods on rods, spheres on cuboids."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
+from ..graph.differentiate import jvp
 from ..graph.vectors import Vec3
-from ..limits.contacts import FOCAL, NEAREST, PARALLEL
+from ..limits.contacts import PARALLEL
 from ..records import dataclass
 from .branches import where
 from .contact import Contact, Touch
-from .contact_rounds import direction
+from .contact_rounds import direction, seen_from
+from .contact_states import BLOCK, CORE
 from .force import View
 
 
@@ -25,6 +30,15 @@ class RodRod(Contact):
     radii: tuple[Expr, Expr]
 
     def touch(self, view: View) -> Touch:
+        a, b, s, t, across = self._nearest(view)
+        distance = sqrt(vec.dot(across, across))
+        normal: Vec3 = (across[0] / distance, across[1] / distance, across[2] / distance)
+        depth = self.radii[0] + self.radii[1] - distance
+        first = vec.add(vec.scale(s, a), vec.scale(self.radii[0] - 0.5 * depth, normal))
+        return normal, depth, first, vec.add(vec.scale(t, b), vec.scale(0.5 * depth - self.radii[1], normal))
+
+    def _nearest(self, view: View) -> tuple[Vec3, Vec3, Expr, Expr, Vec3]:
+        """Directions of both, how far along them the nearest points are, and from the first of these to the second."""
         graph = view.graph
         a, b = (vec.transpose(view.rotation(marker))[0] for marker in (self.first, self.second))
         reach = vec.sub(view.position(self.second), view.position(self.first))
@@ -39,35 +53,82 @@ class RodRod(Contact):
         s = where(skew, (c - e * f) / where(skew, square, 1.0), 0.0)
         t = within(e * within(s, self.halves[0]) - f, self.halves[1])
         s = within(c + e * t, self.halves[0])
-        across = vec.add(reach, vec.sub(vec.scale(t, b), vec.scale(s, a)))
-        distance = sqrt(vec.dot(across, across))
-        normal: Vec3 = (across[0] / distance, across[1] / distance, across[2] / distance)
-        depth = self.radii[0] + self.radii[1] - distance
-        first = vec.add(vec.scale(s, a), vec.scale(self.radii[0] - 0.5 * depth, normal))
-        return normal, depth, first, vec.add(vec.scale(t, b), vec.scale(0.5 * depth - self.radii[1], normal))
+        return a, b, s, t, vec.add(reach, vec.sub(vec.scale(t, b), vec.scale(s, a)))
+
+
+#: A class, a place, the order of axes of which the first lies along it, sizes, the radius of a bound, a number.
+CuboidPart = tuple[str, Vec3, tuple[int, int, int], tuple[Expr, ...], Expr, int]
+
+
+def cuboid_parts(size: Sequence[Expr], edge: Expr) -> list[CuboidPart]:
+    """A cuboid's parts: the whole and its corners, and the same with rounded edges.
+
+    Cuboids meet each other as spheropolyhedra, which are solids within a layer of the thickness of the radius of edges:
+    corners meet the other's solid, edges its edges, and each such pair has an energy that depends on its distance alone
+    (Galindo-Torres and Pedroza, Phys. Rev. E 81, 2010, 061303; Alonso-Marroquin, Europhys. Lett. 83, 2008, 14001).
+    """
+    halves, zero = [0.5 * one for one in size], edge.graph.zero
+    inner = [half - edge for half in halves]
+    x, y, z = inner
+    plain = (0, 1, 2)
+    reach = sqrt(halves[0] * halves[0] + halves[1] * halves[1] + halves[2] * halves[2])
+    found: list[CuboidPart] = [(BLOCK, (zero, zero, zero), plain, (*halves, zero), reach, 0)]
+    ways = list(itertools.product((-1.0, 1.0), repeat=3))
+    for n, (i, j, k) in enumerate(ways):
+        found.append(("end", (i * halves[0], j * halves[1], k * halves[2]), plain, (zero,), zero, n))
+    found.append((CORE, (zero, zero, zero), plain, (x, y, z, edge), reach, 0))
+    found += [("knob", (i * x, j * y, k * z), plain, (edge,), edge, n) for n, (i, j, k) in enumerate(ways)]
+    for k in range(3):
+        for n, (i, j) in enumerate(itertools.product((-1.0, 1.0), repeat=2)):
+            place = [zero, i * inner[(k + 1) % 3], j * inner[(k + 2) % 3]]
+            order = (k, (k + 1) % 3, (k + 2) % 3)
+            at = (place[-k % 3], place[(1 - k) % 3], place[(2 - k) % 3])
+            found.append(("brim", at, order, (inner[k], edge), inner[k] + edge, 4 * k + n))
+    return found
+
+
+def _rising(x: Expr) -> Expr:
+    """From 0 at 0 to 1 at 1, with slopes of 0 there."""
+    within = x.graph.apply("max", 0.0, x.graph.apply("min", 1.0, x))
+    return within * within * (3.0 - 2.0 * within)
 
 
 @dataclass(frozen=True)
-class EllipsoidPlane(Contact):
-    """An ellipsoid about the second marker, half axes along its x, y, z, on the plane through the first.
+class EdgeRod(RodRod):
+    """An edge of a cuboid on an edge or a rod: where they cross, not where one ends, as corners touch there.
 
-    Its lowest point is -(a^2 n_x, b^2 n_y, c^2 n_z) / w, w = sqrt(a^2 n_x^2 + b^2 n_y^2 + c^2 n_z^2), of the plane's
-    normal n in the ellipsoid's axes.
+    The energy is that of the law times the square of the sine of their angle, and times parts that go to 0 towards both
+    ends of both within their radii.  The force is its slope.
     """
 
-    axes: tuple[Expr, Expr, Expr]
+    def share(self, view: View) -> Expr:
+        a, b, s, t, _ = self._nearest(view)
+        cross = vec.cross(a, b)
+        part = vec.dot(cross, cross)
+        for x, half, radius in zip((s, t), self.halves, self.radii, strict=True):
+            part = part * _rising((half - view.graph.apply("max", x, -x)) / radius)
+        return part
 
-    def touch(self, view: View) -> Touch:
-        R = view.rotation(self.second)
-        normal = vec.transpose(view.rotation(self.first))[2]
-        reach = vec.sub(view.position(self.second), view.position(self.first))
-        n = vec.transpose_times(R, normal)
-        x, y, z = (a * a * k for a, k in zip(self.axes, n, strict=True))
-        w = sqrt(vec.dot((x, y, z), n))
-        depth = w - vec.dot(normal, reach)
-        lowest = vec.times(R, (-x / w, -y / w, -z / w))
-        second = vec.add(lowest, vec.scale(0.5 * depth, normal))
-        return normal, depth, vec.add(reach, second), second
+    def _change(self, view: View) -> tuple[Vec3, Vec3]:
+        """How the share changes as the second body moves along axes of the ground, and as it turns about them."""
+        graph, share = view.graph, self.share(view)
+        axes = vec.identity(graph)
+        place, columns = view.position(self.second), vec.transpose(view.rotation(self.second))
+        moved = [jvp([share], {p: graph.one})[0] for p in place]
+        turned = []
+        for axis in axes:
+            seeds = {x: d for column in columns for x, d in zip(column, vec.cross(axis, column), strict=True)}
+            turned.append(jvp([share], seeds)[0])
+        return (moved[0], moved[1], moved[2]), (turned[0], turned[1], turned[2])
+
+    def aside(self, view: View) -> Vec3:
+        energy = self.law_here(view).energy(self.touch(view)[1])
+        return vec.scale(-energy, self._change(view)[0])
+
+    def couple(self, view: View) -> Vec3:
+        _, depth, _, arm = self.touch(view)
+        about = vec.scale(-self.law_here(view).energy(depth), self._change(view)[1])
+        return vec.sub(about, vec.cross(arm, self.aside(view)))
 
 
 @dataclass(frozen=True)
@@ -75,15 +136,16 @@ class BlockRound(Contact):
     """A sphere about the second marker on a cuboid about the first, half lengths along its x, y, z.
 
     A centre outside is pushed away from the nearest point of the cuboid, one inside out through the nearest face.
+    ``rounding`` is the radius of a layer around it.
     """
 
     halves: tuple[Expr, Expr, Expr]
+    rounding: Expr
     radius: Expr
 
     def touch(self, view: View) -> Touch:
-        graph, R = view.graph, view.rotation(self.first)
-        reach = vec.sub(view.position(self.second), view.position(self.first))
-        place = vec.transpose_times(R, reach)
+        graph = view.graph
+        reach, R, place = seen_from(self, view)
         x, y, z = (
             a - graph.apply("max", -h, graph.apply("min", h, a)) for a, h in zip(place, self.halves, strict=True)
         )
@@ -99,47 +161,6 @@ class BlockRound(Contact):
         normal, distance = direction((x, y, z), (a, b, c))
         gap = where(graph.apply("lt", 0.0, distance), distance, rise)
         out = vec.times(R, normal)
-        depth = self.radius - gap
-        second = vec.scale(0.5 * depth - self.radius, out)
-        return out, depth, vec.add(reach, second), second
-
-
-@dataclass(frozen=True)
-class EllipsoidRound(Contact):
-    """A sphere about the second marker on an ellipsoid about the first, half axes along its x, y, z.
-
-    The nearest point to p is (a^2 p_x / (t + a^2), ...), where S(t), the sum of (a p_x / (t + a^2))^2, is 1 (Eberly,
-    Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid, 2013); t times (p_x / (t + a^2), ...) leads
-    from it to p.  Newton's method for 1 / sqrt(S) = 1, which is nearly linear (More and Sorensen, SIAM J. Sci. Stat.
-    Comput. 4, 1983, 553-572), comes to t from the side on which S > 1, where the largest of the three squares is 1, or
-    t = 0 of a centre outside.  Undefined at the centre of the ellipsoid.
-    """
-
-    axes: tuple[Expr, Expr, Expr]
-    radius: Expr
-
-    def touch(self, view: View) -> Touch:
-        graph, R = view.graph, view.rotation(self.first)
-        reach = vec.sub(view.position(self.second), view.position(self.first))
-        place = vec.transpose_times(R, reach)
-        squares = [a * a for a in self.axes]
-        scaled = [a * p for a, p in zip(self.axes, place, strict=True)]
-        least = graph.apply("min", squares[0], graph.apply("min", squares[1], squares[2]))
-        begin = -(1.0 - FOCAL) * least
-        for s, q in zip(scaled, squares, strict=True):
-            begin = graph.apply("max", begin, graph.apply("max", s, -s) - q)
-        rises = [p / a for p, a in zip(place, self.axes, strict=True)]
-        outside = graph.apply("lt", 1.0, rises[0] * rises[0] + rises[1] * rises[1] + rises[2] * rises[2])
-        begin = where(outside, graph.apply("max", begin, 0.0), begin)
-        t = begin
-        for _ in range(NEAREST):
-            parts = [s / (t + q) for s, q in zip(scaled, squares, strict=True)]
-            total = parts[0] * parts[0] + parts[1] * parts[1] + parts[2] * parts[2]
-            slope = sum((s * s / (t + q) for s, q in zip(parts, squares, strict=True)), graph.zero)
-            t = graph.apply("max", begin, t + total * (sqrt(total) - 1.0) / slope)
-        x, y, z = (p / (t + q) for p, q in zip(place, squares, strict=True))
-        size = sqrt(x * x + y * y + z * z)
-        out = vec.times(R, (x / size, y / size, z / size))
-        depth = self.radius - t * size
+        depth = self.rounding + self.radius - gap
         second = vec.scale(0.5 * depth - self.radius, out)
         return out, depth, vec.add(reach, second), second

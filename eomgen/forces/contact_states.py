@@ -16,13 +16,17 @@ MOST_PAIRS = 2000  #: pairs that may have states: equations grow with states, an
 PLATE = 2  #: points of a plate unless given
 POINTS = 8  #: most points of a plate
 WHEEL = "wheel"  #: a circle with a width
+BED = "bed"  #: soil that remembers by place, in cells
+BED_CELL = "cell"  #: class of the cells, whose states belong to no pair
 TEETH = 3  #: fewest teeth of a sprocket
 #: Parts that meet surfaces, in the order in which their states stand.
 PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon")
 #: Parts that meet surfaces and have no states.
-STATELESS = ("rim",)
+STATELESS = ("rim", "sole", "knob", "tip", "brim", "spine")
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
 BLOCK = "block"  #: class of cuboids, which spheres meet
+CORE = "core"  #: class of cuboids with rounded edges, which those of other cuboids and capsules meet
+FIELD = "field"  #: class of height fields, of which those of one height have one number
 _ROUND = ("round", "rod", POLYGON)
 #: Classes of first parts that are told apart; all others are surfaces.
 _APART = (*_ROUND, "ellipsoid", BLOCK)
@@ -31,18 +35,22 @@ _FIRST = {
     "circle": "round", "sphere": "round", "capsule": "rod", "segment": "segment", "box": POLYGON, "polygon": POLYGON,
     "profile": "ground", "smooth_profile": "ground", "outline": "ground", "smooth_outline": "ground",
     "sprocket": "ground", "half_plane": "half", "half_space": "half",
-    "ellipsoid": "ellipsoid", "cuboid": BLOCK,
+    "ellipsoid": "ellipsoid", "cuboid": BLOCK, "height_field": FIELD,
 }  # fmt: skip
 #: What is met by each of these.
 MET = {
     "round": ("round",),
     "rod": ("round", "rod"),
-    "ellipsoid": ("round",),
+    "ellipsoid": ("round", "rod", "ellipsoid"),
     BLOCK: ("round",),
+    CORE: ("knob", "tip"),
+    "brim": ("brim", "spine"),
+    FIELD: ("round", "end", "ellipsoid"),
     "segment": ("round", "corner", "vertex"),
     POLYGON: ("round", "corner", POLYGON),
     "ground": ("round", "corner", "vertex", "pad", "rim"),
     "half": ("round", "corner", "vertex", "end", "ellipsoid", "pad", "rim"),
+    BED_CELL: ("rim", "sole"),
 }
 
 
@@ -77,10 +85,11 @@ def parts_of(kind: str, points: int = 0) -> ShapeParts:
     found = {
         "circle": {"round": 1}, "sphere": {"round": 1}, "segment": {"corner": 2},
         "box": {POLYGON: 1, "vertex": 4}, "polygon": {POLYGON: 1, "vertex": points},
-        "capsule": {"rod": 1, "end": 2}, "ellipsoid": {"ellipsoid": 1}, "cuboid": {"end": 8},
+        "capsule": {"rod": 1, "end": 2, "tip": 2, "spine": 1}, "ellipsoid": {"ellipsoid": 1},
+        "cuboid": {"end": 8, "knob": 8, "brim": 12},
         "outline": {"corner": points}, "smooth_outline": {"corner": points},
         "sprocket": {"corner": 2 * points}, "plate": {"pad": points}, WHEEL: {"rim": 1},
-        "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2},
+        "profile": {"corner": points - 2}, "smooth_profile": {"corner": points - 2}, BED: {BED_CELL: points},
     }  # fmt: skip
     return ShapeParts(kind, found.get(kind, {}))
 
@@ -133,6 +142,11 @@ def _meets(kind: str, first: str, second: str) -> bool:
     return own != "" and class_of(own, second) == first and second in MET[own]
 
 
+def cells_of(groups: Sequence[Sequence[ShapeParts]]) -> int:
+    """How many cells the beds of some groups have."""
+    return sum(shape.parts.get(BED_CELL, 0) for group in groups for shape in group)
+
+
 # -- from what the user gave ------------------------------------------------------------------------------------------
 def _whole(given: Any) -> int | None:
     """A whole number, also one that is written with decimals, such as 2.0; None if it is none."""
@@ -147,6 +161,12 @@ def points_of_plate(given: Mapping[str, Any]) -> int | None:
     """At how many points a plate is felt; None where that is no number."""
     count = _whole(given.get("points", PLATE))
     return count if count is not None and 1 <= count <= POINTS else None
+
+
+def cells_of_bed(given: Mapping[str, Any]) -> int | None:
+    """How many cells a bed has; None where that is no number."""
+    count = _whole(given.get("cells"))
+    return count if count is not None and 1 <= count <= MOST_PAIRS else None
 
 
 def teeth_of_sprocket(given: Mapping[str, Any]) -> int | None:
@@ -176,6 +196,8 @@ def _given_shapes(value: Any) -> list[ShapeParts]:
             count = points_of_plate(shape) or 0
         elif kind == "sprocket":
             count = teeth_of_sprocket(shape) or 0
+        elif kind == BED:
+            count = cells_of_bed(shape) or 0
         elif kind == "circle" and "width" in shape:
             kind, count = WHEEL, 1
         else:

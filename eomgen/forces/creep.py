@@ -13,6 +13,7 @@ from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .force import Force, Load, MarkerLoad, View
@@ -107,7 +108,7 @@ class Creep(Force):
 
 def _creep(e: Entry) -> Creep | None:
     pair, law, radius = e.pair(), e.choice("creep_law"), e.law("radius")
-    e.require("radius", radius, lambda r: r > 0, "must be greater than 0")
+    e.require("radius", radius, POSITIVE, "must be greater than 0")
     for key in ("normal", "friction"):
         if law == "linear":
             e.refuse(key, "the linear law does not saturate")
@@ -115,10 +116,10 @@ def _creep(e: Entry) -> Creep | None:
             e.fault(key, "is missing", f"the law {law} needs the normal force and the coefficient of friction")
     along, across, turning, spin = (e.law(key) for key in ("longitudinal", "lateral", "lateral_spin", "spin"))
     for key, value in (("longitudinal", along), ("lateral", across)):
-        e.require(key, value, lambda f: f >= 0, "must be 0 or greater")
+        e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     friction = e.given("friction")
     if friction is not None:
-        e.require("friction", friction, lambda m: m >= 0, "must be 0 or greater")
+        e.require("friction", friction, NOT_NEGATIVE, "must be 0 or greater")
     if pair is None or e.at_fault():
         return None
     track, wheel = pair

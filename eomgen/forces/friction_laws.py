@@ -14,6 +14,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..limits.contacts import AT_REST
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
 from ..records import dataclass
 from .branches import beyond_zero, where
 
@@ -321,7 +322,7 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
                 e.fault(key, f"is given without {dynamic}", f"give {dynamic}, or leave {key} out")
         return None
     level = e.law(dynamic)
-    e.require(dynamic, level, lambda x: x >= 0, "must be 0 or greater")
+    e.require(dynamic, level, NOT_NEGATIVE, "must be 0 or greater")
     kind = e.choice("friction_law")
     along = e.given(viscous)
     drag = e.graph.zero if along is None else along
@@ -346,7 +347,7 @@ def _onset(e: Entry, static: str) -> tuple[Expr | None, Expr | None] | None:
         return None
     onset = e.given(static)
     if onset is not None:
-        e.require(static, onset, lambda x: x >= 0, "must be 0 or greater")
+        e.require(static, onset, NOT_NEGATIVE, "must be 0 or greater")
     return onset, e.positive("stribeck") if "stribeck" in e.values else None
 
 
@@ -359,8 +360,8 @@ def _brown_mcphee(e: Entry, level: Expr, viscous: Expr, static: str) -> BrownMcP
     onset = e.given(static)
     if onset is None:
         onset = level
-    e.require(static, onset, lambda x: x >= 0, "must be 0 or greater")
-    e.require(static, onset - level, lambda x: x >= 0, "this is static minus sliding friction; static is the greater")
+    e.require(static, onset, NOT_NEGATIVE, "must be 0 or greater")
+    e.require(static, onset - level, NOT_NEGATIVE, "this is static minus sliding friction; static is the greater")
     return BrownMcPhee(level, onset, e.positive("transition"), viscous)
 
 
@@ -371,9 +372,9 @@ def _lugre(e: Entry, level: Expr, viscous: Expr, dynamic: str, static: str) -> L
         if key not in e.values:
             e.fault(key, "is missing", "friction_law: lugre needs bristle_stiffness and bristle_damping")
     pair = _onset(e, static)
-    e.require(dynamic, level, lambda x: x > 0, "must be greater than 0 in friction_law: lugre")
+    e.require(dynamic, level, POSITIVE, "must be greater than 0 in friction_law: lugre")
     if pair is None or e.at_fault():
         return None
     if pair[0] is not None:
-        e.require(static, pair[0], lambda x: x > 0, "must be greater than 0 in friction_law: lugre")
+        e.require(static, pair[0], POSITIVE, "must be greater than 0 in friction_law: lugre")
     return LuGre(level, e.positive("bristle_stiffness"), e.positive("bristle_damping"), viscous, *pair, e.states())

@@ -11,6 +11,7 @@ from ..elements.entry import Entry
 from ..elements.field import LAW, Field
 from ..elements.looks import Seen
 from ..graph.core import Expr, sin, sqrt
+from ..numeric.value_ranges import Allowed
 from ..records import dataclass
 from .force import Force, Load, View
 from .paths import BETWEEN, Path
@@ -131,16 +132,16 @@ def _muscle(e: Entry) -> Muscle | None:
     if "excitation" in e.values:
         activation = e.states()[0]
         drive = Activation(e.law("excitation"), e.positive("activation_time"), e.positive("deactivation_time"))
-        e.require("excitation", drive.excitation, lambda a: 0 <= a <= 1, "an excitation is 0 to 1")
+        e.require("excitation", drive.excitation, Allowed(0.0, 1.0), "an excitation is 0 to 1")
     else:
         activation = e.law("activation")
-        e.require("activation", activation, lambda a: 0 <= a <= 1, "an activation is 0 to 1")
+        e.require("activation", activation, Allowed(0.0, 1.0), "an activation is 0 to 1")
         for key in ("activation_time", "deactivation_time"):
             e.refuse(key, "has a meaning beside excitation only")
     force_max, fiber_length, slack_length = (e.positive(k) for k in ("force_max", "fiber_length", "slack_length"))
     velocity_max = e.positive("velocity_max") if "velocity_max" in e.values else SHORTENING * fiber_length
     pennation, damping = e.law("pennation"), e.law("damping")
-    e.require("pennation", pennation, lambda x: abs(x) < 1.5707, "must be less than pi/2")
+    e.require("pennation", pennation, Allowed(-1.5707, 1.5707, above=True, below=True), "must be less than pi/2")
     if path is None:
         return None
     sizes = (force_max, fiber_length, slack_length, velocity_max, pennation, damping)

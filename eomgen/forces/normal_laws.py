@@ -10,6 +10,7 @@ from ..elements.dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE
 from ..elements.entry import Entry
 from ..elements.field import EXPONENT, LINEAR, Field, Fields
 from ..graph.core import Expr, sqrt
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from ..records import dataclass
 from .branches import beyond_zero
 
@@ -253,7 +254,7 @@ def read_normal_law(e: Entry) -> NormalLaw:
         return _elastic(e, kind)
     _require_stiffness(e)
     stiffness, exponent = e.positive("stiffness"), e.law("exponent")
-    e.require("exponent", exponent, lambda n: n >= 1, "must be at least 1; above 1 the stiffness begins without a jump")
+    e.require("exponent", exponent, Allowed(1.0), "must be at least 1; above 1 the stiffness begins without a jump")
     return HuntCrossley(stiffness, exponent, _dissipation(e))
 
 
@@ -269,7 +270,7 @@ def _linear(e: Entry) -> DampedLinear:
         e.refuse(key, "has no meaning in normal_law: linear, which has stiffness and damping")
     damping = e.given("damping")
     if damping is not None:
-        e.require("damping", damping, lambda c: c >= 0, "must be 0 or greater")
+        e.require("damping", damping, NOT_NEGATIVE, "must be 0 or greater")
     return DampedLinear(e.positive("stiffness"), e.graph.zero if damping is None else damping)
 
 
@@ -283,8 +284,8 @@ def _elastic(e: Entry, kind: str) -> NormalLaw:
         if key not in e.values:
             e.fault(key, "is missing", "give moduli and poisson together, two numbers each")
     for key, found, right, rule in (
-        ("moduli", moduli, lambda x: x > 0, "must be greater than 0"),
-        ("poisson", ratios, lambda x: -1 < x <= 0.5, "is above -1 and at most 0.5"),
+        ("moduli", moduli, POSITIVE, "must be greater than 0"),
+        ("poisson", ratios, Allowed(-1.0, 0.5, above=True), "is above -1 and at most 0.5"),
     ):
         for k, x in enumerate(found or ()):
             e.require(f"{key}[{k}]", x, right, rule)
@@ -305,7 +306,7 @@ def _dissipation(e: Entry) -> Expr:
             if key in e.values:
                 e.fault(key, "dissipation is given too", "give dissipation, or restitution with velocity")
         value = e.law("dissipation")
-        e.require("dissipation", value, lambda x: x >= 0, "must be 0 or greater")
+        e.require("dissipation", value, NOT_NEGATIVE, "must be 0 or greater")
         return value
     if restitution is None and velocity is None:
         if "formula" in e.values:
@@ -316,6 +317,6 @@ def _dissipation(e: Entry) -> Expr:
             "velocity" if velocity is None else "restitution", "is missing", "give restitution and velocity together"
         )
         return e.stand_in
-    e.require("restitution", restitution, lambda x: 0 < x <= 1, "must be greater than 0 and at most 1")
-    e.require("velocity", velocity, lambda x: x > 0, "must be greater than 0")
+    e.require("restitution", restitution, Allowed(0.0, 1.0, above=True), "must be greater than 0 and at most 1")
+    e.require("velocity", velocity, POSITIVE, "must be greater than 0")
     return dissipation_of(restitution, velocity, formula)

@@ -9,6 +9,7 @@ from ..elements.dimensions import LENGTH, NONE
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field, Fields
 from ..graph.core import Expr, sqrt
+from ..numeric.value_ranges import NOT_NEGATIVE
 from ..records import dataclass
 from .branches import beyond_zero
 from .force import Force, Load, View
@@ -92,7 +93,7 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
     given = {"coefficient": coefficient, "static_coefficient": onset, "coulomb": preload, "static": breakaway}
     for key, value in given.items():
         if value is not None:
-            e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
+            e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     if ("stribeck" in e.values) != (onset is not None or breakaway is not None):
         message = "is missing" if "stribeck" not in e.values else "is given without static_coefficient or static"
         e.fault("stribeck", message, "give stribeck together with static_coefficient or static, or none of them")

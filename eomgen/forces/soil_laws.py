@@ -18,9 +18,10 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..limits.contacts import CAUGHT_UP
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from ..records import dataclass
 from .branches import beyond_zero, where
-from .contact_states import WHEEL, given_groups
+from .contact_states import WHEEL, cells_of, given_groups
 from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip
 from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, NormalLaw
 from .soils import RECOVERY, SOILS
@@ -116,8 +117,8 @@ class SoilPressure(NormalLaw):
     def energy(self, depth: Expr) -> Expr:
         return depth.graph.zero
 
-    def rates(self, depth: Expr, rate: Expr) -> tuple[Expr, ...]:
-        """z_m' = z' while the sinkage grows beyond z_m; above the ground z_m fades.
+    def deepening(self, depth: Expr, rate: Expr) -> Expr:
+        """z_m' of what is in the ground: z' while the sinkage grows beyond z_m.
 
         Where a plate that has begun deeper than z_m rises, z_m catches up with z: dz_m / d|z| = (z - z_m) / (part z).
         """
@@ -125,8 +126,12 @@ class SoilPressure(NormalLaw):
         graph, deepest = depth.graph, self.deepest
         over = beyond_zero(depth, lambda z: 1.0 - deepest / z)
         change = where(graph.apply("lt", rate, 0.0), -over / CAUGHT_UP * rate, rate)
-        grows = where(graph.apply("le", deepest, depth), change, 0.0)
-        return (where(graph.apply("lt", 0.0, depth), grows, self.rates_apart()[0]),)
+        return where(graph.apply("lt", 0.0, depth), where(graph.apply("le", deepest, depth), change, 0.0), 0.0)
+
+    def rates(self, depth: Expr, rate: Expr) -> tuple[Expr, ...]:
+        """z_m' in the ground; above the ground z_m fades."""
+        inside = depth.graph.apply("lt", 0.0, depth)
+        return (where(inside, self.deepening(depth, rate), self.rates_apart()[0]),)
 
     def rates_apart(self) -> tuple[Expr, ...]:
         assert self.deepest is not None
@@ -273,21 +278,22 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
     angle = number("friction_angle", soil and math.radians(soil.angle))
     modulus = number("shear_modulus", soil and soil.shear)
     for key, value in (("cohesive_modulus", cohesive), ("frictional_modulus", frictional), ("cohesion", cohesion)):
-        e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
+        e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     for key, value in (("sinkage_exponent", exponent), ("shear_modulus", modulus)):
-        e.require(key, value, lambda x: x > 0, "must be greater than 0")
-    e.require("friction_angle", angle, lambda x: 0 <= x < math.pi / 2, "is 0 or greater and below pi/2; it is in rad")
-    if "frictional_modulus" not in e.values or not frictional.is_zero:
-        pass
-    elif cohesive.is_zero:
-        e.fault("frictional_modulus", "is 0 as cohesive_modulus is", "give one that is greater than 0")
+        e.require(key, value, POSITIVE, "must be greater than 0")
+    acute = Allowed(0.0, math.pi / 2, below=True)
+    e.require("friction_angle", angle, acute, "is 0 or greater and below pi/2; it is in rad")
+    if "frictional_modulus" in e.values and not e.at_fault():
+        message, remedy = "is 0 as cohesive_modulus is", "give one that is greater than 0"
+        e.require("frictional_modulus", cohesive + frictional, POSITIVE, remedy, message)
     width = e.positive("contact_width") if "contact_width" in e.values else None
-    rolls = any(shape.kind == WHEEL for group in given_groups(e.values) for shape in group)
+    groups = given_groups(e.values)
+    rolls = any(shape.kind == WHEEL for group in groups for shape in group) and not cells_of(groups)
     recovery = e.graph.one if rolls else number("recovery", soil and RECOVERY)
-    e.require("recovery", recovery, lambda x: x > 0, "must be greater than 0")
+    e.require("recovery", recovery, POSITIVE, "must be greater than 0")
     dissipation = e.given("dissipation")
     if dissipation is not None:
-        e.require("dissipation", dissipation, lambda x: x >= 0, "must be 0 or greater")
+        e.require("dissipation", dissipation, NOT_NEGATIVE, "must be 0 or greater")
     unloading, peak = _unloading(e), _peak(e)
     reversal = e.positive("reversal")
     if e.at_fault():
@@ -302,12 +308,12 @@ def _unloading(e: Entry) -> tuple[Expr | None, tuple[Expr, Expr] | None]:
     keys = ("unloading_stiffness", "unloading_rise")
     if not any(key in e.values for key in keys):
         part = e.law("rebound") if "rebound" in e.values else e.graph.constant(REBOUND)
-        e.require("rebound", part, lambda x: 0 < x <= 1, "is above 0 and at most 1")
+        e.require("rebound", part, Allowed(0.0, 1.0, above=True), "is above 0 and at most 1")
         return part, None
     e.refuse("rebound", f"follows from {' and '.join(keys)}")
     found = [e.law(key) if key in e.values else e.graph.zero for key in keys]
     for key, value in zip(keys, found, strict=True):
-        e.require(key, value, lambda x: x >= 0, "must be 0 or greater")
+        e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     return None, (found[0], found[1])
 
 
@@ -316,8 +322,8 @@ def _peak(e: Entry) -> tuple[Expr, Expr] | None:
     pair = e.several("peak_angle", 2) if "peak_angle" in e.values else None
     if pair is None:
         return None
-    e.require("peak_angle[0]", pair[0], lambda c: 0 < c <= 1, "is above 0 and at most 1")
-    e.require("peak_angle[1]", pair[1], lambda c: c >= 0, "must be 0 or greater")
+    e.require("peak_angle[0]", pair[0], Allowed(0.0, 1.0, above=True), "is above 0 and at most 1")
+    e.require("peak_angle[1]", pair[1], NOT_NEGATIVE, "must be 0 or greater")
     for key in ("rebound", "unloading_stiffness", "unloading_rise"):
         e.refuse(key, "is of the rear of wheels without peak_angle, which gives the pressure of the whole arc")
     return pair[0], pair[1]

@@ -9,6 +9,7 @@ from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
 from ..graph.core import Expr
+from ..numeric.value_ranges import POSITIVE
 from ..records import dataclass
 from .force import Force, Load, View
 from .normal_laws import NORMAL, NORMAL_CHOICE, NormalLaw, read_normal_law
@@ -72,7 +73,7 @@ def _stop(e: Entry) -> JointStop | None:
     if lower is None and upper is None:
         e.fault("", "has no limit", "give lower, upper or both")
     if lower is not None and upper is not None:
-        e.require("upper", upper - lower, lambda x: x > 0, "this is upper - lower; lower must be less than upper")
+        e.require("upper", upper - lower, POSITIVE, "this is upper - lower; lower must be less than upper")
     return None if path is None else JointStop(e.name, path, lower, upper, law)
 
 

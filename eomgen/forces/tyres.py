@@ -14,6 +14,7 @@ from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
+from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
 from ..records import dataclass
 from .branches import where
 from .force import Force, Load, MarkerLoad, Measured, View
@@ -225,10 +226,10 @@ def _tyre(e: Entry) -> Tyre | None:
     rolling = e.positive("rolling_radius") if "rolling_radius" in e.values else radius
     damping, settling, relaxation = e.law("damping"), e.law("settling"), e.several("relaxation", 2)
     reversal = e.positive("reversal")
-    e.require("settling", settling, lambda x: x >= 0, "must be 0 or greater")
-    e.require("damping", damping, lambda c: c >= 0, "must be 0 or greater")
+    e.require("settling", settling, NOT_NEGATIVE, "must be 0 or greater")
+    e.require("damping", damping, NOT_NEGATIVE, "must be 0 or greater")
     for k, length in enumerate(relaxation or ()):
-        e.require(f"relaxation[{k}]", length, lambda x: x > 0, "must be greater than 0")
+        e.require(f"relaxation[{k}]", length, POSITIVE, "must be greater than 0")
     law, load_law = _law(e), DampedLinear(e.positive("stiffness"), damping)
     if pair is None or law is None or relaxation is None or e.at_fault():
         return None

@@ -11,93 +11,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, Literal
+from operator import itemgetter
+from typing import Any
 
 from ..errors import UsageError
 from ..numeric.pair_sums import MEETING, MOTION, POSE, RECORD, SPOT, PairSum, pairs_of_rows
+from ..numeric.polygon_edges import facing
 from ..records import dataclass
 from .core import Expr, Graph
-from .nodes import Node
+from .pair_kinds import PairKind, PairPart
 from .substitute import substitute
 from .traverse import reachable
 
-PairPart = Literal["outputs", "slopes", "touch", "spot"]
 #: Pairs that a list of near ones has room for: so many, and so many for each part of a shape, in the plane (heaps of
 #: discs have 3 that touch, as edges of a planar graph are fewer than three for each node) and in space (heaps of equal
 #: spheres have 6, of unequal ones 7).
 SPARE, IN_PLANE, IN_SPACE = 16, 5, 12
 LOSSES = "0"  #: begins the name of a sum of losses, as no name of a model does
-
-
-@dataclass(frozen=True)
-class PairKind:
-    """How two shapes act on each other.
-
-    Attributes
-    ----------
-    name : str
-        Such as ``round_half``.
-    first, second : int
-        Tables of the shapes.
-    planar : bool
-        Whether distances count across the z axis of the first shape only.
-    law : tuple of int
-        Places of the law's numbers in the data.
-    nodes : tuple
-        The nodes of its graph, whose symbols are named in ``symbols`` by their order.
-    symbols : tuple of str
-        Numbers of the first shape, of the second, of the law, and then their rates.
-    outputs, slopes : tuple of int
-        What a pair exerts (:data:`~eomgen.numeric.pair_sums.RESULT` nodes), and its directional derivative.
-    touch : tuple of int
-        Normal (3), from the first shape to the second, penetration, and the radius about the centre of the second shape
-        of what its turning moves (0 where it is round).
-    spot : tuple of int
-        Where they touch: :data:`~eomgen.numeric.pair_sums.SPOT` nodes for each place.
-    held : tuple of tuple of int
-        Of each row of the first table and of each of the second a number: their sum is the place of the pair's states
-        among all states of the sum.  Empty without states.
-    states : int
-        How many states a pair has.  What it adds to their rates stands behind the results.  A number that is only
-        summed, such as how many pieces of a shape touch, is one of them: 0 is given for it, and its sum stands in the
-        place of its rate.
-    """
-
-    name: str
-    first: int
-    second: int
-    planar: bool
-    law: tuple[int, ...]
-    nodes: tuple[Node, ...]
-    symbols: tuple[str, ...]
-    outputs: tuple[int, ...]
-    slopes: tuple[int, ...]
-    touch: tuple[int, ...]
-    spot: tuple[int, ...]
-    held: tuple[tuple[int, ...], ...] = ()
-    states: int = 0
-
-    def graph(self) -> Graph:
-        """Its nodes as a graph."""
-        graph = Graph()
-        graph.nodes = list(self.nodes)
-        graph._ids = {node: i for i, node in enumerate(self.nodes)}
-        return graph
-
-    def expressions(self, what: PairPart = "outputs") -> list[Expr]:
-        """Its results, their derivatives, or its geometry."""
-        graph = self.graph()
-        return [Expr(graph, i) for i in getattr(self, what)]
-
-    @property
-    def plain(self) -> tuple[str, ...]:
-        """The symbols that its results depend on."""
-        return self.symbols[: len(self.symbols) // 2]
-
-    @property
-    def beside(self) -> tuple[int, tuple[tuple[int, ...], ...]] | tuple[()]:
-        """How many states a pair has and where they stand; nothing without states."""
-        return (self.states, self.held) if self.states else ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,13 +120,18 @@ class PairFunction:
         kinds = [
             (
                 *(k.first, k.second, k.planar, k.law),
-                *(made(k.expressions(), k.plain), made(k.expressions("slopes"), k.symbols)),
-                *(made(k.expressions("touch"), k.plain), made(k.expressions("spot"), k.plain)),
+                *(self._law(k, part, made) for part in ("outputs", "slopes", "touch", "spot")),
                 *k.beside,
             )
             for k in self.kinds
         ]
         return PairSum(self.bodies, self.tables, kinds, self.room, self.states)
+
+    @staticmethod
+    def _law(kind: PairKind, part: PairPart, made: Callable[[list[Expr], Sequence[str]], Callable[[Any], Any]]) -> Any:
+        sloped = part == "slopes"
+        law = made(kind.expressions(part), kind.symbols if sloped else kind.plain)
+        return facing(law, (kind.corners[0], kind.corners[1]), sloped) if kind.corners else law
 
     def __getstate__(self) -> dict[str, Any]:
         return {
@@ -236,7 +171,7 @@ class PairCall:
 
     def implementation(self, orders: tuple[int, ...]) -> Callable[..., Any]:
         """Its value as a function of floats or arrays."""
-        return self.on_numbers(self.function.in_floats)
+        return itemgetter(self.numbers[0]) if self.part == "item" else self.on_numbers(self.function.in_floats)
 
     def on_numbers(self, loops: PairSum) -> Callable[..., Any]:
         """Its value as a function of numbers, by given loops."""
@@ -254,7 +189,7 @@ class PairCall:
 
         made: dict[str, Callable[..., Any]] = {"given": given, "sum": loops, "slope": slope, "meeting": meeting}
         made["spots"] = loops.spots
-        return made[self.part] if self.part in made else lambda listed: listed[self.numbers[0]]
+        return made[self.part] if self.part in made else itemgetter(self.numbers[0])
 
 
 def _unpacked(operands: Sequence[Any]) -> Sequence[Any]:

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..limits.rounding import ROUNDED
+from ..limits.rounding import CHANCE, ROUNDED
 from ..operations import OPERATIONS, operations_with
 from ..operations.table import unit
 from .core import Expr, Graph
@@ -25,7 +25,9 @@ from .vectors import Mat3, Vec3
 TRIES = 3  #: random points at which an identity is tried
 
 
-def with_bounds(outputs: Sequence[Expr], values: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
+def with_bounds(
+    outputs: Sequence[Expr], values: Mapping[str, Value], independent: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
     """Values of expressions and the bounds of their rounding.
 
     Parameters
@@ -34,6 +36,9 @@ def with_bounds(outputs: Sequence[Expr], values: Mapping[str, Value]) -> tuple[n
         Expressions of one graph.
     values : mapping of str to float or (k,) array
         Of all symbols, taken as exact.
+    independent : bool
+        Take roundings as independent: squares of bounds add up.  No strict bound, but it stays near the error in long
+        products of rotations, where the other grows with every factor.
 
     Returns
     -------
@@ -63,22 +68,30 @@ def with_bounds(outputs: Sequence[Expr], values: Mapping[str, Value]) -> tuple[n
                 bounds[i] = 0.0
                 continue
             bound = 0.0 if row is not None and row.exact else abs(y)
+            bound = bound * bound if independent else bound
             if row is not None and row.rates:  # a table or a function in C knows its value
                 try:
                     x = [found[k] for k in operands]
                     for rate, k in zip(row.rates, operands, strict=True):
                         e = bounds[k]
                         if e if type(e) is float else np.any(e):
-                            bound += e if rate is unit else rate(y, *x) * e
+                            more = e if rate is unit else rate(y, *x) * e
+                            bound += more * more if independent else more
                 except (ValueError, ArithmeticError):
                     bound = math.inf
-            bounds[i] = bound
+            bounds[i] = bound**0.5 if independent else bound
     width = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
     shape = (len(outputs), *width)
     result = np.empty(shape), np.empty(shape)
     for k, y in enumerate(outputs):
         result[0][k], result[1][k] = found[y.id], bounds[y.id]
     return result
+
+
+def with_likely_bounds(outputs: Sequence[Expr], values: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
+    """The same, bounds at most CHANCE times those of independent roundings, which long chains of rotations need."""
+    found, bounds = with_bounds(outputs, values)
+    return found, np.minimum(bounds, CHANCE * with_bounds(outputs, values, independent=True)[1])
 
 
 def vanishing(outputs: Sequence[Expr]) -> list[bool]:
@@ -101,6 +114,9 @@ def vanishing(outputs: Sequence[Expr]) -> list[bool]:
         values, bounds = with_bounds([outputs[k] for k in left], names)
         zero = is_rounding(values, bounds)
         left = [k for k, z in zip(left, zero, strict=True) if z]
+    if left:
+        zero = is_rounding(*with_likely_bounds([outputs[k] for k in left], names))
+        left = [k for k, z in zip(left, zero, strict=True) if z]
     left = [k for k in left if _is_flat(outputs[k], names)]
     found = set(left)
     return [k in found for k in range(len(outputs))]
@@ -109,13 +125,16 @@ def vanishing(outputs: Sequence[Expr]) -> list[bool]:
 def _is_flat(x: Expr, values: Mapping[str, float]) -> bool:
     """Whether the slope by each symbol is rounding, also of the terms' own slopes, which folded constants hide."""
     names = sorted(symbols_of([x]))
-    slopes, bounds = with_bounds(gradient(x, [x.graph.symbol(name) for name in names]), values)
-    terms = _slopes_of_terms(x, names, values)
+    slopes, bounds = with_likely_bounds(gradient(x, [x.graph.symbol(name) for name in names]), values)
+    terms = np.minimum(_slopes_of_terms(x, names, values), CHANCE * _slopes_of_terms(x, names, values, power=2))
     return bool(is_rounding(slopes, np.maximum(bounds, terms)).all())
 
 
-def _slopes_of_terms(x: Expr, names: Sequence[str], values: Mapping[str, float]) -> np.ndarray:
-    """Of each symbol, the sum of the magnitudes of the slopes of all terms by it: (n,), from the result backwards."""
+def _slopes_of_terms(x: Expr, names: Sequence[str], values: Mapping[str, float], power: int = 1) -> np.ndarray:
+    """Of each symbol, the sum of the magnitudes of the slopes of all terms by it: (n,), from the result backwards.
+
+    Of their squares, and the root of that, with ``power`` 2.
+    """
     graph = x.graph
     order, nodes = reachable(graph, [x.id]), graph.nodes
     known = [nodes[i][1] for i in order if nodes[i][0] == "sym"]
@@ -132,10 +151,10 @@ def _slopes_of_terms(x: Expr, names: Sequence[str], values: Mapping[str, float])
             try:
                 at = [found[k] for k in operands]
                 for rate, k in zip(row.rates, operands, strict=True):
-                    weights[k] += weight if rate is unit else float(rate(y, *at)) * weight
+                    weights[k] += weight if rate is unit else float(rate(y, *at)) ** power * weight
             except (ValueError, ArithmeticError):
                 weights.update((k, math.inf) for k in operands)
-    return np.array([weights.get(graph.symbol(name).id, 0.0) for name in names])
+    return np.array([weights.get(graph.symbol(name).id, 0.0) ** (1.0 / power) for name in names])
 
 
 def is_rounding(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import SimulationError, UsageError
+from ..errors import ParameterError, SimulationError, UsageError
 from ..limits.identification import MEASURED, ROUNDS
 from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array
+from ..runtime.allowed_parameters import bounds_of
 from ..runtime.near_names import check_names, read_names, require, require_mapping, unknown
 from ..runtime.refusals import refuse_rigid
 from ..runtime.room import read_number
@@ -60,7 +61,7 @@ def fit(
     initial, inputs : optional
         As for ``simulate``; of several experiments a list with one of each, or one for all.
     bounds : mapping of str to (low, high), optional
-        Limits of the values; parameters that are the mass of a body are at least 0 without them.
+        Limits of the values; without them those that elements set, such as at least 0 for a mass or a stiffness.
     sigma : float or mapping of str to float, optional
         Standard deviation of the noise of each column.  By default it is found from the residuals, and the fit is
         repeated with it, so that units do not matter.
@@ -187,13 +188,13 @@ class _Problem:
         return simulate(self.module, **self.arguments(values, one))
 
     def residuals(self, values: Array, told: bool = False) -> Array:
-        """(run - data) / sigma where something was measured; infinite where a run fails, unless that is told."""
+        """(run - data) / sigma where something was measured; infinite where there is no run, unless that is told."""
         parts = []
         for one in self.experiments:
             try:
                 run = self.run(values, one)
                 complete = len(run.t) == len(one.t)
-            except SimulationError:
+            except (SimulationError, ParameterError):
                 if told:
                     raise
                 complete = False
@@ -244,9 +245,10 @@ class _Problem:
 
 
 def _bounds(problem: _Problem, given: Mapping[str, Any] | None) -> tuple[Array, Array]:
-    masses = problem.module.metadata.get("masses", {})  # no run has a negative one
-    low = np.array([0.0 if name in masses else -np.inf for name in problem.names])
-    high = np.full(len(problem.names), np.inf)
+    low, high = np.full(len(problem.names), -np.inf), np.full(len(problem.names), np.inf)
+    for name, pair in bounds_of(problem.module.metadata).items():  # outside of which there is no run
+        if name in problem.names:
+            low[problem.names.index(name)], high[problem.names.index(name)] = pair
     if given is not None:
         require_mapping("bounds", given)
     for name, pair in (given or {}).items():

@@ -8,7 +8,7 @@ cut joint, times the wrench by which the equation acts there.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from ..describe.mechanism import JointSpec
 from ..graph import vectors as vec
@@ -23,6 +23,7 @@ from .kinematics import Kinematics
 
 #: Rows by twists are taken where they and the constraints are shorter than this times those of derivatives.
 SHORTER = 0.9
+Turns: TypeAlias = tuple[Expr, list[tuple[int, float]]]
 COMMON = ("r_x", "r_y", "r_z")  #: rows along axes that both chains share (see close_loop)
 
 
@@ -59,7 +60,7 @@ def pose_equations(kinematics: Kinematics, spec: JointSpec) -> PoseEquations:
     R, r = pose_symbols(graph, "")
     turn = graph.symbol("turn(z)")
     angles = [k for k, coordinate in enumerate(spec.joint.coordinates) if coordinate.kind == "angle"]
-    turns = sum_of_turns(graph, rotation, kinematics.q) if len(angles) == 1 else None
+    turns = turns_about_z(kinematics, spec)
     if turns is None:
         rows = spec.joint.closure(graph, R, r)
     else:
@@ -70,6 +71,16 @@ def pose_equations(kinematics: Kinematics, spec: JointSpec) -> PoseEquations:
     true = put_pose(R, r, rotation, position) | ({turn: turns[0]} if turns is not None else {})
     expressions = [*(row.expression for row in rows), *measured]
     return PoseEquations(tuple(row.label for row in rows), expressions, R, r, turn, true, turns is not None)
+
+
+def turns_about_z(kinematics: Kinematics, spec: JointSpec) -> Turns | None:
+    """What :func:`.angle_sums.sum_of_turns` finds of a cut joint with one angle, looked for once."""
+    kept: dict[str, Turns | None] = vars(kinematics).setdefault("_turns_about_z", {})
+    if spec.name not in kept:
+        alone = sum(coordinate.kind == "angle" for coordinate in spec.joint.coordinates) == 1
+        rotation = kinematics.poses.relative(spec.predecessor, spec.successor).rotation
+        kept[spec.name] = sum_of_turns(kinematics.graph, rotation, kinematics.q) if alone else None
+    return kept[spec.name]
 
 
 def pose_symbols(graph: Graph, of: str) -> tuple[Mat3, Vec3]:
@@ -129,10 +140,10 @@ def _operations(outputs: Sequence[Expr]) -> int:
 def twist_rows(kinematics: Kinematics, cut: int) -> dict[str, tuple[Expr, ...]]:
     """Rows of a cut joint by their labels; none of one whose loop lies in a plane, where derivatives are sums."""
     graph, poses, spec = kinematics.graph, kinematics.poses, kinematics.mechanism.joints[cut]
+    if turns_about_z(kinematics, spec) is not None:
+        return {}
     base, within = poses.between(spec.predecessor, spec.successor)
     closing = closing_gradients(kinematics, spec)
-    if closing.in_turns:
-        return {}
     outer, inner = poses.pair(spec.predecessor, spec.successor)
     rows = {}
     for label, (push, turn) in zip(closing.labels, closing.gradients, strict=False):

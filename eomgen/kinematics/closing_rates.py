@@ -19,7 +19,7 @@ from ..graph.differentiate import jvp
 from ..graph.substitute import substitute
 from ..graph.tensors import skew
 from ..graph.vectors import Mat3, Vec3
-from .closing_gradients import COMMON, SHORTER, pose_equations, pose_symbols, put_pose
+from .closing_gradients import COMMON, SHORTER, pose_equations, pose_symbols, put_pose, turns_about_z
 from .joint_rates import JointRates, joint_rates
 from .kinematics import Kinematics
 
@@ -60,9 +60,9 @@ def end_gammas(kinematics: Kinematics) -> dict[str, Expr]:
 def _gamma(kinematics: Kinematics, rates: Sequence[JointRates], cut: int) -> dict[str, Expr]:
     """Gamma of the rows of a cut joint by their labels; none of one whose loop lies in a plane."""
     graph, poses, spec = kinematics.graph, kinematics.poses, kinematics.mechanism.joints[cut]
-    labels, expressions, R, r, _, true, in_turns = pose_equations(kinematics, spec)
-    if in_turns:
+    if turns_about_z(kinematics, spec) is not None:
         return {}
+    labels, expressions, R, r, _, true, _ = pose_equations(kinematics, spec)
     first, second = _end(kinematics, rates, spec.predecessor, spec), _end(kinematics, rates, spec.successor, spec)
     (R_rate, r_rate), (R_second, r_second) = pose_symbols(graph, "'"), pose_symbols(graph, "''")
     along = put_pose(R, r, R_rate, r_rate)

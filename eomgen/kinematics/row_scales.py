@@ -2,11 +2,12 @@
 
 A gap of a joint or contact changes by about as much as the coordinates that make it: its size is that of its kind, the
 length scale of the mechanism or 1.  That of a loop far smaller than the mechanism, a thousandth or less, is the length
-of its own scaled gradient, or its rows would be lost beside the others.  A relation written by a user may be multiplied
-by anything, areas in m^2 or numbers of teeth; its size is the length of its scaled gradient, so that a factor does not
-matter (row equilibration: A. van der Sluis, Numerische Mathematik 14, 1969).  A gradient that is not told from rounding
-of the terms that were added in it (:mod:`~..graph.rounding_bounds`) is no size: such a row counts as nothing beside
-those terms.  Factors that are parameters stay symbols.
+of its own scaled gradient, or its rows would be lost beside the others.  The three rows of a gap in a loop of many
+links have the typical length of their columns as their size, or all others would be lost beside them.  A relation
+written by a user may be multiplied by anything, areas in m^2 or numbers of teeth; its size is the length of its scaled
+gradient, so that a factor does not matter (row equilibration: A. van der Sluis, Numerische Mathematik 14, 1969).  A
+gradient that is not told from rounding of the terms that were added in it (:mod:`~..graph.rounding_bounds`) is no size:
+such a row counts as nothing beside those terms.  Factors that are parameters stay symbols.
 """
 
 from __future__ import annotations
@@ -17,12 +18,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..graph.core import Expr
-from ..graph.rounding_bounds import is_rounding, terms_of, with_bounds
+from ..graph.rounding_bounds import is_rounding, terms_of, with_bounds, with_likely_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from ..limits.descriptions import BY_CHANCE, SMALL_LOOP
+from ..limits.descriptions import BY_CHANCE, LARGE_LOOP, SMALL_LOOP
 from ..limits.rounding import ROUNDED, TINY_ROOT
 from .kinematics import Kinematics
+from .row_groups import row_groups
 
 PLAIN = 4.0  #: a row whose gradient is a number within this factor of the kind's size keeps that
 
@@ -74,7 +76,26 @@ def _find_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
         elif written or TINY_ROOT < largest < SMALL_LOOP * usual.value:
             place = places[first.value < BY_CHANCE * second.value]
             found[i] = _length(substitute(gradient, place))
+    lengths = dict(zip(measured, at_first, strict=True))
+    for rows in _gaps(kinematics, measured):
+        total = sum(lengths[i].value ** 2 for i in rows)
+        if total <= (LARGE_LOOP * usual.value) ** 2:
+            continue
+        columns = len({k for i in rows for k, x in enumerate(c.jacobian[i]) if not x.is_zero})
+        if total > columns * (LARGE_LOOP * usual.value) ** 2:
+            typical = _length(substitute([x for i in rows for x in measured[i]], places[0])) * (1.0 / columns**0.5)
+            for i in rows:
+                found[i] = typical
     return tuple(found)
+
+
+def _gaps(kinematics: Kinematics, measured: Mapping[int, object]) -> list[list[int]]:
+    """The measured rows of each gap."""
+    members: dict[int, list[int]] = {}
+    for i, group in enumerate(row_groups(kinematics)):
+        if group > 0 and i in measured:
+            members.setdefault(group, []).append(i)
+    return list(members.values())
 
 
 def _moves(kinematics: Kinematics, row: Sequence[Expr]) -> bool:
@@ -130,7 +151,7 @@ def _numbers(kinematics: Kinematics, place: Mapping[Expr, Expr]) -> dict[str, fl
 
 def _lengths_at(gradients: Sequence[Sequence[Expr]], numbers: Mapping[str, float]) -> list[Length]:
     """The lengths of some gradients at one place; what they share is evaluated once."""
-    values, bounds = with_bounds([x for gradient in gradients for x in gradient], numbers)
+    values, bounds = with_likely_bounds([x for gradient in gradients for x in gradient], numbers)
     ends = np.cumsum([len(gradient) for gradient in gradients])[:-1]
     return [_length_of(*parts) for parts in zip(np.split(values, ends), np.split(bounds, ends), strict=True)]
 

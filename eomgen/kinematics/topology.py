@@ -2,8 +2,9 @@
 
 Which joint of a loop is cut: never one with a chosen independent coordinate if that can be helped; one whose
 coordinates the user did not name (and does not drive, and whose angular velocity they did not give) before one they
-named; among equals the one that leaves the shortest chains; then the last declared.  Pure constraints (a rod) are
-always cut, joints that cannot be cut (a point on a curve) never.
+named; in a loop of more than LONG joints the one with the most freedoms, since each equation of it is carried through
+the whole loop; among equals the one that leaves the shortest chains; then the last declared.  Pure constraints (a rod)
+are always cut, joints that cannot be cut (a point on a curve) never.
 """
 
 from __future__ import annotations
@@ -16,6 +17,10 @@ from ..describe.mechanism import JointSpec, Mechanism
 from ..errors import ModelError
 from ..frames import GROUND
 from ..records import dataclass
+
+#: Joints of a loop above which equations count more than lengths of chains: forces and multipliers of long loops are
+#: found by recursion over their bodies, whose work grows with the rows and not with the depth of the tree.
+LONG = 32
 
 
 @dataclass(frozen=True)
@@ -179,14 +184,18 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
     branches = _walk(n, joints, tree)
     _check_tree(mechanism, tree, branches)
     depths = _Depths(joints, branches)
-    improved = True
-    while improved:
+    improved, before = True, set[frozenset[int]]()
+    while improved and frozenset(tree) not in before:
+        before.add(frozenset(tree))
         improved = False
         for cut in sorted(set(range(len(joints))) - tree):
-            best, swap = (0, -cut), None
-            for other, longer in sorted(depths.changes(cut).items()):
-                if rank[other] == rank[cut] and (longer, -other) < best:
-                    best, swap = (longer, -other), other
+            best, swap = (0, 0, -cut), None
+            changes = depths.changes(cut)
+            long = len(changes) >= LONG
+            for other, longer in sorted(changes.items()):
+                more = len(joints[cut].velocities) - len(joints[other].velocities) if long else 0
+                if rank[other] == rank[cut] and (more, longer, -other) < best:
+                    best, swap = (more, longer, -other), other
             if swap is not None:
                 tree = tree - {swap} | {cut}
                 branches = _walk(n, joints, tree)

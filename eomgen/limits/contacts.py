@@ -37,3 +37,32 @@ NEAREST = 12
 #: inside are not unique: 1 / 1e-6 is lost of 16 digits there, and centres of spheres that touch it are outside or near
 #: its surface.
 FOCAL = 1e-6
+#: Part of a wheel's radius beside its axle where the rim still presses a cell of soil: at 0.98 the rim stands at 11
+#: degrees to the column, where the depth at which it crosses it changes five times as fast as the wheel moves ahead.
+BESIDE = 0.98
+#: Cosine of the inclination up to which a plate presses cells of soil, 34 degrees: the edges of 45 degrees stand at 11
+#: degrees to the column there, as rims at BESIDE do.
+UPRIGHT = 0.83
+#: Part of K over which shear of a cell of soil follows its sliding, and which it gives back.  Of a wheel on dry sand at
+#: slips of 0.02 to 0.6 the sum of shear is within 0.6 % of that of 1 - exp(-j / K), by quadrature over the arc.
+GRIP = 0.02
+#: Part of the strength of a cell of soil that is there before it has been sheared, so that u / T stays a number.
+UNSHEARED = 0.01
+#: Steps of Newton's method for the common normal of two ellipsoids, or of an ellipsoid and a line.  Measured on 40,000
+#: random pairs with known normals: after 12 steps the normal is right to 1e-7 for pairs that are apart by up to ten
+#: times their size, touch, or overlap by a twentieth of the least sum of their radii of curvature, but for 3 in 10,000
+#: of axes of 10 : 1; up to a fifth of it for axes of 4 : 1, but for 1 in 10,000.
+COMMON = 12
+#: Steps before these towards the normal at which ellipsoids scaled by one factor touch: each squares the distance less
+#: than it halves it, and Newton's method needs a start within some degrees (six, measured with the above).
+TWICE = 6
+#: Steps of Newton's method for the point of a height field that is nearest to a shape.  Measured on 40,000 random
+#: places above and below waves of slopes up to 1.2: right to 1e-6 after 4 steps up to 0.5 and after 6 up to 0.7 of the
+#: least radius of curvature; the error is squared with each further step.
+FOOT = 7
+#: Squared part of the distance of a shape from a point of a height field that may lie along the ground there: Newton's
+#: method leaves 1e-16 where it converges, and about 1 where it does not.
+ASTRAY = 1e-2
+#: Least part of a distance straight down that the nearest ground of a height field is away: the cosine of its slope, of
+#: grounds of up to 60 degrees.
+STEEP = 0.5

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from .descriptions import SMALL_LOOP
+
 #: A crossing is looked for where the weakest pivot is smaller; accelerations, known to V^2 EXACT / pivot^3, keep 1e-11
 #: there. NEAR_SQUARE: the same of squares of sines between columns.
 NEAR = 0.05
 NEAR_SQUARE = NEAR * NEAR
+SMALL = SMALL_LOOP  #: least size of a gap's rows: smaller loops have row sizes of their own, the rest is rounding
 REACH = 0.1  #: scaled motion to the first points on either side; halved while that promises a smaller error
 SHORTEST = 0.01  #: least reach
 MIDDLE = 5.0  #: the pivots at the first points are together so many times that here: the crossing is within 0.4 reaches

@@ -22,6 +22,10 @@ RESTING = 100.0
 PLANE = 1e-9
 #: A gap whose gradient is below this part of its kind's size is of a loop that small: more digits would be lost.
 SMALL_LOOP = 1e-3
+#: A gap whose columns are so many lengths long, as a root of mean squares, is of a loop that large: of more than twenty
+#: links.  Residuals beside these lengths would count as far from closed long before the loop does, and rows of
+#: directions, whose entries are 1, be lost beside its rows.
+LARGE_LOOP = 5.0
 #: Gradients at the initial values that are this part of those beside them vanish there by chance.
 BY_CHANCE = 1e-3
 #: How far given Euler parameters may be from length 1: six digits written.

@@ -6,6 +6,10 @@ EPS = 2.0**-52  #: distance from 1 to the next number
 #: A sum counts as zero within so many times eps of its terms: the numbers of a description are rounded before they come
 #: here, entries of a turned frame from three angles by up to nine products, a turned tensor from some 30.
 ROUNDED = 64.0 * EPS
+#: A bound in which all roundings add up counts as at most so many times that of independent ones, the root of their
+#: squares: at each of hundreds of rotations the first grows with abs(cos) + abs(sin), up to 1.41, the second by eps.
+#: Both are within it for sums of a thousand terms alike, the root of which it is.
+CHANCE = 32.0
 #: The same of a sum of products formed here, of which each is rounded once and the sum once.
 SUMMED = 4.0 * EPS
 #: The same of a constraint row over its own terms, each known to half of eps: what is smaller is noise for certain.

@@ -31,6 +31,9 @@ NEAR, OUTSIDE = 2.0 * WITHIN, 0.5
 APART = 1e-12
 UNHURRIED = 1e3  #: the least step, over which contacts shorten none further
 SUNK = 0.1  #: penetration at the start, relative to the thickness of both shapes, that is no rest on a floor
+#: Rate of coordinates by themselves (dq'/dq) times the step below which implicit systems are solved by parts: what the
+#: series leaves out is its square, far below the rate at which Newton's iterations converge.
+DRIFTING = 1e-2
 SLOW = 1e-3  #: rate of Newton's iterations in a Radau step above which the Jacobian is renewed
 
 # -- runs that stall -------------------------------------------------------------------------------------------------

@@ -45,6 +45,13 @@ def svd(A: Any, full_matrices: bool = True) -> tuple[Array, Array, Array]:
     return U, sizes, Vt
 
 
+def qr(A: Any) -> tuple[Array, Array]:
+    """Q of orthonormal columns and the triangle R."""
+    with _Told("a matrix has no orthonormal basis", A):
+        Q, R = np.linalg.qr(A)
+    return Q, R
+
+
 def singular_values(A: Any) -> Array:
     """Singular values, the largest first."""
     with _Told("singular values cannot be found", A):

@@ -53,7 +53,7 @@ def solve_dependent(
         if not np.isfinite(size):
             raise NonFiniteError("the constraints are not finite")
         J = scales.jacobian(C_q)
-        split = partition(J, rank, independent, strict=True)
+        split = partition(J, rank, independent, strict=True, sizes=scales.row_sizes(J))
         rounded = scales.rounding(q, J[: len(e)])
         if size <= EXACT or (step and size > 0.5 * before and within(e, SETTLED, rounded)):
             return q, C_q, split

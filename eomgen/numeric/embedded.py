@@ -80,7 +80,8 @@ def embed(
         As :func:`~.partitions.partition`.
     """
     scaled = scales.q[:, None] * M * scales.q
-    split = partition(scales.jacobian(C_q), rank, independent)
+    J = scales.jacobian(C_q)
+    split = partition(J, rank, independent, sizes=scales.row_sizes(J))
     matrix = split.B.T @ scaled @ split.B
     if not np.isfinite(matrix).all():
         raise NonFiniteError("the mass matrix is not finite")
@@ -230,7 +231,8 @@ def embedded_mass(M: Array, C_q: Array, scales: Scales, rank: int, independent: 
     PartitionError
         The coordinates are not independent here.
     """
-    split = partition(scales.jacobian(C_q), rank, independent, strict=True)
+    J = scales.jacobian(C_q)
+    split = partition(J, rank, independent, strict=True, sizes=scales.row_sizes(J))
     s_i = scales.q[split.independent]
     scaled = split.B.T @ (scales.q[:, None] * M * scales.q) @ split.B
     return np.asarray(scaled / s_i[:, None] / s_i)

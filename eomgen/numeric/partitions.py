@@ -27,7 +27,7 @@ class Partition(NamedTuple):
     rows: Indices  #: (r,) rows that determine the dependent coordinates; the others are redundant here
     inverse: Array  #: (r, r) inverse of J[rows, dependent]
     B: Array  #: (n, n - r) velocity transformation: v = B v_i (+ b_t), J B = 0
-    pivot: float  #: smallest pivot divided by the largest entry of J: 1 is good, 0 is singular
+    pivot: float  #: smallest pivot as a part of its row's size, divided by the largest: 1 is good, 0 is singular
     weakest: float = 1.0  #: the same where no column is preferred
 
     def particular(self, y: Array) -> Array:
@@ -41,7 +41,13 @@ class Partition(NamedTuple):
         return np.asarray(self.inverse.T @ f[self.dependent])
 
 
-def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict: bool = False) -> Partition:
+def partition(
+    J: Array,
+    rank: int,
+    independent: Sequence[int] | Indices,
+    strict: bool = False,
+    sizes: Array | None = None,
+) -> Partition:
     """Split the coordinates.
 
     Parameters
@@ -54,6 +60,8 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
         Preferred independent columns; the other columns are preferred as dependent.
     strict : bool
         Take exactly this set or fail.
+    sizes : (m,) array, optional
+        What the entries of each row are compared with (:meth:`~.scales.Scales.row_sizes`); all with the same if none.
 
     Returns
     -------
@@ -62,14 +70,15 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
     Raises
     ------
     PartitionError
-        Fewer than `rank` good pivots: below STATE of the largest entry of J, or CHOSEN if `strict`.
+        Fewer than `rank` good pivots: below STATE of the largest part of a row's size, or CHOSEN if `strict`.
     """
     n = J.shape[1]
     preferred = np.ones(n, dtype=bool)
     preferred[np.asarray(independent, dtype=np.intp)] = False
     columns = np.flatnonzero(preferred)
-    work = J.take(columns, axis=1) if strict else np.array(J)
-    size = float(np.abs(J).max()) if J.size else 0.0
+    scaled = J if sizes is None else J / sizes[:, None]
+    work = scaled.take(columns, axis=1) if strict else np.array(scaled)
+    size = float(np.abs(scaled).max()) if J.size else 0.0
     rows = np.empty(rank, dtype=np.intp)
     dependent = np.empty(rank, dtype=np.intp)
     smallest = weakest = size

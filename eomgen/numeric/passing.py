@@ -90,7 +90,7 @@ class Around(NamedTuple):
 
     def split(self, J: Array) -> Partition:
         """The partition of the coordinates."""
-        return partition(J, self.rank, self.independent)
+        return partition(J, self.rank, self.independent, sizes=self.scales.row_sizes(J))
 
     def away(self, q: Array) -> Array:
         """The scaled step from the state, smooth in q."""

@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from ..limits.crossings import SMALL
 from ..limits.rounding import ROUNDED
 from .given_rates import GivenRates
 from .space import Array, Indices, Space
@@ -32,6 +33,7 @@ class Scales(NamedTuple):
     c: Array  #: (m,) of the constraint rows, holonomic ones first
     space: Space | None = None  #: where q' = N(q) v, how coordinates move with velocities
     long: Array | None = None  #: (n,) 1.0 for velocities of lengths, 0.0 for those of angles
+    groups: Indices | None = None  #: (m,) of rows, by eomgen/kinematics/row_groups.py; None: all are compared
 
     @classmethod
     def of_kinds(
@@ -49,6 +51,19 @@ class Scales(NamedTuple):
     def jacobian(self, C_q: Array) -> Array:
         """The scaled Jacobian J = diag(1/s_c) C_q diag(s_q), (m, n), of all rows or the first; or (..., m, n)."""
         return C_q * self.q / self.c[: C_q.shape[-2], None]
+
+    def row_sizes(self, J: Array) -> Array:
+        """What entries of the rows of the scaled J (m, n) are compared with, all rows or the first, (m,)."""
+        largest = np.abs(J).max(axis=1, initial=0.0)
+        sizes = np.full(len(J), largest.max(initial=0.0) or 1.0)
+        if self.groups is None:
+            return sizes
+        groups = self.groups[: len(J)]
+        of_gaps = np.full(groups.max(initial=0) + 1, SMALL)
+        np.maximum.at(of_gaps, groups[groups > 0], largest[groups > 0])
+        sizes[groups > 0] = of_gaps[groups[groups > 0]]
+        sizes[groups < 0] = 1.0
+        return sizes
 
     def residual(self, C: Array) -> Array:
         """The scaled residual e = C / s_c, (m,), of all rows or the first."""

@@ -11,7 +11,7 @@ from ..limits.constraints import KEPT, LEFT
 from ..limits.crossings import NEAR_SQUARE
 from ..numeric.triangular import diagonal_blocks
 from .factor import outward
-from .loop_blocks import NOTHING, LoopBlocks, apart, total_magnitude
+from .loop_blocks import NOTHING, LoopBlocks, apart, largest, total_magnitude
 from .sparse import dot, times, transpose
 
 
@@ -53,7 +53,7 @@ class BodyLoops(LoopBlocks):
         moving = zip(a[: terms.n_v - terms.n_states], self.s, strict=False)
         size = total_magnitude([*(x / s for x, s in moving), *(x * self.unit for x in pushed)])
         conditions.append(graph.apply("lt", total_magnitude(left) * self.unit, size * LEFT + NOTHING))
-        dz = times(transpose(self.J, terms.n_v), self._factor[0].solve(left))
+        dz = times(transpose(self.J, terms.n_v), self._solver[0].solve(left))
         a = [x - s * d for x, s, d in zip(a, self.s, dz, strict=True)]
         return a, []
 
@@ -89,5 +89,11 @@ class BodyLoops(LoopBlocks):
                 square = dot(row, row)
                 angles += [(square, pivot * pivot)] if square is not None else []
             else:
-                angles.append(apart(*(left[m].get(c, self.terms.graph.zero) for m in rows for c in columns))[:2])
+                size, part, _ = apart(*(left[m].get(c, self.terms.graph.zero) for m in rows for c in columns))
+                squares = [dot(self.J[m], self.J[m]) for m in rows]
+                usual = largest(
+                    [x * (1.0 / len(self.J[m])) for m, x in zip(rows, squares, strict=True) if x is not None]
+                )
+                # columns that are short beside the usual entry have no angle but that of their rounding
+                angles.append((self.terms.graph.apply("max", size, usual * usual * NEAR_SQUARE), part))
         return angles

@@ -24,6 +24,7 @@ from ..kinematics.inertial_terms import inertial_terms
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
 from ..kinematics.near_pairs import describe_contacts, motion_axes, near_pairs
+from ..kinematics.row_groups import row_groups
 from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
@@ -31,6 +32,7 @@ from .drawn import describe_picture
 from .event_terms import describe_events, resets
 from .factor import has_long_paths
 from .given_multipliers import multiplier_values
+from .kept_rules import keep_rules
 from .rolling_discs import describe_discs
 from .soundness import flag_forces, not_finite_where
 from .state_terms import with_states
@@ -77,6 +79,7 @@ def collect_terms(
         alignment=c.aligned,
         coordinate_scales=tuple(scale[kind] for kind in kinematics.velocity_kinds),
         constraint_scales=row_scales(kinematics),
+        row_groups=row_groups(kinematics),
         n_dof=mobility.n_dof,
         preferred=_independent(kinematics, mobility),
         parent=_pattern(kinematics),
@@ -229,6 +232,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         **({"velocity_outputs": moved} if (moved := [o.name for o in m.outputs if o.of_velocities]) else {}),
         "body_names": [b.name for b in m.bodies],
         "masses": dict(_mass_parameters(kinematics)),
+        **keep_rules(m.requirements, kinematics.parameter_names),
         "joint_names": [j.name for j in m.joints],
         "euler_angles": _euler_angles(kinematics),
         "rolling_discs": describe_discs(kinematics),
@@ -244,6 +248,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
         "constraint_scales": list(mobility.row_scales),
+        **({"row_groups": list(groups)} if any(groups := row_groups(kinematics)) else {}),
         "alignment_labels": list(c.aligned_joints),
         "fragile_forces": [name for name, _ in flag_forces(kinematics)],
         **({"not_finite_where": where} if (where := not_finite_where(kinematics)) else {}),

@@ -13,8 +13,9 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from ..graph.core import Expr
+from ..kinematics.row_groups import ALL, UNIT
 from ..limits.constraints import GENTLE, LEFT, TIKHONOV, UNMOVED
-from ..limits.crossings import NEAR_SQUARE
+from ..limits.crossings import NEAR_SQUARE, SMALL
 from ..limits.rounding import ROW
 from .sparse import Row, SparseFactor, dot, factorize, fill, gram, in_parts, rows_of, times, transpose
 from .terms import SystemTerms
@@ -115,7 +116,7 @@ class LoopBlocks(ABC):
             term = graph.apply("select", graph.apply("lt", graph.constant(UNMOVED * UNMOVED), size), term, graph.one)
         for i, row in enumerate(G):
             row[i] = row.get(i, graph.zero) + term
-        return factorize(G), term
+        return factorize(G, term), term
 
     # -- position -------------------------------------------------------------------------------------------------
     def closing(self) -> list[Expr]:
@@ -143,8 +144,8 @@ class LoopBlocks(ABC):
 
     # -- velocity and acceleration --------------------------------------------------------------------------------
     @cached_property
-    def _factor(self) -> tuple[SparseFactor, tuple[int, int]]:
-        """The factor of J J^T, and how many passes of both corrections by it leave no trace of its regularisation."""
+    def _solver(self) -> tuple[SparseFactor, tuple[int, int]]:
+        """The factor of J J^T and a term, and how many passes of both corrections leave no trace of that."""
         if self.gentle:
             return self._regularised(self.J, GENTLE)[0], self.passes
         if self.redundant:
@@ -156,12 +157,10 @@ class LoopBlocks(ABC):
 
         Velocities are of order 1, accelerations of order 2.
         """
-        factor, passes = self._factor
-        columns = transpose(self.J, self.terms.n_v)
-        for _ in range(passes[order - 1]):
-            e = [a + b for a, b in zip(r, times(self.rows, x), strict=True)]
-            dz = times(columns, factor.solve(e))
-            x = [a - s * b for a, s, b in in_parts(list(zip(x, self.s, dz, strict=True)), x)]
+        factor, passes = self._solver
+        e = [a + b for a, b in zip(r, times(self.rows, x), strict=True)]
+        dz = times(transpose(self.J, self.terms.n_v), factor.settle(e, passes[order - 1]))
+        x = [a - s * b for a, s, b in in_parts(list(zip(x, self.s, dz, strict=True)), x)]
         if self.gentle:
             graph = self.terms.graph
             left = total_magnitude([a + b for a, b in zip(r, times(self.rows, x), strict=True)]) * self.unit
@@ -171,12 +170,16 @@ class LoopBlocks(ABC):
         return x
 
     def nearest(self, x: Sequence[Expr], r: Sequence[Expr], rows: int, factor: SparseFactor, passes: int) -> list[Expr]:
-        """The nearest x with C_q x + r = 0 of so many rows, r scaled as they are, by passes with their factor."""
+        """The nearest x with C_q x + r = 0 of so many rows, r scaled as they are, by passes with their factor.
+
+        All but the last are taken at once, of what each leaves, which needs no rows; what rounding leaves of these the
+        last one mends.
+        """
         x, J = list(x), self.J[:rows]
         columns = transpose(J, self.terms.n_v)
-        for _ in range(passes):
+        for together in (passes - 1, 1) if passes > 1 else (1,):
             e = [a + b for a, b in zip(r, times(self.rows[:rows], x), strict=True)]
-            dz = times(columns, factor.solve(e))
+            dz = times(columns, factor.settle(e, together))
             x = [a - k * b for a, k, b in in_parts(list(zip(x, self.s, dz, strict=True)), x)]
         return x
 
@@ -190,12 +193,12 @@ class LoopBlocks(ABC):
     @property
     def factor(self) -> SparseFactor:
         """Of J J^T, of all rows."""
-        return self._factor[0]
+        return self._solver[0]
 
     @property
     def corrections(self) -> int:
         """Passes by it after which velocities are projected."""
-        return self._factor[1][0]
+        return self._solver[1][0]
 
     def regularised(self, rows: Sequence[Row]) -> SparseFactor:
         """The factor of J J^T of some rows, which may depend on each other."""
@@ -236,12 +239,31 @@ class LoopBlocks(ABC):
             sound = condition if sound == self.terms.graph.one else self.terms.graph.apply("and", sound, condition)
         return sound
 
+    @property
+    def _groups(self) -> tuple[int, ...]:
+        return self.terms.row_groups or (ALL,) * len(self.J)
+
     def _separate_rows(self) -> Expr:
-        """Whether as many rows as the rank are neither short beside the longest nor near to those before them."""
-        graph, pivots = self.terms.graph, self._factor[0].pivots
+        """Whether as many rows as the rank are neither short beside their group nor near to those before them."""
+        graph, pivots = self.terms.graph, self._solver[0].pivots
         squares = [graph.zero if (x := dot(row, row)) is None else x for row in self.J]
-        held, limit = graph.zero, largest(squares) * NEAR_SQUARE
-        for pivot, square in zip(pivots, squares, strict=True):
+        held, limits = graph.zero, self._shortest(squares)
+        for pivot, square, group in zip(pivots, squares, self._groups, strict=True):
             separate = graph.apply("lt", square * NEAR_SQUARE, pivot)
-            held = held + graph.apply("and", separate, graph.apply("lt", limit, square))
+            held = held + graph.apply("and", separate, graph.apply("lt", limits[group], square))
         return graph.apply("lt", self.terms.n_v - self.terms.n_dof - 0.5, held)
+
+    def _shortest(self, squares: Sequence[Expr]) -> dict[int, Expr]:
+        """Squares of the lengths at which rows of each group are short."""
+        graph, members = self.terms.graph, dict[int, list[Expr]]()
+        for square, group in zip(squares, self._groups, strict=True):
+            members.setdefault(group, []).append(square)
+        unit = graph.constant(1.0) / (self.unit * self.unit)
+        found = {}
+        for group, own in members.items():
+            if group == ALL:
+                size = largest(squares)
+            else:
+                size = unit if group == UNIT else graph.apply("max", largest(own), unit * (SMALL * SMALL))
+            found[group] = size * NEAR_SQUARE
+        return found

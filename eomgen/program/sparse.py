@@ -107,6 +107,17 @@ class SparseFactor:
     columns: tuple[Row, ...]
     pivots: tuple[Expr, ...]  #: by index
     reciprocals: tuple[Expr, ...]
+    term: Expr | None = None  #: what A has on its diagonal beyond the matrix that is meant
+
+    def settle(self, right: Sequence[Expr], passes: int) -> list[Expr]:
+        """The sum of the z of so many passes, each for what the last one left: (A - t I) z = right leaves t z."""
+        z = total = self.solve(right)
+        for _ in range(passes - 1):
+            term = self.term
+            assert term is not None
+            z = self.solve([term * x for x in in_parts(z, z)])
+            total = [a + b for a, b in in_parts(list(zip(total, z, strict=True)), z)]
+        return total
 
     def solve(self, right: Sequence[Expr]) -> list[Expr]:
         """x with A x = right."""
@@ -124,8 +135,11 @@ class SparseFactor:
         return x
 
 
-def factorize(matrix: Sequence[Mapping[int, Expr]]) -> SparseFactor:
-    """Factor a symmetric positive definite matrix given by both triangles, without square roots."""
+def factorize(matrix: Sequence[Mapping[int, Expr]], term: Expr | None = None) -> SparseFactor:
+    """Factor a symmetric positive definite matrix given by both triangles, without square roots.
+
+    ``term`` is what its diagonal has beyond the matrix that is meant; see :meth:`SparseFactor.settle`.
+    """
     work = [dict(row) for row in matrix]
     order = minimum_degree(matrix)
     columns: list[Row] = [{} for _ in work]
@@ -142,4 +156,4 @@ def factorize(matrix: Sequence[Mapping[int, Expr]]) -> SparseFactor:
             for j in below[: a + 1]:
                 change = columns[i][k] * work[i][j]
                 work[k][j] = work[j][k] = work[k][j] - change if j in work[k] else -change
-    return SparseFactor(tuple(order), tuple(columns), tuple(pivots), tuple(reciprocals))
+    return SparseFactor(tuple(order), tuple(columns), tuple(pivots), tuple(reciprocals), term)

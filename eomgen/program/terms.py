@@ -88,6 +88,7 @@ class SystemTerms:
     motion_axes: Row = ()  #: (6 n,) of q, with such lists: the twist that each velocity causes, at the origin
     input_rates: tuple[tuple[str, str], ...] = ()  #: inputs with the input that is their rate
     impacts: bool = False  #: whether an event is a gap with a restitution
+    row_groups: tuple[int, ...] = ()  #: per row which it is compared with, as in kinematics/row_groups.py; none: all
     n_states: int = 0  #: first-order states, the last of the velocities: of unit inertia, no coordinate's rate
     projects: bool = True  #: whether rhs takes the projected state; not with Baumgarte's stabilisation
 

@@ -102,6 +102,11 @@ class BoundModel(Assembled, Momenta):
         return np.array(self.kernels.context.p)
 
     @cached_property
+    def _settled(self) -> dict[tuple[Any, ...], Any]:
+        """What runs with the same arguments have in common; see :mod:`..simulation.settled`."""
+        return {}
+
+    @cached_property
     def _parameters(self) -> Mapping[str, float]:
         """The parameters bound, by name; they never change."""
         return MappingProxyType(dict(zip(self.p_names, self.p.tolist(), strict=True)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from .bound_model import BoundModel
     from .change_points import ChangePoint
 
+FEW = 10_000  #: numbers at most of the raw states that are kept with a run, until its residuals are asked for
+NO_RESIDUALS = Residuals()
+
 
 class Columns:
     """Everything that can be read from the states of a run, evaluated when first asked for.
@@ -30,7 +33,8 @@ class Columns:
     t : (n_t,) array
     x : (n_x, n_t) array
         Projected.
-    u : (n_u, n_t) array
+    u : (n_u, n_t) array, or callable
+        What gives it when it is first needed.
     steps : callable, optional
         Gives t, x and u of the integrator's steps, where other times are stored.
     """
@@ -40,13 +44,18 @@ class Columns:
         module: BoundModel,
         t: Array,
         x: Array,
-        u: Array,
+        u: Array | Callable[[], Array],
         steps: Callable[[], tuple[Array, Array, Array]] | None = None,
     ) -> None:
-        self.module, self.t, self.x, self.u, self._steps = module, t, x, u, steps
+        self.module, self.t, self.x, self._u, self._steps = module, t, x, u, steps
         self._known: dict[str, Array] = {}
         # the first group wins: an output may repeat the coordinate of its own name, and the model may use T for its own
         self.names = column_names(module.layout)
+
+    @cached_property
+    def u(self) -> Array:
+        """Inputs (n_u, n_t)."""
+        return self._u() if callable(self._u) else self._u
 
     @cached_property
     def _groups(self) -> list[tuple[tuple[str, ...], Callable[[], Array]]]:
@@ -166,20 +175,35 @@ def _described(layout: Layout) -> dict[str, Any]:
     }
 
 
-def project(module: BoundModel, t: Array, raw: Array, forcing: Forcing | None = None) -> tuple[Residuals, Array]:
-    """Projected states (n_x, k), and how far the raw ones were off, with the inputs of the run as they are then."""
-    n = module.n_q
+def project(
+    module: BoundModel, t: Array, raw: Array, forcing: Forcing | None = None
+) -> tuple[Residuals | Callable[[], Residuals], Array]:
+    """Projected states (n_x, k), and how far the raw ones were off, with the inputs of the run as they are then.
+
+    Of a short run the residuals are a function, which evaluates them when they are first asked for.
+    """
     if not t.size or not (module.n_rows or module.layout.space):
-        return Residuals(), raw
+        return NO_RESIDUALS, raw
     led = forcing is not None and forcing.constrained
     u = forcing.sample(t, raw) if led and forcing is not None else None
-    x = module.project(raw, t=t, u=u)
+    x = module.project.kernel(raw, None, u, None, t)
     if not module.n_rows:
-        return Residuals(), x
+        return NO_RESIDUALS, x
     here = u
     if led and forcing is not None and forcing.feedback:
         here = forcing.sample(t, x)
         x = module.project(x, t=t, u=here)
+    if raw.size <= FEW and u is None:
+        return partial(_residuals, module, t.copy(), raw), x  # the user may change what he is given
+    return _residuals(module, t, raw, x, u, here), x
+
+
+def _residuals(
+    module: BoundModel, t: Array, raw: Array, x: Array | None = None, u: Array | None = None, here: Array | None = None
+) -> Residuals:
+    """How far raw states and projected ones are from the constraints, at the inputs of each."""
+    n = module.n_q
+    x = module.project.kernel(raw, None, None, None, t) if x is None else x
     position = module.constraints.every
     velocity = module.velocity_constraints.every
     correction = np.abs(x - raw)
@@ -193,7 +217,7 @@ def project(module: BoundModel, t: Array, raw: Array, forcing: Forcing | None = 
         velocity=largest(velocity(x, t=t, u=here)),
         correction_position=largest(correction[:n]),
         correction_velocity=largest(correction[n:]),
-    ), x
+    )
 
 
 def units_of(module: BoundModel, names: Sequence[str]) -> dict[str, str]:

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import UsageError
 from ..kernel_table import NAMED, Sizes
 from ..numeric.scales import Array, Scales, Space
+from .allowed_parameters import require_allowed
 from .near_names import check_names, plain_name, without_dots
 from .room import read_number, read_numbers
 
@@ -99,7 +100,10 @@ class Layout:
         self.velocity_lengths = np.array([kind == "length" for kind in self.velocity_kinds], dtype=bool)
         self.length: float = float(data.get("length_scale") or 1.0)
         rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
-        self.scales = Scales.of_kinds(self.velocity_kinds, rows, self.length, self.space)
+        groups = data.get("row_groups")
+        self.scales = Scales.of_kinds(self.velocity_kinds, rows, self.length, self.space)._replace(
+            groups=np.array(groups, dtype=np.intp) if groups else None
+        )
         self.row_lengths = np.array([kind == "length" for kind in data.get("constraint_kinds", ())], dtype=bool)
         self.independent_moving = self.independent[self.independent < self.moving]  #: of the mechanism
         #: coordinates of the independent velocities, where each is the rate of one
@@ -122,12 +126,14 @@ class Layout:
         reference = data.get("q_reference")
         neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
         self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
+        self._allowed = b""  #: the last parameters that were allowed
         self.sizes = Sizes(**{name: getattr(self, name) for name in Sizes._fields})
 
     def sized(self, sizes: Array) -> Layout:
         """The same with typical sizes of velocities and constraint rows (n_v + n_c,) at parameters of other values.
 
-        The length scale stays as declared where no velocity is one of length and no row is a gap.
+        The length scale stays as declared where no velocity is one of length and no row is a gap; gaps that have sizes
+        of their own change it in proportion.
         """
         s_q, s_c = sizes[: self.n_v], sizes[self.n_v :]
         if np.array_equal(s_q, self.scales.q) and np.array_equal(s_c, self.scales.c):
@@ -136,6 +142,9 @@ class Layout:
         usual = self.row_lengths & (self.scales.c == self.length)  # other rows have sizes of their own
         lengths = [*s_q[self.velocity_lengths], *s_c[usual]]
         found.length = float(lengths[0]) if lengths else self.length
+        if not lengths and self.scales.groups is not None and (self.scales.groups > 0).any():
+            gap = int(np.argmax(self.scales.groups > 0))  # of a large loop, which grows with its links
+            found.length = float(self.length * s_c[gap] / self.scales.c[gap])
         found.scales = self.scales._replace(q=s_q, c=s_c)
         found.place_scales = found.scales
         if self.given_rates:
@@ -209,7 +218,8 @@ class Layout:
             result = read_numbers(f"the {what}s", given)
         if result.shape != (len(names),):
             raise UsageError(f"the {what}s must have shape ({len(names)},) ({', '.join(names)}), not {result.shape}")
-        self._check_masses(what, names, result)
+        if what == "parameter":
+            self.require_allowed(result)
         return result
 
     def explain_constants(self, message: str, p: Any) -> str:
@@ -229,15 +239,19 @@ class Layout:
         remedy = "look for a mass, an inertia or a length of 0, a root of a negative number or an overflow"
         return f"{head} with {', '.join(shown)}{which}{cause}; {remedy}"
 
-    def _check_masses(self, what: str, names: Sequence[str], values: Array) -> None:
-        """Refuse a negative value of a parameter that is a body's mass."""
-        for name, body in self.metadata.get("masses", {}).items() if what == "parameter" else ():
-            value = values[names.index(name)]
-            if value < 0.0:
-                raise UsageError(
-                    f"parameter {name} is the mass of body {body!r}, which must be 0 or positive, not {value:g}; "
-                    "write check_inertia: false in the model to allow negative masses"
-                )
+    def require_allowed(self, p: Array) -> None:
+        """Refuse parameters (n_p,), or (n_p, k) of many runs, that elements do not allow; the same again at no cost.
+
+        Raises
+        ------
+        ParameterError
+        """
+        if p.ndim > 1:
+            return require_allowed(self.metadata, p)
+        given = p.tobytes()
+        if given != self._allowed:
+            require_allowed(self.metadata, p)
+            self._allowed = given
 
 
 def acceleration_name(velocity: str) -> str:

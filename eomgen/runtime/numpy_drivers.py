@@ -113,7 +113,8 @@ class Drivers:
         kept = self._scales  # read once: another thread may replace it
         if kept is None or kept[0] is not c:
             values = np.asarray(self.blocks["scales"](0.0, np.empty(0), np.empty(0), c), dtype=float)
-            self._scales = kept = (c, Scales(values[: self.layout.n_v], values[self.layout.n_v :], self.layout.space))
+            n = self.layout.n_v
+            self._scales = kept = (c, self.layout.scales._replace(q=values[:n], c=values[n:]))
         return kept[1]
 
     def position(self, t: float, u: Array, c: Array, q: Array) -> tuple[Array, Array]:
@@ -201,7 +202,8 @@ class Drivers:
         weakest = 1.0
         if layout.n_c:
             try:
-                weakest = partition(scales.jacobian(position(q)[1]), layout.rank, layout.independent).weakest
+                J = scales.jacobian(position(q)[1])
+                weakest = partition(J, layout.rank, layout.independent, sizes=scales.row_sizes(J)).weakest
             except PartitionError:
                 weakest = 0.0
         return np.concatenate([q if layout.space is None else layout.space.normalised(q), v]), weakest

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, SupportsIndex, overload
 
 from ..numeric.scales import Array
@@ -18,6 +18,11 @@ class Named(list[Array]):
     def __init__(self, values: Sequence[Array], names: Sequence[str]) -> None:
         super().__init__(values)
         self.names = tuple(names)
+
+    @classmethod
+    def of(cls, values: Sequence[Array], header: Mapping[str, Any]) -> Named:
+        """What belongs to the events of a run, by the names in its header; without names they are counted."""
+        return cls(values, header.get("event_names") or [f"event_{k}" for k in range(len(values))])
 
     @overload
     def __getitem__(self, key: str | SupportsIndex) -> Array: ...
@@ -65,3 +70,10 @@ class Residuals(NamedTuple):
     velocity: float = 0.0
     correction_position: float = 0.0  #: largest change of a coordinate by the projection
     correction_velocity: float = 0.0  #: largest change of a velocity
+
+    @classmethod
+    def of(cls, given: Residuals | Mapping[str, float] | Callable[[], Residuals]) -> Residuals:
+        """Residuals as a run has them: themselves, by name, or a function that evaluates them."""
+        if isinstance(given, Residuals):
+            return given
+        return given() if callable(given) else cls(**given)

@@ -246,13 +246,20 @@ class Forcing:
             input.
         """
         self.span = (start, end)
-        self.enter(start, end)
+        if self:
+            self.enter(start, end)
         if self.layout.input_rates:
             from .rate_checks import require_agreement
             from .signal_rates import require_smooth
 
             require_smooth(self, start, end)
             require_agreement(self, start, end)
+
+    def again(self) -> Forcing:
+        """The same inputs for another run, which has times of its own."""
+        other = object.__new__(Forcing)
+        other.__dict__.update(self.__dict__)
+        return other
 
     def enter(self, start: float, end: float) -> None:
         """Go on with the part of a run between two corners: at its ends tables have the piece inside it."""

@@ -78,6 +78,21 @@ def jumps(operation: str) -> bool:
     return operation in OPERATIONS and OPERATIONS[operation].jumps
 
 
+def play_arrays(tape: Sequence[Any], p: Array, x: Array) -> list[Any]:
+    """The results of a tape at parameters (n_p,) or (n_p, k) and at x (n, k), each a number or an array (k,)."""
+    code, numbers, out = tape
+    leaves = {"const": numbers, "p": p, "x": x}
+    results: list[Any] = []
+    with np.errstate(all="ignore"):
+        for op, a, b, c in code:
+            if op in leaves:
+                results.append(np.asarray(leaves[op][a], dtype=float))
+            else:
+                row = OPERATIONS[op]
+                results.append(row.array(*(results[a], results[b], results[c])[: row.arity]))
+    return [results[k] for k in out]
+
+
 def _tape(given: Sequence[Any]) -> Tape:
     code, numbers, out = given
     return [(str(op), int(a), int(b), int(c)) for op, a, b, c in code], list(numbers), list(out)

@@ -72,19 +72,22 @@ class Trajectory:
         sample: Callable[[Array], Trajectory] | None = None,
         described: Callable[[], dict[str, Any]] = dict,
     ) -> None:
-        self.t, self.x = t, x
+        self.t, self.x, self.names = t, x, columns.names
         self._columns, self._header, self._described = columns, header, described
-        self.names = columns.names
         self.units: dict[str, str] = header.get("units", {})
-        self.residuals = Residuals(**header["residuals"])
-        names = header.get("event_names") or [f"event_{k}" for k in range(len(t_events))]
-        self.t_events, self.x_events = Named(t_events, names), Named(x_events, names)
-        self.nfev, self.njev = int(header.get("nfev", 0)), int(header.get("njev", 0))
-        self.nlu = int(header.get("nlu", 0))
-        self.status, self.message = int(header.get("status", 0)), str(header.get("message", ""))
-        self._sample = sample
+        self._times, self._states, self._sample = t_events, x_events, sample
 
-    metadata = cached_property[dict[str, Any]](lambda self: {**self._described(), **self._header})
+    t_events = cached_property[Named](lambda self: Named.of(self._times, self._header))
+    x_events = cached_property[Named](lambda self: Named.of(self._states, self._header))
+    nfev = cached_property[int](lambda self: int(self._header.get("nfev", 0)))
+    njev = cached_property[int](lambda self: int(self._header.get("njev", 0)))
+    nlu = cached_property[int](lambda self: int(self._header.get("nlu", 0)))
+    status = cached_property[int](lambda self: int(self._header.get("status", 0)))
+    message = cached_property[str](lambda self: str(self._header.get("message", "")))
+    residuals = cached_property[Residuals](lambda self: Residuals.of(self._header["residuals"]))
+    metadata = cached_property[dict[str, Any]](
+        lambda self: {**self._described(), **self._header, "residuals": self.residuals._asdict()}
+    )
 
     @property
     def name(self) -> str:

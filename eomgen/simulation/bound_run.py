@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,11 +56,8 @@ class Run:
 
     def stall_check(self, start: float, end: float, x: Array, longest: float, kept: int) -> StallCheck | None:
         """What ends the run where its steps lead nowhere; a slim package has none."""
-        try:
-            from .stalling import StallCheck
-        except UnavailableError:
-            return None
-        return StallCheck(start, end, x, self.module.n_q, longest, self.troubled, kept)
+        check = find_stall_check()
+        return None if check is None else check(start, end, x, self.module.n_q, longest, self.troubled, kept)
 
     def remember(self, name: str, kernel: Timed) -> None:
         """Keep a failure as the cause, unless its state came out of an earlier failure as NaN."""
@@ -115,12 +112,32 @@ class Run:
         return SimulationError(f"{method} stopped near {when} of {end:.6g} s. Last failure: {cause}")
 
 
+@cache
+def find_stall_check() -> type[StallCheck] | None:
+    """The class of what ends runs whose steps lead nowhere; None in a slim package."""
+    try:
+        from .stalling import StallCheck
+    except UnavailableError:
+        return None
+    return StallCheck
+
+
 def watch_run(start: float, end: float, progress: bool | None) -> Progress | None:
     """What shows the progress of a run: if that is asked for, or by default on a terminal."""
+    found = _progress()
+    if isinstance(found, UnavailableError):
+        if progress:
+            raise found
+        return None
+    shown, wanted = found
+    return shown(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
+
+
+@cache
+def _progress() -> Any:
+    """The class of what shows progress and the function that tells whether to; in a slim package why there is none."""
     try:
         from .progress import Progress, wanted
-    except UnavailableError:
-        if progress:
-            raise
-        return None
-    return Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
+    except UnavailableError as error:
+        return error
+    return Progress, wanted

@@ -7,6 +7,7 @@ for an interrupt.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -88,12 +89,17 @@ def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bo
     """
     check_names("option of simulate", options, OPTIONS)
     given = options if checked else check_tolerances(n, span, {"rtol": SCIPY_RTOL, "atol": SCIPY_ATOL, **options})
-    if not isinstance(given["rtol"], float):
-        raise UsageError(f"rtol must be one number for a compiled method, not of shape {given['rtol'].shape}")
-    limits = {"max_step": given.get("max_step", np.inf), "first_step": given.get("first_step", 0.0)}
+    limits = {"max_step": given.get("max_step", inf), "first_step": given.get("first_step", 0.0)}
     atol = np.empty(n)
     atol[:] = given["atol"]
-    return {"rtol": given["rtol"], "atol": atol, **limits}
+    return {"rtol": require_one(given["rtol"]), "atol": atol, **limits}
+
+
+def require_one(rtol: Any) -> float:
+    """A relative tolerance as compiled methods take it, or a UsageError."""
+    if not isinstance(rtol, float):
+        raise UsageError(f"rtol must be one number for a compiled method, not of shape {rtol.shape}")
+    return rtol
 
 
 def integrate_compiled(
@@ -130,10 +136,9 @@ def integrate_compiled(
         "stall_check": None if stall_check is None else stall_check.look,
         "keep": None if checkpoint is None else (checkpoint.every, checkpoint.save),
     }  # fmt: skip
-    settings = stepper_options(len(x0), abs(end - start), options, checked=True)
-    journey = core.journey(
-        method, module.kernels.context, start, x0, end, signals=forcing.encode(), plan=plan, **settings
-    )
+    rtol, atol = require_one(options["rtol"]), options["atol"]
+    limits = options.get("max_step", inf), options.get("first_step", 0.0)
+    journey = core.journey(method, module.kernels.context, start, x0, end, rtol, atol, *limits, forcing.encode(), plan)
     status = 0
     if checkpoint is not None and checkpoint.kept is not None:
         try:

@@ -13,6 +13,9 @@ EVERY = 0.2  #: seconds between updates
 STRIDE = 64  #: calls between looks at the clock
 
 
+_asked: list[Any] = [None, False]  #: stderr at the last run, and whether it is a terminal
+
+
 class Progress:
     """Shows how far a run has come, once it has taken a while.
 
@@ -108,4 +111,8 @@ def in_notebook() -> bool:
 
 def wanted(progress: bool | None) -> bool:
     """Whether to watch a run: as asked, or when stderr is a terminal or this is a notebook."""
-    return sys.stderr.isatty() or in_notebook() if progress is None else read_flag("progress", progress)
+    if progress is not None:
+        return read_flag("progress", progress)
+    if _asked[0] is not sys.stderr:  # to ask takes as long as the start of a short run
+        _asked[:] = sys.stderr, sys.stderr.isatty()
+    return _asked[1] or in_notebook()

@@ -18,6 +18,8 @@ from .integrate import Solution
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
+PLAIN = frozenset((float,))  #: types of options that nobody changes afterwards
+
 
 def record(
     module: BoundModel,
@@ -36,7 +38,8 @@ def record(
     """
     residuals, x = project(module, solution.t, solution.x, forcing)
     described: Callable[[], dict[str, Any]] = partial(_described, module, forcing, options)
-    if forcing.values or not all(type(value) is float for value in options.values()):  # the user may change them
+    varies = bool(forcing.values)
+    if varies or not PLAIN.issuperset(map(type, options.values())):  # the user may change them
         described = described().copy
     header: dict[str, Any] = {
         "method": method,
@@ -46,25 +49,25 @@ def record(
         "status": solution.status,
         "message": solution.message,
         **solution.counts,
-        "residuals": residuals._asdict(),
+        "residuals": residuals,
         "event_names": list(event_names),
+        "units": units_of_layout(module.layout),
     }
     steps: Callable[[], tuple[Array, Array, Array]] | None = None
     if solution.steps is not None:
         walked = solution.steps
         steps = lambda: (*walked, forcing.sample(*walked))  # noqa: E731
-    columns = Columns(module, solution.t, x, forcing.sample(solution.t, x), steps)
-    header["units"] = units_of_layout(module.layout)
-    events = [
-        project(module, t, found, forcing)[1] for t, found in zip(solution.t_events, solution.x_events, strict=True)
-    ]
+    sampled = forcing.sample(solution.t, x) if varies else partial(forcing.sample, solution.t, x)
+    columns = Columns(module, solution.t, x, sampled, steps)
+    happened = zip(solution.t_events, solution.x_events, strict=True) if solution.t_events else ()
+    events = [project(module, t, found, forcing)[1] for t, found in happened]
     dense = solution.dense
     sample: Callable[[Array], Trajectory] | None = None
     if dense is not None:
 
         def sample(t: Array) -> Trajectory:
             found, states = project(module, t, dense(t), forcing)
-            head = described() | header | {"residuals": found._asdict()}
+            head = described() | header | {"residuals": found}
             return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states)), head)
 
     return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample, described)

@@ -28,6 +28,8 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     """Start and end (s) of what a user gives as the span of a run."""
     if span is None:
         return 0.0, declared
+    if type(span) is tuple and [*map(type, span)] == [float, float] and isfinite(span[0]) and isfinite(span[1]):
+        return span
     if isinstance(span, (tuple, list)):
         what = "span must be (start, end) in seconds: an end"
         span = [read_number(what, end) if isinstance(end, str) else end for end in span]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from math import inf, isfinite
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -23,6 +24,7 @@ from .integrate import Interrupted, Solution, check_options, choose_solver, inte
 from .passed_limits import warn_of_limits
 from .recording import record
 from .run_arguments import check_method, declare, find_span, find_state, ordered_times, own_step
+from .settled import settle
 from .stalled import Crawling
 from .tolerances import IMPLICIT, check_tolerances
 
@@ -135,8 +137,12 @@ def simulate(
         The run needs SciPy, which is not installed.
     """
     settings: dict[str, Any] = {**options}
-    kept = pause = None
-    method, step = own_step(module, method, step)
+    kept = pause = usual = size = None
+    alone = inputs is None and events is None and controllers is None and checkpoint is None and resume is None
+    if alone and max_step is None and first_step is None and step is None and not settings:
+        usual = settle(module, method, rtol, atol)
+    if usual is None:
+        method, step = own_step(module, method, step)
     if checkpoint is not None:
         from .checkpoint import Checkpoint, identify
         from .solver_state import Pause
@@ -144,48 +150,58 @@ def simulate(
         kept = Checkpoint(checkpoint, checkpoint_every, resume)
     elif resume is not None:
         raise UsageError("resume needs checkpoint=, the file to continue from")
-    if (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof):
+    if usual is None and (
+        (isinstance(method, str) and method == "kinematic") or (method is None and not module.layout.n_dof)
+    ):
         from .driven import follow_drivers
 
         steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **settings}
         motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, kept, steps)
         if motion is not None:
             return motion
-    if (isinstance(method, str) and method == "moreau") or "rigid_only" in module.metadata:
+    if usual is None and ((isinstance(method, str) and method == "moreau") or "rigid_only" in module.metadata):
         from .moreau import step_rigidly
 
         others: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
         others |= {"dense_output": dense_output, "checkpoint": checkpoint, "controllers": controllers, **settings}
         return step_rigidly(module, span, initial, parameters, inputs, method, step, t_eval, events, progress, others)
-    step, dense_output = check_method(method, step), read_flag("dense_output", dense_output)
-    declared = declare(module)
-    method = declared["method"] if method is None else method
-    watched = Events(module.layout, events)
-    if controllers is not None:
-        from .controllers import ControlledEvents
-
-        watched = ControlledEvents(module.layout, events, controllers, kept is not None)
-    forcing = Forcing(module.layout, inputs)
-    compiled = can_run(module, method, forcing) and settings.keys().isdisjoint(IMPLICIT)
-    if method == "RK4" and not compiled:
-        raise UsageError("method RK4 needs compiled code: use target='cython', and no input that is a function")
-    if compiled:
-        solver, title = None, str(method)
-        check_names("option of simulate", settings, (), OPTIONS)
+    dense_output = read_flag("dense_output", dense_output)
+    if usual is not None:
+        forcing, (_, watched, title, last, settings) = usual.forcing.again(), usual
+        compiled, solver = True, None
     else:
-        solver = choose_solver(method)
-        title = solver.__name__
-        check_options(solver, settings, OPTIONS)
-    start, end = find_span(span, float(declared["end"]))
-    if step is not None:
-        require_steps("step", step, start, end)
-        max_step, first_step = step, min(step, abs(end - start)) or None
+        size = check_method(method, step)
+        declared = declare(module)
+        method, last = declared["method"] if method is None else method, float(declared["end"])
+        watched = Events(module.layout, events)
+        if controllers is not None:
+            from .controllers import ControlledEvents
+
+            watched = ControlledEvents(module.layout, events, controllers, kept is not None)
+        forcing = Forcing(module.layout, inputs)
+        compiled = can_run(module, method, forcing) and settings.keys().isdisjoint(IMPLICIT)
+        if method == "RK4" and not compiled:
+            raise UsageError("method RK4 needs compiled code: use target='cython', and no input that is a function")
+        if compiled:
+            solver, title = None, str(method)
+            check_names("option of simulate", settings, (), OPTIONS)
+        else:
+            solver = choose_solver(method)
+            title = solver.__name__
+            check_options(solver, settings, OPTIONS)
+    start, end = find_span(span, last)
+    if size is not None:
+        require_steps("step", size, start, end)
+        max_step, first_step = size, min(size, abs(end - start)) or None
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.attach(bound)
+    if usual is None or bound is not module:
+        forcing.attach(bound)
     nodes = [start, *forcing.corners(start, end, compiled), end]
-    forcing.enter(*nodes[:2])
+    varies = bool(forcing)
+    if varies:
+        forcing.enter(*nodes[:2])
     x0 = find_state(bound, initial, start, forcing)
-    if forcing:
+    if varies:
         u0 = forcing(start, x0)
         forcing.require_finite()
         bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
@@ -196,20 +212,22 @@ def simulate(
         from .meetings import begin
 
         solver = begin(run, solver, (start, end), x0)
-    given = (("rtol", rtol), ("atol", atol))
-    steps = {key: value for key, value in (("max_step", max_step), ("first_step", first_step)) if value is not None}
-    settings = {name: declared[name] if value is None else value for name, value in given} | steps | settings
-    if compiled or solver.__module__.startswith("scipy."):  # another's solver may take anything
-        settings = check_tolerances(module.n_x, abs(end - start), settings)
-        require_steps("max_step", float(settings.get("max_step", np.inf)), start, end)
+    if usual is None:
+        given = (("rtol", rtol), ("atol", atol))
+        steps = {key: value for key, value in (("max_step", max_step), ("first_step", first_step)) if value is not None}
+        settings = {name: declared[name] if value is None else value for name, value in given} | steps | settings
+        if compiled or solver.__module__.startswith("scipy."):  # another's solver may take anything
+            settings = check_tolerances(module.n_x, abs(end - start), settings)
+            require_steps("max_step", float(settings.get("max_step", np.inf)), start, end)
     if not compiled and takes_jacobian(solver):
         settings.setdefault("jac", run.jacobian)
     watch = watch_run(start, end, progress)
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
-    longest = float(settings.get("max_step", np.inf))
-    numbers = (1 + module.n_x) * ((stored is None) + 8 * bool(dense_output))  # of each step
+    longest = float(settings.get("max_step", inf))
+    numbers = (1 + module.n_x) * ((stored is None) + 8 * dense_output)  # of each step
     many = abs(end - start) / longest if longest > 0.0 else 0.0  # a solver of another refuses what it does not take
-    require_room(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
+    if many:
+        require_room(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
     if kept is not None:
         pause = None if compiled else Pause(kept, solver, dense_output)
         own = {name: value for name, value in settings.items() if name != "jac" or value != run.jacobian}
@@ -261,7 +279,8 @@ def simulate(
 
 
 def _check(run: Run, solution: Solution, start: float, end: float, method: str) -> None:
-    if not np.isfinite(solution.x).all():
+    x = solution.x.ravel()
+    if not isfinite(x.dot(x)) and not np.isfinite(solution.x).all():  # a finite sum of squares says it at once
         finite = np.isfinite(solution.x).all(axis=0)
         first = int(np.flatnonzero(~finite)[0])
         raise run.ended(float(solution.t[first]), end, method, "the state is not finite.") from run.cause()

@@ -56,8 +56,8 @@ class StallCheck:
         self.limit = min(SHORT * abs(end - start), 0.1 * max_step)
         self.troubled = troubled
         self.steps = 0
-        self.t, self.x = start, np.array(x)
-        self.largest = np.abs(self.x)
+        self.t, self.x = start, x
+        self.largest: Array | None = None  #: magnitude of each state at the windows before
 
     def look(self, t: float, x: Array, steps: int = 1) -> None:
         """Take note of so many further steps, the last of which came to x at t."""
@@ -67,8 +67,9 @@ class StallCheck:
         if self.steps < WINDOW:
             return
         step, moved = abs(t - self.t) / self.steps, np.abs(x - self.x)
+        largest = np.abs(self.x) if self.largest is None else self.largest
         self.t, self.x, self.steps = t, np.array(x), 0
-        self.largest = np.fmax(self.largest, np.abs(self.x))
+        self.largest = np.fmax(largest, np.abs(self.x))
         if step > self.limit or abs(self.end - t) < MANY * step:
             return
         still = all((moved[part] <= STILL * self.largest[part].max(initial=0.0)).all() for part in self.parts)

@@ -93,9 +93,13 @@ _LONG = 20_000  # operations from which on a call lets other threads run: 5 micr
 
 
 cdef int find(str name, object error) except -1:
-    if name not in names:
+    place = _PLACES.get(name)
+    if place is None:
         raise error(f"model {MODEL.name.decode()!r} has no kernel {name!r}; it has {', '.join(names)}")
-    return names.index(name)
+    return place
+
+
+cdef dict _PLACES = {name: place for place, name in enumerate(names)}
 
 
 include "_numbers.pxi"

@@ -122,7 +122,8 @@ cdef class Ensemble:
         if all.method.squares > 0:
             all.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
         if "meeting_time" in names:
-            all.meeting, all.n_q = MODEL.kernels[find("meeting_time", ValueError)].call, _FACTS["n_q"]
+            all.meeting = MODEL.kernels[find("meeting_time", ValueError)].call
+        all.n_q = _FACTS.get("n_q", 0)
         if lanes != NULL:
             all.lane_rhs, all.lane_series, all.lane_width = lanes.contracted, lanes.expand, lanes.width
         all.x0, all.p, all.u = reading(x0), reading(p), reading(u)

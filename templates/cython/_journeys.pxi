@@ -134,9 +134,10 @@ cdef class Journey(Stepper):
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
         cdef eomgen_journey *journey = &self.journey
-        self.stored, self.raised, self.stride = [[], [], [], [], []], None, 8
-        nodes = self.hold(plan["nodes"], float)
-        journey.nodes, journey.n_nodes = <const double *>cnp.PyArray_DATA(<cnp.ndarray>nodes), len(nodes)
+        self.stored, self.raised, self.stride = [[], [], [], [], []], None, 16
+        cdef cnp.ndarray nodes = numbers_of(list(plan["nodes"]))
+        self.held.append(nodes)
+        journey.nodes, journey.n_nodes = <const double *>cnp.PyArray_DATA(nodes), cnp.PyArray_DIM(nodes, 0)
         journey.span, journey.n_eval = abs(t_bound - t0), -1
         if plan["t_eval"] is not None:
             asked = self.hold(plan["t_eval"], float)
@@ -199,10 +200,12 @@ cdef class Journey(Stepper):
         """Room for results, after what is there has been taken out."""
         cdef eomgen_journey *j = &self.journey
         cdef int n = self.run.n
+        cdef cnp.npy_intp long_room
         if j.n_eval >= 0:
             room = j.n_eval
         if self.times is None or j.n_eval < 0:
-            self.times, self.states = np.empty(room), rows(room, n)
+            long_room = room
+            self.times, self.states = cnp.PyArray_EMPTY(1, &long_room, cnp.NPY_DOUBLE, 0), rows(room, n)
             j.room, j.times = room, <double *>cnp.PyArray_DATA(self.times)
             j.states = <double *>cnp.PyArray_DATA(self.states)
         if j.pieces_room > 0:

@@ -68,10 +68,14 @@ for _index in range(3 if "rhs" in names else 0):  # once: to ask the processor m
     METHODS[_index] = eomgen_suited(METHODS[_index], MODEL.kernels[find("rhs", ValueError)].n_in)
 
 
+_TITLES = [METHODS[_index].name.decode() for _index in range(6)]
+
+
 cdef method_pointer find_method(str name) except NULL:
     """The method of a name, with what it needs of the model."""
+    cdef int i
     for i in range(6):
-        if METHODS[i].name.decode() == name and name in methods:
+        if name == _TITLES[i] and name in methods:
             if METHODS[i].expands and seen_series(SERIES) == NULL:
                 take_lanes()
                 if seen_series(SERIES) == NULL:
@@ -125,6 +129,16 @@ while eomgen_operations[_code] != NULL:
 cdef cnp.ndarray rows(cnp.npy_intp n, cnp.npy_intp k):
     cdef cnp.npy_intp[2] dims = [n, k]
     return cnp.PyArray_EMPTY(2, dims, cnp.NPY_DOUBLE, 0)
+
+
+cdef cnp.ndarray numbers_of(list given):
+    """A list of floats as an array: quicker than NumPy's for the few of a run."""
+    cdef cnp.npy_intp n = len(given), i
+    cdef cnp.ndarray result = cnp.PyArray_EMPTY(1, &n, cnp.NPY_DOUBLE, 0)
+    cdef double *data = <double *>cnp.PyArray_DATA(result)
+    for i in range(n):
+        data[i] = given[i]
+    return result
 
 
 cdef class Interpolant:
@@ -200,7 +214,7 @@ cdef class Stepper:
         Start and end.
     y0 : (n_x,) array
     rtol : float
-    atol : (n_x,) array
+    atol : float or (n_x,) array
     max_step, first_step : float
         A first step of 0 is chosen.
     signals : list of (index, order, times, values) or (index, (code, numbers, out)), optional
@@ -226,13 +240,17 @@ cdef class Stepper:
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, i
         self.method = find_method(method)
         self.context, self.held = context, []
-        self.atol = np.array(vector(atol, n, "atol", ValueError))
+        if isinstance(atol, float):
+            self.atol = numbers_of([atol] * n)
+        else:
+            self.atol = np.array(vector(atol, n, "atol", ValueError))
         cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)
         cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
         if self.method.squares > 0:
             self.run.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
-        if "meeting_time" in names:
-            self.run.meeting, self.run.n_q = MODEL.kernels[find("meeting_time", ValueError)].call, _FACTS["n_q"]
+        if "meeting_time" in _PLACES:
+            self.run.meeting = MODEL.kernels[find("meeting_time", ValueError)].call
+        self.run.n_q = _FACTS.get("n_q", 0)
         cdef const eomgen_series *series = seen_series(SERIES)
         self.run.series = series
         length += eomgen_further(self.method, n, series)

@@ -399,17 +399,17 @@ def test_reports_and_pictures_tell_what_holds_for_a_time() -> None:
     mod = eqs.compile(target="numpy")
     assert [e["name"] for e in mod.metadata["picture"]["elements"]] == ["grip"]
     with pytest.raises(
-        eg.UsageError, match="revolute has no argument 'closes': joints hold for good; for a time use a"
+        eg.UsageError, match="inline has no argument 'closes': joints without coordinates hold for good, save for welds"
     ):
-        m.revolute("hinge", a, b, closes="1 - t")
+        m.inline("hinge", a, b, closes="1 - t")
 
 
 def test_a_joint_in_a_file_that_should_close_is_shown_the_way(tmp_path: Path) -> None:
     file = tmp_path / "c.yaml"
     file.write_text(
         "name: c\nbodies: {a: {mass: 1, inertia: {zz: 1}}}\n"
-        "joints: {A: {type: revolute, between: [ground, a], closes: 1 - t}}\n",
+        "joints: {A: {type: revolute, between: [ground, a]}, B: {type: inline, between: [ground, a], closes: 1 - t}}\n",
         encoding="utf-8",
     )
-    with pytest.raises(ModelError, match="joints.A.closes: unknown key; joints hold for good; for a time use a constr"):
+    with pytest.raises(ModelError, match="joints.B.closes: a inline joint has no .closes.; joints without coordinates"):
         eg.load(file).check()

@@ -165,6 +165,8 @@ def load_held() -> eg.Model:
     m.free("fly", m.ground, egg)
     m.rolling("roll", egg, shape="ellipsoid", semi_axes=(0.3, 0.2, 0.1))
     m.hold("grasp", m.ground, egg, closes="1 - t")
+    m.revolute("pin", egg, m.body("arm", mass=1, inertia=(1, 1, 1)), axis="z")
+    m.lock("brake", joint="pin", closes="2 - t")
     return m
 
 

@@ -50,6 +50,26 @@ def test_jacobian_equals_central_differences(systems, compiled, nodes):
     np.testing.assert_allclose(J, numeric, rtol=0, atol=1e-8 * np.abs(J).max())
 
 
+@pytest.mark.parametrize("n", [3, 5, 7, 8, 13])
+def test_jacobians_of_every_number_of_columns_agree(systems, compiled, n):
+    """Columns are solved twelve, four and one at a time: all agree with plain loops and with differences."""
+    system = systems.chain(n, name=f"columns{n}", limits=systems.Limits(unrolled=0, jacobian_nodes=10**9))
+    library, plain = compiled(system), compiled(system, "-DEOMGEN_PORTABLE")
+    x = state(system)
+    J = library.fine("jacobian", x, 0.4).reshape(2 * n, 2 * n)
+    scale = np.abs(J).max()
+    # other sines, of the C library, whose last digits the inverse of M carries on
+    np.testing.assert_allclose(plain.fine("jacobian", x, 0.4).reshape(J.shape), J, rtol=0, atol=1e-11 * scale)
+    numeric = np.empty_like(J)
+    for k in range(2 * n):
+        step = np.zeros(2 * n)
+        step[k] = 1e-3
+        f = [library.fine("rhs", x + s * step, 0.4) for s in (-2, -1, 1, 2)]
+        numeric[:, k] = (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step[k])
+    np.testing.assert_allclose(J, numeric, rtol=0, atol=1e-7 * scale)
+    np.testing.assert_array_equal(J[:n], np.hstack([np.zeros((n, n)), np.eye(n)]))
+
+
 def test_thirty_links_in_loops_and_unrolled_agree(systems, compiled):
     system = systems.chain(30)
     kernels = ["rhs"]

@@ -179,6 +179,62 @@ def test_pins_of_a_chain_sit_in_the_seats() -> None:
                     assert not force.any()
 
 
+@pytest.mark.parametrize("seat_angle", [math.radians(130), "a"])
+def test_a_tooth_is_felt_on_one_side_where_it_is_narrowest(seat_angle: Any) -> None:
+    """Between seats that reach the line of their pins; the energy of a path across the tooth has no jump."""
+    m, (ball,) = scenes.planar("waist", 1, (0, 0, 0))
+    m.parameter("a", math.radians(130))
+    wheel = {"teeth": 7, "pitch": 0.1, "seat": 0.02, "tip_radius": 0.14, "seat_angle": seat_angle}
+    law = {"stiffness": 1e4, "normal_law": "linear"}
+    m.contacts(
+        "mesh", {"shape": "circle", "on": ball, "radius": 0.015}, on({"shape": "sprocket", **wheel}, m.ground), law
+    )
+    mod = m.compile(target="numpy")
+    half = math.pi / 7
+    reach = 0.1 / (2 * math.sin(half))
+    first, second = reach * np.array([1.0, 0.0]), reach * np.array([math.cos(2 * half), math.sin(2 * half)])
+    part = np.linspace(0.01, 0.99, 20001)
+    x = np.zeros((6, len(part)))
+    x[:2] = first[:, None] + (second - first)[:, None] * part
+    deep = 0.015 + 0.1 * np.minimum(part, 1.0 - part) - 0.02  # by the distance of the nearest seat
+    found = mod.energy(x)[1]
+    expected = 0.5e4 * np.maximum(0.0, deep) ** 2
+    inside = np.abs(part - 0.5) > 1e-4  # where both sides are as near, each counts half
+    np.testing.assert_allclose(found[inside], expected[inside], rtol=1e-6, atol=1e-9)
+    assert found[10000 - 10] == pytest.approx(0.5e4 * 0.045**2, rel=1e-2)
+
+
+def test_where_the_energy_of_an_outline_jumps() -> None:
+    """As deep as its depth; and in a seat that is narrower than the circle, where both of its flanks take over."""
+    m, (ball,) = scenes.planar("walls", 1, (0, 0, 0))
+    corners = [(-0.1, -0.1), (0.1, -0.1), (0.02, 0.01), (0, 0.1)]
+    law = {"stiffness": 1e4, "normal_law": "linear"}
+    m.contacts(
+        "wall",
+        {"shape": "circle", "on": ball, "radius": 0.1},
+        {"shape": "outline", "points": corners, "depth": 0.03, "on": m.ground},
+        law,
+    )
+    mod = m.compile(target="numpy")
+    heights = np.array([-0.1 + 0.03 - 1e-6, -0.1 + 0.03 + 1e-6])
+    x = np.zeros((6, 2))
+    x[1] = heights
+    np.testing.assert_allclose(mod.energy(x)[1], [0.5e4 * 0.13**2, 0.0], rtol=1e-4)
+    reach = SPROCKET["pitch"] / (2 * math.sin(math.pi / SPROCKET["teeth"]))
+    for radius in (0.021, 0.024, 0.03):
+        m, (ball,) = scenes.planar("seats", 1, (0, 0, 0))
+        m.contacts(
+            "mesh",
+            {"shape": "circle", "on": ball, "radius": radius},
+            {"shape": "sprocket", "on": m.ground, **SPROCKET},
+            law,
+        )
+        x = np.zeros((6, 2))
+        x[0] = reach - 1e-7, reach + 1e-7
+        once = 0.5e4 * max(0.0, radius - SPROCKET["seat"]) ** 2
+        np.testing.assert_allclose(m.compile(target="numpy").energy(x)[1], [once, 2 * once], rtol=1e-3, atol=1e-12)
+
+
 def test_a_wheel_of_teeth_drives_a_pinned_bar() -> None:
     """The sprocket turns slowly; a flank pushes the pin, which a spring holds back."""
     m = eg.Model("drive", gravity=(0, 0, 0))
@@ -288,3 +344,35 @@ def test_sizes_of_a_sprocket_are_parameters() -> None:
             np.testing.assert_allclose(found, (late[1] - late[0]) / (2 * h), rtol=1e-3, atol=atol)
         pushed += np.abs(all_rates[0]).max() > 100
     assert pushed > 5
+
+
+@pytest.mark.parametrize("other", ["box", "outline"])
+def test_a_convex_outline_lies_flush_as_a_polygon_does(other: str) -> None:
+    """Of exactly one width, with a point on the middle of an edge; forces are those of the polygon."""
+    corners = scenes.rectangle(0.2, 0.1)
+    found = []
+    for kind in ("outline", "polygon"):
+        m, (body,) = scenes.planar("flush", 1)
+        points = [*corners, (-0.1, 0.0)] if kind == "outline" else corners
+        base = {"shape": kind, "points": points, "on": m.ground}
+        upper = {"shape": "box", "size": (0.2, 0.1)} if other == "box" else {"shape": "outline", "points": corners}
+        m.contacts("touch", {**upper, "on": body}, base, {**LAW, "dissipation": 20.0})
+        m.initial(j0_y=0.1)
+        mod = m.compile(target="numpy")
+        found.append([*mod.rhs(0.0, [0.003, 0.0995, 0.001, 0.1, -0.2, 0.3]), *mod.rhs(0.0, [0, 0.09, 0, 0, 0, 0])])
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9, atol=1e-9)
+    assert found[0][10] > 0.0  # pushed up
+    drawn = m.mechanism().forces[0].drawn()
+    assert len(drawn) == 2
+
+
+def test_smooth_outlines_are_drawn_as_arcs() -> None:
+    """Points of a circle: all points of the line lie on it."""
+    m, (body,) = scenes.planar("round", 1)
+    around = [(0.3 * np.cos(t), 0.3 * np.sin(t)) for t in 2 * np.pi * np.arange(7) / 7]
+    ring = {"shape": "smooth_outline", "points": around, "on": body}
+    m.contacts("touch", ring, {"shape": "half_plane", "on": m.ground}, ELASTIC)
+    line = m.mechanism().forces[0].drawn()[0].stops
+    radii = [np.hypot(*(marker.frame.position[k].value for k in (0, 1))) for marker in line]
+    assert len(radii) > 50
+    np.testing.assert_allclose(radii, 0.3, rtol=1e-12)

@@ -156,3 +156,23 @@ def test_quarter_and_half_turns_are_exact_and_keep_their_signs(axis: int, quarte
     numbers[i, i], numbers[j, j], numbers[i, j], numbers[j, i] = c, c, -s, s
     turned = settled_rotation(tuple(tuple(map(graph.constant, row)) for row in numbers.tolist()))
     assert [[x.value for x in row] for row in turned] == np.round(numbers).tolist()
+
+
+@pytest.mark.parametrize("n", [10, 60, 500])
+def test_long_products_of_rotations_are_told_from_nothing(n: int) -> None:
+    """A constraint row of a chain of 400 links counted as rounding: bounds that add up grow with each rotation."""
+    graph = Graph()
+    zero, one = graph.zero, graph.one
+    total = ((one, zero, zero), (zero, one, zero), (zero, zero, one))
+    for k in range(n):
+        c, s = cos(graph.symbol(f"q{k}")), sin(graph.symbol(f"q{k}"))
+        about_z, about_y = (
+            ((c, -s, zero), (s, c, zero), (zero, zero, one)),
+            ((c, zero, s), (zero, one, zero), (-s, zero, c)),
+        )
+        turn = about_z if k % 3 else about_y
+        total = product(total, turn)
+    unit = product(total, transpose(total))
+    assert vanishing([*total[0], *total[1], *total[2]]) == [False] * 9
+    identities = [unit[i][j] - (1.0 if i == j else 0.0) for i in range(3) for j in range(3)]
+    assert vanishing(identities) == [True] * 9

@@ -325,7 +325,9 @@ def test_hostile_numbers_are_refused(pendulum: Any, tmp_path: Path, killed: Any)
     bad: list[dict[str, Any]] = [{"counts": np.where(np.arange(17) == i, 10**6, counts)} for i in (7, 8, 9, 10, 11, 16)]
     bad += [{"counts": np.where(np.arange(17) == i, -5, counts)} for i in (7, 8, 9, 10, 11, 16)]
     bad += [{"counts": counts[:-1]}, {"counts": counts.astype("U20")}, {"block": block[:-1]}, {"rows": None}]
-    bad += [{"event_counts": np.array([[1, 7, 0]])}, {"events": np.zeros((6, 2))}, {"states": np.zeros((3, 4))}]
+    stored = np.load(file)["states"]
+    bad += [{"event_counts": np.array([[1, 7, 0]])}, {"events": np.zeros((6, 2))}]
+    bad += [{"states": np.zeros((len(stored) + more, 4))} for more in (-1, 1)]
     bad += [{"times": np.zeros((2, 2))}, {"notes": np.full((1, notes.shape[1]), 9.0)}, {"header": np.zeros(3)}]
     n = pendulum.n_x
     place = 22 * n + 4 * n * n + 16  # rows exchanged, whole numbers two in a double

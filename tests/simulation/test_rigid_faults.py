@@ -87,7 +87,7 @@ def test_law(law: dict[str, Any], told: str) -> None:
 @pytest.mark.parametrize("values", [{"mu": -0.2}, {"e": 1.5}, {"e": -0.1}])
 def test_parameters_of_the_law_given_late(values: dict[str, float]) -> None:
     mod = pile(["circle", "box"]).compile(target="numpy")
-    with pytest.raises(UsageError, match=r"contacts 'walls': friction is .* and restitution"):
+    with pytest.raises(UsageError, match=r"forces.walls.(friction|restitution): is .*; must be"):
         mod.simulate(0.1, {"j0_y": 0.1, "j1_y": 0.6}, values, method="moreau", step=1e-3)
 
 

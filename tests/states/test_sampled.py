@@ -306,7 +306,7 @@ def test_runs_backwards_and_periods_that_are_not_positive_are_refused(module: An
         with pytest.raises(eg.UsageError, match=r"forward in time, not from 1 s to 0 s"):
             call((1.0, 0.0), {"s": 0.0})
     for period in (0.0, -0.1):
-        with pytest.raises(eg.UsageError, match=r"period of z, u is .* positive time"):
+        with pytest.raises(eg.UsageError, match=r"states\.z\.period: .* is not positive with T = .*; give the time"):
             module.simulate(1.0, parameters={"T": period})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from xml.etree import ElementTree
@@ -108,8 +109,10 @@ def _attributes(variable: Variable) -> dict[str, str]:
 
 
 def _numbers(variable: Variable) -> dict[str, str]:
-    """Unit and start value."""
+    """Unit, bounds and start value."""
     unit = {"unit": variable.unit} if variable.unit else {}
+    bounds = zip(("min", "max"), variable.bounds, strict=True)
+    unit |= {word: repr(float(bound)) for word, bound in bounds if math.isfinite(bound)}
     return unit | ({"start": repr(variable.start)} if variable.start is not None else {})
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from ...program import Program
+from ...runtime.allowed_parameters import bounds_of
 
 
 class Variable(NamedTuple):
@@ -20,6 +22,8 @@ class Variable(NamedTuple):
     group : {'x', 'rate', 'u', 'p', 'y', 'time', 'event'}
     unit, doc : str
     start : float or None
+    bounds : pair of float
+        The least and the greatest value, infinite where there is none.
     exact : bool
         Of a state: whether its start value holds; others follow from these where loops are closed.
     state : int or None
@@ -32,6 +36,7 @@ class Variable(NamedTuple):
     unit: str = ""
     doc: str = ""
     start: float | None = None
+    bounds: tuple[float, float] = (-math.inf, math.inf)
     exact: bool = True
     state: int | None = None
 
@@ -52,7 +57,7 @@ def list_variables(program: Program, start: Sequence[float]) -> list[Variable]:
     """
     metadata, units, docs = program.metadata, program.metadata["units"], program.metadata["docs"]
     x_names, taken = metadata["x_names"], set(metadata["x_names"])
-    exact = find_exact(program)
+    exact, bounds = find_exact(program), bounds_of(metadata)
     found: list[Variable] = []
 
     def add(name: str, group: str, unit: str, doc: str, **more: object) -> None:
@@ -71,7 +76,8 @@ def list_variables(program: Program, start: Sequence[float]) -> list[Variable]:
             doc = f"{doc}; its signal over time comes from outside".removeprefix("; ")
         add(name, "u", units.get(name, ""), doc, start=float(value or 0.0))
     for name, value in zip(metadata["p_names"], metadata["p_values"], strict=True):
-        add(name, "p", units.get(name, ""), docs.get(name, ""), start=float(value))
+        pair = bounds.get(name, (-math.inf, math.inf))
+        add(name, "p", units.get(name, ""), docs.get(name, ""), start=float(value), bounds=pair)
     for name in metadata["y_names"]:
         add(name, "y", units.get(name, ""), docs.get(name, ""))
     add("time", "time", "s", "")

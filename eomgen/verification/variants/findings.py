@@ -10,6 +10,7 @@ import numpy as np
 
 from ...describe.builder import Builder
 from ...describe.description import Description
+from ...describe.joint_locks import with_locks
 from ...errors import EomgenError
 from ..finding import NOT_REACHED, Finding
 from .body_frames import turn_bodies, turn_ground
@@ -129,7 +130,7 @@ def original_of(model: Builder, seed: int, motion_only: bool = False) -> Origina
         base = plain(model)
     except EomgenError as error:
         raise NotApplicable(f"the model cannot be written in its plain form: {error}") from None
-    description, kinds = with_probes(base)
+    description, kinds = with_probes(with_locks(base))
     original = observe(description, kinds, np.random.default_rng([seed, 99]), motion_only=motion_only)
     # variants whose coordinates differ are assembled from the same configuration
     start = original.named(0)

@@ -22,13 +22,31 @@ static void form_rows(const double *restrict J, const double *restrict column, i
     }
 }
 
+/* What entries of each row of J in w + AT_ROWS are compared with (eomgen/kinematics/row_groups.py). */
+static void find_sizes(const double *restrict a, int width, double *restrict sizes)
+{
+    double largest[M + 1] = {0.0};
+    for (int i = 0; i < M; i++) {
+        const int gap = ROW_GROUP[i] > 0 ? ROW_GROUP[i] : 0;
+        for (int k = 0; k < N; k++) {
+            largest[0] = fmax(largest[0], fabs(a[i * width + k]));
+            largest[gap] = fmax(largest[gap], fabs(a[i * width + k]));
+        }
+    }
+    for (int i = 0; i < M; i++) {
+        const double size = ROW_GROUP[i] < 0 ? 1.0 : largest[ROW_GROUP[i]];
+        sizes[i] = ROW_GROUP[i] > 0 ? fmax(size, CROSSINGS_SMALL) : size > 0.0 ? size : 1.0;
+    }
+}
+
 /* Complete pivoting over the rows in w + AT_ROWS, R pivots: the best among the columns preferred as dependent if it is
    within 100 of the best of all. With `strict` only preferred columns are taken. */
 static int split(int width, int strict, partition *restrict parts, double *restrict w)
 {
     double *const a = w + AT_ROWS;
     int spent[M + 1] = {0}, taken[N + 1] = {0}, best[M + 1][2], changed[M + 1], count = 0;
-    double size = 0.0;
+    double size = 0.0, row_sizes[M + 1];
+    find_sizes(a, width, row_sizes);
     for (int i = 0; i < M; i++) {
         changed[i] = 1;
     }
@@ -41,7 +59,7 @@ static int split(int width, int strict, partition *restrict parts, double *restr
                 find_best(a + i * width, taken, best[i]);
             }
             for (int kind = 0; kind < 2 && !spent[i]; kind++) {
-                const double entry = best[i][kind] < 0 ? 0.0 : fabs(a[i * width + best[i][kind]]);
+                const double entry = best[i][kind] < 0 ? 0.0 : fabs(a[i * width + best[i][kind]]) / row_sizes[i];
                 if (entry > sizes[kind]) {
                     sizes[kind] = entry, rows[kind] = i;
                 }

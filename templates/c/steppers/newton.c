@@ -1,5 +1,5 @@
 /* Systems (g - J) x = r of implicit methods. Where J = [0 1; K D], of a state [q; v] with q' = v, only
-   (g - D - K / g) v = r_v + K r_q / g is solved, and q = (r_q + v) / g. */
+   (g - D - K / g) v = r_v + K r_q / g is solved, and q = (r_q + v) / g; other large ones by parts (newton_parts.c). */
 #include <math.h>
 #include <string.h>
 
@@ -12,7 +12,9 @@ typedef struct {
     int *order, *order_complex; /* n each */
 } newton_area;
 
-enum { NEWTON_STATE = 16, HALVED = 0 };
+/* Numbers of the state: how J is made, and by how much q drifts by itself; LARGE: states from which parts are worth while. */
+enum { NEWTON_STATE = 16, HALVED = 0, DRIFT = 8 };
+enum { WHOLE = 0, HALF = 1, PARTS = 2, LARGE = 24 };
 
 static newton_area newton_areas(const eomgen_run *run, int rows)
 {
@@ -39,6 +41,17 @@ static int is_halved(int n, const double *J)
         }
     }
     return 1;
+}
+
+/* How J is made, which a step that is too long for parts ends (newton_factor). */
+static void newton_look(const eomgen_run *run, const newton_area *a)
+{
+    const int n = run->n, n_q = run->n_q, m = n - n_q;
+    a->state[HALVED] = is_halved(n, a->J) ? HALF : WHOLE;
+    if (a->state[HALVED] == WHOLE && n >= LARGE && n_q > 0 && 2 * m * m <= n * n) {
+        a->state[HALVED] = PARTS;
+        a->state[DRIFT] = parts_products(n, n_q, a->J, a->real + m * m, a->re + m * m, a->im);
+    }
 }
 
 /* dx'/dx at (t, y) into J, inputs that are expressions of the state included; 0, or the status of a failure. */
@@ -79,9 +92,16 @@ int eomgen_differentiate(eomgen_run *run, double t, const double *y, const doubl
 /* Factor g - J for a real g and for g = x + i y; 1 if one is singular. */
 static int newton_factor(eomgen_run *run, const newton_area *a, double g, double x, double y)
 {
-    const int n = run->n, halved = a->state[HALVED] != 0.0, m = halved ? n / 2 : n;
+    const int n = run->n, n_q = run->n_q;
     const double square = x * x + y * y;
     run->factorizations += 2;
+    if (a->state[HALVED] == PARTS && a->state[DRIFT] < RUNS_DRIFTING * fmin(fabs(g), sqrt(square))) {
+        const int m = n - n_q;
+        parts_matrices(n, n_q, a->J, a->real + m * m, a->re + m * m, g, x / square, -y / square, a->real, a->re, a->im);
+        return lu_factor(m, a->real, a->order) || lu_factor_complex(m, a->re, a->im, a->order_complex);
+    }
+    a->state[HALVED] = a->state[HALVED] == HALF ? HALF : WHOLE;
+    const int halved = a->state[HALVED] == HALF, m = halved ? n / 2 : n;
     for (int i = 0; i < m; i++) {
         const double *const row = a->J + (halved ? m + i : i) * n;
         double *const plain = a->real + i * m, *const re = a->re + i * m, *const im = a->im + i * m;
@@ -99,7 +119,16 @@ static int newton_factor(eomgen_run *run, const newton_area *a, double g, double
 static void newton_solve(const eomgen_run *run, const newton_area *a, double g, double *restrict r)
 {
     const int n = run->n, m = n / 2;
-    if (a->state[HALVED] == 0.0) {
+    if (a->state[HALVED] == PARTS) {
+        const int n_q = run->n_q, n_v = n - n_q;
+        double *const room = a->im + n_v * n_v;
+        parts_carry(n, n_q, a->J, g, NULL, r, room);
+        add_times(n_v, n_q, a->J + n_q * n, n, r, r + n_q);
+        lu_solve(n_v, a->real, a->order, r + n_q);
+        parts_carry(n, n_q, a->J, g, r + n_q, r, room);
+        return;
+    }
+    if (a->state[HALVED] == WHOLE) {
         lu_solve(n, a->real, a->order, r);
         return;
     }
@@ -122,11 +151,21 @@ static void newton_solve_complex(const eomgen_run *run, const newton_area *a, do
                                  double *restrict s)
 {
     const int n = run->n, m = n / 2;
-    if (a->state[HALVED] == 0.0) {
+    const double square = x * x + y * y, u = x / square, v = -y / square;
+    if (a->state[HALVED] == PARTS) {
+        const int n_q = run->n_q, n_v = n - n_q;
+        double *const room = a->im + n_v * n_v;
+        parts_carry_complex(n, n_q, a->J, u, v, NULL, NULL, r, s, room);
+        add_times(n_v, n_q, a->J + n_q * n, n, r, r + n_q);
+        add_times(n_v, n_q, a->J + n_q * n, n, s, s + n_q);
+        lu_solve_complex(n_v, a->re, a->im, a->order_complex, r + n_q, s + n_q);
+        parts_carry_complex(n, n_q, a->J, u, v, r + n_q, s + n_q, r, s, room);
+        return;
+    }
+    if (a->state[HALVED] == WHOLE) {
         lu_solve_complex(n, a->re, a->im, a->order_complex, r, s);
         return;
     }
-    const double square = x * x + y * y, u = x / square, v = -y / square;
     for (int i = 0; i < m; i++) {
         double p = 0.0, q = 0.0;
         for (int k = 0; k < m; k++) {

@@ -120,5 +120,5 @@ static void radau_begin(eomgen_run *run)
     a.state[RADAU_ERROR_OLD] = -1.0;
     a.state[RADAU_CURRENT] =
         eomgen_differentiate(run, run->t, run->y, run->f, a.J, run->K + RADAU_SPARE * run->n) == 0;
-    a.state[HALVED] = is_halved(run->n, a.J);
+    newton_look(run, &a);
 }

@@ -10,7 +10,7 @@ static int radau_differentiate(eomgen_run *run, const newton_area *a, double t, 
     a->state[RADAU_FACTORED] = 0.0;
     const int status = eomgen_differentiate(run, t, y, f, a->J, run->K + RADAU_SPARE * run->n);
     a->state[RADAU_CURRENT] = status == 0;
-    a->state[HALVED] = is_halved(run->n, a->J);
+    newton_look(run, a);
     return status;
 }
 

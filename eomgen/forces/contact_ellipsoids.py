@@ -1,0 +1,257 @@
+"""Force elements, contact of ellipsoids: on planes, spheres, rods and each other -> where they touch."""
+
+from __future__ import annotations
+
+from ..graph import vectors as vec
+from ..graph.core import Expr, sqrt
+from ..graph.vectors import Mat3, Vec3
+from ..limits.contacts import COMMON, FOCAL, NEAREST, TWICE
+from ..records import dataclass
+from .branches import where
+from .contact import Contact, Touch
+from .contact_rounds import along_axis, direction, seen_from, settled
+from .force import View
+
+_TOO_BENT = 0.05  #: part of the plain step's determinant below which Newton's step is not taken
+
+
+@dataclass(frozen=True)
+class EllipsoidPlane(Contact):
+    """An ellipsoid about the second marker, half axes along its x, y, z, on the plane through the first.
+
+    Its lowest point is -(a^2 n_x, b^2 n_y, c^2 n_z) / w, w = sqrt(a^2 n_x^2 + b^2 n_y^2 + c^2 n_z^2), of the plane's
+    normal n in the ellipsoid's axes.
+    """
+
+    axes: tuple[Expr, Expr, Expr]
+
+    def touch(self, view: View) -> Touch:
+        R = view.rotation(self.second)
+        normal = vec.transpose(view.rotation(self.first))[2]
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        n = vec.transpose_times(R, normal)
+        x, y, z = (a * a * k for a, k in zip(self.axes, n, strict=True))
+        w = sqrt(vec.dot((x, y, z), n))
+        depth = w - vec.dot(normal, reach)
+        lowest = vec.times(R, (-x / w, -y / w, -z / w))
+        second = vec.add(lowest, vec.scale(0.5 * depth, normal))
+        return normal, depth, vec.add(reach, second), second
+
+
+def quadratic_form(R: Mat3, axes: tuple[Expr, Expr, Expr]) -> Mat3:
+    """R diag(a^2, b^2, c^2) R^T of an ellipsoid's half axes."""
+    a, b, c = (x * x for x in axes)
+    x, y, z = ((p * a, q * b, r * c) for p, q, r in R)
+    return vec.product((x, y, z), vec.transpose(R))
+
+
+def _nearest(view: View, axes: tuple[Expr, Expr, Expr], place: Vec3) -> tuple[Vec3, Expr]:
+    """The outward normal at the point of an ellipsoid that is nearest to a place, and how far that is outside.
+
+    The nearest point to p is (a^2 p_x / (t + a^2), ...), where S(t), the sum of (a p_x / (t + a^2))^2, is 1 (Eberly,
+    Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid, 2013); t times (p_x / (t + a^2), ...) leads
+    from it to p.  Newton's method for 1 / sqrt(S) = 1, which is nearly linear (More and Sorensen, SIAM J. Sci. Stat.
+    Comput. 4, 1983, 553-572), comes to t from the side on which S > 1, where the largest of the three squares is 1, or
+    t = 0 of a centre outside.  Where S is less than 1 there, as about the centre of the ellipsoid, two points on both
+    sides of the least axis are nearest (Eberly, section 3); the one on the side of p counts, or the positive one.
+    """
+    graph = view.graph
+    squares = [a * a for a in axes]
+    scaled = [a * p for a, p in zip(axes, place, strict=True)]
+    least = graph.apply("min", squares[0], graph.apply("min", squares[1], squares[2]))
+    begin = -(1.0 - FOCAL) * least
+    for s, q in zip(scaled, squares, strict=True):
+        begin = graph.apply("max", begin, graph.apply("max", s, -s) - q)
+    rises = [p / a for p, a in zip(place, axes, strict=True)]
+    outside = graph.apply("lt", 1.0, rises[0] * rises[0] + rises[1] * rises[1] + rises[2] * rises[2])
+    begin = where(outside, graph.apply("max", begin, 0.0), begin)
+
+    def parts_at(t: Expr) -> tuple[list[Expr], Expr]:
+        parts = [s / (t + q) for s, q in zip(scaled, squares, strict=True)]
+        return parts, parts[0] * parts[0] + parts[1] * parts[1] + parts[2] * parts[2]
+
+    t = begin
+    for k in range(NEAREST):
+        t = settled(view, t) if k == NEAREST - 1 else t
+        parts, total = parts_at(t)
+        slope = sum((s * s / (t + q) for s, q in zip(parts, squares, strict=True)), graph.zero)
+        rising = graph.apply("lt", 0.0, slope)  # but at the centre
+        t = graph.apply("max", begin, t + total * (sqrt(where(rising, total, 1.0)) - 1.0) / where(rising, slope, 1.0))
+    parts, _ = parts_at(t)
+    both = graph.apply("lt", parts_at(begin)[1], 1.0)
+    chosen, free = list[Expr](), graph.one
+    for part, q in zip(parts, squares, strict=True):
+        mine = where(graph.apply("le", q, least), free, 0.0)  # the least axis, the first of equal ones
+        free = free - mine
+        rest = graph.apply("max", 0.0, 1.0 - sum((other * other for other in parts if other is not part), graph.zero))
+        completed = sqrt(where(both, where(graph.apply("lt", 0.0, rest), rest, 1.0), 1.0))
+        completed = where(graph.apply("lt", part, 0.0), -completed, completed)
+        chosen.append(where(both, where(graph.apply("lt", 0.0, mine), completed, part), part))
+    x, y, z = (s / a for s, a in zip(chosen, axes, strict=True))
+    size = sqrt(x * x + y * y + z * z)
+    return (x / size, y / size, z / size), t * size
+
+
+@dataclass(frozen=True)
+class EllipsoidRound(Contact):
+    """A sphere about the second marker on an ellipsoid about the first, half axes along its x, y, z."""
+
+    axes: tuple[Expr, Expr, Expr]
+    radius: Expr
+
+    def touch(self, view: View) -> Touch:
+        reach, R, place = seen_from(self, view)
+        return self._touching(view, reach, R, place)
+
+    def _touching(self, view: View, reach: Vec3, R: Mat3, place: Vec3) -> Touch:
+        """A sphere at a place, at which ``reach`` ends."""
+        normal, gap = _nearest(view, self.axes, place)
+        out = vec.times(R, normal)
+        depth = self.radius - gap
+        second = vec.scale(0.5 * depth - self.radius, out)
+        return out, depth, vec.add(reach, second), second
+
+
+@dataclass(frozen=True)
+class EllipsoidRod(EllipsoidRound):
+    """A rod along x of the second marker, of a radius, on an ellipsoid about the first.
+
+    It touches as the sphere about that point of its axis which is nearest to the ellipsoid: the signed distance of a
+    convex body is convex, so that the nearest point of the whole line, held between the ends, is the nearest.  That of
+    the line is found across it, where the ellipsoid is an ellipse, by the normal n that makes n r - sqrt(n B n)
+    greatest, r from the centre to the line, B = R diag(a^2, b^2, c^2) R^T.
+    """
+
+    half: Expr
+
+    def touch(self, view: View) -> Touch:
+        graph = view.graph
+        reach, R, place = seen_from(self, view)
+        along, *across = (vec.transpose_times(R, axis) for axis in vec.transpose(view.rotation(self.second)))
+        squares = [a * a for a in self.axes]
+
+        def form(a: Vec3, b: Vec3) -> Expr:
+            return sum((q * x * y for q, x, y in zip(squares, a, b, strict=True)), graph.zero)
+
+        r = vec.dot(across[0], place), vec.dot(across[1], place)
+        bxx, bxy, byy = form(across[0], across[0]), form(across[0], across[1]), form(across[1], across[1])
+        square = r[0] * r[0] + r[1] * r[1]
+        apart = graph.apply("lt", 0.0, square)
+        far, nearest = sqrt(where(apart, square, 1.0)), bxx * byy - bxy * bxy
+        radial = far * sqrt(
+            nearest / where(apart, byy * r[0] * r[0] - 2.0 * bxy * r[0] * r[1] + bxx * r[1] * r[1], 1.0)
+        )
+        t = graph.apply("max", 0.0, radial * (far - radial))
+        nx = where(apart, (byy + t) * r[0] - bxy * r[1], 1.0)
+        ny = where(apart, (bxx + t) * r[1] - bxy * r[0], 0.0)
+        size = sqrt(nx * nx + ny * ny)
+        nx, ny = nx / size, ny / size
+        bx = by = h = graph.zero
+        for k in range(COMMON + 1):
+            bx, by = bxx * nx + bxy * ny, bxy * nx + byy * ny
+            h = sqrt(nx * bx + ny * by)
+            if k == COMMON:
+                break
+            if k == COMMON - 1:
+                nx, ny = settled(view, nx), settled(view, ny)
+                bx, by = bxx * nx + bxy * ny, bxy * nx + byy * ny
+                h = sqrt(nx * bx + ny * by)
+            gx, gy = r[0] - bx / h, r[1] - by / h
+            cross = nx * by - ny * bx
+            bend = (ny * ny * bxx - 2.0 * nx * ny * bxy + nx * nx * byy) / h - cross * cross / (h * h * h)
+            whole = bend + nx * gx + ny * gy
+            step = (nx * gy - ny * gx) / where(graph.apply("lt", _TOO_BENT * bend, whole), whole, bend)
+            nx, ny = nx - step * ny, ny + step * nx
+            size = sqrt(nx * nx + ny * ny)
+            nx, ny = nx / size, ny / size
+        n = vec.add(vec.scale(nx, across[0]), vec.scale(ny, across[1]))
+        s = graph.apply("max", -self.half, graph.apply("min", self.half, form(along, n) / h - vec.dot(along, place)))
+        moved = vec.scale(s, along)
+        arm = vec.times(R, moved)
+        out, depth, first, second = self._touching(view, vec.add(reach, arm), R, vec.add(place, moved))
+        return out, depth, first, vec.add(arm, second)
+
+
+def _solved(rows: Mat3, right: Vec3) -> tuple[Vec3, Expr]:
+    """The solution of three equations times the determinant, and that."""
+    a, b, c = rows
+    first = vec.cross(b, c)
+    found = vec.add(vec.scale(right[0], first), vec.scale(right[1], vec.cross(c, a)))
+    return vec.add(found, vec.scale(right[2], vec.cross(a, b))), vec.dot(a, first)
+
+
+def _weighed(weight: Expr, a: Mat3, other: Expr, b: Mat3) -> Mat3:
+    x, y, z = (vec.add(vec.scale(weight, p), vec.scale(other, q)) for p, q in zip(a, b, strict=True))
+    return x, y, z
+
+
+def _outer(weight: Expr, a: Vec3) -> Mat3:
+    x, y, z = (vec.scale(weight * k, a) for k in a)
+    return x, y, z
+
+
+@dataclass(frozen=True)
+class EllipsoidEllipsoid(Contact):
+    """Two ellipsoids about the markers, half axes along their x, y, z: contact along their common normal n.
+
+    The gap n r - sqrt(n B1 n) - sqrt(n B2 n), with r from centre to centre and B = R diag(a^2, b^2, c^2) R^T, is
+    greatest there among all n of length 1, be it positive or, for bodies that overlap, negative.  So it changes with
+    positions as if n did not, and the force has a potential.  Newton's method on the sphere of all n begins at the
+    normal where both bodies, scaled by one factor, would just touch (Perram and Wertheim, J. Comput. Phys. 58, 1985,
+    409-416): n = (l B1 + (1 - l) B2)^-1 r with the l that makes l^2 n B1 n equal (1 - l)^2 n B2 n.
+    """
+
+    axes: tuple[tuple[Expr, Expr, Expr], tuple[Expr, Expr, Expr]]
+
+    def touch(self, view: View) -> Touch:
+        graph = view.graph
+        markers = zip((self.first, self.second), self.axes, strict=True)
+        forms = [quadratic_form(view.rotation(marker), axes) for marker, axes in markers]
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        apart = graph.apply("lt", 0.0, vec.dot(reach, reach))
+        x, y, z = (where(apart, a, b) for a, b in zip(reach, along_axis(view, self.first, 0), strict=True))
+        n = self._begin(forms, (x, y, z))
+        for k in range(COMMON):
+            if k == COMMON - 1:
+                x, y, z = n
+                n = settled(view, x), settled(view, y), settled(view, z)
+            n = self._step(forms, reach, n)
+        own, other = (vec.times(B, n) for B in forms)
+        h1, h2 = sqrt(vec.dot(n, own)), sqrt(vec.dot(n, other))
+        depth = h1 + h2 - vec.dot(n, reach)
+        first = vec.sub(vec.scale(1.0 / h1, own), vec.scale(0.5 * depth, n))
+        return n, depth, first, vec.sub(first, reach)
+
+    @staticmethod
+    def _begin(forms: list[Mat3], reach: Vec3) -> Vec3:
+        part = reach[0].graph.constant(0.5)
+        for k in range(TWICE + 1):
+            n, det = _solved(_weighed(part, forms[0], 1.0 - part, forms[1]), reach)
+            if k < TWICE:
+                a, b = (sqrt(vec.dot(n, vec.times(B, n))) for B in forms)
+                part = b / (a + b)
+        x, y, z = (k / det for k in n)
+        size = sqrt(x * x + y * y + z * z)
+        return x / size, y / size, z / size
+
+    @staticmethod
+    def _step(forms: list[Mat3], reach: Vec3, n: Vec3) -> Vec3:
+        graph = reach[0].graph
+        bend = _outer(graph.one, n)
+        gap = reach
+        for B in forms:
+            own = vec.times(B, n)
+            h = sqrt(vec.dot(n, own))
+            gap = vec.sub(gap, vec.scale(1.0 / h, own))
+            bend = _weighed(
+                graph.one, bend, graph.one, _weighed(1.0 / h, B, -1.0 / (h * h * h), _outer(graph.one, own))
+            )
+        rise = vec.dot(n, gap)
+        aside = vec.sub(gap, vec.scale(rise, n))
+        more = _weighed(rise, vec.identity(graph), -rise, _outer(graph.one, n))
+        whole = _weighed(graph.one, bend, graph.one, more)
+        (way, det), (plain, det0) = _solved(whole, aside), _solved(bend, aside)
+        trace = whole[0][0] + whole[1][1] + whole[2][2] - 1.0
+        good = graph.apply("and", graph.apply("lt", _TOO_BENT * det0, det), graph.apply("lt", 0.0, trace))
+        x, y, z = (a + where(good, p, q) / where(good, det, det0) for a, p, q in zip(n, way, plain, strict=True))
+        return direction((x, y, z), n)[0]

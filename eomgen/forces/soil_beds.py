@@ -1,0 +1,228 @@
+"""Force elements, soil that remembers by place: a strip of cells, each a column that wheels and plates press and shear.
+
+The states of a cell are shared by all that pass over it, so that a second wheel finds the rut of the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ..graph import vectors as vec
+from ..graph.core import Expr, sqrt
+from ..graph.vectors import Vec3
+from ..limits.contacts import BESIDE, GRIP, UNSHEARED, UPRIGHT
+from ..records import dataclass
+from .branches import beyond_zero, where
+from .contact import Contact, Touch
+from .contact_shapes import SOLE
+from .force import Load, View
+from .normal_laws import NormalLaw
+from .soil_laws import SoilPressure, SoilShear
+
+STATES = ("shear", "grip", "sinkage")  #: of a cell, in the order in which laws hold them
+COUNTS = 2  #: numbers of a cell beside its states: how many press it, how many press it deeper
+
+
+class _Column(NamedTuple):
+    """Where an underside crosses the axis of a cell: there or not, how deep, normal out of it (along x and y), gap."""
+
+    inside: Expr
+    depth: Expr
+    normal: tuple[Expr, Expr]
+    gap: Expr  #: distance from the cell's place, negative inside
+
+
+class _Pressing(NamedTuple):
+    """How a column is pressed: directions, arms, depth and its rate, sliding, force along the normal, strength."""
+
+    outward: Vec3
+    along: Vec3
+    arms: tuple[Vec3, Vec3]
+    depth: Expr
+    rate: Expr
+    sliding: Expr
+    push: Expr
+    strength: Expr
+
+
+@dataclass(frozen=True)
+class SoilCell(Contact):
+    r"""A wheel or a plate on one cell of soil: a column of the length a along the ground, as wide as what presses it.
+
+    At the depth z at which the underside crosses the axis of the cell, where its slope is c = cos of the angle between
+    its normal and the column,
+
+        F_n = p(z, z_m) a b / c along the normal of the underside        (Bekker; Wong below z_m)
+        z_m' = z' where z = z_m and z' > 0, else 0                       the greatest sinkage at this place
+        d' = v - |v| d / K                                               shear displacement (Janosi and Hanamoto)
+        S = (c_0 + p tan phi) a b / c,  T = S (e + (1 - e) |d| / K)
+        F_t = -max(-T, min(T, sqrt(S S_0) u / l)),  u' = sqrt(S / S_0) v - |v| u / (l T / S),  l = K / 50, e = 0.01
+
+    of the velocity v of the underside along itself.  F_n is dual to z, F_n = -p a b dz/dx, so that its power is
+    -p a b z'.  p is that of an elastic store which falls where z_m grows, and S_0 u^2 / (2 l) is the most that u can
+    give back, whatever the load does: no cycle of load, sinkage and sliding gains energy, with any number of wheels.
+    S_0 is the strength of a cell as wide as it is long at the sinkage K.
+    """
+
+    kind: str
+    sizes: tuple[Expr, ...]
+    size: Expr  #: a
+    height: Vec3 | None
+
+    # -- geometry -----------------------------------------------------------------------------------------------------
+    def _place(self, view: View) -> tuple[Vec3, Expr, Expr, Vec3, Vec3]:
+        """From the cell to the marker of what presses: the way, its parts, and the axes x and y of the cell."""
+        axes = vec.transpose(view.rotation(self.first))
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        return reach, vec.dot(axes[0], reach), vec.dot(axes[1], reach), axes[0], axes[1]
+
+    def _column(self, view: View) -> _Column:
+        _, x, y, ahead, up = self._place(view)
+        if self.kind != SOLE:
+            return _under_rim(self.sizes[0], x, y)
+        axis = vec.transpose(view.rotation(self.second))[0]
+        return _under_sole(self.sizes[0], x, y, (vec.dot(axis, ahead), vec.dot(axis, up)))
+
+    def touch(self, view: View) -> Touch:
+        reach, _, _, _, up = self._place(view)
+        column = self._column(view)
+        depth = where(column.inside, column.depth, -self.sizes[0])
+        here = vec.scale(-depth, up)
+        first = here if self.height is None else vec.add(here, self.height)
+        return up, depth, first, vec.sub(here, reach)
+
+    def nearness(self, view: View) -> tuple[Vec3, Expr]:
+        _, _, _, ahead, up = self._place(view)
+        column = self._column(view)
+        return vec.neg(vec.add(vec.scale(column.normal[0], ahead), vec.scale(column.normal[1], up))), -column.gap
+
+    # -- forces -------------------------------------------------------------------------------------------------------
+    def _pressing(self, view: View) -> _Pressing:
+        _, _, _, ahead, up = self._place(view)
+        column = self._column(view)
+        nx, ny = column.normal
+        outward = vec.add(vec.scale(nx, ahead), vec.scale(ny, up))
+        along = vec.sub(vec.scale(nx, up), vec.scale(ny, ahead))
+        _, depth, first, second = self.touch(view)
+        v1, v2 = (
+            vec.add(view.velocity(marker), vec.cross(view.angular_velocity(marker), arm))
+            for marker, arm in ((self.first, first), (self.second, second))
+        )
+        velocity = vec.sub(v2, v1)
+        rate, sliding = vec.dot(outward, velocity) / -ny, vec.dot(along, velocity)
+        law, shear = self._laws()
+        area = self.sizes[1] * self.size
+        push = law.on_pad(area, self.sizes[1]).force(depth, rate) / -ny
+        pressed = view.graph.apply("lt", 0.0, push)
+        strength = where(pressed, shear.cohesion * area / -ny + push * shear.slope, 0.0)
+        return _Pressing(outward, along, (first, second), depth, rate, sliding, push, strength)
+
+    def _laws(self) -> tuple[SoilPressure, SoilShear]:
+        assert isinstance(self.normal_law, SoilPressure)
+        assert isinstance(self.friction, SoilShear)
+        return self.normal_law, self.friction
+
+    def _reference(self) -> Expr:
+        """S_0."""
+        law, shear = self._laws()
+        stress = shear.cohesion + law.modulus_of(self.size) * shear.modulus**law.exponent * shear.slope
+        strength = stress * self.size * self.size
+        return where(strength.graph.apply("lt", 0.0, strength), strength, 1.0)  # without strength any number will do
+
+    def _part(self) -> Expr:
+        """T / S."""
+        _, shear = self._laws()
+        return UNSHEARED + (1.0 - UNSHEARED) * shear.shears[0].graph.apply("abs", shear.shears[0]) / shear.modulus
+
+    def loads(self, view: View) -> list[Load]:
+        found = self._pressing(view)
+        graph = view.graph
+        _, shear = self._laws()
+        most = found.strength * self._part()
+        root = beyond_zero(found.strength * self._reference(), sqrt)
+        grip = root * shear.shears[1] / (GRIP * shear.modulus)
+        drag = graph.apply("max", -most, graph.apply("min", most, grip))
+        force = vec.neg(vec.add(vec.scale(found.push, found.outward), vec.scale(drag, found.along)))
+        return self._pair(found.arms, force)
+
+    def remainder(self, view: View) -> list[Load]:
+        return self.loads(view)
+
+    def potential(self, view: View) -> Expr | None:
+        return view.graph.zero
+
+    def sums(self, view: View) -> list[Expr]:
+        """What this adds to the rates of the states of the cell, and to the counts of what presses it, and deeper."""
+        found, graph = self._pressing(view), view.graph
+        law, shear = self._laws()
+        pressed = graph.apply("lt", 0.0, found.push)
+        speed = graph.apply("abs", found.sliding)
+        build = found.sliding - speed * shear.shears[0] / shear.modulus
+        root = beyond_zero(found.strength / self._reference(), sqrt)
+        held = root * found.sliding - speed * shear.shears[1] / (GRIP * shear.modulus * self._part())
+        deeper = law.deepening(found.depth, found.rate)
+        grows = graph.apply("lt", 0.0, deeper)
+        return [
+            where(pressed, build, 0.0),
+            where(pressed, held, 0.0),
+            where(grows, deeper, 0.0),
+            where(pressed, 1.0, 0.0),
+            where(grows, 1.0, 0.0),
+        ]
+
+
+def _under_rim(radius: Expr, x: Expr, y: Expr) -> _Column:
+    """Of a wheel, whose centre is at x, y."""
+    graph = radius.graph
+    far = BESIDE * radius
+    inside = graph.apply("lt", x * x, far * far)
+    root = sqrt(where(inside, radius * radius - x * x, radius * radius))
+    distance = beyond_zero(x * x + y * y, sqrt)
+    across = where(inside, -x / radius, 0.0)
+    return _Column(inside, root - y, (across, -root / radius), distance - radius)
+
+
+def _under_sole(length: Expr, x: Expr, y: Expr, axis: tuple[Expr, Expr]) -> _Column:
+    """Of a plate, whose middle is at x, y and whose axis has two parts: its line, and edges that rise at 45 degrees."""
+    graph = length.graph
+    turned = graph.apply("lt", axis[0], 0.0)
+    ex, ey = (where(turned, -part, part) for part in axis)
+    inside = graph.apply("lt", UPRIGHT, ex)
+    ex, ey = where(inside, ex, 1.0), where(inside, ey, 0.0)
+    half, slant = 0.5 * length, 0.5**0.5
+    lines = [
+        (x, y, ex, ey),
+        (x + half * ex, y + half * ey, slant * (ex - ey), slant * (ex + ey)),
+        (x - half * ex, y - half * ey, slant * (ex + ey), slant * (ey - ex)),
+    ]
+    (px, py, dx, dy), *edges = lines
+    level, normal = py - px * dy / dx, (dy, -dx)
+    for px, py, dx, dy in edges:
+        other = py - px * dy / dx
+        higher = graph.apply("lt", level, other)
+        level = where(higher, other, level)
+        normal = where(higher, dy, normal[0]), where(higher, -dx, normal[1])
+    return _Column(inside, -level, normal, level * -normal[1])
+
+
+def bed_rates(states: Sequence[Expr], sums: Sequence[Expr], recovery: Expr) -> list[Expr]:
+    """Rates of the states of all cells, from the sums over what presses them.
+
+    Shear is forgotten where nothing presses; the greatest sinkage stays, and grows with the mean of what deepens it.
+    """
+    found: list[Expr] = []
+    each, slots = len(STATES), len(STATES) + COUNTS
+    for k in range(len(states) // each):
+        *rates, deeper, pressed, pushing = sums[k * slots : (k + 1) * slots]
+        free = pressed.graph.apply("lt", pressed, 0.5)
+        own = states[k * each : k * each + each - 1]
+        found += [rate + where(free, -state / recovery, 0.0) for rate, state in zip(rates, own, strict=True)]
+        found.append(deeper / deeper.graph.apply("max", 1.0, pushing))
+    return found
+
+
+def cell_of(law: Contact, sizes: tuple[Expr, ...], size: Expr, kind: str, height: Vec3 | None) -> SoilCell:
+    """The contact of a feature with a cell; ``law`` has the markers and laws."""
+    normal: NormalLaw = law.normal_law
+    return SoilCell(law.name, law.first, law.second, normal, law.friction, kind, sizes, size, height)

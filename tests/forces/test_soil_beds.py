@@ -1,0 +1,460 @@
+"""Soil that remembers by place: ruts, the second pass and shear against closed forms, and energy in any motion."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
+
+import eomgen as eg
+from eomgen.errors import ModelError
+from eomgen.forces.soils import SOILS
+
+G = 9.81
+SAND = SOILS["dry_sand"]
+N, REBOUND = SAND.exponent, 0.1
+SLIPPERY = {"cohesion": 0.0, "friction_angle": 0.0}
+RADIUS, WIDTH = 0.5, 0.3
+
+
+def modulus(width: float) -> float:
+    return SAND.cohesive / width + SAND.frictional
+
+
+def wong(z: Any, deepest: Any, k: float, rebound: float = REBOUND) -> Any:
+    """Pressure at a depth below the greatest one so far; Wong's unloading and reloading by one line."""
+    z = np.maximum(z, 0.0)
+    most = np.maximum(np.maximum(z, deepest), 1e-12)
+    top = k * most**N
+    return np.where(z > 0, np.maximum(top - top / (rebound * most) * (most - z), 0.0), 0.0)
+
+
+def bed_model(
+    shapes: Any, length: Any, cells: int, bodies: int = 2, on: Any = None, target: str = "cython"
+) -> eg.Module:
+    """Bodies of 1 kg that move freely in the plane, without gravity; ``on`` makes the marker of the bed."""
+    m = eg.Model("bed", gravity=(0, 0, 0))
+    for k in range(bodies):
+        m.planar(f"j{k}", m.ground, m.body(f"b{k}", mass=1.0, inertia={"zz": 1.0}))
+    bed = {"shape": "bed", "on": m.ground if on is None else on(m), "length": length, "cells": cells}
+    law = {
+        "soil": "dry_sand", "rebound": m.parameter("rebound", REBOUND),
+        "cohesion": m.parameter("cohesion", SAND.cohesion),
+        "friction_angle": m.parameter("friction_angle", math.radians(SAND.angle)),
+        "shear_modulus": m.parameter("K", 0.025),
+    }  # fmt: skip
+    m.contacts("soil", [{**shapes, "on": f"b{k}"} for k in range(bodies)], bed, law)
+    return m.compile(target=target)
+
+
+WHEEL = {"shape": "circle", "radius": RADIUS, "width": WIDTH}
+LENGTH, CELLS = 1.2, 48
+
+
+@pytest.fixture(scope="module")
+def wheels() -> eg.Module:
+    """Two wheels and 48 cells, of which 9 lie under a wheel at 5 cm that rolls."""
+    return bed_model(WHEEL, LENGTH, CELLS)
+
+
+@pytest.fixture(scope="module")
+def plates() -> eg.Module:
+    """Two plates and 40 cells."""
+    return bed_model({"shape": "plate", "length": 0.3, "width": 0.2}, 0.6, 40)
+
+
+def state(mod: eg.Module, soil: float = 0.0, **values: float) -> Any:
+    """The second body is far above, unless it is said where; all cells have been pressed as deep as ``soil``."""
+    x = np.zeros(mod.n_x)
+    for name, value in {"j1_y": 5.0, **values}.items():
+        if name in mod.x_names:
+            x[mod.x_names.index(name)] = value
+    x[["sinkage" in name for name in mod.x_names]] = soil
+    return x
+
+
+# -- forces at given sinkages -----------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("z", "deepest"), [(0.05, 0.0), (0.05, 0.05), (0.05, 0.052), (0.05, 0.06), (0.03, 0.02)])
+def test_a_wheel_in_a_rut_of_one_depth(wheels: eg.Module, z: float, deepest: float) -> None:
+    """The sum over cells of p a is the integral of p dx over the arc; it pushes up alone, as the arc is symmetric."""
+    rates = wheels.rhs(0.0, state(wheels, deepest, j0_x=0.6, j0_y=RADIUS - z), p=SLIPPERY)
+    edge, marks = math.sqrt(RADIUS**2 - (RADIUS - z) ** 2), [0.0]
+    for depth in (deepest, (1 - REBOUND) * deepest):
+        if 0 < depth < z:
+            marks += [sign * math.sqrt(RADIUS**2 - (RADIUS - z + depth) ** 2) for sign in (-1, 1)]
+    wanted = WIDTH * quad(
+        lambda x: float(wong(math.sqrt(RADIUS**2 - x * x) - RADIUS + z, deepest, modulus(WIDTH))),
+        -edge, edge, points=sorted(marks), limit=200,
+    )[0]  # fmt: skip
+    assert rates[7] == pytest.approx(wanted, rel=0.03, abs=1e-9)
+    assert abs(rates[6]) < 1e-9 * max(wanted, 1)
+    assert abs(rates[8]) < 1e-9 * max(wanted, 1)
+
+
+@pytest.mark.parametrize("angle", [0.0, math.pi])
+@pytest.mark.parametrize(("z", "deepest"), [(0.0525, 0.0), (0.0525, 0.05), (0.05, 0.052), (0.02, 0.04)])
+def test_a_plate_and_its_edges(plates: eg.Module, z: float, deepest: float, angle: float) -> None:
+    """p L on the plate, and the columns that its edges of 45 degrees reach; also upside down."""
+    up = plates.rhs(0.0, state(plates, deepest, j0_x=0.3, j0_y=-z, j0_3=angle), p=SLIPPERY)[7]
+    k = modulus(0.2)
+    beside = np.maximum(np.abs((np.arange(40) + 0.5) * 0.015 - 0.3) - 0.15, 0.0)
+    assert up == pytest.approx(0.2 * 0.015 * wong(z - beside, deepest, k).sum(), rel=1e-9)
+    edge = quad(lambda s: float(wong(z - s, deepest, k)), 0, z, points=[max(0.0, z - deepest)], limit=200)[0]
+    wanted = 0.2 * (0.3 * float(wong(z, deepest, k)) + 2 * edge)
+    assert up == pytest.approx(wanted, rel=0.05, abs=1e-9)
+
+
+# -- steady rolling ---------------------------------------------------------------------------------------------------
+def rolled(mod: eg.Module, z: float, slip: float, p: Any = None, V: float = 0.5) -> Any:
+    """Mean force along x, up and the torque of a wheel that is led along fresh soil at a depth."""
+    spin, seconds = V / (RADIUS * (1 - slip)), 1.2
+    x, start = state(mod), 12
+
+    def at(t: float, soil: Any) -> Any:
+        x[[0, 1, 2, 6, 7, 8]] = 0.3 + V * t, RADIUS - z, -spin * t, V, 0.0, -spin
+        x[start:] = soil
+        return x
+
+    sol = solve_ivp(
+        lambda t, s: np.array(mod.rhs(t, at(t, s), p=p))[start:], (0, seconds), np.zeros(mod.n_x - start), rtol=1e-5,
+        atol=1e-8, max_step=0.01,
+    )  # fmt: skip
+    late = np.flatnonzero(sol.t > 0.7 * seconds)
+    found = np.array([np.array(mod.rhs(sol.t[k], at(sol.t[k], sol.y[:, k]), p=p))[6:9] for k in late])
+    return np.trapezoid(found, sol.t[late], axis=0) / np.ptp(sol.t[late])
+
+
+@pytest.mark.parametrize("slip", [0.02, 0.3, 0.6])
+def test_forces_of_steady_rolling(wheels: eg.Module, slip: float) -> None:
+    """By SciPy's quadrature over the arc, with dj = (R Omega - V cos a) R cos a / V, the way of soil under the rim."""
+    z, k = 0.05, modulus(WIDTH)
+    assert SAND.shear is not None
+    slope, entry = math.tan(math.radians(SAND.angle)), math.acos(1 - z / RADIUS)
+    leave = -math.acos(1 - REBOUND * z / RADIUS)
+
+    def pressure(a: float) -> float:
+        depth = RADIUS * (math.cos(a) - math.cos(entry))
+        return float(wong(depth, 0.0 if a > 0 else z, k))
+
+    def stress(a: float) -> float:
+        way = RADIUS / (1 - slip) * (math.sin(entry) - math.sin(a))
+        way -= RADIUS * ((entry - a) / 2 + (math.sin(2 * entry) - math.sin(2 * a)) / 4)
+        return (SAND.cohesion + pressure(a) * slope) * (1 - math.exp(-way / SAND.shear))
+
+    def over(f: Any) -> float:
+        return WIDTH * RADIUS * float(quad(f, leave, 0)[0] + quad(f, 0, entry)[0])
+
+    pull = over(lambda a: stress(a) * math.cos(a) - pressure(a) * math.sin(a))
+    lift = over(lambda a: pressure(a) * math.cos(a) + stress(a) * math.sin(a))
+    torque = RADIUS * over(stress)
+    found = rolled(wheels, z, slip)
+    size = max(abs(torque) / RADIUS, abs(pull))
+    np.testing.assert_allclose(found[1], lift, rtol=0.01)
+    assert abs(found[0] - pull) < 0.02 * size
+    assert abs(found[2] - torque) < 0.02 * size * RADIUS
+
+
+def test_compaction_resistance(wheels: eg.Module) -> None:
+    """Bekker's b k z^(n+1) / (n + 1), less what the rebound behind the wheel gives back, p^2 / (2 k_u)."""
+    for z in (0.02, 0.05):
+        top = modulus(WIDTH) * z**N
+        wanted = WIDTH * (top * z / (N + 1) - 0.5 * top * REBOUND * z)
+        assert -rolled(wheels, z, 0.0, SLIPPERY)[0] == pytest.approx(wanted, rel=0.015)
+
+
+# -- the second pass --------------------------------------------------------------------------------------------------
+TRAIN = 110  #: cells, of 3 cm
+
+
+def train(masses: tuple[float, ...]) -> eg.Model:
+    """Wheels in line, 0.7 m apart, that roll at 1 m/s and are free up and down."""
+    m = eg.Model("train", gravity=(0, -G, 0))
+    for k, mass in enumerate(masses):
+        m.body(f"cart{k}", mass=0)
+        m.body(f"wheel{k}", mass=mass)
+        m.prismatic(f"x{k}", m.ground, f"cart{k}", axis="x")
+        m.prismatic(f"y{k}", f"cart{k}", f"wheel{k}", axis="y")
+        m.driver(f"roll{k}", coordinate=f"x{k}", value=f"{1.9 - 0.7 * k} + t")
+        m.initial(**{f"y{k}": RADIUS - 0.02})
+    shapes = [{**WHEEL, "on": f"wheel{k}"} for k in range(len(masses))]
+    bed = {"shape": "bed", "on": m.ground, "length": 3.3, "cells": TRAIN}
+    m.contacts("soil", shapes, bed, {"soil": "dry_sand", **SLIPPERY})
+    return m
+
+
+def depth_in_rut(load: float, rut: float) -> float:
+    """Where the quadrature over the arc of a wheel carries a load, in soil pressed to a depth; behind it unloads."""
+    k = modulus(WIDTH)
+
+    def lift(z: float) -> float:
+        reach = math.sqrt(RADIUS**2 - (RADIUS - z) ** 2)
+
+        def pressure(x: float) -> float:
+            return float(wong(math.sqrt(RADIUS**2 - x * x) - RADIUS + z, rut if x > 0 else max(rut, z), k))
+
+        bends = [
+            math.sqrt(max(RADIUS**2 - (RADIUS - z + d) ** 2, 0.0)) for d in (rut, 0.9 * rut, 0.9 * max(rut, z)) if d < z
+        ]
+        marks = sorted({0.0, *bends, *(-b for b in bends)})
+        return WIDTH * float(quad(pressure, -reach, reach, points=marks, limit=200)[0])
+
+    return float(brentq(lambda z: lift(z) - load, 1e-3, 0.2))
+
+
+@pytest.fixture(scope="module")
+def convoy() -> eg.Module:
+    """Two wheels of one load, and a heavier third."""
+    return train((100.0, 100.0, 160.0)).compile()
+
+
+def late_depths(traj: Any) -> list[float]:
+    late = traj.t > 0.8
+    t = traj.t[late]
+    return [float(np.trapezoid(RADIUS - traj[f"y{k}"][late], t) / np.ptp(t)) for k in range(3)]
+
+
+def test_each_wheel_deepens_the_rut_of_those_before_it(convoy: eg.Module) -> None:
+    """By the closed form of Wong's reloading, from the rut that the wheels before have left."""
+    traj = convoy.simulate((0, 1.1), rtol=1e-6, atol=1e-8)
+    first, second, heavy = late_depths(traj)
+    rut = depth_in_rut(100 * G, 0.0)
+    deeper = depth_in_rut(100 * G, rut)
+    assert first == pytest.approx(rut, rel=2e-3)
+    assert second == pytest.approx(deeper, rel=2e-3)
+    assert heavy == pytest.approx(depth_in_rut(160 * G, rut), rel=2e-3)  # which the first has not run in
+    assert second - rut < 0.25 * first
+    cells = np.array([traj[f"soil_sinkage_{k + 1}"] for k in range(TRAIN)])
+    assert (np.diff(cells, axis=1) >= -1e-8).all()
+    place = (np.arange(TRAIN) + 0.5) * 0.03
+    for below, above, depth in ((2.55, 2.7, rut), (2.05, 2.2, deeper), (1.3, 1.45, heavy)):
+        np.testing.assert_allclose(cells[(place > below) & (place < above), -1], depth, rtol=0.01)
+
+
+def test_a_rut_can_be_given(convoy: eg.Module) -> None:
+    """A wheel that is put into a rut as deep as it would make stands where the closed form says, as the second does."""
+    rut = depth_in_rut(100 * G, 0.0)
+    given = {f"soil_sinkage_{k + 1}": rut for k in range(TRAIN)}
+    depths = late_depths(convoy.simulate((0, 1.1), initial=given, rtol=1e-6, atol=1e-8))
+    assert depths[0] == pytest.approx(depth_in_rut(100 * G, rut), rel=2e-3)
+
+
+def test_the_order_of_wheels_does_not_count(wheels: eg.Module) -> None:
+    """Two wheels press the same cells; their places exchanged, forces and rates of states are exchanged, to the bit."""
+    random = np.random.default_rng(8)
+    x = state(wheels, 0.02, j0_x=0.5, j0_y=RADIUS - 0.04, j1_x=0.6, j1_y=RADIUS - 0.03)
+    x[6:12] = random.uniform(-0.5, 0.5, 6)
+    x[12:] += random.uniform(0, 2e-3, len(x) - 12)
+    swap = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8, *range(12, len(x))]
+    rates = np.array(wheels.rhs(0.0, x))
+    assert np.abs(rates[6:12]).min() > 1
+    np.testing.assert_allclose(np.array(wheels.rhs(0.0, x[swap])), rates[swap], rtol=1e-12)
+
+
+# -- energy -----------------------------------------------------------------------------------------------------------
+def work_done(mod: eg.Module, motion: Any, seconds: float, p: Any = None) -> Any:
+    """Work that led bodies have put into the bed so far, from fresh soil on."""
+    n = 6
+
+    def at(t: float, soil: Any) -> Any:
+        q, v = motion(t)
+        return np.concatenate([q, v, soil])
+
+    def f(t: float, y: Any) -> Any:
+        rates = np.array(mod.rhs(t, at(t, y[:-1]), p=p))
+        return np.append(rates[2 * n :], -rates[n : 2 * n] @ motion(t)[1])
+
+    sol = solve_ivp(f, (0, seconds), np.zeros(mod.n_x - 2 * n + 1), rtol=1e-5, atol=1e-7, max_step=0.005)
+    return sol.t, sol.y[-1]
+
+
+def wave(random: np.random.Generator, means: Any, sizes: Any) -> Any:
+    """A smooth random motion."""
+    count, terms = len(means), 4
+    a = random.standard_normal((count, terms)) * np.asarray(sizes)[:, None] / 2
+    w, phase = random.uniform(2, 25, (count, terms)), random.uniform(0, 2 * np.pi, (count, terms))
+
+    def motion(t: float) -> Any:
+        angle = w * t + phase
+        return np.asarray(means) + (a * np.sin(angle)).sum(axis=1), (a * w * np.cos(angle)).sum(axis=1)
+
+    return motion
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", ["wheels", "plates"])
+def test_no_motion_takes_more_out_than_it_has_put_in(request: Any, kind: str, seed: int) -> None:
+    """Two led bodies over the same cells: sinkage, load and sliding change at random, in phase or not."""
+    random = np.random.default_rng([seed, 31])
+    mod = request.getfixturevalue(kind)
+    middle, height, turn = (0.6, RADIUS - 0.02, 0.5) if kind == "wheels" else (0.3, -0.01, 0.15)
+    waves = wave(random, [middle, height, 0] * 2, [0.08, 0.02, turn] * 2)
+
+    def motion(t: float) -> Any:
+        """From above the ground, as soil that begins pressed has been given energy."""
+        q, v = waves(t)
+        lifted = max(0.0, 1.0 - t / 0.1)
+        q[[1, 4]] += 0.15 * lifted**2
+        v[[1, 4]] -= 3.0 * lifted
+        return q, v
+
+    _, work = work_done(mod, motion, 0.6, {"rebound": [0.1, 0.5, 1.0, 1.0][seed], "K": [0.025, 0.01][seed % 2]})
+    assert work[-1] > 0
+    assert work.min() > -1e-5 * work.max()
+
+
+@pytest.mark.parametrize("lead", [-0.5, 0.5])
+def test_a_load_that_rises_while_shear_is_held_gains_nothing(plates: eg.Module, lead: float) -> None:
+    """Sheared under a small load, pressed, and let back: the cycle by which stress that follows the load gains."""
+    w = 2 * np.pi
+    rest = np.array([0.3, -0.01, 0, 0.3, 5.0, 0])
+
+    def motion(t: float) -> Any:
+        q, v = rest.copy(), np.zeros(6)
+        q[0] += 5e-4 * np.sin(w * t)
+        q[1] += 0.002 * np.cos(w * (t + 0.5 * lead))
+        v[0], v[1] = 5e-4 * w * np.cos(w * t), -0.002 * w * np.sin(w * (t + 0.5 * lead))
+        return q, v
+
+    t, work = work_done(plates, motion, 3.0, {"rebound": 1.0, "K": 0.01})
+    assert (np.diff(np.interp([1.0, 2.0, 3.0], t, work)) > -1e-6 * work.max()).all()
+
+
+# -- frames, targets, derivatives, refusals ---------------------------------------------------------------------------
+def test_a_turned_bed_gives_the_same_forces() -> None:
+    """The marker of the bed is turned and moved by parameters that are given late."""
+
+    def place(m: eg.Model) -> Any:
+        return m.ground.at(m.parameter("px", 0.0), m.parameter("py", 0.0), 0, rpy=(0, 0, m.parameter("turn", 0.0)))
+
+    mod = bed_model(WHEEL, 0.6, 12, 1, place, "numpy")
+    angle, corner = 0.7, np.array([0.3, -0.2])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    x = state(mod, 0.03, j0_x=0.3, j0_y=RADIUS - 0.05, j0_x_dot=0.4, j0_y_dot=-0.1, j0_3_dot=-1.5)
+    x[6:] += np.random.default_rng(2).uniform(0, 2e-3, len(x) - 6)
+    other = x.copy()
+    other[:2], other[2], other[3:5] = corner + turn @ x[:2], x[2] + angle, turn @ x[3:5]
+    here, there = np.array(mod.rhs(0, x)), np.array(mod.rhs(0, other, p={"px": 0.3, "py": -0.2, "turn": angle}))
+    assert np.abs(here[3:6]).max() > 100
+    np.testing.assert_allclose(there[3:5], turn @ here[3:5], rtol=1e-9)
+    np.testing.assert_allclose(there[5:], here[5:], rtol=1e-9, atol=1e-12)
+
+
+def free_pair(target: str) -> eg.Module:
+    """A wheel over a bed on a free body."""
+    m = eg.Model("both", gravity=(0, 0, 0))
+    for name, mass in (("ground_body", 5.0), ("wheel", 2.0)):
+        m.planar(f"j_{name}", m.ground, m.body(name, mass=mass, inertia={"zz": 0.4}))
+    bed = {"shape": "bed", "on": "ground_body", "length": m.parameter("L", 1.6), "cells": 16}
+    m.contacts("soil", {**WHEEL, "on": "wheel"}, bed, {"soil": "dry_sand", "dissipation": 0.3})
+    return m.compile(target=target)
+
+
+def met(mod: eg.Module) -> Any:
+    x = np.zeros(mod.n_x)
+    x[:12] = [-0.7, 0.05, 0.1, 0.05, 0.48, 0.4, 0.1, -0.2, 0.3, 0.5, -0.3, -2.0]
+    x[12:] = np.random.default_rng(4).uniform(0, 4e-3, mod.n_x - 12)
+    return x
+
+
+@pytest.fixture(scope="module")
+def compiled() -> eg.Module:
+    return free_pair("cython")
+
+
+def test_momentum_targets_jacobian_and_late_parameters(compiled: eg.Module) -> None:
+    numpy, cython = free_pair("numpy"), compiled
+    x = met(numpy)
+    rates = np.array(numpy.rhs(0, x))
+    np.testing.assert_allclose(np.array(cython.rhs(0, x)), rates, rtol=1e-9, atol=1e-11)
+    masses = np.array([5.0, 5.0, 2.0, 2.0])
+    force = masses * rates[[6, 7, 9, 10]]
+    assert np.abs(force).max() > 50
+    np.testing.assert_allclose(force[:2], -force[2:], rtol=1e-10)
+    moments = 0.4 * (rates[8] + rates[11]) + x[0] * force[1] - x[1] * force[0] + x[3] * force[3] - x[4] * force[2]
+    assert abs(moments) < 1e-9 * np.abs(force).max()
+    J, h = np.array(cython.jacobian(0, x)), 1e-7
+    for k in (*range(12), *range(12, numpy.n_x, 7)):
+        step = np.zeros_like(x)
+        step[k] = h
+        by_difference = (np.array(cython.rhs(0, x + step)) - np.array(cython.rhs(0, x - step))) / (2 * h)
+        assert (
+            np.abs(J[:, k] - by_difference).max()
+            < 2e-5 * max(1.0, np.abs(J[:, k]).max()) + 4e-16 * np.abs(rates).max() / h
+        )
+    longer = {"L": 1.8}
+    assert np.abs(np.array(cython.rhs(0, x, p=longer)) - rates).max() > 1.0
+    np.testing.assert_allclose(
+        np.array(cython.rhs(0, x, p=longer)), np.array(numpy.rhs(0, x, p=longer)), rtol=1e-9, atol=1e-11
+    )
+
+
+def test_a_fall_onto_a_free_bed_loses_energy_and_keeps_momentum(compiled: eg.Module) -> None:
+    mod = compiled
+    start = {
+        "j_ground_body_x": -0.8,
+        "j_wheel_y": 0.6,
+        "j_wheel_y_dot": -1.0,
+        "j_wheel_x_dot": 0.3,
+        "j_wheel_3_dot": -4.0,
+    }
+    traj = mod.simulate((0, 1.5), initial=start, rtol=1e-8, atol=1e-10)
+    energy = np.array([sum(mod.energy(x)) for x in traj.x.T])
+    assert (np.diff(energy) < 1e-7 * energy[0]).all()
+    assert energy[-1] < energy[0] - 0.3
+    momenta = np.array([mod.momentum(x)[:2] for x in traj.x.T])
+    assert np.abs(momenta - momenta[0]).max() < 1e-7
+
+
+YAML = """
+name: rover
+gravity: [0, -9.81, 0]
+bodies:
+  wheel: {mass: 100, inertia: {zz: 10}}
+joints:
+  j: {type: planar, between: [ground, wheel]}
+contacts:
+  soil:
+    first: {shape: circle, on: wheel, radius: 0.5, width: 0.3}
+    second: {shape: bed, on: ground, length: 2, cells: 8}
+    law: {soil: dry_sand}
+initial: {j_x: 1, j_y: 0.48, soil_sinkage_3: 0.01}
+"""
+
+
+def test_the_same_from_yaml(tmp_path: Any) -> None:
+    file = tmp_path / "rover.yaml"
+    file.write_text(YAML)
+    mod = eg.load(file).compile(target="numpy")
+    assert mod.x_names[6:9] == ("soil_shear_1", "soil_grip_1", "soil_sinkage_1")
+    assert mod.x0()[mod.x_names.index("soil_sinkage_3")] == 0.01
+    other = bed_model(WHEEL, 2, 8, 1, target="numpy")
+    x = state(other, 0.001, j0_x=1.0, j0_y=0.48, j0_x_dot=0.2)
+    np.testing.assert_allclose(
+        100 * (np.array(mod.rhs(0, x))[3:5] + np.array([0, G])), np.array(other.rhs(0, x))[3:5], rtol=1e-9, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("shape", "bed", "law", "told"),
+    [
+        (WHEEL, {"cells": 0}, {"soil": "dry_sand"}, "cells"),
+        (WHEEL, {"cells": 3000}, {"soil": "dry_sand"}, "cells"),
+        (WHEEL, {"length": -1}, {"soil": "dry_sand"}, "length"),
+        (WHEEL, {}, {"soil": "dry_sand", "lateral": False}, "lateral.*has no meaning for a bed"),
+        (WHEEL, {}, {"soil": "dry_sand", "peak_angle": [0.4, 0.3]}, "peak_angle"),
+        ({"shape": "circle", "radius": 0.5}, {}, {"stiffness": 1e5}, "belongs to soil"),
+        ({"shape": "box", "size": (1, 1)}, {}, {"soil": "dry_sand"}, "box"),
+        (WHEEL, {}, {"soil": "own", "sinkage_exponent": 1, "cohesive_modulus": 1e3, "frictional_modulus": 1e6,
+                     "cohesion": 0, "friction_angle": 0.5, "shear_modulus": 0.01}, "recovery"),
+    ],
+)  # fmt: skip
+def test_what_is_refused(shape: Any, bed: Any, law: Any, told: str) -> None:
+    m = eg.Model("bed")
+    m.planar("j", m.ground, m.body("b", mass=1.0, inertia={"zz": 1.0}))
+    m.contacts("soil", {**shape, "on": "b"}, {"shape": "bed", "on": m.ground, "length": 2.0, "cells": 5, **bed}, law)
+    with pytest.raises(ModelError, match=f"(?s){told}"):
+        m.compile(target="numpy")
