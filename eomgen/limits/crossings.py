@@ -15,6 +15,9 @@ MIDDLE = 5.0  #: the pivots at the first points are together so many times that 
 CLOSED = 1e-12  #: scaled residual of the interpolated position: a mechanism that only comes near misses by more
 NOISE = 1e-16  #: of C; a solution at the state has NOISE V^2 / pivot^3 in accelerations for velocities V
 GOOD = 1e-11  #: error of an interpolation, over V^2, that no shorter reach can better
+#: Weakest pivot s below which a state alone tells no acceleration: closures are known to 1e-16, so that a state on no
+#: branch counts as closed where it misses its branch by 1e-16 / s, which is 1e-16 / s^2 = 1 % of s here.
+UNTOLD = 1e-7
 WEAKEST = 1e-4  #: below this pivot the solution at the state gets no worse: its weak part is left out
 STILL = 1e-9  #: scaled velocity that tells no direction
 SLANT = 1e-3  #: least part of the motion that the tangent coordinates must keep

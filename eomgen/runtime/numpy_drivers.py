@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..errors import PartitionError, SingularMassMatrixError, UnsolvedError
-from ..limits.crossings import NEAR
+from ..limits.crossings import NEAR, UNTOLD
 from ..limits.inertia import SINGULAR
 from ..numeric import algebra, embedded, passing, projection
 from ..numeric.definite import correlated
@@ -218,6 +218,8 @@ class Drivers:
                 raise
             return better
         better = self._better(function, t, x, u, c, weakest)
+        if better is None and weakest < UNTOLD:
+            raise PartitionError("no closed position is told from the change point that is here")
         return values if better is None else better
 
     def _better(self, function: Motion, t: float, x: Array, u: Array, c: Array, weakest: float) -> Array | None:

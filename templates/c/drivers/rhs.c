@@ -2,5 +2,6 @@ static int rhs_driver(double t, const double *restrict x, const double *restrict
                      double *restrict out, double *restrict w)
 {
     double weakest;
-    return rhs_here(t, x, u, c, out, &weakest, w);
+    const int status = rhs_here(t, x, u, c, out, &weakest, w);
+    return told(status, weakest);
 }
