@@ -87,19 +87,16 @@ if MODEL.abi != 3:
 metadata = MODEL.metadata.decode()
 compiler = EOMGEN_COMPILER.decode()  # of this layer, and of the model that is linked with it
 names = tuple([MODEL.kernels[i].name.decode() for i in range(MODEL.n_kernels)])
+cdef dict _PLACES = {name: place for place, name in enumerate(names)}
 sizes = {"n_p": MODEL.n_p, "n_u": MODEL.n_u, "n_const": MODEL.n_const, "n_work": MODEL.n_work}
 _FACTS = json.loads(metadata)
 _LONG = 20_000  # operations from which on a call lets other threads run: 5 microseconds, 100 times what that costs
 
 
 cdef int find(str name, object error) except -1:
-    place = _PLACES.get(name)
-    if place is None:
+    if name not in _PLACES:
         raise error(f"model {MODEL.name.decode()!r} has no kernel {name!r}; it has {', '.join(names)}")
-    return place
-
-
-cdef dict _PLACES = {name: place for place, name in enumerate(names)}
+    return _PLACES[name]
 
 
 include "_numbers.pxi"
