@@ -22,8 +22,8 @@ def check_turns(constraints: Sequence[Constraint], requirements: Requirements) -
             if turn is None:
                 continue
             laws, angle = turn
-            end = " at the declared values" if symbols_of(laws) - {angle} else ""
+            where = " at the declared values" if symbols_of(laws) - {angle} else ""
             try:
-                requirements.judge(f"constraints.{constraint.name}.{field.name}", TURN, laws, (end,), [angle])
+                requirements.judge(f"constraints.{constraint.name}.{field.name}", TURN, laws, (), [angle], where)
             except ModelError:  # native code without a twin in Python
                 continue

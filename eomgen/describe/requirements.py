@@ -51,16 +51,22 @@ class Requirements:
         self.numbers = {name: value for name, value in values.items() if value is not None}
 
     def judge(
-        self, path: str, rule: str, expressions: Sequence[Expr], data: Sequence[Any] = (), local: Sequence[str] = ()
+        self,
+        path: str,
+        rule: str,
+        expressions: Sequence[Expr],
+        data: Sequence[Any] = (),
+        local: Sequence[str] = (),
+        where: str = "",
     ) -> bool:
         """Note what is wrong at the declared values, and keep the rule for late ones; True where something is wrong.
 
-        Numbers that depend on more than parameters and local names are not judged.
+        Numbers that depend on more than parameters and local names are not judged.  ``where`` ends the messages.
         """
         values = self.known(expressions, dict(zip(local, POINTS[rule](), strict=True)) if local else {})
         flaws = [] if values is None else RULES[rule](values, *data)
         for flaw in flaws:
-            self.faults.add(path + flaw.key, flaw.message, flaw.remedy)
+            self.faults.add(path + flaw.key, flaw.message + where, flaw.remedy)
         if not flaws:
             self.keep(path, rule, expressions, data, local)
         return bool(flaws)

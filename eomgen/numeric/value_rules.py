@@ -104,7 +104,7 @@ def turn_points() -> Array:
     return np.concatenate([[EDGE, math.tau - EDGE], np.linspace(EDGE, math.tau - EDGE, 100)])[None]
 
 
-def judge_turn(values: Any, end: str = "") -> list[Flaw]:
+def judge_turn(values: Any) -> list[Flaw]:
     """A profile and its slope over a turn, at :func:`turn_points`: what it is elsewhere is judged elsewhere."""
     found = np.asarray(values, dtype=float)
     if not np.isfinite(found).all():
@@ -114,7 +114,7 @@ def judge_turn(values: Any, end: str = "") -> list[Flaw]:
         first, last = (0.0 if abs(x) < ZERO * size else float(x) for x in f[:2])
         if abs(last - first) > CLOSING * float(size) + rounding:
             message = f"does not close after a turn: its {what} is {first:.6g} at theta = 0 and {last:.6g} at 2 pi"
-            return [Flaw("", message + end, CORRECT_TURN)]
+            return [Flaw("", message, CORRECT_TURN)]
     return []
 
 

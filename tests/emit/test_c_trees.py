@@ -35,19 +35,24 @@ def test_rhs_equals_a_dense_solve(systems, compiled, parents, unrolled):
     np.testing.assert_allclose(library.fine("outputs", x, 0.4), y, rtol=1e-13, atol=1e-13)
 
 
+def differences(library, x):
+    """The slopes of rhs, from four points on each line."""
+    numeric = np.empty((len(x), len(x)))
+    for k in range(len(x)):
+        step = np.zeros(len(x))
+        step[k] = 1e-3
+        f = [library.fine("rhs", x + s * step, 0.4) for s in (-2, -1, 1, 2)]
+        numeric[:, k] = (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step[k])
+    return numeric
+
+
 @pytest.mark.parametrize("nodes", [0, 10**9], ids=["by direction", "at once"])
 def test_jacobian_equals_central_differences(systems, compiled, nodes):
     system = systems.chain(len(BRANCHED), BRANCHED)
     library = compiled(system, limits=systems.Limits(jacobian_nodes=nodes))
     n, x = system.n, state(system)
     J = library.fine("jacobian", x, 0.4).reshape(2 * n, 2 * n)
-    numeric = np.empty_like(J)
-    for k in range(2 * n):
-        step = np.zeros(2 * n)
-        step[k] = 1e-3
-        f = [library.fine("rhs", x + s * step, 0.4) for s in (-2, -1, 1, 2)]
-        numeric[:, k] = (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step[k])
-    np.testing.assert_allclose(J, numeric, rtol=0, atol=1e-8 * np.abs(J).max())
+    np.testing.assert_allclose(J, differences(library, x), rtol=0, atol=1e-8 * np.abs(J).max())
 
 
 @pytest.mark.parametrize("n", [3, 5, 7, 8, 13])
@@ -60,13 +65,7 @@ def test_jacobians_of_every_number_of_columns_agree(systems, compiled, n):
     scale = np.abs(J).max()
     # other sines, of the C library, whose last digits the inverse of M carries on
     np.testing.assert_allclose(plain.fine("jacobian", x, 0.4).reshape(J.shape), J, rtol=0, atol=1e-11 * scale)
-    numeric = np.empty_like(J)
-    for k in range(2 * n):
-        step = np.zeros(2 * n)
-        step[k] = 1e-3
-        f = [library.fine("rhs", x + s * step, 0.4) for s in (-2, -1, 1, 2)]
-        numeric[:, k] = (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step[k])
-    np.testing.assert_allclose(J, numeric, rtol=0, atol=1e-7 * scale)
+    np.testing.assert_allclose(J, differences(library, x), rtol=0, atol=1e-7 * scale)
     np.testing.assert_array_equal(J[:n], np.hstack([np.zeros((n, n)), np.eye(n)]))
 
 

@@ -11,7 +11,7 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
     double time_per_length, speed;
     const double reach = interpolate_best(t, x, u, c, weakest, &time_per_length, &speed, w);
     if (!(reach > 0.0) || !(set_out(t, u, c, reach, time_per_length, speed, w) > 0.0)) {
-        return told(status, weakest);
+        return TOLD_STATUS(status, weakest);
     }
     for (int k = 0; k < NX * NX; k++) {
         out[k] = 0.0;

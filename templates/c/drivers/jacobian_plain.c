@@ -3,5 +3,5 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
 {
     double weakest = 1.0;
     const int status = jacobian_here(t, x, u, c, out, &weakest, w);
-    return told(status, weakest);
+    return TOLD_STATUS(status, weakest);
 }

@@ -7,10 +7,7 @@ typedef struct {
 } partition;
 
 /* The status of accelerations of a state alone, which tells none where its position is not told from a change point. */
-static int told(int status, double weakest)
-{
-    return status == 0 && weakest < CROSSINGS_UNTOLD ? EOMGEN_PARTITION_BAD : status;
-}
+#define TOLD_STATUS(status, weakest) ((status) == 0 && (weakest) < CROSSINGS_UNTOLD ? EOMGEN_PARTITION_BAD : (status))
 
 /* Rows [J | -column/s_c | I] of the given width in w + AT_ROWS; the unit matrix only where the width has room. */
 static void form_rows(const double *restrict J, const double *restrict column, int width, double *restrict w)

@@ -3,5 +3,5 @@ static int rhs_driver(double t, const double *restrict x, const double *restrict
 {
     double weakest;
     const int status = rhs_here(t, x, u, c, out, &weakest, w);
-    return told(status, weakest);
+    return TOLD_STATUS(status, weakest);
 }

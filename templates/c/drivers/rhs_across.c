@@ -19,5 +19,5 @@ static int rhs_across(double t, const double *restrict x, const double *restrict
     if (found) {
         normalise(w + AT_X);
     }
-    return found ? 0 : told(status, weakest);
+    return found ? 0 : TOLD_STATUS(status, weakest);
 }
