@@ -103,8 +103,8 @@ def wall_items(data: PictureData, view: Array | None, symbol: float, poses: Arra
     bearings = [f.position for j in data.joints if j.pieces and not j.slides for f in (j.P, j.S) if f.body == GROUND]
     for element in data.elements:
         stops = element.get("stops", ())
-        if len(stops) < 2:
-            continue
+        if len(stops) < 2 or (view is None and all(stop.body == GROUND for stop, _, _ in stops)):
+            continue  # or it is ground itself, whose lines would be cubes at every end
         for (stop, _, _), (other, _, _) in ((stops[0], stops[1]), (stops[-1], stops[-2])):
             here = stop.position
             if stop.body != GROUND or any(np.abs(here - b).max() < symbol for b in bearings):

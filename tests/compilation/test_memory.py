@@ -45,7 +45,7 @@ def grown(target: str, count: int) -> tuple[float, int]:
 
 
 def test_throw_away_models_of_numpy_leave_nothing() -> None:
-    per_model, left = grown("numpy", 55)
+    per_model, left = grown("numpy", 175)  # so many that what the allocator keeps once counts little
     assert left == 0
     assert per_model < 0.02  # MB; 0.06 while they were kept
 

@@ -166,6 +166,21 @@ def test_a_law_between_two_points_is_seen() -> None:
     assert np.allclose(line[-1], (1, 0, 0))
 
 
+def test_a_height_field_is_lines_at_its_heights_and_not_walls() -> None:
+    m = eg.Model("dunes", gravity=(0, 0, -9.81))
+    ball = m.body("ball", mass=1, inertia=(0.004,) * 3)
+    m.free("j", m.ground, ball)
+    x = [-1.0, 0.0, 1.0]
+    field = {"shape": "height_field", "on": m.ground, "x": x, "y": x, "z": [[0.2] * 3, [0.0] * 3, [0.2] * 3]}
+    m.contacts("c", {"shape": "sphere", "radius": 0.1, "on": ball}, field, {"stiffness": 1e5})
+    items = scene_of(m.compile(target="numpy")).items
+    assert not [item for item in items if item.role == "hatch" and item.name == "c"]
+    points = np.vstack([item.points for item in items if item.role == "force" and item.name == "c"])
+    edges = points[np.isclose(np.abs(points[:, 0]), 1.0)]
+    assert len(edges) > 4
+    assert np.allclose(edges[:, 2], 0.2)
+
+
 @pytest.mark.parametrize("name", sorted(file.name for file in EXAMPLES.glob("*.yaml")))
 def test_every_example_draws_all_bodies_in_the_page(name: str) -> None:
     module = compiled(name)
