@@ -11,8 +11,9 @@ from typing import Any
 
 from ..limits.in_c import definitions
 from ..program import Block, Program
+from ..program.block_groups import REGULAR, USUAL
 from .c_functions import declarations, used_calls
-from .c_layout import space_file
+from .c_layout import space_file, straight_file
 from .c_pairs import pair_declarations
 from .c_text import used_helpers
 from .sources import read_template, render
@@ -32,19 +33,19 @@ WIDTHS: dict[int, tuple[tuple[str, ...], str]] = {
 
 
 #: Blocks of which the right-hand side of loops in lanes is made.
-CLOSED = ("closing", "dynamics")
+CLOSED = (*USUAL, *REGULAR)
 
 
 def loops_in_lanes(program: Program) -> bool:
     """Whether there are loops whose right-hand side has lanes."""
     driven = {name for d in program.drivers if d.name == "rhs" for name in d.blocks}
-    return driven.issuperset(CLOSED) and not program.given_rates
+    return driven.issuperset(USUAL) and not program.given_rates
 
 
 def rhs_blocks(program: Program) -> list[str]:
     """Names of the blocks of the right-hand side in lanes; none if it has no lanes."""
     if loops_in_lanes(program):
-        return list(CLOSED)
+        return [name for name in CLOSED if name in program.block_names]
     rhs = program.twins.get("rhs", "rhs")
     return [rhs] if rhs in public_blocks(program) else []
 
@@ -77,8 +78,8 @@ def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
         return {}
     name = program.name
     roots = [y for b in blocks.values() for y in (*b.outputs, *b.checks)]
-    files_of_loops = [space_file(program), "rhs_in_lanes"] if loops_in_lanes(program) else []
-    drivers = [read_template(f"c/drivers/{file}.c") for file in files_of_loops]
+    parts = [space_file(program), f"{straight_file(program)}_in_lanes", "rhs_in_lanes"]
+    drivers = [read_template(f"c/drivers/{file}.c") for file in parts if loops_in_lanes(program)]
     inside = {
         **context,
         "helpers": [

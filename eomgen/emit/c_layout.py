@@ -57,8 +57,14 @@ def rhs_files(program: Program) -> tuple[str, ...]:
     if "system" in program.block_names:
         here: tuple[str, ...] = (*CLOSE, *PIVOT, "embed", *SOLVE, "weakest", "system_rhs_here")
     else:
-        here = (*ACCELERATE, "weakest", "rhs_here_direct" if "dynamics" in program.block_names else "rhs_here")
+        direct = (straight_file(program), "rhs_here_direct") if "dynamics" in program.block_names else ("rhs_here",)
+        here = (*ACCELERATE, "weakest", *direct)
     return (*here, *(PASSING if passes(program) else ()))
+
+
+def straight_file(program: Program) -> str:
+    """The file that calls the blocks of straight-line code of loops."""
+    return "straight_regular" if "regular_dynamics" in program.block_names else "straight_usual"
 
 
 def space_file(program: Program) -> str:

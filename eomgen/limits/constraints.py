@@ -15,6 +15,9 @@ SETTLED = 1000.0 * EXACT  #: at which to stop when it falls no longer: rounding 
 ACCEPTED = 100.0 * SETTLED  #: largest of a projected or assembled state: what users are told is closed
 CONTRADICTION = 100.0 * ACCEPTED  #: of rows that no position closes, or whose rates differ by this part
 SHORT = 1e-8  #: scaled Newton step, whose square, what the step leaves of a smooth row, is below EXACT
+#: Scaled Newton step up to which the term in J J^T, which is as large as the residual, may be left out: with the term a
+#: step d misses d^2 / s^2 along weak rows, which the next one mends but for d^3 / s^2, 1e-13 at an s of 0.1.
+NEARBY = 1e-5
 MEASURED = 1e-6  #: of gaps that a user says are closed, and of positions that count as one
 
 # -- solved by J J^T -------------------------------------------------------------------------------------------------

@@ -1,4 +1,6 @@
-"""Stage program, groups of blocks: what is composed, what belongs to given rates, and kernels made along directions."""
+"""Stage program, groups of blocks: what is composed, what belongs to given rates and to loops, and what is made along
+directions.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +11,9 @@ from .terms import Row
 
 COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h, C_q and gamma are put together from
 RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
+
+#: Blocks of the right-hand side of loops, and those that are tried before them where that pays.
+USUAL, REGULAR = ("closing", "dynamics"), ("regular_closing", "regular_dynamics")
 
 #: Kernels that are derivatives by something other than the state -> what.
 SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}

@@ -11,21 +11,22 @@ from ..graph.pair_calls import pairs_of_bodies, without_pairs
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from ..kernel_table import DAE, NAMED, Sizes
-from .block_groups import ALONG, COMPOSED, RATES, SHIFTS, flat
+from .block_groups import ALONG, COMPOSED, RATES, REGULAR, SHIFTS, USUAL, flat
 from .body_loops import BodyLoops
 from .dae_rows import dae_kinematics
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
-from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
+from .factor import articulated_positivity, factorize, is_unrolled, positivity, solve
 from .inverse_slopes import inverse_slopes
 from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .loop_blocks import LoopBlocks
 from .loop_slopes import BY_BODIES, LoopSlopes
 from .port_symbols import port_symbols
 from .program import Block, Limits, Port
+from .regular_loops import RegularLoops
 from .residuals import acceleration_residual, force_residual
 from .second_order import TreeHessian, hessian_product
 from .second_order_loops import LoopHessian
-from .straight_loops import curved_loops, straight_loops
+from .straight_loops import curved_loops, regular_loops, straight_loops
 from .terms import SystemTerms
 
 
@@ -53,6 +54,11 @@ class BlockMaker:
     def _loops(self) -> LoopBlocks | None:
         """The straight-line form of a right-hand side with loops, if it is not too long."""
         return straight_loops(self.terms, self.limits.unrolled_loops) if self.limits.unrolled_loops else None
+
+    @cached_property
+    def _regular(self) -> RegularLoops | None:
+        """The shorter form that is tried before that one."""
+        return regular_loops(self._loops, self.limits.unrolled_loops)
 
     @cached_property
     def curved_loops(self) -> LoopBlocks | None:
@@ -98,11 +104,7 @@ class BlockMaker:
         """v' of a tree in terms of (q, v), and the conditions for it to exist."""
         terms = self.terms
         if terms.accelerations is not None and terms.pivots:
-            scaled = zip(terms.pivots, terms.coordinate_scales, strict=True)
-            pivots = [d * s * s for d, s in terms.graph.marked(scaled)]
-            zero = terms.graph.zero
-            one = [terms.graph.apply("lt", zero, d) for d in pivots]
-            checks = one if len(pivots) == 1 else exceeding(pivots, outward(pivots, terms.parent))
+            checks = articulated_positivity(terms.pivots, terms.coordinate_scales, terms.parent)
             return list(terms.accelerations), [*self._turned, *checks]
         mass, bias = terms.turned.system if terms.turned else (terms.mass_matrix, terms.bias)
         factor = factorize(mass, terms.parent)
@@ -285,8 +287,8 @@ class BlockMaker:
         project = ("scales", "position", "rate")
         accelerate = formed if self.outputs_need_accelerations else ()
         mass = "mass_times" if self.terms.by_columns else "mass_matrix"
-        direct = ("closing", "dynamics") if self._loops is not None else ()
-        along = ("closing", "dynamics", *BY_BODIES) if self._loop_slopes is not None else ()
+        direct = (*USUAL, *(REGULAR if self._regular else ())) if self._loops is not None else ()
+        along = (*direct, *BY_BODIES) if self._loop_slopes is not None else ()
         return {
             "rhs": (*project, *formed, *direct),
             "jacobian": (*project, *formed, residual, *along),
@@ -316,12 +318,12 @@ class BlockMaker:
                 return self._internal(name, "q v", every, self._turned)
             case "position":  # C, C_q
                 return self._internal(name, "q", [*terms.constraints, *flat(terms.constraint_jacobian)])
-            case "closing":  # a Newton step
-                assert self._loops is not None
-                return self._internal(name, "q", self._loops.closing())
-            case "dynamics":  # v, a, whether the preferred partition is sound
-                assert self._loops is not None
-                outputs, checks = self._loops.dynamics()
+            case "closing" | "dynamics" | "regular_closing" | "regular_dynamics":
+                form = self._loops if name in USUAL else self._regular
+                assert form is not None
+                if name.endswith("closing"):  # a Newton step
+                    return self._internal(name, "q", form.closing())
+                outputs, checks = form.dynamics()  # v, a, whether these are sound
                 return self._internal(name, "q v", outputs, [*self._turned, *checks])
             case "loop_slopes" | "slopes_by_position" | "slopes_by_velocity":
                 assert self._loop_slopes is not None

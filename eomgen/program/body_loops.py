@@ -65,14 +65,14 @@ class BodyLoops(LoopBlocks):
         kept = list(zip(outward(pivots, self.terms.parent), pivots, strict=True))
         if not self.redundant:
             kept += zip(self.motion.row_sizes, self.motion.row_pivots, strict=True)
-        return self._all([self.terms.graph.apply("lt", size * KEPT, pivot) for size, pivot in kept])
+        return self.all_of([self.terms.graph.apply("lt", size * KEPT, pivot) for size, pivot in kept])
 
     def _far(self) -> Expr:
         """By the rows, of which redundant ones keep nothing, or by the columns of the dependent coordinates."""
         graph, separate, angles = self.terms.graph, self._separate_rows(), self._angles_of_columns()
         if angles is None:
             return separate
-        columns = self._all([graph.apply("lt", size * NEAR_SQUARE, part) for size, part in angles])
+        columns = self.all_of([graph.apply("lt", size * NEAR_SQUARE, part) for size, part in angles])
         return graph.apply("or", columns, separate)
 
     def _angles_of_columns(self) -> list[tuple[Expr, Expr]] | None:

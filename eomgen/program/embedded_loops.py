@@ -18,6 +18,33 @@ from .terms import SystemTerms
 SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast as independent ones (scaled)
 
 
+def embedded_accelerations(
+    terms: SystemTerms, scales: Sequence[Expr], B: Sequence[Row], a: Sequence[Expr], bias: Sequence[Expr]
+) -> tuple[list[Expr], list[Expr]]:
+    """Accelerations a + B y with B^T (M (a + B y) + bias) = 0, and checks of the inertia B^T M B."""
+    graph, f = terms.graph, range(terms.n_dof)
+    M = rows_of(terms.mass_matrix)
+    force = [x + y for x, y in zip(bias, times(M, a), strict=True)]
+    columns = transpose(B, terms.n_dof)
+    MB = [{k: x for k, b in enumerate(columns) if (x := dot(row, b)) is not None} for row in M]
+    across = transpose(MB, terms.n_dof)
+    embedded = {(i, k): dot(columns[i], across[k]) for i in f for k in f if k <= i}
+    entries = {key: graph.zero if x is None else x for key, x in embedded.items()}
+    factor = factorize([{k: entries[max(i, k), min(i, k)] for k in f} for i in f])
+    y = factor.solve([-x for x in times(columns, force)])
+    diagonal = {i: row.get(i, graph.zero) for i, row in enumerate(M)}
+    squares = [dot({i: x * x for i, x in column.items()}, diagonal) for column in columns]
+    units = [scales[k] * scales[k] if terms.n_dof > 1 else graph.one for k in terms.preferred]
+    sizes = [graph.zero if x is None else x * k for x, k in zip(squares, units, strict=True)]
+    checks = exceeding([d * k for d, k in zip(factor.pivots, units, strict=True)], sizes)
+    if terms.n_dof == 1:  # there is no other motion whose inertia tells what nothing is
+        moving = {k: scales[k] / scales[terms.preferred[0]] for k, row in enumerate(B) if row}
+        reach = dot({k: ratio * ratio for k, ratio in moving.items()}, diagonal)
+        if reach is not None:
+            checks.append(graph.apply("lt", reach * STILL, factor.pivots[0]))
+    return [x + d for x, d in zip(a, times(B, y), strict=True)], checks
+
+
 class EmbeddedLoops(LoopBlocks):
     """M_e = B^T M B; sound where the preferred partition is well conditioned."""
 
@@ -36,7 +63,7 @@ class EmbeddedLoops(LoopBlocks):
         return held.issuperset(k for k in range(self.terms.n_v) if k not in self.terms.preferred)
 
     def _accelerate(self, moved: dict[Expr, Expr], conditions: list[Expr]) -> tuple[list[Expr], list[Expr]]:
-        terms, graph, f = self.terms, self.terms.graph, range(self.terms.n_dof)
+        terms, graph = self.terms, self.terms.graph
         here = substitute([*terms.bias, *terms.gamma], moved)
         gamma = [x * i for x, i in zip(here[terms.n_v :], self.inverse, strict=True)]
         if self.gentle:
@@ -44,26 +71,7 @@ class EmbeddedLoops(LoopBlocks):
             B, _ = self._partition(None, conditions)
         else:
             B, a = self._partition([-x for x in gamma], conditions)
-        M = rows_of(terms.mass_matrix)
-        force = [x + y for x, y in zip(here[: terms.n_v], times(M, a), strict=True)]
-        columns = transpose(B, terms.n_dof)
-        MB = [{k: x for k, b in enumerate(columns) if (x := dot(row, b)) is not None} for row in M]
-        across = transpose(MB, terms.n_dof)
-        embedded = {(i, k): dot(columns[i], across[k]) for i in f for k in f if k <= i}
-        entries = {key: graph.zero if x is None else x for key, x in embedded.items()}
-        factor = factorize([{k: entries[max(i, k), min(i, k)] for k in f} for i in f])
-        y = factor.solve([-x for x in times(columns, force)])
-        a = [x + d for x, d in zip(a, times(B, y), strict=True)]
-        diagonal = {i: row.get(i, graph.zero) for i, row in enumerate(M)}
-        squares = [dot({i: x * x for i, x in column.items()}, diagonal) for column in columns]
-        units = [self.s[k] * self.s[k] if terms.n_dof > 1 else graph.one for k in terms.preferred]
-        sizes = [graph.zero if x is None else x * k for x, k in zip(squares, units, strict=True)]
-        checks = exceeding([d * k for d, k in zip(factor.pivots, units, strict=True)], sizes)
-        if terms.n_dof == 1:  # there is no other motion whose inertia tells what nothing is
-            moving = {k: self.s[k] / self.s[terms.preferred[0]] for k, row in enumerate(B) if row}
-            reach = dot({k: ratio * ratio for k, ratio in moving.items()}, diagonal)
-            if reach is not None:
-                checks.append(graph.apply("lt", reach * STILL, factor.pivots[0]))
+        a, checks = embedded_accelerations(terms, self.s, B, a, here[: terms.n_v])
         return a, checks
 
     def _far(self) -> Expr:
@@ -71,7 +79,7 @@ class EmbeddedLoops(LoopBlocks):
         parallel too, or by the rows of all.
         """
         graph = self.terms.graph
-        far = self._all([graph.apply("lt", size * NEAR_SQUARE, part) for size, part in self._angles])
+        far = self.all_of([graph.apply("lt", size * NEAR_SQUARE, part) for size, part in self._angles])
         if self.gentle and far != graph.one and not self.redundant:
             far = graph.apply("or", far, self._separate_rows())
         return far

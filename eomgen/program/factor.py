@@ -115,6 +115,15 @@ def outward(pivots: Sequence[Expr], parent: Sequence[int]) -> list[Expr]:
     return sizes
 
 
+def articulated_positivity(pivots: Sequence[Expr], scales: Sequence[Expr], parent: Sequence[int]) -> list[Expr]:
+    """Conditions as of :func:`positivity`, by articulated inertias."""
+    graph = pivots[0].graph
+    pivots = [d * s * s for d, s in graph.marked(zip(pivots, scales, strict=True))]
+    if len(pivots) == 1:
+        return [graph.apply("lt", graph.zero, pivots[0])]
+    return exceeding(pivots, outward(pivots, parent))
+
+
 def _larger(a: Expr, b: Expr) -> Expr:
     """Plain comparison, not "max": NaN is caught with the result, and this is one instruction."""
     return a.graph.apply("select", a.graph.apply("lt", a, b), b, a)

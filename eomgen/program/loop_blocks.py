@@ -124,10 +124,7 @@ class LoopBlocks(ABC):
         graph = self.terms.graph
         if not self.h:
             return [graph.zero] * (3 + self.terms.n_v)
-        e = [x * i for x, i in zip(self.terms.constraints, self.inverse, strict=False)]
-        if self.gentle:
-            closed = self._closed()
-            e = [graph.apply("select", closed, graph.zero, x) for x in e]
+        e = self.residuals
         rows = self.J[: self.h]
         size = total_magnitude(e) * (self.unit / float(self.h))
         factor, term = self._regularised(rows, graph.apply("max", graph.constant(GENTLE), size))
@@ -135,6 +132,16 @@ class LoopBlocks(ABC):
         dz = times(transpose(rows, self.terms.n_v), z)
         left = total_magnitude(z) * term * self.unit
         return [size, left, total_magnitude(dz), *(-s * d for s, d in zip(self.s, dz, strict=True))]
+
+    @cached_property
+    def residuals(self) -> list[Expr]:
+        """The scaled holonomic rows (h,); all zero where rounding is all that is left of them."""
+        graph = self.terms.graph
+        e = [x * i for x, i in zip(self.terms.constraints, self.inverse, strict=False)]
+        if self.gentle:
+            closed = self._closed()
+            e = [graph.apply("select", closed, graph.zero, x) for x in e]
+        return e
 
     def _closed(self) -> Expr:
         """Whether no row is farther off than its own sum is rounded: its step would be noise, large near lost rank."""
@@ -222,7 +229,7 @@ class LoopBlocks(ABC):
         conditions: list[Expr] = []
         moved = self._moved(conditions)
         a, checks = self._accelerate(dict(zip(v, moved, strict=True)), conditions)
-        return [*moved, *a, self._all(conditions), self._far()], checks
+        return [*moved, *a, self.all_of(conditions), self._far()], checks
 
     @abstractmethod
     def _accelerate(self, moved: dict[Expr, Expr], conditions: list[Expr]) -> tuple[list[Expr], list[Expr]]:
@@ -232,7 +239,7 @@ class LoopBlocks(ABC):
     def _far(self) -> Expr:
         """1 where no change point can be near."""
 
-    def _all(self, conditions: Sequence[Expr]) -> Expr:
+    def all_of(self, conditions: Sequence[Expr]) -> Expr:
         """Whether all conditions hold."""
         sound = self.terms.graph.one
         for condition in conditions:
@@ -240,23 +247,24 @@ class LoopBlocks(ABC):
         return sound
 
     @property
-    def _groups(self) -> tuple[int, ...]:
+    def groups(self) -> tuple[int, ...]:
+        """Per row the group with which its length is compared."""
         return self.terms.row_groups or (ALL,) * len(self.J)
 
     def _separate_rows(self) -> Expr:
         """Whether as many rows as the rank are neither short beside their group nor near to those before them."""
         graph, pivots = self.terms.graph, self._solver[0].pivots
         squares = [graph.zero if (x := dot(row, row)) is None else x for row in self.J]
-        held, limits = graph.zero, self._shortest(squares)
-        for pivot, square, group in zip(pivots, squares, self._groups, strict=True):
+        held, limits = graph.zero, self.shortest(squares)
+        for pivot, square, group in zip(pivots, squares, self.groups, strict=True):
             separate = graph.apply("lt", square * NEAR_SQUARE, pivot)
             held = held + graph.apply("and", separate, graph.apply("lt", limits[group], square))
         return graph.apply("lt", self.terms.n_v - self.terms.n_dof - 0.5, held)
 
-    def _shortest(self, squares: Sequence[Expr]) -> dict[int, Expr]:
+    def shortest(self, squares: Sequence[Expr]) -> dict[int, Expr]:
         """Squares of the lengths at which rows of each group are short."""
         graph, members = self.terms.graph, dict[int, list[Expr]]()
-        for square, group in zip(squares, self._groups, strict=True):
+        for square, group in zip(squares, self.groups, strict=True):
             members.setdefault(group, []).append(square)
         unit = graph.constant(1.0) / (self.unit * self.unit)
         found = {}

@@ -13,6 +13,7 @@ from ..graph.core import Expr, Graph
 from ..graph.count import Operations
 from ..kernel_table import Sizes
 from ..records import dataclass
+from .block_groups import REGULAR, USUAL
 
 #: Blocks that only trees have whose accelerations are known without their mass matrix.
 BY_COLUMNS = ("mass_times", "acceleration_tangent", "input_acceleration", "parameter_acceleration")
@@ -180,7 +181,7 @@ class Program:
     def is_searched(self, name: str) -> bool:
         """Whether what is alike in a block, or in ``precompute``, is found without marks of the graph too."""
         limits = self.limits
-        most = limits.repeated_dynamics if name in ("closing", "dynamics") else limits.repeated
+        most = limits.repeated_dynamics if name in (*USUAL, *REGULAR) else limits.repeated
         return self.counts[name].total > most
 
     @cached_property

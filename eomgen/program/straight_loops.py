@@ -2,13 +2,34 @@
 
 from __future__ import annotations
 
+from ..graph.count import count
 from ..limits.constraints import DIFFERENTIATED, TIKHONOV
 from .body_loops import BodyLoops
 from .embedded_loops import EmbeddedLoops
 from .loop_blocks import LoopBlocks, estimate
+from .regular_loops import RegularLoops
 from .terms import SystemTerms
 
 SOLUTIONS = 4  #: that leave no trace of DIFFERENTIATED
+SAVED = 0.8  #: part of the operations of the usual blocks that others take at most which are tried before them
+
+
+def regular_loops(loops: LoopBlocks | None, longest: int) -> RegularLoops | None:
+    """The form of right-hand sides away from change points, where the usual one takes many more operations.
+
+    Mechanisms of few velocities have no use for it: their usual form is left for pivots near change points.
+    """
+    if loops is None or not loops.gentle:
+        return None
+    regular = RegularLoops(loops)
+    if not regular.possible or regular.estimate > longest:
+        return None
+    return regular if _operations(regular) < SAVED * _operations(loops) else None
+
+
+def _operations(blocks: LoopBlocks | RegularLoops) -> int:
+    outputs, checks = blocks.dynamics()
+    return count(blocks.closing()).total + count([*outputs, *checks]).total
 
 
 def curved_loops(terms: SystemTerms, longest: int, usual: LoopBlocks | None) -> LoopBlocks | None:

@@ -45,7 +45,8 @@ def facts(module: BoundModel) -> list[tuple[str, str]]:
         ("method, target", f"{data.get('method', '-')}, {data.get('target', '-')}"),
     ]
     operations = data.get("operations", {})
-    parts = next((p for p in (("rhs",), ("closing", "dynamics"), ("terms",)) if operations.get(p[-1])), None)
+    known = (("rhs",), ("regular_closing", "regular_dynamics"), ("closing", "dynamics"), ("terms",))
+    parts = next((p for p in known if operations.get(p[-1])), None)
     if parts:  # terms alone: linear algebra comes on top
         kinds = [kind for kind, n in operations[parts[-1]].items() if isinstance(n, int)]
         totals = {kind: sum(operations[part][kind] for part in parts) for kind in kinds}

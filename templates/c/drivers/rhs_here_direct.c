@@ -21,7 +21,7 @@ static int close_directly(double t, double *restrict q, const double *restrict u
 {
     double *const found = w + AT_CLOSING;
     for (int step = 0, all = 0; step < 6 && all < 25; all++) {
-        (void)closing_block(t, q, u, c, found, w);
+        step_directly(t, q, u, c, found, w);
         const double left = found[1], length = found[2];
         if (!(length <= 0.25)) { /* or not a number */
             const double part = kept_part(t, q, u, c, w);
@@ -61,7 +61,7 @@ static int rhs_here(double t, const double *restrict x, const double *restrict u
         y[k] = x[k];
     }
     if (close_directly(t, y, u, c, w) == 0) {
-        const int status = dynamics_block(t, y, u, c, w + AT_DYNAMICS, w);
+        const int status = accelerate_directly(t, y, u, c, w + AT_DYNAMICS, w);
         if (status == 0 && found[2 * N] != 0.0) {
             form_rates(y, found, out);
             for (int k = 0; k < N; k++) {

@@ -13,7 +13,7 @@ static flag rhs_driver(real t, const real *restrict x, const real *restrict u, c
         y[k] = x[k];
     }
     for (int i = 0; i < 6 && any_of(open); i++) {
-        (void)closing_block(t, y, u, c, found, w);
+        step_directly(t, y, u, c, found, w);
         left |= open & ~(found[2] <= 0.25); /* or not a number */
         open &= ~left;
         for (int k = 0; k < N; k++) {
@@ -22,7 +22,7 @@ static flag rhs_driver(real t, const real *restrict x, const real *restrict u, c
         move(y, step);
         open &= ~((found[2] <= CONSTRAINTS_SHORT) & (found[1] <= CONSTRAINTS_EXACT));
     }
-    left |= open | dynamics_block(t, y, u, c, solved, w);
+    left |= open | accelerate_directly(t, y, u, c, solved, w);
     left |= (solved[2 * N] == 0.0) | (solved[2 * N + 1] == 0.0);
     form_rates(y, solved, out);
     for (int k = 0; k < N; k++) {

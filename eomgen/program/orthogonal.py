@@ -1,0 +1,235 @@
+"""Stage program: sparse matrix with independent columns -> straight-line solutions by orthogonal combinations of rows.
+
+Columns that the same few rows hold are taken out together.  Their rows make as many equations for these unknowns, and
+orthonormal combinations that are free of them, which take the place of the rows: a sparse QR factor by blocks (A.
+George and M. Heath, Linear Algebra and its Applications 34 (1980), 69-83).  Any rows will do, so that nothing is
+pivoted and redundant rows need no choice.  Blocks of up to three rows are written by minors and cross products.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from .sparse import Row, dot, transpose
+
+
+class Front(NamedTuple):
+    """Rows that hold some columns, all of them, and the other columns that these rows hold."""
+
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+    others: tuple[int, ...]
+    left: tuple[int, ...]  #: new rows, free of the columns
+
+
+def fronts(pattern: Sequence[Iterable[int]], n: int) -> list[Front] | None:
+    """The order in which columns are taken out, those of the fewest rows first; None if these cannot be independent."""
+    held = dict(enumerate(map(set, pattern)))
+    touching: list[set[int]] = [set() for _ in range(n)]
+    for i, row in held.items():
+        for k in row:
+            touching[k].add(i)
+    found, waiting, new = [], set(range(n)), len(held)
+    while waiting:
+        first = min(waiting, key=lambda k: (len(touching[k]), k))
+        rows = touching[first]
+        near = set().union(*(held[i] for i in rows))
+        columns = {k for k in near if touching[k] <= rows}
+        if len(columns) > len(rows) or not columns:
+            return None
+        others = near - columns
+        left = tuple(range(new, new + len(rows) - len(columns)))
+        new += len(left)
+        found.append(Front(tuple(sorted(rows)), tuple(sorted(columns)), tuple(sorted(others)), left))
+        for k in others:
+            touching[k] = (touching[k] - rows) | set(left)
+        for i in rows:
+            del held[i]
+        held |= {i: set(others) for i in left}
+        waiting -= columns
+    return found
+
+
+def work(order: Sequence[Front], right: int) -> int:
+    """About how many multiplications the factor and solutions for so many right-hand sides take."""
+    return sum(len(f.rows) ** 2 * (len(f.others) + right) + len(f.columns) * len(f.others) * right for f in order)
+
+
+class _Taken(NamedTuple):
+    """x[columns] = inverse b[rows] - across x[others]; b[left] = free b[rows]."""
+
+    front: Front
+    inverse: list[Row]
+    free: list[Row]
+    across: list[Row]
+
+
+class OrthogonalFactor:
+    """Solutions x (n,) of A x = b in the sense of least squares.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        Of A (m, n).
+    order : sequence of Front
+        Of its pattern.
+
+    Attributes
+    ----------
+    squares : list of Expr
+        Of the lengths of the columns (n,).
+    apart : list of tuple
+        Columns that were taken out together, and the product of the squares of what each has across those before it.
+    parts : list of set
+        Columns that rows connect.
+    """
+
+    def __init__(self, rows: Sequence[Row], n: int, order: Sequence[Front]) -> None:
+        self.n, self.m = n, len(rows)
+        self.apart: list[tuple[tuple[int, ...], Expr]] = []
+        self._taken: list[_Taken] = []
+        held = dict(enumerate(rows))
+        self.squares = [x for column in transpose(rows, n) if (x := dot(column, column)) is not None]
+        self.parts = _connected(rows)
+        for front in order:
+            own = [held.pop(i) for i in front.rows]
+            graph = next(x.graph for row in own for x in row.values())
+            block = [[row.get(k, graph.zero) for k in front.columns] for row in own]
+            inverse, free, apart = _split(block)
+            beside = [{k: row[k] for k in front.others if k in row} for row in own]
+            across = [_combined(part, beside) for part in inverse]
+            for i, part in zip(front.left, free, strict=True):
+                held[i] = _combined(part, beside)
+            self._taken.append(_Taken(front, inverse, free, across))
+            self.apart.append((front.columns, apart))
+
+    def solve(self, right: Sequence[Expr]) -> list[Expr]:
+        """x with A x = right."""
+        zero = right[0].graph.zero
+        b = dict(enumerate(right))
+        values: list[list[Expr]] = []
+        for front, inverse, free, _ in self._taken:
+            own = {j: b[i] for j, i in enumerate(front.rows) if not b[i].is_zero}
+            values.append([_product(part, own, zero) for part in inverse])
+            b.update(zip(front.left, (_product(part, own, zero) for part in free), strict=True))
+        x = [zero] * self.n
+        for (front, _, _, across), value in zip(reversed(self._taken), reversed(values), strict=True):
+            for k, total, row in zip(front.columns, value, across, strict=True):
+                for j, entry in row.items():
+                    if not x[j].is_zero:
+                        total = total - entry * x[j]
+                x[k] = total
+        return x
+
+
+def _connected(rows: Sequence[Row]) -> list[set[int]]:
+    found: list[set[int]] = []
+    for row in rows:
+        touched = [part for part in found if not part.isdisjoint(row)]
+        found = [part for part in found if part.isdisjoint(row)]
+        found += [set(row).union(*touched)] if row else []
+    return found
+
+
+def _product(a: Row, b: Row, zero: Expr) -> Expr:
+    found = dot(a, b)
+    return zero if found is None else found
+
+
+def _combined(part: Row, rows: Sequence[Row]) -> Row:
+    """A combination of rows."""
+    found: Row = {}
+    for i, factor in part.items():
+        for k, x in rows[i].items():
+            term = factor * x
+            found[k] = found[k] + term if k in found else term
+    return {k: x for k, x in found.items() if not x.is_zero}
+
+
+def _split(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], Expr]:
+    """Of independent columns (m, k): the pseudo-inverse (k, m), orthonormal rows (m - k, m) across them, and the
+    determinant of their products.
+    """
+    m, k = len(block), len(block[0])
+    graph = block[0][0].graph
+    if (m, k) in ((1, 1), (2, 2), (3, 3)):
+        inverse, determinant = _square(block)
+        return inverse, [], determinant * determinant
+    if m == 2:
+        (p,), (r,) = block
+        square = p * p + r * r
+        length = 1.0 / graph.apply("sqrt", square)
+        p, r = p * length, r * length
+        return [_row(p * length, r * length)], [_row(-r, p)], square
+    if (m, k) == (3, 2):
+        a, b = ((block[0][j], block[1][j], block[2][j]) for j in (0, 1))
+        normal = vec.cross(a, b)
+        square = vec.dot(normal, normal)
+        length = 1.0 / graph.apply("sqrt", square)
+        unit = vec.scale(length, normal)
+        short = vec.scale(length, unit)
+        return [_row(*vec.cross(b, short)), _row(*vec.cross(short, a))], [_row(*unit)], square
+    return _reflected(block)
+
+
+def _row(*entries: Expr) -> Row:
+    return {i: x for i, x in enumerate(entries) if not x.is_zero}
+
+
+def _square(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], Expr]:
+    """Inverse and determinant of up to three rows."""
+    if len(block) == 1:
+        return [_row(1.0 / block[0][0])], block[0][0]
+    if len(block) == 2:
+        (p, q), (r, t) = block
+        determinant = p * t - q * r
+        inverse = 1.0 / determinant
+        return [_row(t * inverse, -q * inverse), _row(-r * inverse, p * inverse)], determinant
+    a, b, c = ((block[0][j], block[1][j], block[2][j]) for j in range(3))
+    first, second, third = vec.cross(b, c), vec.cross(c, a), vec.cross(a, b)
+    determinant = vec.dot(a, first)
+    inverse = 1.0 / determinant
+    return [_row(*vec.scale(inverse, x)) for x in (first, second, third)], determinant
+
+
+def _reflected(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], Expr]:
+    """By Householder's reflections, for any number of rows."""
+    m, k = len(block), len(block[0])
+    graph = block[0][0].graph
+    zero, one = graph.zero, graph.one
+    columns = [[row[j] for row in block] for j in range(k)]
+    turned = [[one if i == j else zero for i in range(m)] for j in range(m)]  # columns of Q^T
+    product = one
+    for j in range(k):
+        column = columns[j]
+        square = dot(dict(enumerate(column[j:])), dict(enumerate(column[j:])))
+        assert square is not None
+        product = product * square
+        length = graph.apply("sqrt", square)
+        length = graph.apply("select", graph.apply("lt", column[j], zero), -length, length)
+        head = column[j] + length
+        tail = column[j + 1 :]
+        factor = 1.0 / (length * head)
+        for other in (*columns[j + 1 :], *turned):
+            pairs = [head * other[j], *(x * y for x, y in zip(tail, other[j + 1 :], strict=True))]
+            total = zero
+            for pair in pairs:
+                total = total + pair
+            total = total * factor
+            other[j] = other[j] - total * head
+            for i, x in enumerate(tail, j + 1):
+                other[i] = other[i] - total * x
+        column[j] = -length
+    reciprocals = [1.0 / columns[j][j] for j in range(k)]
+    inverse: list[list[Expr]] = [[] for _ in range(k)]
+    for j in reversed(range(k)):
+        for i in range(m):
+            total = turned[i][j]
+            for c in range(j + 1, k):
+                total = total - columns[c][j] * inverse[c][i]
+            inverse[j].append(total * reciprocals[j])
+    free = [_row(*(turned[i][j] for i in range(m))) for j in range(k, m)]
+    return [_row(*x) for x in inverse], free, product

@@ -1,0 +1,166 @@
+"""Stage program: loops whose state is far from any change point -> the shortest straight-line form.
+
+All motions are v = B y with the preferred velocities y: B follows from the rows by orthogonal combinations
+(:mod:`.orthogonal`), block by block, so that every leg of a platform is paid for alone.  With weights W = S^-2 of the
+coordinates the nearest motion is the one with B^T W (v - B y) = 0, of as many unknowns as there are freedoms; so the
+step onto the constraints, velocities and accelerations share B, and no matrix has the size of the rows.
+
+Where columns of B are long, or what they follow from is nearly dependent, the forms of :mod:`.loop_blocks` take over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+from ..graph.core import Expr
+from ..graph.substitute import substitute
+from ..limits.crossings import NEAR_SQUARE
+from .embedded_loops import SPREAD, embedded_accelerations
+from .loop_blocks import LoopBlocks, largest, total_magnitude
+from .orthogonal import OrthogonalFactor, fronts, work
+from .sparse import Row, SparseFactor, dot, factorize, times, transpose
+
+ENDLESS = 1e300  #: the length of a step that is not known here
+
+
+class RegularLoops:
+    """The expressions of both blocks.
+
+    Parameters
+    ----------
+    loops : LoopBlocks
+        Those that take over.
+    """
+
+    def __init__(self, loops: LoopBlocks) -> None:
+        self.loops, self.terms = loops, loops.terms
+        preferred = set(self.terms.preferred)
+        self.dependent = [k for k in range(self.terms.n_v) if k not in preferred]
+        place = {k: j for j, k in enumerate(self.dependent)}
+        self._left = [{place[k]: x for k, x in row.items() if k in place} for row in loops.rows]
+        self.order = fronts(self._left, len(self.dependent))
+        weights = [1.0 / s for s in loops.s]
+        self.weights = [x * x for x in weights]
+
+    @property
+    def estimate(self) -> int:
+        """About how many multiplications the linear algebra takes, by the pattern alone."""
+        n, f = self.terms.n_v, self.terms.n_dof
+        return work(self.order or (), f + 1) + n * f * f + f**3 // 6
+
+    @property
+    def possible(self) -> bool:
+        """Whether there is a mass matrix, all rows are of positions, and hold the dependent velocities."""
+        return self.order is not None and self.loops.h == len(self.loops.J) and not self.terms.by_columns
+
+    # -- motions --------------------------------------------------------------------------------------------------
+    @cached_property
+    def _factor(self) -> OrthogonalFactor:
+        assert self.order is not None
+        return OrthogonalFactor(self._left, len(self.dependent), self.order)
+
+    def _particular(self, right: Sequence[Expr]) -> list[Expr]:
+        """x (n,) with C_q x = right and no independent part."""
+        x = [self.terms.graph.zero] * self.terms.n_v
+        for k, value in zip(self.dependent, self._factor.solve(right), strict=True):
+            x[k] = value
+        return x
+
+    @cached_property
+    def _motions(self) -> list[Row]:
+        """B (n rows of f)."""
+        zero = self.terms.graph.zero
+        columns = [self._particular([-row.get(k, zero) for row in self.loops.rows]) for k in self.terms.preferred]
+        for k, column in zip(self.terms.preferred, columns, strict=True):
+            column[k] = self.terms.graph.one
+        return [{j: x[i] for j, x in enumerate(columns) if not x[i].is_zero} for i in range(self.terms.n_v)]
+
+    @cached_property
+    def _columns(self) -> list[Row]:
+        return transpose(self._motions, self.terms.n_dof)
+
+    @cached_property
+    def _weighted(self) -> list[Row]:
+        return [{i: x * self.weights[i] for i, x in column.items()} for column in self._columns]
+
+    @cached_property
+    def _products(self) -> list[Row]:
+        """B^T W B."""
+        f = range(self.terms.n_dof)
+        lower = {(i, j): dot(self._columns[i], self._weighted[j]) for i in f for j in f if j <= i}
+        return [{j: x for j in f if (x := lower[max(i, j), min(i, j)]) is not None} for i in f]
+
+    @cached_property
+    def _nearest(self) -> SparseFactor:
+        return factorize(self._products)
+
+    def _along(self, x: Sequence[Expr]) -> list[Expr]:
+        """y (f,) for which B y is nearest to x."""
+        return self._nearest.solve(times(self._weighted, x))
+
+    def _follows(self) -> list[Expr]:
+        """Whether the dependent velocities follow well from the independent ones: not by columns that are nearly
+        parallel, or short beside others.
+        """
+        graph, s = self.terms.graph, self.loops.s
+        scales = [s[k] * s[k] for k in self.dependent]
+        lengths = [x * k for x, k in zip(self._factor.squares, scales, strict=True)]
+        least: dict[int, Expr] = {}
+        for part in self._factor.parts:
+            least |= dict.fromkeys(part, largest([lengths[k] for k in part]) * NEAR_SQUARE)
+        found = []
+        for columns, apart in self._factor.apart:
+            usual = graph.constant(NEAR_SQUARE)
+            for k in columns:
+                usual, apart = usual * graph.apply("max", lengths[k], least[k]), apart * scales[k]
+            found.append(graph.apply("lt", usual, apart))
+        for j, k in enumerate(self.terms.preferred):
+            square = self._products[j][j] * (s[k] * s[k])
+            found.append(graph.apply("lt", square, graph.constant(SPREAD * SPREAD)))
+        return found
+
+    def _long(self) -> Expr:
+        """Whether as many rows as their rank are not short beside their group."""
+        graph, zero = self.terms.graph, self.terms.graph.zero
+        squares = [zero if (x := dot(row, row)) is None else x for row in self.loops.J]
+        limits, held = self.loops.shortest(squares), zero
+        for square, group in zip(squares, self.loops.groups, strict=True):
+            held = held + graph.apply("lt", limits[group], square)
+        return graph.apply("lt", len(self.dependent) - 0.5, held)
+
+    # -- blocks ---------------------------------------------------------------------------------------------------
+    def closing(self) -> list[Expr]:
+        """As of LoopBlocks; the length is endless where another form is to take the step."""
+        graph, loops = self.terms.graph, self.loops
+        e = loops.residuals
+        size = total_magnitude(e) * (loops.unit / float(loops.h))
+        d = self._particular(e)
+        dz = [x - y for x, y in zip(d, times(self._motions, self._along(d)), strict=True)]
+        length = total_magnitude([x * (1.0 / s) for x, s in zip(dz, loops.s, strict=True)])
+        length = graph.apply("select", self.loops.all_of(self._follows()), length, graph.constant(ENDLESS))
+        return [size, graph.zero, length, *(-x for x in dz)]
+
+    @cached_property
+    def moved(self) -> list[Expr]:
+        """Projected velocities (n,)."""
+        terms = self.terms
+        v = [terms.graph.symbol(name) for name in terms.v]
+        rate = [-x * i for x, i in zip(terms.constraint_rate, self.loops.inverse, strict=True)]
+        given = self._particular(rate)
+        y = [v[k] for k in terms.preferred]
+        missed = [a - b - c for a, b, c in zip(v, given, times(self._motions, y), strict=True)]
+        y = [a + b for a, b in zip(y, self._along(missed), strict=True)]
+        return [a + b for a, b in zip(given, times(self._motions, y), strict=True)]
+
+    def dynamics(self) -> tuple[list[Expr], list[Expr]]:
+        """As of LoopBlocks; where it is sound, no change point is near."""
+        terms = self.terms
+        v = [terms.graph.symbol(name) for name in terms.v]
+        here = substitute([*terms.bias, *terms.gamma], dict(zip(v, self.moved, strict=True)))
+        gamma = [-x * i for x, i in zip(here[terms.n_v :], self.loops.inverse, strict=True)]
+        a, checks = embedded_accelerations(
+            terms, self.loops.s, self._motions, self._particular(gamma), here[: terms.n_v]
+        )
+        sound = self.loops.all_of([*self._follows(), self._long()])
+        return [*self.moved, *a, sound, terms.graph.one], checks
