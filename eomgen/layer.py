@@ -23,6 +23,7 @@ LAYER = {
     "_core.pyx": ("cython/_core.pyx",),
     "_numbers.pxi": ("cython/_numbers.pxi",),
     "_batches.pxi": ("cython/_batches.pxi",),
+    "_kernel.pxi": ("cython/_kernel.pxi",),
     "_calls.pxi": ("cython/_calls.pxi",),
     "_lanes.pxi": ("cython/_lanes.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),
