@@ -80,7 +80,7 @@ def describe_layer(texts: Mapping[str, str], headers: Mapping[str, str], compile
     Models' keys hold this: a module that is built already needs no Cython to be found.
     """
     return {
-        "kind": "layer", "sources": {**texts, **headers}, "flags": [layer_flags(compiler), _c_flags(compiler)],
+        "kind": "layer", "sources": {**texts, **headers}, "flags": [layer_flags(compiler), *(_c_flags(compiler, file) for file in texts if file.endswith(".c"))],
         "compiler": [*compiler.command, compiler.version], "interpreter": describe_interpreter(),
     }  # fmt: skip
 
@@ -137,7 +137,10 @@ def build_layer(
         for name, text in {**texts, **headers}.items():
             (directory / name).write_text(text, encoding="utf-8")
         commands = [
-            *([*compiler.command, *_c_flags(compiler), "-I.", "-c", name, "-o", f"{name}.o"] for name in half.c_files),
+            *(
+                [*compiler.command, *_c_flags(compiler, name), "-I.", "-c", name, "-o", f"{name}.o"]
+                for name in half.c_files
+            ),
             [*compiler.command, *layer_flags(compiler), "-I.", *includes, "-c", "_core.c", "-o", _OBJECT],
         ]
 
@@ -166,9 +169,11 @@ def build_layer(
         return _objects(cache.publish(directory, key, "layer", "_core", _OBJECT, recipe), half)
 
 
-def _c_flags(compiler: CompilerInfo) -> list[str]:
-    """Flags of the C files, with all lanes that this processor takes: models choose."""
-    return [*stepper_flags(compiler), f"-DEOMGEN_LANES={sum(w for w in (2, 4, 8) if w <= lane_width())}"]
+def _c_flags(compiler: CompilerInfo, file: str) -> list[str]:
+    """Flags of a C file, with all lanes that this processor takes: models choose."""
+    widest = lane_width()
+    flags = stepper_flags(compiler, wide=file != "eomgen_steppers.c" or widest < 4)
+    return [*flags, f"-DEOMGEN_LANES={sum(w for w in (2, 4, 8) if w <= widest)}"]
 
 
 def _objects(entry: CacheEntry, half: Half) -> list[Path]:

@@ -85,13 +85,16 @@ def find_class(core: Any, file: Path, name: str) -> Any:
                 stacklevel=2,
             )
             raise AttributeError(name) from error
-        found = {late: getattr(made, late) for late in NAMES}
-    vars(core).update(found)
-    return found[name]
+        if name == "ensemble":
+            core.take_lanes()
+        found = vars(core)[name] = getattr(made, name)
+    return found
 
 
 def _load(core: Any, file: Path) -> ModuleType:
     name = f"{core.__name__.removesuffix('._core')}_late._core"
+    if name in sys.modules:
+        return sys.modules[name]
     entry = _find_or_build(file)
     loader = importlib.machinery.ExtensionFileLoader(name, str(entry.product))
     spec = importlib.util.spec_from_file_location(name, entry.product, loader=loader)
