@@ -13,7 +13,7 @@ from .shipped import shipped
 STEPPERS = (
     *("control", "signals", "tape"),
     *("plain", "rk4_step", "rk4"),
-    *("lu", "lu_complex", "newton_parts", "newton", "radau", "radau_step"),
+    *("dense_begin", "lu", "lu_complex", "newton_parts", "newton", "radau", "radau_step", "dense_end"),
     *("taylor_terms", "taylor"),
     *("event_values", "event_zero", "crossings", "loop"),
 )
@@ -23,6 +23,7 @@ LAYER = {
     "_core.pyx": ("cython/_core.pyx",),
     "_numbers.pxi": ("cython/_numbers.pxi",),
     "_batches.pxi": ("cython/_batches.pxi",),
+    "_kernel.pxi": ("cython/_kernel.pxi",),
     "_calls.pxi": ("cython/_calls.pxi",),
     "_lanes.pxi": ("cython/_lanes.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),

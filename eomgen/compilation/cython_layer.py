@@ -1,4 +1,8 @@
-"""Cython layer: _core.pyx and the steppers -> object files, compiled once per interpreter, linked with every model."""
+"""Cython layer: _core.pyx and the steppers -> object files, compiled once per interpreter, linked with every model.
+
+There are two builds of it. The first has what a single run needs. The late one has ensembles and rigid contacts; it is
+made when a model first asks for them (:mod:`.late_classes`).
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,7 @@ import sys
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,11 +26,41 @@ from .options import layer_flags, stepper_flags
 from .processor import lane_width
 from .products import require_object, stamp, write_stamp
 
-SOURCE = "_core.pyx"
+SOURCE, _OBJECT = "_core.pyx", "_core.o"
 #: Of a model, that the layer reads too.
 HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_processor.h", "eomgen_contraction.h")
-C_FILES = tuple(name for name in LAYER if name.endswith(".c"))
-_OBJECTS = ("_core.o", *(f"{name}.o" for name in C_FILES))
+
+
+class Half(NamedTuple):
+    """One of the two builds of the layer.
+
+    Attributes
+    ----------
+    without : frozenset of str
+        Files of the Cython text that are not included.
+    c_files : tuple of str
+        C files that are compiled.
+    """
+
+    without: frozenset[str]
+    c_files: tuple[str, ...]
+
+    def choose(self, texts: Mapping[str, str]) -> dict[str, str]:
+        """The texts that it is made from."""
+        lines = {f'include "{name}"' for name in self.without}
+        return {
+            name: "".join(line for line in text.splitlines(keepends=True) if line.rstrip() not in lines)
+            for name, text in texts.items()
+            if name not in self.without and (not name.endswith(".c") or name in self.c_files)
+        }
+
+
+FIRST = Half(frozenset({"_ensembles.pxi", "_contacts.pxi"}), ("eomgen_steppers.c", "eomgen_wide_steps.c"))
+#: Linked with the C files of the first.
+LATE = Half(
+    frozenset({"_kernel.pxi", "_calls.pxi", "_integrators.pxi"}),
+    tuple(name for name in LAYER if name.endswith(".c") and name not in FIRST.c_files),
+)
 _lock = threading.Lock()  # Cython keeps state of its own
 
 
@@ -46,7 +80,7 @@ def describe_layer(texts: Mapping[str, str], headers: Mapping[str, str], compile
     Models' keys hold this: a module that is built already needs no Cython to be found.
     """
     return {
-        "kind": "layer", "sources": {**texts, **headers}, "flags": [layer_flags(compiler), _c_flags(compiler)],
+        "kind": "layer", "sources": {**texts, **headers}, "flags": [layer_flags(compiler), *(_c_flags(compiler, file) for file in texts if file.endswith(".c"))],
         "compiler": [*compiler.command, compiler.version], "interpreter": describe_interpreter(),
     }  # fmt: skip
 
@@ -57,8 +91,9 @@ def build_layer(
     headers: Mapping[str, str],
     compiler: CompilerInfo,
     progress: Callable[[str], None] | None = None,
+    half: Half = FIRST,
 ) -> list[Path]:
-    """Find the layer's object files in the cache, or make them.
+    """Find object files of the layer in the cache, or make them; that of the Cython text is the first of them.
 
     Parameters
     ----------
@@ -72,6 +107,8 @@ def build_layer(
         Who compiles.
     progress : callable, optional
         Told what is being done.
+    half : Half
+        Which of them.
 
     Raises
     ------
@@ -87,20 +124,24 @@ def build_layer(
             'target="cython" needs Cython to build its layer once: pip install cython. target="numpy" needs neither '
             "Cython nor a compiler"
         ) from error
+    texts = half.choose(texts)
     key = compute_key({**describe_layer(texts, headers, compiler), "cython": version})
     if (entry := cache.find(key)) is not None:
-        return _objects(entry)
+        return _objects(entry, half)
     from concurrent.futures import ThreadPoolExecutor  # slow to import
 
     includes = [f"-I{find_python_headers()}", f"-I{np.get_include()}"]
     if progress is not None:
-        progress("building the Cython layer (once)")
+        progress(f"building the Cython layer{'' if half is FIRST else ' of ensembles and contacts'} (once)")
     with cache.attempt(key) as directory:
         for name, text in {**texts, **headers}.items():
             (directory / name).write_text(text, encoding="utf-8")
         commands = [
-            *([*compiler.command, *_c_flags(compiler), "-I.", "-c", name, "-o", f"{name}.o"] for name in C_FILES),
-            [*compiler.command, *layer_flags(compiler), "-I.", *includes, "-c", "_core.c", "-o", _OBJECTS[0]],
+            *(
+                [*compiler.command, *_c_flags(compiler, name), "-I.", "-c", name, "-o", f"{name}.o"]
+                for name in half.c_files
+            ),
+            [*compiler.command, *layer_flags(compiler), "-I.", *includes, "-c", "_core.c", "-o", _OBJECT],
         ]
 
         def compile_one(command: list[str]) -> None:
@@ -125,16 +166,18 @@ def build_layer(
                 raise
         (directory / "_core.c").unlink()
         recipe = {"commands": commands, "cython": version}
-        return _objects(cache.publish(directory, key, "layer", "_core", _OBJECTS[0], recipe))
+        return _objects(cache.publish(directory, key, "layer", "_core", _OBJECT, recipe), half)
 
 
-def _c_flags(compiler: CompilerInfo) -> list[str]:
-    """Flags of the C files, with all lanes that this processor takes: models choose."""
-    return [*stepper_flags(compiler), f"-DEOMGEN_LANES={sum(w for w in (2, 4, 8) if w <= lane_width())}"]
+def _c_flags(compiler: CompilerInfo, file: str) -> list[str]:
+    """Flags of a C file, with all lanes that this processor takes: models choose."""
+    widest = lane_width()
+    flags = stepper_flags(compiler, wide=file != "eomgen_steppers.c" or widest < 4)
+    return [*flags, f"-DEOMGEN_LANES={sum(w for w in (2, 4, 8) if w <= widest)}"]
 
 
-def _objects(entry: CacheEntry) -> list[Path]:
-    return [entry.directory / name for name in _OBJECTS]
+def _objects(entry: CacheEntry, half: Half) -> list[Path]:
+    return [entry.directory / name for name in (_OBJECT, *(f"{name}.o" for name in half.c_files))]
 
 
 def _translate(directory: Path) -> None:
@@ -145,8 +188,8 @@ def _translate(directory: Path) -> None:
     import tempfile  # rarely needed
 
     with tempfile.TemporaryDirectory(prefix="eomgen-") as plain:
-        for name in LAYER:
-            shutil.copy(directory / name, plain)
+        for path in directory.glob("*.p[yx]*"):
+            shutil.copy(path, plain)
         try:
             _run_cython(Path(plain, SOURCE))
         except UnicodeError as error:

@@ -20,6 +20,8 @@ from .compiler import CompilerInfo, find_compiler
 from .processor import lane_files, late_files
 
 _loaded: list[ctypes.CDLL] = []  # stay loaded: their functions are called
+#: Files of modules of which a warning has said that something cannot be compiled: it is said once.
+told: set[Path] = set()
 
 
 def find_lanes(file: Path) -> int:
@@ -43,6 +45,9 @@ def find_lanes(file: Path) -> int:
             return 0
         library, table = _load(entry, file)
     except (ToolchainError, OSError, ValueError, AttributeError) as error:
+        if file in told:
+            return 0
+        told.add(file)
         warnings.warn(
             f"batches of the model in {file} are computed one state at a time, because their vector code cannot be "
             f"compiled: {error}",

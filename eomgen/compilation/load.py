@@ -59,17 +59,23 @@ def load_core(artifact: Artifact) -> ModuleType:
                 f"the compiled model {artifact.path} cannot be loaded: {error}. It was removed from the cache; compile "
                 "the model again, and use another compiler (CC) if this happens again"
             ) from error
-        offer_lanes(module, artifact.path)
+        offer_late(module, artifact.path)
         sys.modules[name] = module
         return module
 
 
-def offer_lanes(core: Any, file: Path) -> None:
-    """Let a core from the cache have its lanes when a batch first needs them."""
+def offer_late(core: Any, file: Path) -> None:
+    """Let a core from the cache have its lanes, ensembles and rigid contacts when they are first needed."""
 
     def find() -> int:
         from .late_lanes import find_lanes  # rarely needed
 
         return find_lanes(file)
 
+    def find_late(name: str) -> Any:
+        from .late_classes import find_class  # rarely needed
+
+        return find_class(core, file, name)
+
     core.offer_lanes(find)
+    core.__getattr__ = find_late

@@ -77,6 +77,7 @@ def describe(module: BoundModel) -> Handle:
         raise UsageError(f"the module of {module.name!r} is not in a file that workers could load; use target cython")
     if hasattr(core, "take_lanes"):
         core.take_lanes()  # here, once, so that workers find them beside the module
+    getattr(core, "ensemble", None)  # likewise
     recipe = _recipe(Path(file))
     native = bool(recipe) and json.loads(recipe)["options"].get("native", False)
     needs = tuple(sorted(processor_features())) if native else ()

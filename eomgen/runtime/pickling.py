@@ -95,6 +95,7 @@ def _find_core(name: str, file: str) -> ModuleType:
     core = util.module_from_spec(spec)
     loader.exec_module(core)
     core.offer_lanes(partial(_find_lanes, path))
+    core.__getattr__ = partial(_find_class, core, path)
     sys.modules[name] = core
     return core
 
@@ -106,3 +107,12 @@ def _find_lanes(file: Path) -> int:
     except ImportError:
         return 0
     return int(late.find_lanes(file))
+
+
+def _find_class(core: Any, file: Path, name: str) -> Any:
+    """The same for ensembles and rigid contacts."""
+    try:
+        late = import_module("eomgen.compilation.late_classes")
+    except ImportError:
+        raise AttributeError(f"module {core.__name__!r} has no attribute {name!r}") from None
+    return late.find_class(core, file, name)

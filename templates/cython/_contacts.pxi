@@ -105,8 +105,8 @@ cdef class RigidStepper:
 
     Parameters
     ----------
-    context : Context
-        Parameters and inputs.
+    bound : Context
+        Parameters and inputs; of any build of the model.
     sources : dict of str to (int, ndarray)
         Of each function of the model that is needed its address and its constants.
     n_work : int
@@ -136,9 +136,10 @@ cdef class RigidStepper:
     cdef object forcing, raised
     cdef cnp.ndarray memory, many, numbers, acting, known
 
-    def __cinit__(self, Context context not None, dict sources, int n_work, dict facts, dict tables, double tolerance,
+    def __cinit__(self, bound, dict sources, int n_work, dict facts, dict tables, double tolerance,
                   int most, signals, forcing, within):
         cdef eomgen_rigid *s = &self.s
+        cdef Context context = bound if isinstance(bound, Context) else Context(bound.p, bound.u)
         cdef dict kept = {name: np.ascontiguousarray(table, np.int8 if name == "moved" else np.intc)
                           for name, table in tables.items()}
         cdef cnp.npy_intp length
