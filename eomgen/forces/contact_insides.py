@@ -17,7 +17,10 @@ centres that are deeper inside than pieces tell by themselves.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+
+import numpy as np
 
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
@@ -29,6 +32,8 @@ from .contact_profiles import Point, ProfilePart, ProfilePiece, dot, part, unit
 from .force import View
 
 _ROUND = 1e-9  #: cosine below which a corner of numbers is no inner one
+_SAMPLES = 12  #: points of an arc at which the room inside is measured
+_WITHIN = 0.9  #: part of it that is taken, as there are points between
 
 
 def notch(corner: Point, before: Point, after: Point, width: Expr) -> ProfilePart:
@@ -70,6 +75,30 @@ def piece_numbers(pieces: Sequence[ProfilePart]) -> list[Expr]:
     return found
 
 
+def told_by_arcs(pieces: Sequence[ProfilePart]) -> float:
+    """How deep inside an outline of arcs every point has one nearest place, as far as numbers tell; else infinite.
+
+    It is the least radius of circles that touch the outline from inside and hold none of its points, |w|^2 / (2 w n)
+    with the way w between two points and the inward normal n at the first, over points of all arcs.
+    """
+    numbers = [[x.value for x in (*one.origin, *one.along, *one.sizes[:2])] for one in pieces if one.kind == "arc"]
+    if len(numbers) < len(pieces) or any(None in row for row in numbers):
+        return math.inf
+    x, y, c, s, bend, half = np.array(numbers, dtype=float).T[:, :, None]
+    part = (np.arange(_SAMPLES) + 0.5) * 2.0 / _SAMPLES - 1.0
+    angle = np.arcsin(np.clip(bend * half, -1.0, 1.0))
+    turn = np.where(angle == 0.0, 1e-12, angle)
+    along = half * np.sin(turn * part) / np.sin(turn)
+    up = along * np.tan(0.5 * turn * part)
+    nx, ny = np.sin(turn * part), -np.cos(turn * part)
+    place = np.stack([x + c * along - s * up, y + s * along + c * up]).reshape(2, -1)
+    normal = np.stack([c * nx - s * ny, s * nx + c * ny]).reshape(2, -1)
+    way = place[:, None, :] - place[:, :, None]
+    inward = 2.0 * (way * normal[:, :, None]).sum(axis=0)
+    ahead = inward > 0.0
+    return _WITHIN * float(((way * way).sum(axis=0)[ahead] / inward[ahead]).min(initial=math.inf))
+
+
 class NotchRound(ProfilePiece):
     """At an inner corner that is farther from the centre than the edges beside it."""
 
@@ -89,7 +118,10 @@ class NotchRound(ProfilePiece):
 
 
 class BowlRound(ProfilePiece):
-    """At the far side of a hollow arc of curvature k, at (1 + q) / k, q = |(k x, 1 - k y)|, seen from beyond its centre."""
+    """At the far side of a hollow arc of curvature k, seen from beyond its centre.
+
+    It is (1 + q) / k away, q = |(k x, 1 - k y)|.
+    """
 
     def share(self, view: View) -> Expr:
         x, y, _ = self._place(view)

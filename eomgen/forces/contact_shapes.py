@@ -22,7 +22,7 @@ from ..graph.vectors import Vec3
 from ..numeric.polygon_edges import EDGE
 from ..records import dataclass
 from .contact_fields import field_lines
-from .contact_insides import bowls, notches, piece_numbers
+from .contact_insides import bowls, notches, piece_numbers, told_by_arcs
 from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
 from .contact_profiles import (
     Point,
@@ -225,8 +225,11 @@ class ContactShape:
         pieces, tops = self._parts()
         depth = solid_depth(pieces, depth)
         surface = [one for one in pieces if one.kind in ("edge", "arc")]
+        told = depth  # by each piece for itself
+        if self.kind == "smooth_outline" and math.isfinite(most := told_by_arcs(surface)):
+            told = zero.graph.apply("min", depth, most)
         found = [
-            Feature(one.kind, one.frame(frame), (*one.sizes, depth), None if one.open else one.half + depth, depth)
+            Feature(one.kind, one.frame(frame), (*one.sizes, told), None if one.open else one.half + told, depth)
             for one in surface
         ]
         if self.kind not in GROUNDS:
@@ -234,7 +237,7 @@ class ContactShape:
             found += [Feature(one.kind, one.frame(frame), (*one.sizes, depth), one.half, depth) for one in hollows]
             reach = greatest([length(one.origin) + one.half for one in surface])
             kind = f"{INSIDE}{len(surface)}"
-            found.append(Feature(kind, frame, (*piece_numbers(surface), depth), reach, depth))
+            found.append(Feature(kind, frame, (*piece_numbers(surface), told), reach, depth))
         for k, (x, y) in tops:
             found.append(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth, k))
         return found
