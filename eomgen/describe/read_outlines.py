@@ -29,6 +29,8 @@ def outline_sizes(reader: Reader, path: str, given: Mapping[str, Any], corners: 
     if "depth" in given:
         depth = reader.expression(f"{path}.depth", given["depth"])
         positive(reader, f"{path}.depth", depth)
+        if all(x.value is not None for x in corners):
+            depth = reader.graph.apply("min", depth, half_gap(numbers))
     elif all(x.value is not None for x in corners):
         depth = reader.graph.constant(half_gap(numbers))
     else:

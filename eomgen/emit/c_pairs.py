@@ -13,6 +13,7 @@ from ..graph.pair_calls import PairFunction
 from ..graph.pair_kinds import PairKind, PairPart
 from ..graph.substitute import symbols_of
 from ..limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
+from ..numeric.outline_pieces import CHOSEN, PIECE
 from ..numeric.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, RECORD, REST, RESULT, SORTED, SPOT
 from ..numeric.polygon_edges import OTHER, OWN
 from ..program import Program
@@ -63,10 +64,11 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
         named = f"{function.name}_{kind.name}"
         for part, ending in parts:
             name = f"{named}{ending}"
-            text, needed = _law(program, kind, f"{name}_facing" if kind.corners else name, part, tables)
+            ending = ("", "_chosen", "_facing")[len(kind.corners)]
+            text, needed = _law(program, kind, f"{name}{ending}", part, tables)
             functions.append(text)
             if kind.corners:
-                functions.append(_facing(kind, name, part, tables))
+                functions.append(_choosing(kind, name, part, tables))
             helpers += [helper for helper in needed if helper not in helpers]
         touch = kind.expressions("touch")
         kinds.append(
@@ -102,7 +104,10 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
         "tables": tables,
         "kinds": kinds,
         "functions": functions,
-        "polygons": max((max(kind.corners) for kind in function.kinds if kind.corners), default=0),
+        "polygons": max((max(kind.corners) for kind in function.kinds if len(kind.corners) == 2), default=0),
+        "outlines": any(len(kind.corners) == 1 for kind in function.kinds),
+        "piece": PIECE,
+        "chosen": CHOSEN,
         "own": OWN,
         "other": OTHER,
         "helpers": helpers,
@@ -154,8 +159,10 @@ def _law(
         letter, number = plain[0], int(plain[1:])
         own = len(kind.law) + kind.states  # states stand behind the numbers of the law
         shape = tables[kind.first if letter == "a" else kind.second]["length"]
-        if kind.corners:
+        if len(kind.corners) == 2:
             shape = POSE + (OWN if letter == "a" else OTHER)
+        elif kind.corners and letter == "a":
+            shape = POSE + CHOSEN
         step = own if letter in "ls" else shape
         number += len(kind.law) * (letter == "s")
         places[graph.symbol(symbol).id] = f"{'xucc'['abls'.index(letter)]}[{number + rate * step}]"
@@ -164,11 +171,14 @@ def _law(
     return print_pieces(alone, name, pieces, places).text, used_helpers(alone, outputs)
 
 
-def _facing(kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[str, Any]]) -> str:
-    """The function of two polygons, which calls that of the edges and corners that matter."""
-    first, second = tables[kind.first], tables[kind.second]
+def _choosing(kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[str, Any]]) -> str:
+    """The function of two polygons or the inside of an outline, which calls that of the numbers that matter."""
+    first, second, sloped = tables[kind.first], tables[kind.second], part == "slopes"
+    if len(kind.corners) == 1:
+        deep = {"name": name, "first": first["length"], "pieces": kind.corners[0], "sloped": sloped}
+        return render("c/pairs_deep.c.j2", {**deep, "quick": part in ("outputs", "slopes")})
     context = {"name": name, "first": first["length"], "second": second["length"], "corners": kind.corners}
-    return render("c/pairs_facing.c.j2", {**context, "own": OWN, "other": OTHER, "sloped": part == "slopes"})
+    return render("c/pairs_facing.c.j2", {**context, "own": OWN, "other": OTHER, "sloped": sloped})
 
 
 def pair_declarations(program: Program) -> list[str]:

@@ -40,7 +40,10 @@ def define_functions(program: Program, bundled: bool) -> tuple[list[str], list[s
     sums = used_sums(program)
     if sums:
         imports.append("from .numeric.pair_sums import PairSum")
-        if any(kind.corners for function, *_ in sums for kind in function.kinds):
+        chosen = {len(kind.corners) for function, *_ in sums for kind in function.kinds}
+        if 1 in chosen:
+            imports.append("from .numeric.outline_pieces import nearest")
+        if 2 in chosen:
             imports.append("from .numeric.polygon_edges import facing")
         definitions += [print_pair_sum(program, function) for function, *_ in sums]
     return imports, definitions

@@ -99,7 +99,9 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
             text = _print_pieces(printer, name, f"A pair {kind.name}.", pieces, start, ["return out"], by_entry=True)
             texts.append(text.replace(f"def {name}(t, x, u, c):", f"def {name}(x):"))
             sloped = ", True" if part == "slopes" else ""
-            names.append(f"facing({name}, {kind.corners!r}{sloped})" if kind.corners else name)
+            if len(kind.corners) == 1:
+                name = f"nearest({name}, {kind.corners[0]}{sloped})"
+            names.append(f"facing({name}, {kind.corners!r}{sloped})" if len(kind.corners) > 1 else name)
         row = (kind.first, kind.second, kind.planar, kind.law)
         kinds.append(f"        ({', '.join([*map(repr, row), *names, *map(repr, kind.beside)])}),\n")
     tables = "".join(f"        {table!r},\n" for table in function.tables)

@@ -17,11 +17,12 @@ from ..graph.core import Expr, Graph
 from ..graph.pair_calls import LOSSES, PairFunction, pair_meeting, pair_spots, pair_sum
 from ..graph.vectors import Vec3
 from ..records import dataclass
+from .contact_insides import never_reached
 from .contact_pair_laws import PairLaw, pair_kind
 from .contact_shape_fields import PLANAR
 from .contact_shapes import PIECED, ContactShape, Feature
 from .contact_states import BED, FIELD, POLYGON, alike, class_of, pair_states, part_of
-from .contact_touch import meet
+from .contact_touch import HOLLOWS, meet
 from .force import Force, Load, MarkerLoad, MovingView, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw, RigidLaw
@@ -136,9 +137,17 @@ class ContactGroups(Force):
         for g, own in enumerate(groups):
             for h, other in enumerate(groups):
                 if g != h or len(groups) == 1:
-                    pairs = [(a, b) for a in own for b in other if meet((a, b))]
+                    pairs = [(a, b) for a in own for b in other if self._meet((a, b), own[a], other[b])]
                     met |= {(g, a) for a, _ in pairs} | {(h, b) for _, b in pairs}
         return [{k: parts for k, parts in group.items() if (g, k) in met} for g, group in enumerate(groups)]
+
+    def _meet(self, kinds: tuple[str, str], own: list[_Part], other: list[_Part]) -> bool:
+        """Whether parts of two classes meet, and act on each other."""
+        if not meet(kinds) or kinds[0] not in HOLLOWS:
+            return meet(kinds)
+        pairs = [(one.feature.sizes, two.feature.sizes[0]) for one in own for two in other]
+        never = all(never_reached(kinds[0], sizes, radius) for sizes, radius in pairs)
+        return not never and not self.normal_law.elastic(other[0].feature.sizes[0].graph.one).is_zero
 
     def met_shapes(self) -> list[str]:
         parts = [one.shape for group in self._groups() for features in group.values() for one in features]
@@ -206,8 +215,8 @@ class ContactGroups(Force):
             for j, (h, second) in enumerate(keys):
                 apart = g != h or len(groups) == 1
                 twice = alike(first, second) and i > j  # round beside round, once
-                if apart and not twice and meet((first, second)):
-                    own, other = groups[g][first], groups[h][second]
+                own, other = groups[g][first], groups[h][second]
+                if apart and not twice and self._meet((first, second), own, other):
                     sizes = len(own[0].feature.sizes), len(other[0].feature.sizes)
                     height = own[0].shape.sizes[0] if part_of(first) == FIELD else None
                     kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost, height)

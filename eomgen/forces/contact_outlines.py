@@ -14,6 +14,7 @@ from typing import NamedTuple
 from ..graph.core import Expr, cos, sin, sqrt
 from ..limits.contacts import SHARED
 from .branches import where
+from .contact_insides import notch
 from .contact_profiles import Point, ProfilePart, arc, biarcs, edge, length, minus, tangent, times, unit
 
 Pair = tuple[float, float]
@@ -25,7 +26,8 @@ def straight_ring(points: Sequence[Point]) -> list[ProfilePart]:
     edges = [minus(b, a) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
     ways = [unit(one) for one in edges]
     n = len(points)
-    return [edge(points[k], edges[k], ways[k - 1], ways[(k + 1) % n], width) for k in range(n)]
+    found = [edge(points[k], edges[k], ways[k - 1], ways[(k + 1) % n], width, walls=True) for k in range(n)]
+    return found + [notch(points[k], ways[k - 1], ways[k], width) for k in range(n)]
 
 
 def smooth_ring(points: Sequence[Point]) -> list[ProfilePart]:
@@ -95,10 +97,10 @@ def sprocket_ring(
     over, down, up = unit(across), (-s, -c), (s, -c)
     width = SHARED * (teeth * pitch)
     tooth = [
-        edge(end, times(down, flank), over, down, width),
+        edge(end, times(down, flank), over, down, width, walls=True),
         arc((x, y), low, down, width),
-        edge(low, times(up, flank), up, _turned(over, step), width),
-        edge(low_end, _turned(across, step), up, _turned(down, step), width),
+        edge(low, times(up, flank), up, _turned(over, step), width, walls=True),
+        edge(low_end, _turned(across, step), up, _turned(down, step), width, walls=True),
     ]
     line = [end, (x, y), (_pitch_radius(teeth, pitch) - seat, graph.zero), low, low_end]
     pieces: list[ProfilePart] = []

@@ -20,14 +20,15 @@ from ..graph.substitute import substitute
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..limits.contacts import NOWHERE
+from ..numeric.outline_pieces import CHOSEN, PIECE
 from ..numeric.pair_sums import POSE
 from ..numeric.polygon_edges import EDGE, OTHER, OWN
 from .branches import where
 from .contact import Contact, SpherePlane
 from .contact_fields import planted
 from .contact_rounds import AtHeight
-from .contact_states import BED_CELL, POLYGON, part_of, places_of
-from .contact_touch import ShapeMotion, touching, turning_radius
+from .contact_states import BED_CELL, INSIDE, POLYGON, part_of, places_of
+from .contact_touch import HOLLOWS, ShapeMotion, touching, turning_radius
 from .force import MarkerLoad, View
 from .friction_laws import DryFriction
 from .normal_laws import NormalLaw
@@ -167,8 +168,9 @@ def pair_kind(
     markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
     lateral = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2] if law.planar else None
     polygons = part_of(kinds[0]) == part_of(kinds[1]) == POLYGON
-    corners = (sizes[0] // EDGE, sizes[1] // EDGE) if polygons else ()
-    sizes = (OWN, OTHER) if polygons else sizes
+    inside = part_of(kinds[0]) == INSIDE
+    corners = (sizes[0] // EDGE, sizes[1] // EDGE) if polygons else (sizes[0] // PIECE,) if inside else ()
+    sizes = (OWN, OTHER) if polygons else (CHOSEN, sizes[1]) if inside else sizes
     given = [
         tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)
     ]
@@ -194,7 +196,7 @@ def pair_kind(
             across = vec.transpose(view.rotation(markers[0]))[0 if kinds[0] == "half" else 2]
             contact = SoilWheel(law.name, *markers, push, dry, contact, given[1][0], given[1][1], across)
         exerted.append(_exerted(contact, view, lost))
-        if states and lost:
+        if states and (lost or kinds[0] in HOLLOWS):
             rates += [graph.zero] * law.slots
         elif states:
             rates += (
@@ -205,7 +207,9 @@ def pair_kind(
         touch = [*(contact.nearness(view)[0]), contact.nearness(view)[1], turning_radius(kinds[1], given[1], graph)]
         if share is not None:  # beside a piece of ground nothing is in it, and its neighbour is what is near
             owned = graph.apply("lt", 0.0, share)
-            touch[3] = where(owned, depth, graph.apply("min", depth, 0.0))
+            # what is inside has come there through the outline
+            away = -NOWHERE if inside or kinds[0] in HOLLOWS else graph.apply("min", depth, 0.0)
+            touch[3] = where(owned, depth, away)
             depth = where(owned, depth, -NOWHERE)
         spots += [*normal_of, depth, *vec.add(view.position(markers[0]), arm), *out, *rigid]
     results = [*(reduce(add, found) for found in zip(*exerted, strict=True)), *rates]

@@ -56,10 +56,13 @@ def straight_pieces(points: Sequence[Point]) -> list[ProfilePart]:
     ]
 
 
-def edge(start: Point, reach: Point, before: Point | None, after: Point | None, width: Expr) -> ProfilePart:
+def edge(
+    start: Point, reach: Point, before: Point | None, after: Point | None, width: Expr, walls: bool = False
+) -> ProfilePart:
     """A straight piece between neighbours of two directions.
 
-    Sizes: half of its length; at the left and the right end x and y of the bisector and 1, or 0 without an end.
+    Sizes: half of its length; at the left and the right end x and y of the bisector and 1, or 0 without an end; 1 if it
+    is felt beside its neighbours where these turn towards it (``walls``), else 0.
     """
     graph, way, half = width.graph, unit(reach), 0.5 * length(reach)
     ends: list[Expr] = []
@@ -70,7 +73,8 @@ def edge(start: Point, reach: Point, before: Point | None, after: Point | None, 
         bisector = unit((-way[1] - other[1], way[0] + other[0]))  # the sum of both normals
         ends += [inward * dot(bisector, way), way[0] * bisector[1] - way[1] * bisector[0], graph.one]
     middle = (start[0] + 0.5 * reach[0], start[1] + 0.5 * reach[1])
-    return ProfilePart("edge", middle, way, (half, *ends, width), half, before is None or after is None)
+    sizes = (half, *ends, graph.constant(float(walls)), width)
+    return ProfilePart("edge", middle, way, sizes, half, before is None or after is None)
 
 
 def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
@@ -199,7 +203,7 @@ def unit(a: Point) -> Point:
     return a[0] / size, a[1] / size
 
 
-def _part(side: Expr, width: Expr) -> Expr:
+def part(side: Expr, width: Expr) -> Expr:
     """1 on the inner side of a bisector, 0 on the outer; the piece on its other side has the rest of 1."""
     graph = side.graph
     return graph.apply("max", 0.0, graph.apply("min", 1.0, 0.5 + 0.5 * side / width))
@@ -233,15 +237,18 @@ class EdgeRound(ProfilePiece):
 
     def share(self, view: View) -> Expr:
         x, y, _ = self._place(view)
-        half, left_x, left_y, left, right_x, right_y, right, width, _ = self.sizes
-        first = _part((x + half) * left_y - y * left_x, width)
-        second = _part((half - x) * right_y - y * right_x, width)
+        half, left_x, left_y, left, right_x, right_y, right, walls, width, _ = self.sizes
+        above = walls * view.graph.apply("max", 0.0, y)
+        first, second = (
+            part(along * by - y * bx + above * view.graph.apply("max", 0.0, bx), width)
+            for along, bx, by in ((x + half, left_x, left_y), (half - x, right_x, right_y))
+        )
         return (1.0 - left * (1.0 - first)) * (1.0 - right * (1.0 - second))
 
     def touch(self, view: View) -> Touch:
         graph = view.graph
         x, y, reach = self._place(view)
-        half, _, _, left, _, _, right, _, _ = self.sizes
+        half, _, _, left, _, _, right, _, _, _ = self.sizes
         over = right * graph.apply("max", 0.0, x - half) - left * graph.apply("max", 0.0, -half - x)
         beside = graph.apply("lt", 0.0, over * over)
         distance = sqrt(where(beside, over * over + y * y, 1.0))
@@ -261,7 +268,7 @@ class ArcRound(ProfilePiece):
         _, half, rise, cosine, sine, width, _ = self.sizes
         left = (x + half) * cosine - (y - rise) * sine
         right = (half - x) * cosine - (y - rise) * sine
-        return _part(left, width) * _part(right, width)
+        return part(left, width) * part(right, width)
 
     def touch(self, view: View) -> Touch:
         graph = view.graph

@@ -22,12 +22,14 @@ from ..graph.vectors import Vec3
 from ..numeric.polygon_edges import EDGE
 from ..records import dataclass
 from .contact_fields import field_lines
+from .contact_insides import bowls, notches, piece_numbers, told_by_arcs
 from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
 from .contact_profiles import (
     Point,
     ProfilePart,
     arc_points,
     cross,
+    length,
     minus,
     peaks,
     smooth_pieces,
@@ -36,7 +38,7 @@ from .contact_profiles import (
 )
 from .contact_shape_fields import GROUNDS
 from .contact_solids import cuboid_parts
-from .contact_states import BED, BED_CELL, FIELD, WHEEL, ShapeParts, parts_of
+from .contact_states import BED, BED_CELL, FIELD, INSIDE, WHEEL, ShapeParts, parts_of
 
 #: Shapes whose pieces are edges and arcs.
 PIECED = ("profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
@@ -222,10 +224,20 @@ class ContactShape:
         depth, zero = self.sizes[0], self.sizes[0].graph.zero
         pieces, tops = self._parts()
         depth = solid_depth(pieces, depth)
+        surface = [one for one in pieces if one.kind in ("edge", "arc")]
+        told = depth  # by each piece for itself
+        if self.kind == "smooth_outline" and math.isfinite(most := told_by_arcs(surface)):
+            told = zero.graph.apply("min", depth, most)
         found = [
-            Feature(one.kind, one.frame(frame), (*one.sizes, depth), None if one.open else one.half + depth, depth)
-            for one in pieces
+            Feature(one.kind, one.frame(frame), (*one.sizes, told), None if one.open else one.half + told, depth)
+            for one in surface
         ]
+        if self.kind not in GROUNDS:
+            hollows = [*notches(pieces), *bowls(pieces)]
+            found += [Feature(one.kind, one.frame(frame), (*one.sizes, depth), one.half, depth) for one in hollows]
+            reach = greatest([length(one.origin) + one.half for one in surface])
+            kind = f"{INSIDE}{len(surface)}"
+            found.append(Feature(kind, frame, (*piece_numbers(surface), told), reach, depth))
         for k, (x, y) in tops:
             found.append(Feature("corner", _moved(frame, (x, y, zero)), (zero,), zero, depth, k))
         return found

@@ -26,6 +26,8 @@ STATELESS = ("rim", "sole", "knob", "tip", "brim", "spine")
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
 BLOCK = "block"  #: class of cuboids, which spheres meet
 CORE = "core"  #: class of cuboids with rounded edges, which those of other cuboids and capsules meet
+INSIDE = "inside"  #: class of the insides of closed outlines, which what is deep in them meets
+HOLLOW = "hollow"  #: class of places of outlines where parts of an overlap grow together
 FIELD = "field"  #: class of height fields, of which those of one height have one number
 _ROUND = ("round", "rod", POLYGON)
 #: Classes of first parts that are told apart; all others are surfaces.
@@ -49,6 +51,8 @@ MET = {
     "segment": ("round", "corner", "vertex"),
     POLYGON: ("round", "corner", POLYGON),
     "ground": ("round", "corner", "vertex", "pad", "rim"),
+    INSIDE: ("round", "corner", "vertex", "pad"),
+    HOLLOW: ("round", "corner"),
     "half": ("round", "corner", "vertex", "end", "ellipsoid", "pad", "rim"),
     BED_CELL: ("rim", "sole"),
 }

@@ -11,15 +11,19 @@ from ..graph.vectors import Mat3, Vec3
 from .contact import Contact, SpherePlane, joint_radius
 from .contact_ellipsoids import EllipsoidEllipsoid, EllipsoidPlane, EllipsoidRod, EllipsoidRound
 from .contact_fields import FieldEllipsoid, FieldRound, HeightField
+from .contact_insides import BowlRound, InsideRound, NotchRound
 from .contact_polygons import PolygonPolygon
 from .contact_profiles import ArcRound, EdgeRound
 from .contact_rounds import PolygonRound, RoundRound, SegmentRound
 from .contact_shapes import SOLE, greatest
 from .contact_solids import BlockRound, EdgeRod, RodRod
-from .contact_states import BLOCK, CORE, MET, POLYGON, part_of
+from .contact_states import BLOCK, CORE, HOLLOW, INSIDE, MET, POLYGON, part_of
+from .normal_laws import ElasticPart
 
+#: Features at which an overlap acts back, with the elastic part of the law alone.
+HOLLOWS = ("notch", "bowl")
 #: Features of the first shapes of :data:`~.contact_states.MET` that have several.
-_SURFACES = {"ground": ("edge", "arc")}
+_SURFACES = {"ground": ("edge", "arc"), HOLLOW: HOLLOWS}
 #: Classes of features that meet: the first is a surface, or both are of one class.
 MEETINGS = tuple((one, soft) for own, met in MET.items() for one in _SURFACES.get(own, (own,)) for soft in met)
 
@@ -84,6 +88,11 @@ def touching(
         return RodRod(*laws, (first[0], sizes[1][0]), (first[1], sizes[1][1]))
     if kinds[0] == "half":
         return SpherePlane(*laws, radius)
+    if kinds[0] in HOLLOWS:
+        elastic = (law.name, *markers, ElasticPart(normal), None)
+        return (NotchRound if kinds[0] == "notch" else BowlRound)(*elastic, first, radius)
+    if part_of(kinds[0]) == INSIDE:
+        return InsideRound(*laws, first, radius)
     if kinds[0] in ("edge", "arc"):
         return (EdgeRound if kinds[0] == "edge" else ArcRound)(*laws, first, radius)
     if kinds[0] in ("segment", "rod"):

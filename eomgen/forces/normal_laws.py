@@ -181,6 +181,25 @@ class PartOfLaw(NormalLaw):
 
 
 @dataclass(frozen=True)
+class ElasticPart(NormalLaw):
+    """The part of another law that has a potential."""
+
+    law: NormalLaw
+
+    def force(self, depth: Expr, rate: Expr) -> Expr:
+        return self.law.elastic(depth)
+
+    def elastic(self, depth: Expr) -> Expr:
+        return self.law.elastic(depth)
+
+    def energy(self, depth: Expr) -> Expr:
+        return self.law.energy(depth)
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> ElasticPart:
+        return ElasticPart(self.law.mapped(own))
+
+
+@dataclass(frozen=True)
 class RigidLaw(NormalLaw):
     """No penetration: the force is what it takes, found by a time-stepping method; elsewhere it is none."""
 

@@ -15,6 +15,7 @@ from operator import itemgetter
 from typing import Any
 
 from ..errors import UsageError
+from ..numeric.outline_pieces import nearest
 from ..numeric.pair_sums import MEETING, MOTION, POSE, RECORD, SPOT, PairSum, pairs_of_rows
 from ..numeric.polygon_edges import facing
 from ..records import dataclass
@@ -131,6 +132,8 @@ class PairFunction:
     def _law(kind: PairKind, part: PairPart, made: Callable[[list[Expr], Sequence[str]], Callable[[Any], Any]]) -> Any:
         sloped = part == "slopes"
         law = made(kind.expressions(part), kind.symbols if sloped else kind.plain)
+        if len(kind.corners) == 1:
+            return nearest(law, *kind.corners, sloped)
         return facing(law, (kind.corners[0], kind.corners[1]), sloped) if kind.corners else law
 
     def __getstate__(self) -> dict[str, Any]:

@@ -46,9 +46,10 @@ class PairKind:
         place of its rate.
     calls : tuple of (operation, (function, orders))
         What nodes that call declared functions mean, as in a graph.
-    corners : tuple of two int
+    corners : tuple of int
         Of two polygons: how many corners they have.  The numbers of the shapes are those that matter then, which
-        :mod:`~eomgen.numeric.polygon_edges` finds.
+        :mod:`~eomgen.numeric.polygon_edges` finds.  Of the inside of an outline and another shape: how many pieces it
+        has, of which :mod:`~eomgen.numeric.outline_pieces` finds the nearest.
     """
 
     name: str
