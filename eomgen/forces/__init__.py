@@ -17,6 +17,7 @@ from . import (
 )
 from .actuators import Actuator, BodyTorque, PointForce
 from .attraction import PointGravity
+from .bristles import LuGre
 from .bushing import Bushing
 from .contact import Contact, SpherePlane, SphereSphere
 from .contact_groups import ContactGroups
@@ -24,7 +25,7 @@ from .contact_shapes import ContactShape
 from .creep import Creep
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
 from .friction import JointFriction
-from .friction_laws import BrownMcPhee, Friction, LuGre
+from .friction_laws import BrownMcPhee, Friction
 from .laws import GeneralElement
 from .muscle import Muscle
 from .normal_laws import DampedLinear, HuntCrossley, NormalLaw

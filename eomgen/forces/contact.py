@@ -17,8 +17,10 @@ from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
 from ..records import dataclass
+from .bristles import UNIT, LuGre
+from .dry_friction import DryFriction, Slip
 from .force import Force, Load, MarkerLoad, Measured, View
-from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip, has_bristles, read_friction
+from .friction_laws import FRICTION, FRICTION_CHOICE, has_bristles, read_friction
 from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, HertzBodies, NormalLaw, read_normal_law
 
 #: Normal (ground axes, from the first body to the second), penetration (m), arms of the contact point from the markers.
@@ -78,9 +80,9 @@ class Contact(Force):
 
     def loads(self, view: View) -> list[Load]:
         normal, depth, arms, sliding, rate = self._motion(view)
-        push = self._shared(view, self.law_here(view).force(depth, rate))
-        drag = self._drag(self._slip(view, normal, depth, sliding, push))
-        force, more = vec.add(vec.scale(push, normal), drag), self.aside(view)
+        push = self.law_here(view).force(depth, rate)
+        drag = self._drag(view, self._slip(view, normal, depth, sliding, push))
+        force, more = vec.add(vec.scale(self._shared(view, push), normal), drag), self.aside(view)
         return self._pair(arms, force if more is None else vec.add(force, more), self.couple(view))
 
     def potential(self, view: View) -> Expr | None:
@@ -89,18 +91,28 @@ class Contact(Force):
     def remainder(self, view: View) -> list[Load]:
         normal, depth, arms, sliding, rate = self._motion(view)
         law = self.law_here(view)
-        push = self._shared(view, law.force(depth, rate))
-        lost = push - self._shared(view, law.elastic(depth))
-        drag = self._drag(self._slip(view, normal, depth, sliding, push))
+        push = law.force(depth, rate)
+        lost = self._shared(view, push) - self._shared(view, law.elastic(depth))
+        drag = self._drag(view, self._slip(view, normal, depth, sliding, push))
         return self._pair(arms, vec.add(vec.scale(lost, normal), drag))
 
     def state_rates(self, view: View) -> tuple[Expr, ...]:
         normal, depth, _, sliding, rate = self._motion(view)
-        own = self.normal_law.rates(depth, rate)
+        own, sums = self.normal_law.rates(depth, rate), self.sums_of_rates(view)
+        if isinstance(self.friction, LuGre) and sums is not None:
+            return (*self.friction.rates_of(sums), *own)
         if self.friction is None:
             return own
         push = self.law_here(view).force(depth, rate)
         return (*self.friction.rates_in_plane(self._slip(view, normal, depth, sliding, push)), *own)
+
+    def sums_of_rates(self, view: View) -> tuple[Expr, ...] | None:
+        """What this place adds to sums from which the rates of its states follow; None of laws whose rates add up."""
+        if not isinstance(self.friction, LuGre):
+            return None
+        normal, depth, _, sliding, rate = self._motion(view)
+        slip = self._slip(view, normal, depth, sliding, self.law_here(view).force(depth, rate))
+        return tuple(self._shared(view, x) for x in self.friction.sums(slip))
 
     def rates_apart(self) -> tuple[Expr, ...]:
         """Rates of its states where the surfaces are apart; those of friction come first."""
@@ -129,8 +141,11 @@ class Contact(Force):
     def _slip(self, view: View, normal: Vec3, depth: Expr, sliding: Vec3, push: Expr) -> Slip:
         return Slip(sliding, normal, depth, push, view.rotation(self.first))
 
-    def _drag(self, slip: Slip) -> Vec3:
-        return vec.zero(slip.push.graph) if self.friction is None else self.friction.drag(slip.push, slip)
+    def _drag(self, view: View, slip: Slip) -> Vec3:
+        if self.friction is None:
+            return vec.zero(slip.push.graph)
+        x, y, z = (self._shared(view, part) for part in self.friction.drag(slip.push, slip))
+        return x, y, z
 
     def _pair(self, arms: tuple[Vec3, Vec3], force: Vec3, couple: Vec3 | None = None) -> list[Load]:
         """The force on the second body at the contact point and a couple, their opposites on the first."""
@@ -214,7 +229,7 @@ CURVED: Fields = {**_CONTACT, "stiffness": NORMAL["stiffness"]._replace(required
 
 def _states(axes: str) -> Callable[[Mapping[str, Any]], dict[str, str]]:
     """States of bristles along axes of the first marker."""
-    return lambda values: {f"bristle_{x}": "m" for x in axes} if has_bristles(values) else {}
+    return lambda values: {f"bristle_{x}": UNIT for x in axes} if has_bristles(values) else {}
 
 
 TYPES = table(

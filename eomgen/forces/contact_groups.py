@@ -17,14 +17,15 @@ from ..graph.core import Expr, Graph
 from ..graph.pair_calls import LOSSES, PairFunction, pair_meeting, pair_spots, pair_sum
 from ..graph.vectors import Vec3
 from ..records import dataclass
+from .bristles import SUMS, LuGre
 from .contact_insides import never_reached
 from .contact_pair_laws import PairLaw, pair_kind
 from .contact_shape_fields import PLANAR
 from .contact_shapes import PIECED, ContactShape, Feature
 from .contact_states import BED, FIELD, POLYGON, alike, class_of, pair_states, part_of
 from .contact_touch import HOLLOWS, meet
+from .dry_friction import DryFriction
 from .force import Force, Load, MarkerLoad, MovingView, View
-from .friction_laws import DryFriction
 from .normal_laws import NormalLaw, RigidLaw
 from .soil_beds import COUNTS, bed_rates
 from .soil_laws import SoilPressure, SoilShear
@@ -75,7 +76,9 @@ class ContactGroups(Force):
         if self.on_bed:
             assert isinstance(self.friction, SoilShear)
             return tuple(bed_rates(self.states, found, self.friction.recovery))
-        if self._slots > self._each:
+        if isinstance(self.friction, LuGre) and self._pieces:
+            return self._bent(self.friction, found)
+        if self._pieces:
             found = self._shared_out(found)
         return tuple(map(Expr.__add__, self._rates_apart(), found))
 
@@ -86,6 +89,14 @@ class ContactGroups(Force):
             *added, touching = sums[k : k + self._slots]
             found += [x / x.graph.apply("max", 1.0, touching) for x in added]
         return found
+
+    def _bent(self, friction: LuGre, sums: list[Expr]) -> tuple[Expr, ...]:
+        """Rates of bristles from what all pieces add."""
+        found: list[Expr] = []
+        for k, start in enumerate(range(0, len(sums), self._slots)):
+            own = friction.holding(self.states[k * self._each : (k + 1) * self._each], None)
+            found += own.rates_of(sums[start : start + self._slots])
+        return tuple(found)
 
     def _rates_apart(self) -> list[Expr]:
         """Rates of all states where no shapes meet."""
@@ -108,10 +119,18 @@ class ContactGroups(Force):
 
     @property
     def _slots(self) -> int:
-        """How many numbers a pair has in the sum: its states, and where shapes have pieces how many of them touch."""
+        """How many numbers a pair has in the sum: its states, and where shapes have pieces what their rates need too.
+
+        Soil needs how many pieces touch; see also :meth:`~.bristles.LuGre.sums`.
+        """
         if self.on_bed:
             return self._each + COUNTS
-        return self._each + any(shape.kind in PIECED for shape in (*self.first, *self.second))
+        return self._each + (self._pieces and (SUMS if isinstance(self.friction, LuGre) else 1))
+
+    @property
+    def _pieces(self) -> bool:
+        """Whether shapes have pieces, which share states."""
+        return any(shape.kind in PIECED for shape in (*self.first, *self.second))
 
     @property
     def on_bed(self) -> bool:

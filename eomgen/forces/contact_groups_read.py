@@ -10,12 +10,14 @@ from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
 from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
+from .bristles import UNIT
 from .contact import CURVED
 from .contact_groups import ContactGroups
 from .contact_shape_fields import FIELD_SHAPE, GROUNDS, PLANAR, SHAPE_FIELDS
 from .contact_shapes import ContactShape, by_edges
 from .contact_states import BED, MOST_PAIRS, ShapeParts, cells_of, given_groups, pair_states
-from .friction_laws import DryFriction, has_bristles, read_friction
+from .dry_friction import DryFriction
+from .friction_laws import has_bristles, read_friction
 from .normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, RigidLaw, read_normal_law
 from .soil_beds import STATES
 from .soil_laws import LATERAL, SOIL, read_soil, states_of_soil
@@ -145,8 +147,9 @@ def _states(values: Mapping[str, Any]) -> dict[str, str]:
         return {f"{name}_{k + 1}": "m" for k in range(cells) for name in STATES}
     axes = _axes(values, groups, values.get("lateral", True) is not False)
     names = states_of_soil(axes) if soil else tuple(f"bristle{axis}" for axis in axes)
+    unit = "m" if soil else UNIT
     pairs = pair_states(groups)[1]
-    return {f"{name}_{k + 1}": "m" for k in range(pairs) for name in names} if pairs <= MOST_PAIRS else {}
+    return {f"{name}_{k + 1}": unit for k in range(pairs) for name in names} if pairs <= MOST_PAIRS else {}
 
 
 def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:

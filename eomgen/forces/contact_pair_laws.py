@@ -29,8 +29,8 @@ from .contact_fields import planted
 from .contact_rounds import AtHeight
 from .contact_states import BED_CELL, INSIDE, POLYGON, part_of, places_of
 from .contact_touch import HOLLOWS, ShapeMotion, touching, turning_radius
+from .dry_friction import DryFriction
 from .force import MarkerLoad, View
-from .friction_laws import DryFriction
 from .normal_laws import NormalLaw
 from .soil_beds import SoilCell, cell_of
 from .soil_wheels import SoilWheel
@@ -117,6 +117,8 @@ class PairLaw(NamedTuple):
     ) -> tuple[DryFriction | None, NormalLaw]:
         """The laws of a place of contact with its states."""
         held = None if friction is None else friction.holding(states[: self.axes], lateral)
+        if held is not None and self.slots > self.each:
+            held = held.sharing()
         return held, normal.holding(states[self.axes :])
 
     @property
@@ -253,8 +255,10 @@ def _exerted(contact: Contact, view: View, lost: bool) -> list[Expr]:
 
 def _rates(contact: Contact, view: View, counts: bool) -> list[Expr]:
     """What a place of contact adds to the rates of its states, and to the number of pieces that touch."""
-    graph, share = view.graph, contact.share(view)
-    part = graph.one if share is None else share
+    graph, share, sums = view.graph, contact.share(view), contact.sums_of_rates(view)
+    if sums is not None and counts:
+        return list(sums)
+    part = graph.one if share is None or sums is not None else share  # a load of 0 counts as apart
     pairs = zip(contact.state_rates(view), contact.rates_apart(), strict=True)
     found = [(x - apart) * part for x, apart in pairs]
     touches = [where(graph.apply("lt", 0.0, contact.touch(view)[1]), part, 0.0)] if counts else []

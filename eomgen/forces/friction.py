@@ -11,8 +11,9 @@ from ..elements.entry import Entry
 from ..elements.field import LAW, Field
 from ..graph.core import Expr
 from ..records import dataclass
+from .dry_friction import LineFriction
 from .force import Force, Load, View
-from .friction_laws import FRICTION_CHOICE, LineFriction, has_bristles, read_friction
+from .friction_laws import FRICTION_CHOICE, has_bristles, read_friction
 from .paths import ON_JOINT, Path, read_coordinate
 from .reaction_friction import BY_REACTION, read_reaction_friction
 from .springs import Damper

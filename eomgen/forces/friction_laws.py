@@ -2,96 +2,25 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from typing import Any, ClassVar, NamedTuple
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
 
 from ..elements.dimensions import NONE, RATE, REACH
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field, Fields
 from ..graph import vectors as vec
-from ..graph.core import Expr, sqrt
-from ..graph.vectors import Mat3, Vec3
+from ..graph.core import Expr
+from ..graph.vectors import Vec3
 from ..limits.contacts import AT_REST
 from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
 from ..records import dataclass
-from .branches import beyond_zero, where
+from .bristles import LuGre
+from .dry_friction import LineFriction, Slip, stribeck_level
 
 BRISTLES = "lugre"  #: the law that has states
 #: Laws of dry friction.
 FRICTION_LAWS = ("coulomb", "brown_mcphee", BRISTLES)
-
-
-class DryFriction(ABC):
-    """What opposes sliding in a contact, as a part of the normal force; ``formula`` says it in LaTeX."""
-
-    formula: ClassVar[str]
-
-    @abstractmethod
-    def in_plane(self, slip: Slip) -> Vec3:
-        """Friction at a sliding velocity, with the direction of the velocity."""
-
-    @abstractmethod
-    def mapped(self, own: Callable[[Expr], Expr]) -> DryFriction:
-        """The law with other expressions, in the graph of a pair; without its states."""
-
-    def on_pad(self, area: Expr) -> DryFriction:
-        """The law of a point that stands for an area of a plate."""
-        return self
-
-    def holding(self, states: tuple[Expr, ...], lateral: Vec3 | None) -> DryFriction:
-        """The law with its states; in contacts of the plane ``lateral`` is the direction across the plane."""
-        return self
-
-    def drag(self, push: Expr, slip: Slip) -> Vec3:
-        """The force on the second surface (N), across the normal, beside a normal force."""
-        return vec.scale(-push, self.in_plane(slip))
-
-    def rates_apart(self) -> tuple[Expr, ...]:
-        """Rates of its states where surfaces are apart."""
-        return ()
-
-    def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
-        """Rates of its states at a sliding velocity."""
-        return ()
-
-
-class LineFriction(DryFriction):
-    """Friction that acts in joints too, where it is a force; ``joint_formula`` says it there, in LaTeX."""
-
-    joint_formula: ClassVar[str]
-
-    @abstractmethod
-    def along(self, rate: Expr) -> Expr:
-        """Friction at a velocity along a line, with the sign of the velocity."""
-
-    def rates_along(self, rate: Expr) -> tuple[Expr, ...]:
-        """Rates of its states at a velocity along a line."""
-        return ()
-
-
-class Slip(NamedTuple):
-    """How surfaces slide: velocity and normal (ground axes), penetration, normal force, and axes of the first one."""
-
-    velocity: Vec3
-    normal: Vec3
-    depth: Expr
-    push: Expr
-    axes: Mat3
-
-    def axes_of_states(self, lateral: Vec3 | None) -> Mat3:
-        """In whose axes states are written: of the first surface, or along the surface, across the plane, normal."""
-        if lateral is None:
-            return self.axes
-        return vec.transpose((vec.cross(self.normal, lateral), lateral, self.normal))
-
-    def across(self, states: Sequence[Expr], lateral: Vec3 | None) -> Vec3:
-        """A vector of states in ground axes, less its part along the normal."""
-        zero = self.depth.graph.zero
-        x, y, z = (*states, zero, zero)[:3]
-        found = vec.times(self.axes_of_states(lateral), (x, y, z))
-        return vec.sub(found, vec.scale(vec.dot(found, self.normal), self.normal))
 
 
 class SlidingFriction(LineFriction):
@@ -127,7 +56,7 @@ class Friction(SlidingFriction):
 
     def level(self, squared: Expr) -> Expr:
         """c of the squared sliding velocity."""
-        return _level(squared, self.dynamic, self.static, self.stribeck)
+        return stribeck_level(squared, self.dynamic, self.static, self.stribeck)
 
     def along(self, rate: Expr) -> Expr:
         """c tanh(v / smoothing) + viscous v of a velocity along a line."""
@@ -142,13 +71,6 @@ class Friction(SlidingFriction):
     def mapped(self, own: Callable[[Expr], Expr]) -> Friction:
         static, stribeck = (None if x is None else own(x) for x in (self.static, self.stribeck))
         return Friction(own(self.dynamic), own(self.smoothing), own(self.viscous), static, stribeck)
-
-
-def _level(squared: Expr, dynamic: Expr, static: Expr | None, stribeck: Expr | None) -> Expr:
-    if static is None or stribeck is None:
-        return dynamic
-    fall = squared.graph.apply("exp", -squared / (stribeck * stribeck))
-    return dynamic + (static - dynamic) * fall
 
 
 @dataclass(frozen=True)
@@ -191,72 +113,6 @@ class BrownMcPhee(SlidingFriction):
 
     def mapped(self, own: Callable[[Expr], Expr]) -> BrownMcPhee:
         return BrownMcPhee(own(self.dynamic), own(self.static), own(self.transition), own(self.viscous))
-
-
-@dataclass(frozen=True)
-class LuGre(LineFriction):
-    """Friction of bristles whose deflection z is a state; it holds a body at rest.
-
-        z' = v - stiffness |v| / c(v) z,  friction = stiffness z + damping z' + viscous v
-
-    after Canudas de Wit, Olsson, Astrom and Lischinsky (1995), IEEE Trans. Autom. Control 40, 419-425, with c(v) of
-    :class:`Friction`.  In a plane z and v are vectors (Velenis, Tsiotras and Canudas de Wit, 2002); between
-    surfaces that are apart the bristles spring back, z' = -(stiffness / damping) z.
-    """
-
-    formula: ClassVar[str] = (
-        r"F_t = -F_n (\sigma_0 z + \sigma_1 \dot{z} + b v), \quad \dot{z} = v - \sigma_0 \frac{|v|}{c(v)} z"
-    )
-    joint_formula: ClassVar[str] = (
-        r"F = -(\sigma_0 z + \sigma_1 \dot{z} + b v), \quad \dot{z} = v - \sigma_0 \frac{|v|}{c(v)} z"
-    )
-    dynamic: Expr
-    stiffness: Expr
-    damping: Expr
-    viscous: Expr
-    static: Expr | None
-    stribeck: Expr | None
-    deflections: tuple[Expr, ...]
-    lateral: Vec3 | None = None
-
-    def along(self, rate: Expr) -> Expr:
-        (z,), (change,) = self.deflections, self.rates_along(rate)
-        return self.stiffness * z + self.damping * change + self.viscous * rate
-
-    def rates_along(self, rate: Expr) -> tuple[Expr, ...]:
-        level = _level(rate * rate, self.dynamic, self.static, self.stribeck)
-        return (rate - self.stiffness * rate.graph.apply("abs", rate) / level * self.deflections[0],)
-
-    def in_plane(self, slip: Slip) -> Vec3:
-        """Of deflections in the axes of the first surface; those along the normal have no effect."""
-        pushed = [
-            self.stiffness * z + self.damping * change
-            for z, change in zip(self.deflections, self.rates_in_plane(slip), strict=True)
-        ]
-        return vec.add(slip.across(pushed, self.lateral), vec.scale(self.viscous, slip.velocity))
-
-    def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
-        squared = vec.dot(slip.velocity, slip.velocity)
-        speed = beyond_zero(squared, sqrt)  # the root has no slope at rest
-        decay = self.stiffness * speed / _level(squared, self.dynamic, self.static, self.stribeck)
-        touches = squared.graph.apply("lt", 0.0, slip.depth)
-        velocity = vec.transpose_times(slip.axes_of_states(self.lateral), slip.velocity)
-        apart = self.rates_apart()
-        return tuple(
-            where(touches, v - decay * z, back) for v, z, back in zip(velocity, self.deflections, apart, strict=False)
-        )
-
-    def rates_apart(self) -> tuple[Expr, ...]:
-        relaxed = self.stiffness / self.damping
-        return tuple(-relaxed * z for z in self.deflections)
-
-    def mapped(self, own: Callable[[Expr], Expr]) -> LuGre:
-        static, stribeck = (None if x is None else own(x) for x in (self.static, self.stribeck))
-        dynamic, stiffness, damping = own(self.dynamic), own(self.stiffness), own(self.damping)
-        return LuGre(dynamic, stiffness, damping, own(self.viscous), static, stribeck, ())
-
-    def holding(self, states: tuple[Expr, ...], lateral: Vec3 | None) -> LuGre:
-        return replace(self, deflections=states, lateral=lateral)
 
 
 def has_bristles(values: Mapping[str, Any]) -> bool:

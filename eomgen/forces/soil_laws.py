@@ -22,7 +22,8 @@ from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE, Allowed
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .contact_states import WHEEL, cells_of, given_groups
-from .friction_laws import FRICTION, FRICTION_CHOICE, DryFriction, Slip
+from .dry_friction import DryFriction, Slip
+from .friction_laws import FRICTION, FRICTION_CHOICE
 from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, NormalLaw
 from .soils import RECOVERY, SOILS
 

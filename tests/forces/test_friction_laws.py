@@ -89,7 +89,8 @@ def test_angle_of_slip(law: dict[str, Any]) -> None:
         mod = block(np.arctan(STATIC) + side * 1e-3, law).compile()
         start = {"z": -SINK * np.cos(np.arctan(STATIC))}
         if law is LUGRE:
-            start["touch_bristle_x"] = np.tan(np.arctan(STATIC) - 1e-3) / 1e5
+            bent = np.tan(np.arctan(STATIC) - 1e-3) / 1e5
+            start["touch_bristle_x"] = bent * np.sqrt(1e5 * 2.0 * G * np.cos(np.arctan(STATIC)))
         traj = mod.simulate(3.0, initial=start, method="Radau", rtol=1e-8, atol=1e-12)
         if side > 0:
             assert traj["x_dot"][-1] > 0.5
@@ -108,7 +109,8 @@ def test_creep_on_a_slope() -> None:
         traj = mod.simulate(101.0, initial=start, method="Radau", rtol=1e-9, atol=1e-13, t_eval=times)
         moved[name] = traj["x"][2] - traj["x"][1]
         if name == "lugre":
-            assert traj["touch_bristle_x"][2] == pytest.approx(0.25 / 1e5, rel=1e-6)
+            bent = 0.25 / 1e5 * np.sqrt(1e5 * 2.0 * G * np.cos(angle))
+            assert traj["touch_bristle_x"][2] == pytest.approx(bent, rel=1e-6)
     level = STATIC  # of the law of Stribeck, far below its velocity
     assert moved["coulomb"] == pytest.approx(100 * 1e-5 * 0.25 / np.sqrt(level**2 - 0.25**2), rel=1e-4)
     near = np.linspace(1e-6, 5e-5, 200_001)
@@ -150,7 +152,10 @@ def test_stick_slip_on_a_joint() -> None:
 
 
 def test_bristles_between_surfaces() -> None:
-    """Rates and forces of single contacts against vectors in NumPy, for any turn of the first marker."""
+    """Rates and forces of single contacts against vectors in NumPy, for any turn of the first marker.
+
+    The states are sqrt(s0 N) times the deflections z of the published law.
+    """
     rng = np.random.default_rng(8)
     law = {**LUGRE, "viscous_friction": 0.05, "stiffness": 1e4, "exponent": 1}
     for turn in ((0, 0, 0), (0.3, -0.5, 1.1)):
@@ -171,7 +176,7 @@ def test_bristles_between_surfaces() -> None:
             p = rng.uniform(-0.12, 0.12, 3)
             v = 0.02 * rng.standard_normal(3)
             z = 1e-6 * rng.standard_normal(5)
-            force, rates = np.zeros(3), []
+            force, rates, states = np.zeros(3), [], []
             for n, depth, own in (
                 (R[:, 2], 0.1 - R[:, 2] @ p, [*z[:2], 0.0]),
                 (p / np.linalg.norm(p), 0.15 - np.linalg.norm(p), z[2:]),
@@ -183,10 +188,13 @@ def test_bristles_between_surfaces() -> None:
                 dz = local - 1e5 * speed / g * np.array(own) if depth > 0 else -1e5 / 300 * np.array(own)
                 bristle = R @ (1e5 * np.array(own) + 300 * dz)
                 push = 1e4 * max(depth, 0.0)
+                root = np.sqrt(1e5 * push) if depth > 0 else 1.0
+                states += list(root * np.array(own)[: 2 if len(rates) == 0 else 3])
+                dz = root * dz
                 force += push * n - push * (bristle - n * (n @ bristle) + 0.05 * slide)
                 rates += list(dz[: 2 if len(rates) == 0 else 3])
                 touched += depth > 0
-            found = mod.rhs(0.0, np.concatenate([p, v, z]))
+            found = mod.rhs(0.0, np.concatenate([p, v, states]))
             np.testing.assert_allclose(found[3:6], force, rtol=1e-9, atol=1e-9)
             np.testing.assert_allclose(found[6:], rates, rtol=1e-9, atol=1e-12)
         assert touched > 20

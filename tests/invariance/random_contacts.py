@@ -29,8 +29,9 @@ class Scene:
     family: tuple[str, str]
     masses: np.ndarray
     inertias: np.ndarray  #: principal ones; about z alone in the plane
-    remembers: bool  #: whether its law has states, or a force that gives back what it took without a potential
+    remembers: bool  #: whether its force gives back what it took without a known energy
     told: str
+    bristles: bool = False  #: whether half the square of its states is energy
 
 
 def _polygon(random: np.random.Generator, size: float) -> list[tuple[float, float]]:
@@ -102,6 +103,7 @@ def _friction(random: np.random.Generator, kind: str) -> dict[str, Any]:
         },
         "lugre": {
             "friction": mu, "friction_law": "lugre", "bristle_stiffness": 300.0, "bristle_damping": 2.0,
+            "static_friction": float(random.uniform(1.0, 2.0)) * mu, "stribeck": 0.05,
         },
     }[kind]  # fmt: skip
 
@@ -152,4 +154,5 @@ def random_contacts(number: int) -> Scene:
         shapes = [_in_plane(random, b) if flat else _in_space(random, b, False, curved) for b in bodies]
         m.contacts("c", shapes, law=law)
     told = ", ".join(sorted({str(shape["shape"]) for shape in shapes}))
-    return Scene(m, family, masses, inertias, what == "lugre", f"{told}; {law.get('normal_law', 'hunt_crossley')}")
+    told += f"; {law.get('normal_law', 'hunt_crossley')}"
+    return Scene(m, family, masses, inertias, False, told, what == "lugre")

@@ -69,7 +69,7 @@ def exerted(scene: Scene, x: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray,
 
 
 def random_state(scene: Scene, mod: eg.Module, random: np.random.Generator) -> np.ndarray:
-    """Bodies close to each other, with small or large velocities; memories of states at 0."""
+    """Bodies close to each other, with small or large velocities; states at 0."""
     n, x = len(scene.masses), np.zeros(mod.n_x)
     spread, speed = random.uniform(0.05, 0.3), 10 ** random.uniform(-3, 0.5)
     flat = scene.family[0] == PLANE
@@ -102,7 +102,13 @@ def judge_states(scene: Scene, mod: eg.Module, random: np.random.Generator, resu
     touched = []
     for _ in range(STATES):
         x = random_state(scene, mod, random)
-        rates = mod.rhs(0.0, x)
+        rates, stored = mod.rhs(0.0, x), 0.0
+        if scene.bristles:
+            first = mod.n_q + mod.n_v
+            met = rates[first:] != 0.0  # of surfaces that are apart bristles lose their energy, which would hide a gain
+            x[first:] = np.where(met, 10 ** random.uniform(-3, 0.5) * random.standard_normal(len(met)), 0.0)
+            rates = mod.rhs(0.0, x)
+            stored = float(x[first:] @ rates[first:])
         force, moment, (power, sizes) = exerted(scene, x, rates)
         largest = float(np.abs(force).max())
         if largest < 1e-6:
@@ -116,7 +122,7 @@ def judge_states(scene: Scene, mod: eg.Module, random: np.random.Generator, resu
         slope, bend = _slope(mod, x, rates)
         if bend > KINK * max(abs(slope), sizes):
             continue
-        result.power = max(result.power, float((power + slope) / max(sizes, abs(slope))))
+        result.power = max(result.power, float((power + slope + stored) / max(sizes, abs(slope), abs(stored))))
     return touched
 
 
@@ -154,7 +160,8 @@ def judge_run(scene: Scene, mod: eg.Module, x: np.ndarray, end: float, result: R
         warnings.simplefilter("ignore")
         start = dict(zip(mod.x_names, x, strict=True))
         traj = mod.simulate(end, initial=start, rtol=1e-8, atol=1e-10)
-    energy = np.array([sum(mod.energy(column)) for column in traj.x.T])
+    bent = 0.5 * (traj.x[mod.n_q + mod.n_v :] ** 2).sum(axis=0) if scene.bristles else 0.0
+    energy = np.array([sum(mod.energy(column)) for column in traj.x.T]) + bent
     result.gained = max(result.gained, float((energy.max() - energy[0]) / energy[0]))
     result.lost = max(result.lost, float(1.0 - energy[-1] / energy[0]))
     momenta = np.array([mod.momentum(column)[:3] for column in traj.x.T])

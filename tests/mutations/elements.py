@@ -174,7 +174,7 @@ FAULTS = (
         ("tests/forces/test_loads.py::test_contact_of_two_bodies[point_plane]",),
     ),
     Fault(
-        "friction-stribeck", "eomgen/forces/friction_laws.py",
+        "friction-stribeck", "eomgen/forces/dry_friction.py",
         "dynamic + (static - dynamic) * fall",
         "static + (dynamic - static) * fall",
         "static and dynamic friction are exchanged",

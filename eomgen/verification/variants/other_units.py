@@ -16,6 +16,7 @@ from ...describe.mechanism import MASS as TOTAL_MASS
 from ...describe.names import QUANTITIES
 from ...describe.rewritten_texts import rewritten, scaled
 from ...describe.scope import ENERGIES
+from ...describe.units import read_unit
 from ...describe.visit import Slot, Visitor, visit
 from ...elements.dimensions import ENERGY, LENGTH, NONE, SPEED, SPIN, Dimension
 from ...forces.soil_laws import OWN
@@ -82,9 +83,10 @@ class _Scaled(Visitor):
         self.joints = coordinates_of(description)
         self.home = {joint: own[0] for joint, own in self.joints.items() if len(own) == 1}
         for entry in description.sections["forces"]:
-            for name in states_of(entry):  # deflections of bristles, as long as the way that they follow
-                length = acts_on_length("forces", entry.values, ALONG, self._is_length)
-                self.names[name] = (scales.of(LENGTH if length else NONE), "")
+            way = LENGTH if acts_on_length("forces", entry.values, ALONG, self._is_length) else NONE
+            for name, unit in states_of(entry).items():  # bristles of a joint bend as far as it moves
+                own = read_unit(unit).dimension
+                self.names[name] = (scales.of(way if own in (NONE, LENGTH) else own), "")
 
     def measured_in(self, slot: Slot) -> Dimension | None:
         """The dimension of a scalar, as the row of its field says."""
