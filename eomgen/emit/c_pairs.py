@@ -19,8 +19,8 @@ from ..numeric.polygon_edges import OTHER, OWN
 from ..program import Program
 from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
-from .pair_statements import placed_length, plain_numbers, record_of
-from .pair_sums_used import UsedSum, sums_again, used_sums
+from .pair_statements import placed_length, plain_numbers, record_of, slots_of
+from .pair_sums_used import UsedSum, rates_again, sums_again, used_sums
 from .row_runs import written
 from .sources import render
 from .straight import cut
@@ -43,15 +43,17 @@ def _tables(function: PairFunction) -> list[dict[str, Any]]:
 
 def pair_files(program: Program) -> dict[str, str]:
     """The C files of the sums that a program uses."""
-    again = {function.name for function in sums_again(program)}
+    again = {function.name: rated for function, rated in rates_again(program)}
     return {
-        f"{program.name}_pairs_{used.function.name}.c": _file(program, used, used.function.name in again)
+        f"{program.name}_pairs_{used.function.name}.c": _file(program, used, again.get(used.function.name))
         for used in used_sums(program)
     }
 
 
-def _file(program: Program, used: UsedSum, again: bool) -> str:
+def _file(program: Program, used: UsedSum, rated: frozenset[int] | None) -> str:
+    """The file of a sum; ``rated`` are the numbers that have rates where derivatives are taken again and again."""
     function = used.function
+    begun, again = POSE * function.bodies, rated or frozenset()
     parts: list[tuple[PairPart, str]] = [("outputs", "")] if used.sums or used.slopes else []
     parts += [("slopes", "_slope")] if used.slopes else []
     parts += [("touch", "_touch")] if used.meets else []
@@ -131,8 +133,12 @@ def _file(program: Program, used: UsedSum, again: bool) -> str:
         "beyond": repr(BEYOND),
         "up_to": repr(UP_TO),
         "within": repr(WITHIN),
-        "again": again,
+        "again": rated is not None,
+        "rated": sorted({k % POSE for k in again if k < begun}),
+        "further": len(function.data) if any(k >= begun for k in again) else 0,
         "kept": record_of(function),
+        "slots": slots_of(function),
+        "given": function.count,
         "shapes": sum(map(len, function.tables)),
         "scratch": sum(table["count"] * table["length"] for table in tables),
     }

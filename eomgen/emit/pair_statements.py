@@ -9,6 +9,7 @@ from ..graph.core import Expr, Graph
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
 from ..numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT
 
+SLOTS = 48  #: numbers of columns for each pair, three of seven for each of both bodies and a little
 COPIED = 16  #: entries of a list that are results one after the other, from which they are copied in a loop
 
 
@@ -53,15 +54,21 @@ def work_of(function: PairFunction) -> int:
     return 2 * shapes + 2 * function.count + max(function.results, function.spots)
 
 
+def slots_of(function: PairFunction) -> int:
+    """Numbers for which columns of a derivative at one place have room: so many for each pair that has room."""
+    return SLOTS * function.room + function.results
+
+
 def kept_of(function: PairFunction) -> int:
-    """Numbers that derivatives at one place keep: shapes, their rates, and each near pair with what it exerts."""
+    """Numbers that derivatives at one place keep: shapes, their rates, near pairs with what they exert, and columns."""
     shapes = sum(len(rows) * placed_length(rows) for rows in function.tables)
-    return 2 * shapes + record_of(function) * function.room
+    columns = 2 * function.count + function.bodies + function.results + 2 + slots_of(function)
+    return 2 * shapes + record_of(function) * function.room + columns
 
 
 def record_of(function: PairFunction) -> int:
-    """Numbers of one near pair that is kept: its kind, its two shapes and what it exerts."""
-    return 3 + RESULT + max(kind.states for kind in function.kinds)
+    """Numbers of one near pair that is kept: its kind, its two shapes, their bodies and what it exerts."""
+    return 5 + RESULT + max(kind.states for kind in function.kinds)
 
 
 class PairLists:

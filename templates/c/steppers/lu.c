@@ -9,10 +9,11 @@ static void swap_rows(int n, double *a, double *b)
     }
 }
 
-/* P A = L U in place, reciprocals of the pivots on the diagonal; 1 if a column holds no pivot. */
-static int lu_factor(int n, double *restrict a, int *restrict order)
+/* Columns begin to end of P A = L U in place, reciprocals of the pivots on the diagonal; rows are swapped whole, those behind
+   stay as they are. 1 if a column holds no pivot. */
+static int lu_columns(int n, int begin, int end, double *restrict a, int *restrict order)
 {
-    for (int k = 0; k < n; k++) {
+    for (int k = begin; k < end; k++) {
         int best = k;
         for (int i = k + 1; i < n; i++) {
             best = fabs(a[i * n + k]) > fabs(a[best * n + k]) ? i : best;
@@ -31,12 +32,17 @@ static int lu_factor(int n, double *restrict a, int *restrict order)
             double *restrict const other = a + i * n;
             const double ratio = other[k] * inverse;
             other[k] = ratio;
-            for (int j = k + 1; j < n; j++) {
+            for (int j = k + 1; j < end; j++) {
                 other[j] -= ratio * row[j];
             }
         }
     }
     return 0;
+}
+
+static int lu_factor(int n, double *restrict a, int *restrict order)
+{
+    return lu_columns(n, 0, n, a, order);
 }
 
 static void lu_solve(int n, const double *restrict a, const int *restrict order, double *restrict b)

@@ -1,7 +1,7 @@
 /* As lu.c, of a + i c. */
-static int lu_factor_complex(int n, double *restrict a, double *restrict c, int *restrict order)
+static int lu_columns_complex(int n, int begin, int end, double *restrict a, double *restrict c, int *restrict order)
 {
-    for (int k = 0; k < n; k++) {
+    for (int k = begin; k < end; k++) {
         int best = k;
         double most = -1.0;
         for (int i = k; i < n; i++) {
@@ -23,13 +23,18 @@ static int lu_factor_complex(int n, double *restrict a, double *restrict c, int 
             double *restrict const p = a + i * n, *restrict const q = c + i * n;
             const double u = p[k] * x - q[k] * y, v = p[k] * y + q[k] * x;
             p[k] = u, q[k] = v;
-            for (int j = k + 1; j < n; j++) {
+            for (int j = k + 1; j < end; j++) {
                 p[j] -= u * re[j] - v * im[j];
                 q[j] -= u * im[j] + v * re[j];
             }
         }
     }
     return 0;
+}
+
+static int lu_factor_complex(int n, double *restrict a, double *restrict c, int *restrict order)
+{
+    return lu_columns_complex(n, 0, n, a, c, order);
 }
 
 static void lu_solve_complex(int n, const double *restrict a, const double *restrict c, const int *restrict order,

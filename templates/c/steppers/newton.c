@@ -98,7 +98,7 @@ static int newton_factor(eomgen_run *run, const newton_area *a, double g, double
     if (a->state[HALVED] == PARTS && a->state[DRIFT] < RUNS_DRIFTING * fmin(fabs(g), sqrt(square))) {
         const int m = n - n_q;
         parts_matrices(n, n_q, a->J, a->real + m * m, a->re + m * m, g, x / square, -y / square, a->real, a->re, a->im);
-        return lu_factor(m, a->real, a->order) || lu_factor_complex(m, a->re, a->im, a->order_complex);
+        return factor_real(m, a->real, a->order) || factor_complex(m, a->re, a->im, a->order_complex);
     }
     a->state[HALVED] = a->state[HALVED] == HALF ? HALF : WHOLE;
     const int halved = a->state[HALVED] == HALF, m = halved ? n / 2 : n;
@@ -113,7 +113,7 @@ static int newton_factor(eomgen_run *run, const newton_area *a, double g, double
         }
         plain[i] += g, re[i] += x, im[i] += y;
     }
-    return lu_factor(m, a->real, a->order) || lu_factor_complex(m, a->re, a->im, a->order_complex);
+    return factor_real(m, a->real, a->order) || factor_complex(m, a->re, a->im, a->order_complex);
 }
 
 static void newton_solve(const eomgen_run *run, const newton_area *a, double g, double *restrict r)
@@ -124,12 +124,12 @@ static void newton_solve(const eomgen_run *run, const newton_area *a, double g, 
         double *const room = a->im + n_v * n_v;
         parts_carry(n, n_q, a->J, g, NULL, r, room);
         add_times(n_v, n_q, a->J + n_q * n, n, r, r + n_q);
-        lu_solve(n_v, a->real, a->order, r + n_q);
+        solve_real(n_v, a->real, a->order, r + n_q);
         parts_carry(n, n_q, a->J, g, r + n_q, r, room);
         return;
     }
     if (a->state[HALVED] == WHOLE) {
-        lu_solve(n, a->real, a->order, r);
+        solve_real(n, a->real, a->order, r);
         return;
     }
     const double inverse = 1.0 / g;
@@ -140,7 +140,7 @@ static void newton_solve(const eomgen_run *run, const newton_area *a, double g, 
         }
         r[m + i] += sum * inverse;
     }
-    lu_solve(m, a->real, a->order, r + m);
+    solve_real(m, a->real, a->order, r + m);
     for (int i = 0; i < m; i++) {
         r[i] = (r[i] + r[m + i]) * inverse;
     }
@@ -158,12 +158,12 @@ static void newton_solve_complex(const eomgen_run *run, const newton_area *a, do
         parts_carry_complex(n, n_q, a->J, u, v, NULL, NULL, r, s, room);
         add_times(n_v, n_q, a->J + n_q * n, n, r, r + n_q);
         add_times(n_v, n_q, a->J + n_q * n, n, s, s + n_q);
-        lu_solve_complex(n_v, a->re, a->im, a->order_complex, r + n_q, s + n_q);
+        solve_complex(n_v, a->re, a->im, a->order_complex, r + n_q, s + n_q);
         parts_carry_complex(n, n_q, a->J, u, v, r + n_q, s + n_q, r, s, room);
         return;
     }
     if (a->state[HALVED] == WHOLE) {
-        lu_solve_complex(n, a->re, a->im, a->order_complex, r, s);
+        solve_complex(n, a->re, a->im, a->order_complex, r, s);
         return;
     }
     for (int i = 0; i < m; i++) {
@@ -174,7 +174,7 @@ static void newton_solve_complex(const eomgen_run *run, const newton_area *a, do
         }
         r[m + i] += p * u - q * v, s[m + i] += p * v + q * u;
     }
-    lu_solve_complex(m, a->re, a->im, a->order_complex, r + m, s + m);
+    solve_complex(m, a->re, a->im, a->order_complex, r + m, s + m);
     for (int i = 0; i < m; i++) {
         const double p = r[i] + r[m + i], q = s[i] + s[m + i];
         r[i] = p * u - q * v, s[i] = p * v + q * u;

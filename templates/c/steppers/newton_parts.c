@@ -3,34 +3,15 @@
 #include <math.h>
 #include <string.h>
 
-/* c = a b: n x k by k x m, both of rows that are `step` apart in a, b_step in b; columns of zeros cost nothing. */
+/* c = -a b: n x k by k x m, both of rows that are so many steps apart. */
 static void multiply(int n, int k, int m, const double *restrict a, int step, const double *restrict b, int b_step,
                      double *restrict c)
 {
     memset(c, 0, (size_t)(n * m) * sizeof(double));
-    for (int i = 0; i < n; i++) {
-        for (int l = 0; l < k; l++) {
-            const double x = a[i * step + l];
-            for (int j = 0; x != 0.0 && j < m; j++) {
-                c[i * m + j] += x * b[l * b_step + j];
-            }
-        }
-    }
+    take_products(n, k, m, a, step, b, b_step, c, m);
 }
 
-/* x += a r of n x k numbers, rows of which are `step` apart. */
-static void add_times(int n, int k, const double *restrict a, int step, const double *restrict r, double *restrict x)
-{
-    for (int i = 0; i < n; i++) {
-        double sum = 0.0;
-        for (int l = 0; l < k; l++) {
-            sum += a[i * step + l] * r[l];
-        }
-        x[i] += sum;
-    }
-}
-
-/* K S and K E S, with room for E S; the greatest sum of a row of E. */
+/* -K S and K E S, with room for -E S; the greatest sum of a row of E. */
 static double parts_products(int n, int n_q, const double *restrict J, double *restrict KS, double *restrict KES,
                              double *restrict ES)
 {
@@ -49,7 +30,7 @@ static double parts_products(int n, int n_q, const double *restrict J, double *r
     return most;
 }
 
-/* g - D - K B S for a real g, and for the g with 1/g = u + i v. */
+/* g - D - K B S of -K S and K E S for a real g, and for the g with 1/g = u + i v. */
 static void parts_matrices(int n, int n_q, const double *restrict J, const double *restrict KS,
                            const double *restrict KES, double g, double u, double v, double *restrict plain,
                            double *restrict re, double *restrict im)
@@ -60,9 +41,9 @@ static void parts_matrices(int n, int n_q, const double *restrict J, const doubl
         const double *const D = J + (n_q + i) * n + n_q;
         for (int k = 0; k < m; k++) {
             const double first = KS[i * m + k], second = KES[i * m + k];
-            plain[i * m + k] = -D[k] - (first + second / g) / g;
-            re[i * m + k] = -D[k] - first * u - second * p;
-            im[i * m + k] = -first * v - second * q;
+            plain[i * m + k] = -D[k] + (first - second / g) / g;
+            re[i * m + k] = -D[k] + first * u - second * p;
+            im[i * m + k] = first * v - second * q;
         }
         plain[i * m + i] += g, re[i * m + i] += u / square, im[i * m + i] -= v / square;
     }
