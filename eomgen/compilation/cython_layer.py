@@ -79,8 +79,9 @@ def describe_layer(texts: Mapping[str, str], headers: Mapping[str, str], compile
 
     Models' keys hold this: a module that is built already needs no Cython to be found.
     """
+    flags = [layer_flags(compiler), *(_c_flags(compiler, file) for file in texts if file.endswith(".c"))]
     return {
-        "kind": "layer", "sources": {**texts, **headers}, "flags": [layer_flags(compiler), *(_c_flags(compiler, file) for file in texts if file.endswith(".c"))],
+        "kind": "layer", "sources": {**texts, **headers}, "flags": flags,
         "compiler": [*compiler.command, compiler.version], "interpreter": describe_interpreter(),
     }  # fmt: skip
 
