@@ -158,6 +158,9 @@ CASES: tuple[Judged, ...] = (
           ({"peak_angle": [0.4, "@"]}, "peak_angle[1]", NEGATIVE),
           ({"reversal": "@"}, "reversal", NOT_POSITIVE),
       )),
+    Judged("forces", {"type": "contacts", "first": [{**DISC, "width": 0.2}],
+                      "second": [{"shape": "bed", "on": "ground", "length": 1, "cells": 4}], **SOIL, "settling": "@"},
+           "settling", 0.3, NOT_POSITIVE),
     # shapes
     shape("radius", 0.1, NOT_POSITIVE, shape="circle", on="a", radius="@"),
     shape("length", 0.1, NOT_POSITIVE, shape="segment", on="a", length="@"),

@@ -211,7 +211,8 @@ class ElementMethods(Described):
         frictional_modulus: Value = None, sinkage_exponent: Value = None, cohesion: Value = None,
         friction_angle: Value = None, shear_modulus: Value = None, contact_width: Value = None, rebound: Value = None,
         unloading_stiffness: Value = None, unloading_rise: Value = None, peak_angle: Sequence[Value] | None = None,
-        reversal: Value = 0.01, recovery: Value = None, lateral: bool | None = None) -> ForceHandle:
+        reversal: Value = 0.01, settling: Value = 0.001, recovery: Value = None,
+        lateral: bool | None = None) -> ForceHandle:
         """Add contact of every shape of a group with every shape of another, by one law."""
     def muscle(self, name: str, a: Any, b: Any, activation: Value = None, force_max: Value = None,
         fiber_length: Value = None, slack_length: Value = None, velocity_max: Value = None, pennation: Value = 0,

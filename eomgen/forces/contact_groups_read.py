@@ -121,6 +121,8 @@ def _refuse_on_soil(e: Entry, first: Sequence[ContactShape], second: Sequence[Co
             on_bed = any(shape.kind == BED for shape in shapes)  # whose cells remember
             for word in ("recovery", "lateral") if wheels and not on_bed else ("peak_angle", "reversal"):
                 e.refuse(word, f"has no meaning for {'wheels' if wheels else 'plates'}")
+            if not on_bed:
+                e.refuse("settling", "belongs to the cells of a bed")
             return
     e.fault("", "has soil, but no ground", "give half_plane or a profile as one group, plates or wheels as the other")
 

@@ -6,12 +6,14 @@ The states of a cell are shared by all that pass over it, so that a second wheel
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
+from operator import truediv
 from typing import NamedTuple
 
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..limits.contacts import BESIDE, GRIP, UNSHEARED, UPRIGHT
+from ..limits.contacts import BESIDE, FOLLOWED, GRIP, UNSHEARED, UPRIGHT
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .contact import Contact, Touch
@@ -21,7 +23,7 @@ from .normal_laws import NormalLaw
 from .soil_laws import SoilPressure, SoilShear
 
 STATES = ("shear", "grip", "sinkage")  #: of a cell, in the order in which laws hold them
-COUNTS = 2  #: numbers of a cell beside its states: how many press it, how many press it deeper
+COUNTS = 2  #: numbers of a cell beside its states: how far it is pressed, the sum of the squares of what deepens it
 
 
 class _Column(NamedTuple):
@@ -34,7 +36,10 @@ class _Column(NamedTuple):
 
 
 class _Pressing(NamedTuple):
-    """How a column is pressed: directions, arms, depth and its rate, sliding, force along the normal, strength."""
+    """How a column is pressed.
+
+    Directions, arms, depth and its rate, sliding, force along the normal, f, T and g of :class:`SoilCell`.
+    """
 
     outward: Vec3
     along: Vec3
@@ -43,7 +48,9 @@ class _Pressing(NamedTuple):
     rate: Expr
     sliding: Expr
     push: Expr
-    strength: Expr
+    met: Expr
+    most: Expr
+    quick: Expr
 
 
 @dataclass(frozen=True)
@@ -54,15 +61,19 @@ class SoilCell(Contact):
     its normal and the column,
 
         F_n = p(z, z_m) a b / c along the normal of the underside        (Bekker; Wong below z_m)
-        z_m' = z' where z = z_m and z' > 0, else 0                       the greatest sinkage at this place
-        d' = v - |v| d / K                                               shear displacement (Janosi and Hanamoto)
-        S = (c_0 + p tan phi) a b / c,  T = S (e + (1 - e) |d| / K)
-        F_t = -max(-T, min(T, sqrt(S S_0) u / l)),  u' = sqrt(S / S_0) v - |v| u / (l T / S),  l = K / 50, e = 0.01
+        z_m' = max(0, z') h + max(0, z - z_m) / t                        the greatest sinkage at this place
+        h = max(0, min(2, 1 + (z - z_m) / s)) min(1, z / s),  s = max(a / 200, z' t)
+        d' = f (v - |v| d / K),  f = min(1, p / p(a / 200))               shear displacement (Janosi and Hanamoto)
+        T = (f c_0 + p tan phi) (e + (1 - e) |d| / K) a b / c,  e = 0.025
+        F_t = -max(-T, min(T, sqrt(T S_0) u / l)),  u' = g (sqrt(T / S_0) v - |v| u / l),  l = 0.03 K
+        g = f / max(1, |v| t / l), which also multiplies F_t where it drives the underside
 
-    of the velocity v of the underside along itself.  F_n is dual to z, F_n = -p a b dz/dx, so that its power is
-    -p a b z'.  p is that of an elastic store which falls where z_m grows, and S_0 u^2 / (2 l) is the most that u can
-    give back, whatever the load does: no cycle of load, sinkage and sliding gains energy, with any number of wheels.
-    S_0 is the strength of a cell as wide as it is long at the sinkage K.
+    of the velocity v of the underside along itself.  Where z grows at z_m, h is 1 and leads z_m to z over the length s;
+    the second part of z_m' is there where something begins deeper than z_m.  F_n is dual to z, F_n = -p a b dz/dx, so
+    that its power is -p a b z'.  p is that of an elastic store which falls where z_m grows, and S_0 u^2 / (2 l) is the
+    most that u can give back, whatever the load does: no cycle of load, sinkage and sliding gains energy, with any
+    number of wheels.  S_0 is the strength of a cell as wide as it is long at the sinkage K.  All rates are continuous,
+    and none is quicker than 1 / t or |v| / K.
     """
 
     kind: str
@@ -114,9 +125,14 @@ class SoilCell(Contact):
         law, shear = self._laws()
         area = self.sizes[1] * self.size
         push = law.on_pad(area, self.sizes[1]).force(depth, rate) / -ny
-        pressed = view.graph.apply("lt", 0.0, push)
-        strength = where(pressed, shear.cohesion * area / -ny + push * shear.slope, 0.0)
-        return _Pressing(outward, along, (first, second), depth, rate, sliding, push, strength)
+        graph = view.graph
+        pressed = graph.apply("lt", 0.0, push)
+        begun = law.modulus_of(self.sizes[1]) * (FOLLOWED * self.size) ** law.exponent
+        met = where(pressed, graph.apply("min", 1.0, push * -ny / (area * begun)), 0.0)
+        strength = where(pressed, met * shear.cohesion * area / -ny + push * shear.slope, 0.0)
+        quick = met / graph.apply("max", 1.0, graph.apply("abs", sliding) * law.settling / (GRIP * shear.modulus))
+        most = strength * self._part()
+        return _Pressing(outward, along, (first, second), depth, rate, sliding, push, met, most, quick)
 
     def _laws(self) -> tuple[SoilPressure, SoilShear]:
         assert isinstance(self.normal_law, SoilPressure)
@@ -139,10 +155,11 @@ class SoilCell(Contact):
         found = self._pressing(view)
         graph = view.graph
         _, shear = self._laws()
-        most = found.strength * self._part()
-        root = beyond_zero(found.strength * self._reference(), sqrt)
+        most = found.most
+        root = beyond_zero(most * self._reference(), sqrt)
         grip = root * shear.shears[1] / (GRIP * shear.modulus)
         drag = graph.apply("max", -most, graph.apply("min", most, grip))
+        drag = drag * where(graph.apply("lt", drag * found.sliding, 0.0), found.quick, 1.0)
         force = vec.neg(vec.add(vec.scale(found.push, found.outward), vec.scale(drag, found.along)))
         return self._pair(found.arms, force)
 
@@ -153,23 +170,26 @@ class SoilCell(Contact):
         return view.graph.zero
 
     def sums(self, view: View) -> list[Expr]:
-        """What this adds to the rates of the states of the cell, and to the counts of what presses it, and deeper."""
+        """What this adds to the sums of :func:`bed_rates`."""
         found, graph = self._pressing(view), view.graph
         law, shear = self._laws()
-        pressed = graph.apply("lt", 0.0, found.push)
+        assert law.deepest is not None
         speed = graph.apply("abs", found.sliding)
         build = found.sliding - speed * shear.shears[0] / shear.modulus
-        root = beyond_zero(found.strength / self._reference(), sqrt)
-        held = root * found.sliding - speed * shear.shears[1] / (GRIP * shear.modulus * self._part())
-        deeper = law.deepening(found.depth, found.rate)
-        grows = graph.apply("lt", 0.0, deeper)
-        return [
-            where(pressed, build, 0.0),
-            where(pressed, held, 0.0),
-            where(grows, deeper, 0.0),
-            where(pressed, 1.0, 0.0),
-            where(grows, 1.0, 0.0),
-        ]
+        root = beyond_zero(found.most / self._reference(), sqrt)
+        held = root * found.sliding - speed * shear.shears[1] / (GRIP * shear.modulus)
+        deeper = self._deeper(found.depth, found.rate)
+        return [found.met * build, found.quick * held, deeper, found.met, deeper * deeper]
+
+    def _deeper(self, depth: Expr, rate: Expr) -> Expr:
+        """z_m' by what presses the cell."""
+        law, _ = self._laws()
+        assert law.deepest is not None
+        apply = depth.graph.apply
+        sinking, z = apply("max", 0.0, rate), apply("max", 0.0, depth)
+        near, over = apply("max", FOLLOWED * self.size, sinking * law.settling), z - law.deepest
+        part = apply("max", 0.0, apply("min", 2.0, 1.0 + over / near)) * apply("min", 1.0, z / near)
+        return sinking * part + apply("max", 0.0, over) / law.settling
 
 
 def _under_rim(radius: Expr, x: Expr, y: Expr) -> _Column:
@@ -209,16 +229,17 @@ def _under_sole(length: Expr, x: Expr, y: Expr, axis: tuple[Expr, Expr]) -> _Col
 def bed_rates(states: Sequence[Expr], sums: Sequence[Expr], recovery: Expr) -> list[Expr]:
     """Rates of the states of all cells, from the sums over what presses them.
 
-    Shear is forgotten where nothing presses; the greatest sinkage stays, and grows with the mean of what deepens it.
+    Shear is forgotten where nothing presses; the greatest sinkage stays.  What deepens a cell counts by how quickly it
+    does: sum of squares by sum, which is the rate of one that deepens it alone.
     """
     found: list[Expr] = []
     each, slots = len(STATES), len(STATES) + COUNTS
     for k in range(len(states) // each):
-        *rates, deeper, pressed, pushing = sums[k * slots : (k + 1) * slots]
-        free = pressed.graph.apply("lt", pressed, 0.5)
+        *rates, deeper, pressed, squares = sums[k * slots : (k + 1) * slots]
+        free = pressed.graph.apply("max", 0.0, 1.0 - pressed) / recovery
         own = states[k * each : k * each + each - 1]
-        found += [rate + where(free, -state / recovery, 0.0) for rate, state in zip(rates, own, strict=True)]
-        found.append(deeper / deeper.graph.apply("max", 1.0, pushing))
+        found += [rate - free * state for rate, state in zip(rates, own, strict=True)]
+        found.append(beyond_zero(deeper, partial(truediv, squares)))
     return found
 
 

@@ -30,7 +30,8 @@ from .soils import RECOVERY, SOILS
 OWN = "own"  #: the soil whose numbers are all given
 REBOUND = 0.1  #: part of the sinkage that unloading gives back, where nothing is said
 REVERSAL = 0.01  #: (m/s) of a wheel over the ground, over which its front becomes its rear
-_NUMBERS = ("cohesive", "frictional", "exponent", "dissipation", "recovery", "rebound", "width", "reversal")
+SETTLING = 1e-3  #: (s) of cells of a bed
+_NUMBERS = ("cohesive", "frictional", "exponent", "dissipation", "recovery", "rebound", "width", "reversal", "settling")
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,7 @@ class SoilPressure(NormalLaw):
     unloading: tuple[Expr, Expr] | None
     dissipation: Expr
     recovery: Expr
+    settling: Expr  #: of cells
     reversal: Expr  #: of wheels, as the next
     peak: tuple[Expr, Expr] | None = None
     area: Expr | None = None
@@ -234,6 +236,12 @@ SOIL: Fields = {
         default=REVERSAL,
         dimension=SPEED,
     ),
+    "settling": Field(
+        "expression",
+        "time (s) in which cells of a bed come to hold what is put into them, and in which they follow fast sliding",
+        default=SETTLING,
+        dimension=TIME,
+    ),
     "recovery": Field(
         "expression",
         "time (s) in which a plate above the ground forgets sinkage and shear; of published soils "
@@ -296,11 +304,13 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
     if dissipation is not None:
         e.require("dissipation", dissipation, NOT_NEGATIVE, "must be 0 or greater")
     unloading, peak = _unloading(e), _peak(e)
-    reversal = e.positive("reversal")
+    settling, reversal = e.positive("settling"), e.positive("reversal")
     if e.at_fault():
         return None
     damped = e.graph.zero if dissipation is None else dissipation
-    pressure = SoilPressure(cohesive, frictional, exponent, *unloading, damped, recovery, reversal, peak, None, width)
+    pressure = SoilPressure(
+        cohesive, frictional, exponent, *unloading, damped, recovery, settling, reversal, peak, None, width
+    )
     return pressure, SoilShear(cohesion, angle.graph.apply("tan", angle), modulus, recovery)
 
 
