@@ -14,6 +14,16 @@ SWEEPS = 5  #: over all contacts, after a round that led nowhere
 #: From so many contacts up to WARM times as many sweeps come first: a sweep takes (m d)^2 operations, a step of
 #: Newton's method (m d)^3/3.
 MANY, WARM = 8, 20
+#: Part of its own compliance by which an edge of a cone is softer where edges are found one by one, as in SOFTER; edges
+#: whose part beside those that act is half of it depend on them.
+FIRM = 1e-8
+#: Friction below which the tolerance of an edge does not shrink with it: of a direction across that holds by so little,
+#: nothing is asked that rounding does not tell.
+SLIPPERY = 0.01
+PIVOTS = 3  #: times the edges: each comes and goes about once from a cold start, fewer from impulses of the last step
+#: Rounds in which what slides is renewed: its error shrinks by the friction or so in each, to 1e-4 at 0.5; and rounds in
+#: vain after which that leads nowhere.
+RENEWED, VAIN = 12, 3
 #: The same in Newton's method for rounded laws, whose impulses go on farther in each step; the part by which the
 #: rounding shrinks when a step was good, at first and where that leads nowhere; and the part of the velocities at which
 #: laws count as sharp.

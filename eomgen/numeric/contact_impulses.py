@@ -13,8 +13,9 @@ which a Newton method with the derivatives of the branch at hand solves.  Contac
 each round solves for contacts that are a little softer about the impulses of the round before (the proximal point
 method, R. T. Rockafellar, SIAM J. Control Optim. 14 (1976), 877-898), which leaves the matrix regular and the solution
 as it is.  Where Newton leads nowhere, sweeps over single contacts go on (M. Jean, The non-smooth contact dynamics
-method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257); with many contacts they also come first.  What is left
-over goes to :func:`solve_smoothed`.
+method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257).  Before all that, many contacts are solved by the edges of
+their cones (:mod:`~eomgen.numeric.contact_edges`), or in space by sweeps.  What is left over goes to
+:func:`solve_smoothed`.
 
 ``templates/c/contacts`` has the same iterations in C; modules with it do them as ``core.solve_contacts``.
 """
@@ -28,6 +29,7 @@ import numpy as np
 from ..errors import EvaluationError
 from ..limits.rigid_contacts import MANY, PATIENT, SHARP, SHRINKS, SOFT, SOFTER, SWEEPS, TRIED, WARM
 from . import algebra
+from .contact_edges import solve_edges
 from .space import Array
 
 
@@ -173,7 +175,13 @@ def solve_contacts(problem: ContactProblem, start: Array, tolerance: float, most
     P = np.array(start)
     best, least = np.array(P), problem.size(problem.misses(P)[0])
     count = 0
-    for _ in range(WARM if problem.m >= MANY else 0):
+    sweeps = WARM if problem.m >= MANY else 0
+    if sweeps and problem.d < 3 and least > tolerance:
+        known = least
+        best, least = solve_edges(problem, best, least, tolerance)
+        sweeps = WARM if not least < known else 0
+        P = np.array(best)
+    for _ in range(sweeps):
         if least <= tolerance:
             break
         for _ in range(SWEEPS):

@@ -53,6 +53,12 @@ static double residual_of(contacts *s, const double *P)
     return find_misses(s, P);
 }
 
+static void keep_better(contacts *s, const double *P, double *least)
+{
+    const double size = residual_of(s, P);
+    if (size < *least) { *least = size, memcpy(s->best, P, (size_t)s->n*sizeof(double)); }
+}
+
 /* Impulses from laws whose rounding shrinks as Newton's method follows; the best are kept. Returns the iterations. */
 static int follow(contacts *s, double *least, double tolerance, int most, double shrinks)
 {

@@ -1,9 +1,3 @@
-static void keep_better(contacts *s, const double *P, double *least)
-{
-    const double size = residual_of(s, P);
-    if (size < *least) { *least = size, memcpy(s->best, P, (size_t)s->n*sizeof(double)); }
-}
-
 /* The whole of solve_contacts in numeric/contact_impulses.py. */
 static int iterate(contacts *s, double *P, double tolerance, int most, double *residual)
 {
@@ -12,7 +6,10 @@ static int iterate(contacts *s, double *P, double tolerance, int most, double *r
     double least = residual_of(s, P);
     int count = 0;
     memcpy(s->best, P, bytes);
-    for (int k = 0; k < RIGID_WARM && least > tolerance && s->m >= RIGID_MANY; k++) {
+    const int tried = s->m >= RIGID_MANY && least > tolerance;
+    const int sweeps = tried && (s->d > 2 || !solve_edges(s, P, &least, tolerance)) ? RIGID_WARM : 0;
+    if (sweeps) { (void)residual_of(s, P); /* velocities */ }
+    for (int k = 0; k < sweeps && least > tolerance; k++) {
         sweep(s, P, RIGID_SWEEPS);
         keep_better(s, P, &least);
     }
