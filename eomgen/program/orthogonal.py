@@ -58,6 +58,14 @@ def work(order: Sequence[Front], right: int) -> int:
     return sum(len(f.rows) ** 2 * (len(f.others) + right) + len(f.columns) * len(f.others) * right for f in order)
 
 
+class Apart(NamedTuple):
+    """The square of what a column has across those before it, or the product for two columns, times ``before``."""
+
+    columns: tuple[int, ...]
+    before: Expr
+    square: Expr
+
+
 class _Taken(NamedTuple):
     """x[columns] = inverse b[rows] - across x[others]; b[left] = free b[rows]."""
 
@@ -81,19 +89,19 @@ class OrthogonalFactor:
     ----------
     squares : list of Expr
         Of the lengths of the columns (n,).
-    apart : list of tuple
-        Columns that were taken out together, and the product of the squares of what each has across those before it.
+    apart : list of Apart
+        What every column has across those before it.
     parts : list of set
         Columns that rows connect.
     """
 
     def __init__(self, rows: Sequence[Row], n: int, order: Sequence[Front]) -> None:
         self.n, self.m = n, len(rows)
-        self.apart: list[tuple[tuple[int, ...], Expr]] = []
+        self.apart: list[Apart] = []
         self._taken: list[_Taken] = []
         held = dict(enumerate(rows))
         self.squares = [x for column in transpose(rows, n) if (x := dot(column, column)) is not None]
-        self.parts = _connected(rows)
+        self.parts = connected(rows)
         for front in order:
             own = [held.pop(i) for i in front.rows]
             graph = next(x.graph for row in own for x in row.values())
@@ -104,7 +112,7 @@ class OrthogonalFactor:
             for i, part in zip(front.left, free, strict=True):
                 held[i] = _combined(part, beside)
             self._taken.append(_Taken(front, inverse, free, across))
-            self.apart.append((front.columns, apart))
+            self.apart += [Apart(tuple(front.columns[k] for k in x.columns), x.before, x.square) for x in apart]
 
     def solve(self, right: Sequence[Expr]) -> list[Expr]:
         """x with A x = right."""
@@ -125,7 +133,8 @@ class OrthogonalFactor:
         return x
 
 
-def _connected(rows: Sequence[Row]) -> list[set[int]]:
+def connected(rows: Sequence[Row]) -> list[set[int]]:
+    """The sets of columns that rows connect."""
     found: list[set[int]] = []
     for row in rows:
         touched = [part for part in found if not part.isdisjoint(row)]
@@ -149,21 +158,20 @@ def _combined(part: Row, rows: Sequence[Row]) -> Row:
     return {k: x for k, x in found.items() if not x.is_zero}
 
 
-def _split(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], Expr]:
-    """Of independent columns (m, k): the pseudo-inverse (k, m), orthonormal rows (m - k, m) across them, and the
-    determinant of their products.
+def _split(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], list[Apart]]:
+    """Of independent columns (m, k): the pseudo-inverse (k, m), orthonormal rows (m - k, m) across them, and what they
+    have apart.
     """
     m, k = len(block), len(block[0])
     graph = block[0][0].graph
     if (m, k) in ((1, 1), (2, 2), (3, 3)):
-        inverse, determinant = _square(block)
-        return inverse, [], determinant * determinant
+        return _square(block)
     if m == 2:
         (p,), (r,) = block
         square = p * p + r * r
         length = 1.0 / graph.apply("sqrt", square)
         p, r = p * length, r * length
-        return [_row(p * length, r * length)], [_row(-r, p)], square
+        return [_row(p * length, r * length)], [_row(-r, p)], [Apart((0,), graph.one, square)]
     if (m, k) == (3, 2):
         a, b = ((block[0][j], block[1][j], block[2][j]) for j in (0, 1))
         normal = vec.cross(a, b)
@@ -171,7 +179,8 @@ def _split(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], Expr]
         length = 1.0 / graph.apply("sqrt", square)
         unit = vec.scale(length, normal)
         short = vec.scale(length, unit)
-        return [_row(*vec.cross(b, short)), _row(*vec.cross(short, a))], [_row(*unit)], square
+        inverse = [_row(*vec.cross(b, short)), _row(*vec.cross(short, a))]
+        return inverse, [_row(*unit)], [Apart((0, 1), graph.one, square)]
     return _reflected(block)
 
 
@@ -179,35 +188,40 @@ def _row(*entries: Expr) -> Row:
     return {i: x for i, x in enumerate(entries) if not x.is_zero}
 
 
-def _square(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], Expr]:
-    """Inverse and determinant of up to three rows."""
+def _square(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], list[Apart]]:
+    """Of as many rows as columns, up to three."""
+    one = block[0][0].graph.one
     if len(block) == 1:
-        return [_row(1.0 / block[0][0])], block[0][0]
+        pivot = block[0][0]
+        return [_row(1.0 / pivot)], [], [Apart((0,), one, pivot * pivot)]
     if len(block) == 2:
         (p, q), (r, t) = block
         determinant = p * t - q * r
         inverse = 1.0 / determinant
-        return [_row(t * inverse, -q * inverse), _row(-r * inverse, p * inverse)], determinant
+        rows = [_row(t * inverse, -q * inverse), _row(-r * inverse, p * inverse)]
+        return rows, [], [Apart((0, 1), one, determinant * determinant)]
     a, b, c = ((block[0][j], block[1][j], block[2][j]) for j in range(3))
     first, second, third = vec.cross(b, c), vec.cross(c, a), vec.cross(a, b)
     determinant = vec.dot(a, first)
     inverse = 1.0 / determinant
-    return [_row(*vec.scale(inverse, x)) for x in (first, second, third)], determinant
+    rows = [_row(*vec.scale(inverse, x)) for x in (first, second, third)]
+    across = vec.dot(third, third)
+    return rows, [], [Apart((0, 1), one, across), Apart((2,), across, determinant * determinant)]
 
 
-def _reflected(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], Expr]:
+def _reflected(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], list[Apart]]:
     """By Householder's reflections, for any number of rows."""
     m, k = len(block), len(block[0])
     graph = block[0][0].graph
     zero, one = graph.zero, graph.one
     columns = [[row[j] for row in block] for j in range(k)]
     turned = [[one if i == j else zero for i in range(m)] for j in range(m)]  # columns of Q^T
-    product = one
+    apart = []
     for j in range(k):
         column = columns[j]
         square = dot(dict(enumerate(column[j:])), dict(enumerate(column[j:])))
         assert square is not None
-        product = product * square
+        apart.append(Apart((j,), one, square))
         length = graph.apply("sqrt", square)
         length = graph.apply("select", graph.apply("lt", column[j], zero), -length, length)
         head = column[j] + length
@@ -232,4 +246,4 @@ def _reflected(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], E
                 total = total - columns[c][j] * inverse[c][i]
             inverse[j].append(total * reciprocals[j])
     free = [_row(*(turned[i][j] for i in range(m))) for j in range(k, m)]
-    return [_row(*x) for x in inverse], free, product
+    return [_row(*x) for x in inverse], free, apart

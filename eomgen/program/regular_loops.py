@@ -18,7 +18,7 @@ from ..graph.substitute import substitute
 from ..limits.crossings import NEAR_SQUARE
 from .embedded_loops import SPREAD, embedded_accelerations
 from .loop_blocks import LoopBlocks, largest, total_magnitude
-from .orthogonal import OrthogonalFactor, fronts, work
+from .orthogonal import OrthogonalFactor, connected, fronts, work
 from .sparse import Row, SparseFactor, dot, factorize, times, transpose
 
 ENDLESS = 1e300  #: the length of a step that is not known here
@@ -46,8 +46,12 @@ class RegularLoops:
     @property
     def estimate(self) -> int:
         """About how many multiplications the linear algebra takes, by the pattern alone."""
-        n, f = self.terms.n_v, self.terms.n_dof
-        return work(self.order or (), f + 1) + n * f * f + f**3 // 6
+        total = work(self.order or (), 1) + self.terms.n_dof**3 // 6
+        for part in connected(self._left):
+            own = [row for row, left in zip(self.loops.rows, self._left, strict=True) if not part.isdisjoint(left)]
+            freedoms = len(set().union(*own)) - len(part)
+            total += len(part) * freedoms * (freedoms + 2)
+        return total
 
     @property
     def possible(self) -> bool:
@@ -110,11 +114,10 @@ class RegularLoops:
         for part in self._factor.parts:
             least |= dict.fromkeys(part, largest([lengths[k] for k in part]) * NEAR_SQUARE)
         found = []
-        for columns, apart in self._factor.apart:
-            usual = graph.constant(NEAR_SQUARE)
+        for columns, usual, apart in self._factor.apart:
             for k in columns:
                 usual, apart = usual * graph.apply("max", lengths[k], least[k]), apart * scales[k]
-            found.append(graph.apply("lt", usual, apart))
+            found.append(graph.apply("lt", usual * NEAR_SQUARE, apart))
         for j, k in enumerate(self.terms.preferred):
             square = self._products[j][j] * (s[k] * s[k])
             found.append(graph.apply("lt", square, graph.constant(SPREAD * SPREAD)))

@@ -11,7 +11,7 @@ from .regular_loops import RegularLoops
 from .terms import SystemTerms
 
 SOLUTIONS = 4  #: that leave no trace of DIFFERENTIATED
-SAVED = 0.8  #: part of the operations of the usual blocks that others take at most which are tried before them
+SAVED = 0.7  #: part of the operations of the usual blocks that others take at most which are tried before them
 
 
 def regular_loops(loops: LoopBlocks | None, longest: int) -> RegularLoops | None:

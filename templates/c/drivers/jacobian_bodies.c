@@ -106,10 +106,11 @@ static int jacobian_here(double t, const double *restrict x, const double *restr
     double *const y = w + AT_X;
     const double *const found = w + AT_SLOPES;
     partition parts;
+    int known;
     for (int k = 0; k < NQ + N; k++) {
         y[k] = x[k];
     }
-    if (close_directly(t, y, u, c, w) != 0 || loop_slopes_block(t, y, u, c, w + AT_SLOPES, w) != 0 || found[N] == 0.0) {
+    if (close_directly(t, y, u, c, &known, w) != 0 || loop_slopes_block(t, y, u, c, w + AT_SLOPES, w) != 0 || found[N] == 0.0) {
         return jacobian_by_partition(t, x, u, c, out, weakest, w);
     }
     for (int k = AT_MET; k < AT_SHAPES; k++) { /* pairs of shapes that were near belong to another state */

@@ -5,7 +5,7 @@ static double nearness(double t, const double *restrict x, const double *restric
 {
     const double *const found = w + AT_DYNAMICS;
     partition parts;
-    if (accelerate_directly(t, x, u, c, w + AT_DYNAMICS, w) == 0 && found[2 * N + 1] != 0.0) {
+    if (accelerate_directly(t, x, u, c, 1, w + AT_DYNAMICS, w) == 0 && found[2 * N + 1] != 0.0) {
         return 1.0;
     }
     return find_weakest(t, x, u, c, &parts, w);

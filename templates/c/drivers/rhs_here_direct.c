@@ -15,13 +15,14 @@ static double kept_part(double t, const double *restrict q, const double *restri
     return damping(dz, N);
 }
 
-/* The nearest q with C(q) = 0, in place; nonzero where that takes many steps. */
+/* The nearest q with C(q) = 0, in place; nonzero where that takes many steps. *known: whether short code knew the last. */
 static int close_directly(double t, double *restrict q, const double *restrict u, const double *restrict c,
-                          double *restrict w)
+                          int *restrict known, double *restrict w)
 {
     double *const found = w + AT_CLOSING;
+    *known = 0;
     for (int step = 0, all = 0; step < 6 && all < 25; all++) {
-        step_directly(t, q, u, c, found, w);
+        *known = step_directly(t, q, u, c, found, w);
         const double left = found[1], length = found[2];
         if (!(length <= 0.25)) { /* or not a number */
             const double part = kept_part(t, q, u, c, w);
@@ -46,7 +47,8 @@ static int close_directly(double t, double *restrict q, const double *restrict u
 /* The nearest q with C(q) = 0, in place. */
 static int bring(double t, double *restrict q, const double *restrict u, const double *restrict c, double *restrict w)
 {
-    return close_directly(t, q, u, c, w) == 0 ? 0 : close_position(t, q, u, c, w);
+    int known;
+    return close_directly(t, q, u, c, &known, w) == 0 ? 0 : close_position(t, q, u, c, w);
 }
 
 /* x'; leaves the state on the constraints in w + AT_X. *weakest: as in partition, 1 where it is surely not small. */
@@ -56,12 +58,13 @@ static int rhs_here(double t, const double *restrict x, const double *restrict u
     double *const y = w + AT_X;
     const double *const found = w + AT_DYNAMICS;
     partition parts;
+    int known;
     parts.weakest = 1.0;
     for (int k = 0; k < NQ + N; k++) {
         y[k] = x[k];
     }
-    if (close_directly(t, y, u, c, w) == 0) {
-        const int status = accelerate_directly(t, y, u, c, w + AT_DYNAMICS, w);
+    if (close_directly(t, y, u, c, &known, w) == 0) {
+        const int status = accelerate_directly(t, y, u, c, known, w + AT_DYNAMICS, w);
         if (status == 0 && found[2 * N] != 0.0) {
             form_rates(y, found, out);
             for (int k = 0; k < N; k++) {

@@ -8,12 +8,13 @@ static flag rhs_driver(real t, const real *restrict x, const real *restrict u, c
     const flag none = { 0 };
     real *const y = w + AT_X, *const found = w + AT_CLOSING, *const solved = w + AT_DYNAMICS;
     real step[N];
-    flag open = ~none, left = none;
+    flag open = ~none, left = none, known = none;
     for (int k = 0; k < NQ + N; k++) {
         y[k] = x[k];
     }
     for (int i = 0; i < 6 && any_of(open); i++) {
-        step_directly(t, y, u, c, found, w);
+        const flag shown = step_directly(t, y, u, c, found, w);
+        known = (known & ~open) | (shown & open);
         left |= open & ~(found[2] <= 0.25); /* or not a number */
         open &= ~left;
         for (int k = 0; k < N; k++) {
@@ -22,7 +23,7 @@ static flag rhs_driver(real t, const real *restrict x, const real *restrict u, c
         move(y, step);
         open &= ~((found[2] <= CONSTRAINTS_SHORT) & (found[1] <= CONSTRAINTS_EXACT));
     }
-    left |= open | accelerate_directly(t, y, u, c, solved, w);
+    left |= open | accelerate_directly(t, y, u, c, known, solved, w);
     left |= (solved[2 * N] == 0.0) | (solved[2 * N + 1] == 0.0);
     form_rates(y, solved, out);
     for (int k = 0; k < N; k++) {

@@ -1,0 +1,173 @@
+"""The shorter right-hand side of loops away from change points, beside the usual one and beside pivoting."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+from benchmarks.loop_robots import ROBOTS
+from eomgen import pipeline
+from eomgen.graph.evaluate import compile_evaluator
+from eomgen.limits.constraints import NEARBY
+from eomgen.limits.crossings import NEAR
+from eomgen.program.block_groups import REGULAR, USUAL
+from tests.kinematics.test_row_groups import closed_chain
+from tests.mobility.test_n_four_bar import n_four_bar
+
+KERNELS = ("rhs", "project", "constraints", "constraint_jacobian", "velocity_constraints")
+
+
+def robot(name: str) -> eg.Model:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "robot.xml"
+        path.write_text(ROBOTS[name]().text())
+        return eg.load(path)
+
+
+def redundant() -> eg.Model:
+    """Three arms in a row on one beam: a parallelogram with one arm too many, turned in space."""
+    m = eg.Model("redundant", gravity=(0.3, -9.81, 0.2))
+    beam = m.body("beam", mass=1.0, com=(0.5, 0.1, 0.0), inertia=(0.02, 0.3, 0.31))
+    for k in range(5):
+        arm = m.body(f"arm{k}", mass=0.3, com=(0.0, 0.2, 0.0), inertia=(0.01, 0.002, 0.011))
+        m.revolute(f"foot{k}", m.ground.at(0.25 * k, 0.0, 0.0), arm)
+        m.revolute(f"head{k}", arm.at(0.0, 0.4, 0.0), beam.at(0.25 * k, 0.0, 0.0))
+    tip = beam
+    for k in range(3):
+        link = m.body(f"link{k}", mass=0.2, com=(0.1, 0.0, 0.0), inertia=(0.001, 0.003, 0.004))
+        m.revolute(f"tail{k}", tip.at(1.0 if k == 0 else 0.2, 0.0, 0.0), link)
+        tip = link
+    m.guess(foot0=0.3, tail0=0.2)
+    return m
+
+
+MODELS: dict[str, Callable[[], eg.Model]] = {
+    **{name: (lambda name=name: robot(name)) for name in ROBOTS},
+    **{name: (lambda name=name: eg.load_example(name)) for name in ("excavator", "stewart_platform")},
+    "redundant rows": redundant,
+}
+
+
+class Beside:
+    """Both forms of a model, evaluated on the graph, and states of it."""
+
+    def __init__(self, model: eg.Model) -> None:
+        equations = model.derive()
+        program = pipeline.build(equations, "c", ["rhs"])
+        self.blocks = {b.name: b for b in program.blocks}
+        self.module = equations.compile(target="numpy", kernels=KERNELS)
+        given = {u.name: u.value for u in equations.kinematics.mechanism.inputs}
+        self.values = dict(zip(self.module.p_names, self.module.p, strict=True)) | given
+        self.names = [*program.coordinates, *program.velocities]
+        self.n, self.n_q = self.module.n_v, self.module.n_q
+        self._made: dict[str, Any] = {}
+
+    def evaluate(self, name: str, x: np.ndarray) -> np.ndarray:
+        if name not in self._made:
+            known = (*self.names, *self.values, "t")
+            self._made[name] = compile_evaluator(list(self.blocks[name].outputs), known)
+        return np.array(self._made[name]([*x, *self.values.values(), 0.0]), dtype=float)
+
+    def state(self, rng: np.random.Generator, far: float) -> np.ndarray:
+        """Closed at position level only."""
+        x = self.module.x0() + 0.0
+        x[: self.n_q] += far * rng.uniform(-1, 1, self.n_q)
+        x = self.module.project(x)
+        x[self.n_q :] += rng.uniform(-1, 1, self.n)
+        return x
+
+    def weakest(self, q: np.ndarray) -> float:
+        """Least singular value of the rows that are to hold, beside the longest row."""
+        J = self.module.constraint_jacobian(q)
+        rank = self.n - self.module.n_dof
+        return float(np.linalg.svd(J / np.linalg.norm(J, axis=1).max(), compute_uv=False)[rank - 1])
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_both_forms_agree(name: str) -> None:
+    beside, rng, sound = Beside(MODELS[name]()), np.random.default_rng(4), 0
+    assert set(REGULAR) <= set(beside.blocks)
+    n = beside.n
+    for k in range(20):
+        x = beside.state(rng, (0.02, 0.2)[k % 2])
+        regular, usual = (beside.evaluate(part, x) for part in ("regular_dynamics", "dynamics"))
+        if regular[2 * n] != 1.0:
+            continue
+        assert regular[2 * n + 1] == 1.0
+        assert beside.weakest(x[: beside.n_q]) > NEAR * NEAR
+        sound += 1
+        if usual[2 * n] == 1.0:  # not with redundant rows, whose joints are left for pivots
+            for part in (slice(0, n), slice(n, 2 * n)):
+                size = np.abs(usual[part]).max()
+                np.testing.assert_allclose(regular[part], usual[part], rtol=0, atol=1e-11 * size)
+        expected = beside.module.rhs(0.0, x)[beside.n_q :]
+        np.testing.assert_allclose(regular[n : 2 * n], expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+    assert sound >= 8
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_steps_come_to_the_same_place(name: str) -> None:
+    """What the term in J J^T keeps of a step is mended by the next one."""
+    beside, rng, found = Beside(MODELS[name]()), np.random.default_rng(5), 0
+    for far in (1e-9, 1e-7, 1e-6, 0.03 * NEARBY):
+        x = beside.state(rng, 0.05)
+        x[: beside.n_q] += far * rng.uniform(-1, 1, beside.n_q)
+        places = []
+        for part in ("regular_closing", "closing"):
+            y = x.copy()
+            for _ in range(3):
+                step = beside.evaluate(part, y)
+                y[: beside.n_q] += step[3:]
+            places.append(y)
+        first = beside.evaluate("regular_closing", x)
+        if first[2] <= NEARBY:
+            found += 1
+            np.testing.assert_allclose(places[0], places[1], rtol=0, atol=1e-12)
+            assert np.abs(beside.module.constraints(places[0][: beside.n_q])).max() < 1e-13
+    assert found >= 3
+
+
+def test_next_to_change_points_the_usual_form_decides() -> None:
+    """A row of parallelograms that turns is flat twice in each turn."""
+    beside, found = Beside(n_four_bar(6)), []
+    for x in beside.module.simulate((0.0, 1.0), t_eval=np.linspace(0.0, 1.0, 401), rtol=1e-8, atol=1e-10).x.T:
+        x = beside.module.project(x)
+        found.append((beside.weakest(x[: beside.n_q]), beside.evaluate("regular_dynamics", x)[2 * beside.n]))
+        assert not found[-1][1] or beside.evaluate("dynamics", x)[2 * beside.n + 1] == 1.0
+    assert min(found)[0] < 0.1 * NEAR
+    assert not any(sound for weakest, sound in found if weakest < 0.1 * NEAR)
+    assert all(sound for weakest, sound in found if weakest > NEAR)
+
+
+def test_small_mechanisms_and_those_that_it_does_not_shorten_have_the_usual_form_alone() -> None:
+    for model in (eg.load_example("four_bar"), eg.load_example("delta_robot"), closed_chain(20, True, True)):
+        names = {b.name for b in pipeline.build(model.derive(), "c", ["rhs"]).blocks}
+        assert names >= set(USUAL)
+        assert names.isdisjoint(REGULAR)
+
+
+@pytest.mark.parametrize("name", ["hand of three parallel fingers", "excavator"])
+def test_the_compiled_function_is_that_of_numpy_at_any_distance(name: str) -> None:
+    """Also where one form hands over to the other; lanes have the bits of single states."""
+    equations = MODELS[name]().derive()
+    module = equations.compile(lanes=4, kernels=KERNELS)
+    numbers = equations.compile(target="numpy", kernels=KERNELS)
+    rng, states = np.random.default_rng(6), []
+    for far in (0.0, 1e-9, 1e-6, NEARBY, 2 * NEARBY, 1e-4, 1e-3, 1e-2):
+        for _ in range(4):
+            x = module.x0()
+            x[: module.n_q] += 0.1 * rng.uniform(-1, 1, module.n_q)
+            x = module.project(x)
+            x[: module.n_q] += far * rng.uniform(-1, 1, module.n_q)
+            x[module.n_q :] = rng.uniform(-1, 1, module.n_v)
+            states.append(x)
+            expected = numbers.rhs(0.0, x)
+            np.testing.assert_allclose(module.rhs(0.0, x), expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+    together = module.rhs(0.0, np.array(states).T)
+    assert (together == np.array([module.rhs(0.0, x) for x in states]).T).all()
