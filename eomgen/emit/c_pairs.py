@@ -86,6 +86,7 @@ def _file(program: Program, used: UsedSum, rated: frozenset[int] | None) -> str:
                 "planar": int(kind.planar),
                 "law": kind.law,
                 "states": kind.states,
+                "pieces": kind.corners[0] if len(kind.corners) == 1 else 0,
                 "places": len(kind.spot) // SPOT,
                 "held": [written([(at,) for at in places]) for places in kind.held],
             }
@@ -182,7 +183,7 @@ def _choosing(kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[s
     first, second, sloped = tables[kind.first], tables[kind.second], part == "slopes"
     if len(kind.corners) == 1:
         deep = {"name": name, "first": first["length"], "pieces": kind.corners[0], "sloped": sloped}
-        return render("c/pairs_deep.c.j2", {**deep, "quick": part in ("outputs", "slopes")})
+        return render("c/pairs_deep.c.j2", deep)
     context = {"name": name, "first": first["length"], "second": second["length"], "corners": kind.corners}
     return render("c/pairs_facing.c.j2", {**context, "own": OWN, "other": OTHER, "sloped": sloped})
 

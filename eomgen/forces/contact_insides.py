@@ -24,6 +24,7 @@ import numpy as np
 
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
+from ..limits.contacts import EVEN, FLAT_CORNER, ROOM
 from ..numeric.outline_pieces import PIECE
 from ..records import dataclass
 from .branches import where
@@ -31,9 +32,7 @@ from .contact import Touch
 from .contact_profiles import Point, ProfilePart, ProfilePiece, dot, part, unit
 from .force import View
 
-_ROUND = 1e-9  #: cosine below which a corner of numbers is no inner one
 _SAMPLES = 12  #: points of an arc at which the room inside is measured
-_WITHIN = 0.9  #: part of it that is taken, as there are points between
 
 
 def notch(corner: Point, before: Point, after: Point, width: Expr) -> ProfilePart:
@@ -55,7 +54,7 @@ def bowls(pieces: Sequence[ProfilePart]) -> list[ProfilePart]:
 def notches(pieces: Sequence[ProfilePart]) -> list[ProfilePart]:
     """The inner corners among some corners, as far as numbers tell."""
     found = [one for one in pieces if one.kind == "notch"]
-    return [one for one in found if one.sizes[0].value is None or one.sizes[0].value > _ROUND]
+    return [one for one in found if one.sizes[0].value is None or one.sizes[0].value > EVEN]
 
 
 def never_reached(kind: str, sizes: Sequence[Expr], radius: Expr) -> bool:
@@ -87,7 +86,7 @@ def told_by_arcs(pieces: Sequence[ProfilePart]) -> float:
     x, y, c, s, bend, half = np.array(numbers, dtype=float).T[:, :, None]
     part = (np.arange(_SAMPLES) + 0.5) * 2.0 / _SAMPLES - 1.0
     angle = np.arcsin(np.clip(bend * half, -1.0, 1.0))
-    turn = np.where(angle == 0.0, 1e-12, angle)
+    turn = np.where(angle == 0.0, FLAT_CORNER, angle)
     along = half * np.sin(turn * part) / np.sin(turn)
     up = along * np.tan(0.5 * turn * part)
     nx, ny = np.sin(turn * part), -np.cos(turn * part)
@@ -96,7 +95,7 @@ def told_by_arcs(pieces: Sequence[ProfilePart]) -> float:
     way = place[:, None, :] - place[:, :, None]
     inward = 2.0 * (way * normal[:, :, None]).sum(axis=0)
     ahead = inward > 0.0
-    return _WITHIN * float(((way * way).sum(axis=0)[ahead] / inward[ahead]).min(initial=math.inf))
+    return ROOM * float(((way * way).sum(axis=0)[ahead] / inward[ahead]).min(initial=math.inf))
 
 
 class NotchRound(ProfilePiece):

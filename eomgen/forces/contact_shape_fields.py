@@ -36,8 +36,8 @@ def _outline(how: str) -> Fields:
         ),
         "depth": Field(
             "expression",
-            "how far inside the outline what has passed it is pushed out (m); half of the narrowest place, of points "
-            "that are numbers, unless given",
+            "how far inside the outline its pieces tell by themselves which is nearest (m); half of the narrowest "
+            "place, of points that are numbers, unless given",
             dimension=LENGTH,
         ),
     }
@@ -89,7 +89,8 @@ _SIZES: dict[str, Fields] = {
         ),
         "depth": Field(
             "expression",
-            "how far inside the teeth what has passed them is pushed out (m); half of their least width unless given",
+            "how far inside the teeth pieces tell by themselves which is nearest (m); half of the least width of teeth "
+            "unless given",
             dimension=LENGTH,
         ),
     },

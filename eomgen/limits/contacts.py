@@ -20,6 +20,12 @@ NO_SLIP = 1e-9
 #: Squared angle of two edges of a polygon below which a corner counts as flat: cosines near 1 have errors of 1e-16,
 #: so that the squares of smaller angles lose a thousandth.
 FLAT_CORNER = 1e-13
+#: Cosine of half of the angle between two edges of an outline below which they lie in line: cosines have errors of
+#: 1e-16, and a corner that is left out changes depths by 1e-9 of the distance from it, at most.
+EVEN = 1e-9
+#: Part of the room inside a smooth outline, measured between points of its arcs, that is taken to be there: of 12
+#: points to an arc of up to 180 degrees the nearest two are 15 degrees apart, and 1 / cos(15 deg) is 1.035.
+ROOM = 0.9
 #: (m) How far a shape is from a piece of a profile that is not its nearest, for those who look for what is near.
 NOWHERE = 1e100
 #: Shear displacement by K below which (1 - exp(-x)) / x is its series to x^4: the next term, x^5 / 720, is 1e-18, where

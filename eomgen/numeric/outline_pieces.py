@@ -24,7 +24,8 @@ Law = Callable[[Sequence[Any]], Sequence[Any]]
 def nearest(law: Law, count: int, rates: bool = False) -> Law:
     """The law of an outline of so many pieces with another shape, from that of the numbers of its nearest piece.
 
-    It counts where the centre of the other shape is deeper inside than the last size of the outline.
+    It counts where the centre of the other shape is deeper inside than the last size of the outline.  So what is apart
+    does not meet there first: the function is marked as ``inner`` for those who look for that.
 
     Parameters
     ----------
@@ -51,6 +52,7 @@ def nearest(law: Law, count: int, rates: bool = False) -> Law:
             found += [*shape[:POSE], *kept, *(np.where(flag, float(not start), 0.0) for flag in flags), *given[end:]]
         return law(found)
 
+    chosen.inner = True  # type: ignore[attr-defined]
     return chosen
 
 

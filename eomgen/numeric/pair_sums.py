@@ -148,6 +148,8 @@ class PairSum:
                 gap, closing = np.where(near, -depth, gap), np.where(near, faster, closing)
                 most = np.sqrt(dot(felt, felt)) + radius * (change_of_rate + rate * (own_rate + rate))
                 towards = np.where(near, most, towards)
+            if getattr(touch, "inner", False):  # a law of what is inside: those apart meet other parts before
+                gap = np.where(near, gap, NEVER)
             thick = np.broadcast_to(data[tables[0][i, -1]] + data[tables[1][j, -1]], gap.shape)
             reached = np.maximum(gap * np.where(free, BEYOND, UP_TO), WITHIN * thick)
             with np.errstate(all="ignore"):

@@ -215,6 +215,11 @@ def test_forces_and_jacobians_in_both_targets() -> None:
             x = np.concatenate([rng.uniform(-0.2, 0.2, 12), rng.standard_normal(12)])
             a, b = plain.rhs(0.0, x), quick.rhs(0.0, x)
             np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(a).max())
+            meeting = [
+                mod.kernels.motion("meeting_time")(x[:12], x[12:], np.ones(12), u=np.zeros(0), t=0.0)
+                for mod in (plain, quick)
+            ]
+            np.testing.assert_allclose(*meeting, rtol=1e-9, atol=1e-12)
             J = quick.jacobian(0.0, x)
             np.testing.assert_allclose(plain.jacobian(0.0, x), J, rtol=1e-7, atol=1e-9 * np.abs(J).max())
             h = 1e-7 * np.eye(24)
