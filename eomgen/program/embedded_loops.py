@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..limits.constraints import LOST, TIKHONOV, VANISHED
+from ..limits.constraints import LOST, ROUNDED, TIKHONOV, VANISHED
 from ..limits.crossings import NEAR_SQUARE
 from ..limits.inertia import STILL
 from ..numeric.triangular import DiagonalBlock, diagonal_blocks
@@ -156,7 +156,7 @@ class EmbeddedLoops(LoopBlocks):
         factor = factorize(E)
         for i, pivot in enumerate(factor.pivots):
             if not (pivot - E[i][i]).is_zero:
-                conditions.append(graph.apply("lt", E[i][i] * self.lost, pivot))
+                conditions.append(graph.apply("lt", E[i][i] * max(self.lost, ROUNDED), pivot))
                 self._angles[E[i][i], pivot] = None
         found = []
         for b in right:

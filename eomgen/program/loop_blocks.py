@@ -169,12 +169,15 @@ class LoopBlocks(ABC):
         dz = times(transpose(self.J, self.terms.n_v), factor.settle(e, passes[order - 1]))
         x = [a - s * b for a, s, b in in_parts(list(zip(x, self.s, dz, strict=True)), x)]
         if self.gentle:
-            graph = self.terms.graph
-            left = total_magnitude([a + b for a, b in zip(r, times(self.rows, x), strict=True)]) * self.unit
-            moving = self.terms.n_v - self.terms.n_states
-            size = total_magnitude([a * (1.0 / s) for a, s in zip(x[:moving], self.s, strict=False)])
-            conditions.append(graph.apply("lt", left, size * LEFT + NOTHING))
+            conditions.append(self.held(x, r))
         return x
+
+    def held(self, x: Sequence[Expr], r: Sequence[Expr]) -> Expr:
+        """Whether nothing is left of C_q x + r, r scaled as the rows are."""
+        left = total_magnitude([a + b for a, b in zip(r, times(self.rows, x), strict=True)]) * self.unit
+        moving = self.terms.n_v - self.terms.n_states
+        size = total_magnitude([a * (1.0 / s) for a, s in zip(x[:moving], self.s, strict=False)])
+        return self.terms.graph.apply("lt", left, size * LEFT + NOTHING)
 
     def nearest(self, x: Sequence[Expr], r: Sequence[Expr], rows: int, factor: SparseFactor, passes: int) -> list[Expr]:
         """The nearest x with C_q x + r = 0 of so many rows, r scaled as they are, by passes with their factor.

@@ -114,8 +114,8 @@ class OrthogonalFactor:
             self._taken.append(_Taken(front, inverse, free, across))
             self.apart += [Apart(tuple(front.columns[k] for k in x.columns), x.before, x.square) for x in apart]
 
-    def solve(self, right: Sequence[Expr]) -> list[Expr]:
-        """x with A x = right."""
+    def solve(self, right: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
+        """x with A x = right, and what combinations of redundant rows leave of right."""
         zero = right[0].graph.zero
         b = dict(enumerate(right))
         values: list[list[Expr]] = []
@@ -130,7 +130,8 @@ class OrthogonalFactor:
                     if not x[j].is_zero:
                         total = total - entry * x[j]
                 x[k] = total
-        return x
+        used = {i for front, *_ in self._taken for i in front.rows}
+        return x, [y for i, y in b.items() if i not in used and not y.is_zero]
 
 
 def connected(rows: Sequence[Row]) -> list[set[int]]:

@@ -64,18 +64,19 @@ class RegularLoops:
         assert self.order is not None
         return OrthogonalFactor(self._left, len(self.dependent), self.order)
 
-    def _particular(self, right: Sequence[Expr]) -> list[Expr]:
-        """x (n,) with C_q x = right and no independent part."""
+    def _particular(self, right: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
+        """x (n,) with C_q x = right and no independent part, and what redundant rows leave of right."""
         x = [self.terms.graph.zero] * self.terms.n_v
-        for k, value in zip(self.dependent, self._factor.solve(right), strict=True):
+        found, left = self._factor.solve(right)
+        for k, value in zip(self.dependent, found, strict=True):
             x[k] = value
-        return x
+        return x, left
 
     @cached_property
     def _motions(self) -> list[Row]:
         """B (n rows of f)."""
         zero = self.terms.graph.zero
-        columns = [self._particular([-row.get(k, zero) for row in self.loops.rows]) for k in self.terms.preferred]
+        columns = [self._particular([-row.get(k, zero) for row in self.loops.rows])[0] for k in self.terms.preferred]
         for k, column in zip(self.terms.preferred, columns, strict=True):
             column[k] = self.terms.graph.one
         return [{j: x[i] for j, x in enumerate(columns) if not x[i].is_zero} for i in range(self.terms.n_v)]
@@ -138,19 +139,23 @@ class RegularLoops:
         graph, loops = self.terms.graph, self.loops
         e = loops.residuals
         size = total_magnitude(e) * (loops.unit / float(loops.h))
-        d = self._particular(e)
+        d, rest = self._particular(e)
+        left = total_magnitude(rest) * loops.unit if rest else graph.zero
         dz = [x - y for x, y in zip(d, times(self._motions, self._along(d)), strict=True)]
         length = total_magnitude([x * (1.0 / s) for x, s in zip(dz, loops.s, strict=True)])
         length = graph.apply("select", self.loops.all_of(self._follows()), length, graph.constant(ENDLESS))
-        return [size, graph.zero, length, *(-x for x in dz)]
+        return [size, left, length, *(-x for x in dz)]
+
+    @cached_property
+    def _rate(self) -> list[Expr]:
+        return [x * i for x, i in zip(self.terms.constraint_rate, self.loops.inverse, strict=True)]
 
     @cached_property
     def moved(self) -> list[Expr]:
         """Projected velocities (n,)."""
         terms = self.terms
         v = [terms.graph.symbol(name) for name in terms.v]
-        rate = [-x * i for x, i in zip(terms.constraint_rate, self.loops.inverse, strict=True)]
-        given = self._particular(rate)
+        given, _ = self._particular([-x for x in self._rate])
         y = [v[k] for k in terms.preferred]
         missed = [a - b - c for a, b, c in zip(v, given, times(self._motions, y), strict=True)]
         y = [a + b for a, b in zip(y, self._along(missed), strict=True)]
@@ -161,9 +166,10 @@ class RegularLoops:
         terms = self.terms
         v = [terms.graph.symbol(name) for name in terms.v]
         here = substitute([*terms.bias, *terms.gamma], dict(zip(v, self.moved, strict=True)))
-        gamma = [-x * i for x, i in zip(here[terms.n_v :], self.loops.inverse, strict=True)]
-        a, checks = embedded_accelerations(
-            terms, self.loops.s, self._motions, self._particular(gamma), here[: terms.n_v]
-        )
-        sound = self.loops.all_of([*self._follows(), self._long()])
-        return [*self.moved, *a, sound, terms.graph.one], checks
+        gamma = [x * i for x, i in zip(here[terms.n_v :], self.loops.inverse, strict=True)]
+        given, _ = self._particular([-x for x in gamma])
+        a, checks = embedded_accelerations(terms, self.loops.s, self._motions, given, here[: terms.n_v])
+        conditions = [*self._follows(), self._long()]
+        if self.loops.redundant:  # whose rates may contradict each other
+            conditions += [self.loops.held(self.moved, self._rate), self.loops.held(a, gamma)]
+        return [*self.moved, *a, self.loops.all_of(conditions), terms.graph.one], checks

@@ -47,7 +47,7 @@ def test_solutions_are_those_of_least_squares(name: str) -> None:
     assert sorted(k for front in order for k in front.columns) == list(range(n))
     factor = OrthogonalFactor(rows, n, order)
     right = [graph.symbol(f"b{i}") for i in range(len(rows))]
-    x = factor.solve(right)
+    x, left = factor.solve(right)
     for _ in range(5):
         A, values = dense(pattern, n, rng)
         b = rng.uniform(-1, 1, len(pattern)) if len(pattern) == n else A @ rng.uniform(-1, 1, n)
@@ -60,6 +60,8 @@ def test_solutions_are_those_of_least_squares(name: str) -> None:
         expected = np.linalg.lstsq(A, off, rcond=None)[0]
         size = max(1.0, np.abs(expected).max()) * np.linalg.cond(A) ** 2
         np.testing.assert_allclose(evaluate(x, values), expected, rtol=0, atol=1e-14 * size)
+        missed = np.linalg.norm(off - A @ expected)  # of orthonormal combinations the length stays
+        assert np.linalg.norm(evaluate(left, values)) == pytest.approx(missed, rel=1e-8, abs=1e-14 * size)
 
 
 @pytest.mark.parametrize("name", PATTERNS)

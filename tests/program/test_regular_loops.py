@@ -16,6 +16,7 @@ from eomgen import pipeline
 from eomgen.graph.evaluate import compile_evaluator
 from eomgen.limits.constraints import NEARBY
 from eomgen.limits.crossings import NEAR
+from eomgen.program import straight_loops
 from eomgen.program.block_groups import REGULAR, USUAL
 from tests.kinematics.test_row_groups import closed_chain
 from tests.mobility.test_n_four_bar import n_four_bar
@@ -171,3 +172,44 @@ def test_the_compiled_function_is_that_of_numpy_at_any_distance(name: str) -> No
             np.testing.assert_allclose(module.rhs(0.0, x), expected, rtol=0, atol=1e-11 * np.abs(expected).max())
     together = module.rhs(0.0, np.array(states).T)
     assert (together == np.array([module.rhs(0.0, x) for x in states]).T).all()
+
+
+def four_bars(n: int, moving: bool) -> eg.Model:
+    """Planar four-bars on one another, modelled in space: some rows of each say what the joints say already."""
+    m = eg.Model("four_bars", gravity=(0, -9.81, 0))
+    dz, tilt = (m.parameter(name, 0.0) for name in ("dz", "tilt"))
+    base = m.ground
+    for k in range(n):
+        left, right, coupler = (
+            m.body(f"{name}{k}", mass=1.0, com=(0.15, 0, 0), inertia=(0.01, 0.01, 0.02)) for name in "abc"
+        )
+        m.revolute(f"ja{k}", base, left, coordinate=f"al{k}")
+        m.revolute(f"jb{k}", base.at(0.5, 0, 0), right, coordinate=f"be{k}")
+        m.revolute(f"jc{k}", left.at(0.3, 0, 0), coupler, coordinate=f"ga{k}")
+        off = coupler.at(0.35, 0, dz, rpy=(tilt, 0, 0)) if k == 0 else coupler.at(0.35, 0, 0)
+        m.revolute(f"jd{k}", off, right.at(0.28, 0, 0))
+        m.guess(**{f"al{k}": 1.3, f"be{k}": 1.8, f"ga{k}": -1.2})
+        if k or not moving:
+            m.initial(**{f"al{k}": 1.3})
+        base = coupler
+    if moving:
+        m.parameter("speed", 0.0)
+        m.driver("first", "al0", "1.3 + 0.2*t + 0.1*t**2")
+        m.driver("second", "al0", "1.3 + (0.2 + speed)*t + 0.1*t**2")
+    return m
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_redundant_rows_that_contradict_each_other_are_told(moving: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(straight_loops, "SAVED", 10.0)
+    module = four_bars(5, moving).compile(kernels=(*KERNELS, "alignment"))
+    assert module.metadata["operations"].get("regular_closing"), "the shorter form is not tried here"
+    time = 0.3 if moving else 0.0
+    x = module.x0()
+    if moving:
+        x[: module.n_q] = module.project(x, time)[: module.n_q]
+    assert np.isfinite(module.rhs(time, x)).all()
+    cases = {"speed": (1e-8, 1e-3, 0.1)} if moving else {"dz": (1e-9, 1e-3, 0.1), "tilt": (1e-8, 1e-2)}
+    for name, value in ((name, value) for name, values in cases.items() for value in values):
+        with pytest.raises(eg.ProjectionError):
+            module.rhs(time, x, p={name: value})
