@@ -213,3 +213,34 @@ def test_redundant_rows_that_contradict_each_other_are_told(moving: bool, monkey
     for name, value in ((name, value) for name, values in cases.items() for value in values):
         with pytest.raises(eg.ProjectionError):
             module.rhs(time, x, p={name: value})
+
+
+def parallelograms(n: int) -> eg.Model:
+    """On one another; at the positions of all angles 0, all flat, cranks and couplers determine nothing of each other."""
+    m = eg.Model("parallelograms", gravity=(0, -9.81, 0))
+    length, width, dz = (m.parameter(*one) for one in (("length", 0.3), ("width", 0.4), ("dz", 0.0)))
+    base = m.ground
+    for k in range(n):
+        inertia = (0.01, 0.01, 0.02)
+        left = m.body(f"left{k}", mass=1.0 + 0.1 * k, com=(0.15, 0, 0), inertia=inertia)
+        right = m.body(f"right{k}", mass=1.2, com=(0.15, 0, 0), inertia=inertia)
+        coupler = m.body(f"coupler{k}", mass=0.7, com=(0.2, 0.02, 0), inertia=inertia)
+        m.revolute(f"ja{k}", base, left, coordinate=f"al{k}")
+        m.revolute(f"jb{k}", base.at(width, 0, 0), right, coordinate=f"be{k}")
+        m.revolute(f"jc{k}", left.at(length, 0, 0), coupler, coordinate=f"ga{k}")
+        m.revolute(f"jd{k}", coupler.at(width, 0, dz if k == 0 else 0), right.at(length, 0, 0))
+        base = coupler
+    return m
+
+
+def test_pivots_of_rounding_alone_do_not_count_as_sound() -> None:
+    beside = Beside(parallelograms(4))
+    x = beside.module.x0() * 0.0
+    for i, name in enumerate(beside.module.q_names):
+        angle = 0.5 + 0.3 * int(name[-1])
+        x[i] = -angle if name.startswith("ga") else angle
+    assert np.abs(beside.module.constraints(x[: beside.n_q])).max() < 1e-14
+    dependent = [i for i in range(beside.n) if i not in beside.module.metadata["independent"]]
+    columns = np.asarray(beside.module.constraint_jacobian(x[: beside.n_q]))[:, dependent]
+    assert np.linalg.svd(columns, compute_uv=False)[-1] < 1e-12, "this choice is meant to fail"
+    assert beside.evaluate("dynamics", x)[2 * beside.n] == 0.0
