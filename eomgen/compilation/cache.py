@@ -73,7 +73,7 @@ class CacheEntry:
     key : str
         SHA-256 of everything it depends on.
     kind : str
-        ``extension``, ``library``, ``layer`` or ``lanes``.
+        ``extension``, ``library``, ``layer``, ``lanes`` or ``classes``.
     name : str
         Name of the model.
     directory : Path

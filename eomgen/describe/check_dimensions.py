@@ -163,8 +163,9 @@ def _place(description: Description, path: str) -> tuple[str, DescribedEntry | N
     """Section, entry and the keys and indices that follow, of the path of an expression."""
     section = path.partition(".")[0]
     for entry in description.sections.get(section, ()):
-        if path.startswith((f"{entry.path}.", f"{entry.path}[")):
-            return section, entry, _steps(path[len(entry.path) :])
+        own = entry.path
+        if path.startswith(own) and path[len(own) : len(own) + 1] in (".", "["):
+            return section, entry, _steps(path[len(own) :])
     return section, None, _steps(path)
 
 

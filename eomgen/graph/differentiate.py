@@ -246,9 +246,10 @@ def vjp(outputs: Sequence[Expr], weights: Sequence[Expr], wrt: Sequence[Expr]) -
         raise ValueError(f"{len(outputs)} outputs need as many weights, not {len(weights)}")
     if g is None:
         return []
-    bits = _column_bits(wrt)
-    order = reachable(g, (y.id for y in outputs))
-    active = _active(g, order, bits)
+    nodes, order = g.nodes, reachable(g, (y.id for y in outputs))
+    there = set(order)
+    # of many symbols an output has few: only those, and what is no symbol, which is refused, are looked at
+    active = _active(g, order, _column_bits([x for x in wrt if x.id in there or nodes[x.id][0] != "sym"]))
     adjoints: dict[int, int] = {}
     for y, w in zip(outputs, weights, strict=True):
         if y.id in active:
@@ -256,7 +257,7 @@ def vjp(outputs: Sequence[Expr], weights: Sequence[Expr], wrt: Sequence[Expr]) -
     branches: list[int] = []
     _pull(g, [i for i in order if i in active], set(active), adjoints, branches)
     result = [adjoints.get(x.id, g.zero.id) for x in wrt]
-    for (row, column), slope in _forward_jacobian(g, branches, wrt).items():
+    for (row, column), slope in (_forward_jacobian(g, branches, wrt) if branches else {}).items():
         result[column] = g.add(result[column], g.mul(adjoints[branches[row]], slope))
     return [Expr(g, d) for d in result]
 

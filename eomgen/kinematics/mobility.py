@@ -182,9 +182,9 @@ def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
     random = np.random.default_rng(1)
     if not functions.h:
         return [scales.move(q, random.uniform(0.2, 0.9, len(scales.q))) for _ in range(PROBES)]
+    J = functions.place_jacobian(q)
+    basis = algebra.svd(J)[2][rank(J).rank :]
     for k in range(PROBES):
-        J = functions.place_jacobian(q)
-        basis = algebra.svd(J)[2][rank(J).rank :]
         step = random.normal(size=len(basis)) @ basis
         length = float(np.linalg.norm(step))
         if length == 0.0:
@@ -220,7 +220,8 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     chosen = _choose(kinematics, jacobians, r, wanted)
     quality = conditioning(jacobians[0], chosen)
     at_change_point = ranks[0] < r  # where nothing can be said of a choice: the samples may lie on other branches
-    if wanted and not at_change_point and max(conditioning(J, chosen) for J in jacobians) < CHOSEN:
+    others = [conditioning(J, chosen) for J in jacobians[1:]] if wanted and not at_change_point else []
+    if wanted and not at_change_point and max(quality, *others, 0.0) < CHOSEN:
         message = f"{', '.join(wanted)} cannot move the mechanism on their own at the initial configuration"
         better = [names[j] for j in choose_independent(jacobians, r)]
         raise ModelError([kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can")])
@@ -240,12 +241,20 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         configurations=len(configurations),
         ranks=ranks,
         samples=tuple(tuple(float(x) for x in sample) for sample in configurations),
-        n_positions=len(functions.system.scales.q)
-        - max(rank(functions.place_jacobian(x)).rank for x in configurations),
+        n_positions=len(functions.system.scales.q) - max(_position_ranks(functions, configurations, jacobians, ranks)),
         instantaneous=n - ranks[0],
         candidates=tuple((names[k], value) for k, value in rate_candidates(jacobians[0], chosen).items()),
         driven=any(not e.is_zero for e in kinematics.constraints.time_derivative),
     )
+
+
+def _position_ranks(
+    functions: ConstraintFunctions, configurations: Sequence[Array], jacobians: Sequence[Array], ranks: Sequence[int]
+) -> list[int]:
+    """Ranks of the constraints of positions; those known already of the same matrices are not found again."""
+    known = {J.tobytes(): r for J, r in zip(jacobians, ranks, strict=True)}
+    found = map(functions.place_jacobian, configurations)
+    return [known[key] if (key := J.tobytes()) in known else rank(J).rank for J in found]
 
 
 def _choose(kinematics: Kinematics, jacobians: Sequence[Array], r: int, wanted: Sequence[str]) -> tuple[int, ...]:

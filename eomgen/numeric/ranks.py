@@ -50,15 +50,15 @@ def independent_rows(J: Array, rank: int) -> Indices:
     Earlier rows are preferred: a row is skipped only when the best remaining one is a hundred times farther from the
     span of the chosen ones.
     """
-    work = np.array(J)
+    work, distance = np.array(J), np.linalg.norm(J, axis=1)
     chosen: list[int] = []
     for _ in range(rank):
-        distance = np.linalg.norm(work, axis=1)
+        chosen.append(int(np.flatnonzero(distance >= PREFERENCE * distance.max())[0]))
+        direction = work[chosen[-1]] / distance[chosen[-1]]
+        moved = np.flatnonzero(along := work @ direction)  # few, where each loop has coordinates of its own
+        work[moved] -= np.outer(along[moved], direction)
+        distance[moved] = np.linalg.norm(work[moved], axis=1)
         distance[chosen] = 0.0
-        row = int(np.flatnonzero(distance >= PREFERENCE * distance.max())[0])
-        chosen.append(row)
-        direction = work[row] / distance[row]
-        work -= np.outer(work @ direction, direction)
     return np.array(sorted(chosen), dtype=np.intp)
 
 

@@ -26,8 +26,8 @@ DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
 
 def find_span(span: Span, declared: float) -> tuple[float, float]:
     """Start and end (s) of what a user gives as the span of a run."""
-    if span is None:
-        return 0.0, declared
+    if span is None or (type(span) is float and isfinite(span)):
+        return 0.0, declared if span is None else span
     if type(span) is tuple and [*map(type, span)] == [float, float] and isfinite(span[0]) and isfinite(span[1]):
         return span
     if isinstance(span, (tuple, list)):
