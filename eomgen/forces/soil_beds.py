@@ -234,7 +234,7 @@ def bed_rates(states: Sequence[Expr], sums: Sequence[Expr], recovery: Expr) -> l
     """
     found: list[Expr] = []
     each, slots = len(STATES), len(STATES) + COUNTS
-    for k in range(len(states) // each):
+    for k in states[0].graph.marked(range(len(states) // each)):
         *rates, deeper, pressed, squares = sums[k * slots : (k + 1) * slots]
         free = pressed.graph.apply("max", 0.0, 1.0 - pressed) / recovery
         own = states[k * each : k * each + each - 1]

@@ -43,6 +43,10 @@ class Limits:
     #: (benchmarks/tracks.py) on a chain of 49 links round wheels: 13 s of work to compile it instead of 36 s.
     rolled_of_long: int = 2_500
     long: int = 50_000
+    #: Functions of mechanisms with more first-order states go through these in loops too, whatever their length.
+    #: Measured on a cart with two wheels on a bed of soil: 4 kB of text for each cell of three states instead of 14, in
+    #: the same time of a call, 3.4 us for 40 cells and 15 us for 200.
+    states: int = 60
     #: Functions of more operations are searched for what repeats itself without a mark of the graph (constraint rows,
     #: their factor, derivatives).  Short loops keep more in memory, so the two blocks of the right-hand side of loops
     #: are searched only above the second number.  Measured (closed chains, rows of four-bars), microseconds of loops
@@ -175,6 +179,8 @@ class Program:
 
     def is_rolled(self, name: str) -> bool:
         """Whether a block, or ``precompute``, is so long that what is alike in it is written once."""
+        if self.n_states > self.limits.states:
+            return True
         long = sum(counted.total for counted in self.counts.values()) > self.limits.long
         return self.counts[name].total > (self.limits.rolled_of_long if long else self.limits.rolled)
 

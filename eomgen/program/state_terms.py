@@ -26,14 +26,16 @@ def with_states(terms: SystemTerms, names: Sequence[str], rates: Sequence[Expr])
     nothing: Row = (graph.zero,) * count
     accelerations = tuple(graph.symbol(acceleration_name(name)) for name in names)
     unit = tuple((graph.zero,) * (n + k) + (graph.one,) + (graph.zero,) * (count - 1 - k) for k in range(count))
+    pairs = list(zip(accelerations, rates, strict=True))
+    opposed, left = tuple(-f for f in graph.marked(rates)), tuple(a - f for a, f in graph.marked(pairs))
     mass = tuple((*row, *nothing) for row in terms.mass_matrix) + (unit if terms.mass_matrix or not n else ())
     return replace(
         terms,
         v=(*terms.v, *names),
         a=(*terms.a, *map(acceleration_name, names)),
         mass_matrix=mass,
-        bias=(*terms.bias, *(-f for f in rates)),
-        inverse_dynamics=(*terms.inverse_dynamics, *(a - f for a, f in zip(accelerations, rates, strict=True))),
+        bias=(*terms.bias, *opposed),
+        inverse_dynamics=(*terms.inverse_dynamics, *left),
         constraint_jacobian=tuple((*row, *nothing) for row in terms.constraint_jacobian),
         loop_coordinate_jacobian=tuple((*row, *nothing) for row in terms.loop_coordinate_jacobian),
         coordinate_scales=(*terms.coordinate_scales, *(graph.one,) * count),

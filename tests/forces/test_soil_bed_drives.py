@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.integrate import solve_ivp
 import eomgen as eg
 from eomgen.errors import ModelError
 from eomgen.forces.soils import SOILS
+from eomgen.generation import generate
 
 RADIUS, WIDTH, SAND = 0.15, 0.1, SOILS["dry_sand"]
 LENGTH, CELLS = 1.0, 32
@@ -19,7 +21,7 @@ STEP = 1e-3
 SLIPPERY = {"soil": "dry_sand", "cohesion": 0.0, "friction_angle": 0.0}
 
 
-def cart(bed: int = 0) -> eg.Model:
+def cart(bed: int = 0, cells: int = CELLS) -> eg.Model:
     """A cart of 24 kg with two driven wheels, or a plate of 1 kg that is led over ``bed`` cells, without gravity."""
     m = eg.Model("plate" if bed else "cart", gravity=(0, 0 if bed else -9.81, 0))
     if bed:
@@ -34,7 +36,7 @@ def cart(bed: int = 0) -> eg.Model:
         m.revolute(f"h{k}", {"body": "chassis", "at": [ahead, 0, 0]}, wheel)
         m.torque(f"drive{k}", wheel, (0, 0, -3.5))
     wheels = [{"shape": "circle", "on": f"w{k}", "radius": RADIUS, "width": WIDTH} for k in (0, 1)]
-    m.contacts("soil", wheels, {"shape": "bed", "on": m.ground, "length": LENGTH, "cells": CELLS}, {"soil": "dry_sand"})
+    m.contacts("soil", wheels, {"shape": "bed", "on": m.ground, "length": LENGTH, "cells": cells}, {"soil": "dry_sand"})
     m.initial(c_x=0.35, c_y=RADIUS - 0.005)
     return m
 
@@ -169,3 +171,24 @@ def test_settling_belongs_to_beds(ground: Any) -> None:
     m.contacts("soil", wheel, {**ground, "on": m.ground}, law)
     with pytest.raises(ModelError, match=r"(?s)settling.*(belongs to the cells of a bed|greater than 0)"):
         m.compile(target="numpy")
+
+
+def test_many_cells_go_through_loops(driven: Any) -> None:
+    """The loops of the compiled module against the NumPy target, along a drive: rates and Jacobian."""
+    mod, traj = driven
+    numpy = cart().compile(target="numpy")
+    for k in range(len(traj.t) // 3, len(traj.t), len(traj.t) // 3):
+        x = traj.x[:, k]
+        rates, J = np.array(mod.rhs(0, x)), np.array(mod.jacobian(0, x))
+        np.testing.assert_allclose(rates, np.array(numpy.rhs(0, x)), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(J, np.array(numpy.jacobian(0, x)), rtol=1e-7, atol=1e-9 * np.abs(J).max())
+        assert np.count_nonzero(J[10:, :10]) > 20
+
+
+def test_text_of_a_cell(tmp_path: Path) -> None:
+    """At most 4.5 kB a cell in all files of a library together; written one by one it is 14 kB."""
+    sizes = []
+    for cells in (24, 48):
+        folder = generate(cart(cells=cells), tmp_path / str(cells), target="c")
+        sizes.append(sum(file.stat().st_size for file in folder.rglob("*") if file.is_file()))
+    assert 1000 < (sizes[1] - sizes[0]) / 24 < 4500
