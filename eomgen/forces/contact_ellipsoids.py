@@ -45,7 +45,7 @@ def quadratic_form(R: Mat3, axes: tuple[Expr, Expr, Expr]) -> Mat3:
     return vec.product((x, y, z), vec.transpose(R))
 
 
-def _nearest(view: View, axes: tuple[Expr, Expr, Expr], place: Vec3) -> tuple[Vec3, Expr]:
+def nearest(view: View, axes: tuple[Expr, Expr, Expr], place: Vec3) -> tuple[Vec3, Expr]:
     """The outward normal at the point of an ellipsoid that is nearest to a place, and how far that is outside.
 
     The nearest point to p is (a^2 p_x / (t + a^2), ...), where S(t), the sum of (a p_x / (t + a^2))^2, is 1 (Eberly,
@@ -105,11 +105,44 @@ class EllipsoidRound(Contact):
 
     def _touching(self, view: View, reach: Vec3, R: Mat3, place: Vec3) -> Touch:
         """A sphere at a place, at which ``reach`` ends."""
-        normal, gap = _nearest(view, self.axes, place)
+        normal, gap = nearest(view, self.axes, place)
         out = vec.times(R, normal)
         depth = self.radius - gap
         second = vec.scale(0.5 * depth - self.radius, out)
         return out, depth, vec.add(reach, second), second
+
+
+def normal_across(view: View, r: tuple[Expr, Expr], form: tuple[Expr, Expr, Expr]) -> tuple[Expr, Expr, Expr]:
+    """The unit vector n in a plane for which n r - sqrt(n B n) is greatest, and that root; B is xx, xy, yy."""
+    graph, (bxx, bxy, byy) = view.graph, form
+    square = r[0] * r[0] + r[1] * r[1]
+    apart = graph.apply("lt", 0.0, square)
+    far, nearest = sqrt(where(apart, square, 1.0)), bxx * byy - bxy * bxy
+    radial = far * sqrt(nearest / where(apart, byy * r[0] * r[0] - 2.0 * bxy * r[0] * r[1] + bxx * r[1] * r[1], 1.0))
+    t = graph.apply("max", 0.0, radial * (far - radial))
+    nx = where(apart, (byy + t) * r[0] - bxy * r[1], 1.0)
+    ny = where(apart, (bxx + t) * r[1] - bxy * r[0], 0.0)
+    size = sqrt(nx * nx + ny * ny)
+    nx, ny = nx / size, ny / size
+    bx = by = h = graph.zero
+    for k in range(COMMON + 1):
+        bx, by = bxx * nx + bxy * ny, bxy * nx + byy * ny
+        h = sqrt(nx * bx + ny * by)
+        if k == COMMON:
+            break
+        if k == COMMON - 1:
+            nx, ny = settled(view, nx), settled(view, ny)
+            bx, by = bxx * nx + bxy * ny, bxy * nx + byy * ny
+            h = sqrt(nx * bx + ny * by)
+        gx, gy = r[0] - bx / h, r[1] - by / h
+        cross = nx * by - ny * bx
+        bend = (ny * ny * bxx - 2.0 * nx * ny * bxy + nx * nx * byy) / h - cross * cross / (h * h * h)
+        whole = bend + nx * gx + ny * gy
+        step = (nx * gy - ny * gx) / where(graph.apply("lt", _TOO_BENT * bend, whole), whole, bend)
+        nx, ny = nx - step * ny, ny + step * nx
+        size = sqrt(nx * nx + ny * ny)
+        nx, ny = nx / size, ny / size
+    return nx, ny, h
 
 
 @dataclass(frozen=True)
@@ -135,35 +168,7 @@ class EllipsoidRod(EllipsoidRound):
 
         r = vec.dot(across[0], place), vec.dot(across[1], place)
         bxx, bxy, byy = form(across[0], across[0]), form(across[0], across[1]), form(across[1], across[1])
-        square = r[0] * r[0] + r[1] * r[1]
-        apart = graph.apply("lt", 0.0, square)
-        far, nearest = sqrt(where(apart, square, 1.0)), bxx * byy - bxy * bxy
-        radial = far * sqrt(
-            nearest / where(apart, byy * r[0] * r[0] - 2.0 * bxy * r[0] * r[1] + bxx * r[1] * r[1], 1.0)
-        )
-        t = graph.apply("max", 0.0, radial * (far - radial))
-        nx = where(apart, (byy + t) * r[0] - bxy * r[1], 1.0)
-        ny = where(apart, (bxx + t) * r[1] - bxy * r[0], 0.0)
-        size = sqrt(nx * nx + ny * ny)
-        nx, ny = nx / size, ny / size
-        bx = by = h = graph.zero
-        for k in range(COMMON + 1):
-            bx, by = bxx * nx + bxy * ny, bxy * nx + byy * ny
-            h = sqrt(nx * bx + ny * by)
-            if k == COMMON:
-                break
-            if k == COMMON - 1:
-                nx, ny = settled(view, nx), settled(view, ny)
-                bx, by = bxx * nx + bxy * ny, bxy * nx + byy * ny
-                h = sqrt(nx * bx + ny * by)
-            gx, gy = r[0] - bx / h, r[1] - by / h
-            cross = nx * by - ny * bx
-            bend = (ny * ny * bxx - 2.0 * nx * ny * bxy + nx * nx * byy) / h - cross * cross / (h * h * h)
-            whole = bend + nx * gx + ny * gy
-            step = (nx * gy - ny * gx) / where(graph.apply("lt", _TOO_BENT * bend, whole), whole, bend)
-            nx, ny = nx - step * ny, ny + step * nx
-            size = sqrt(nx * nx + ny * ny)
-            nx, ny = nx / size, ny / size
+        nx, ny, h = normal_across(view, r, (bxx, bxy, byy))
         n = vec.add(vec.scale(nx, across[0]), vec.scale(ny, across[1]))
         s = graph.apply("max", -self.half, graph.apply("min", self.half, form(along, n) / h - vec.dot(along, place)))
         moved = vec.scale(s, along)

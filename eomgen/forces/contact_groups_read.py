@@ -161,9 +161,7 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
         for b in kinds[1]:
             if (a in PLANAR) != (b in PLANAR):
                 e.fault("second", f"{a} and {b} do not meet", _ALLOWED)
-            elif ((a in GROUNDS and b in GROUNDS) or {a, b} == {"ellipsoid", "cuboid"}) and (
-                second or a != b or _differ(first, a)
-            ):
+            elif a in GROUNDS and b in GROUNDS and (second or a != b or _differ(first, a)):
                 told = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
                 e.fault("second" if second else "first", told, _ALLOWED)
     for key, own, met in (("second", kinds[0], kinds[1]), ("first", kinds[1], kinds[0])):
@@ -231,7 +229,7 @@ _CORNERED = (
 _ALLOWED = (
     "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
     "smooth_profile, which plates meet too; wheels and plates meet a bed; sphere, capsule, ellipsoid and cuboid meet "
-    "half_space, height_field and each other, but for ellipsoid and cuboid"
+    "half_space, height_field and each other"
 )
 
 _NORMAL_LAW = CURVED["normal_law"]._replace(

@@ -24,7 +24,7 @@ PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon
 #: Parts that meet surfaces and have no states.
 STATELESS = ("rim", "sole", "knob", "tip", "brim", "spine")
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
-BLOCK = "block"  #: class of cuboids, which spheres meet
+BLOCK = "block"  #: class of cuboids, which spheres and ellipsoids meet
 CORE = "core"  #: class of cuboids with rounded edges, which those of other cuboids and capsules meet
 INSIDE = "inside"  #: class of the insides of closed outlines, which what is deep in them meets
 HOLLOW = "hollow"  #: class of places of outlines where parts of an overlap grow together
@@ -44,7 +44,7 @@ MET = {
     "round": ("round",),
     "rod": ("round", "rod"),
     "ellipsoid": ("round", "rod", "ellipsoid"),
-    BLOCK: ("round",),
+    BLOCK: ("round", "ellipsoid"),
     CORE: ("knob", "tip"),
     "brim": ("brim", "spine"),
     FIELD: ("round", "end", "ellipsoid"),

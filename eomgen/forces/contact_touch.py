@@ -9,6 +9,7 @@ from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from .contact import Contact, SpherePlane, joint_radius
+from .contact_blocks import BlockEllipsoid
 from .contact_ellipsoids import EllipsoidEllipsoid, EllipsoidPlane, EllipsoidRod, EllipsoidRound
 from .contact_fields import FieldEllipsoid, FieldRound, HeightField
 from .contact_insides import BowlRound, InsideRound, NotchRound
@@ -69,6 +70,8 @@ def touching(
             return FieldEllipsoid(*laws, field, (x, y, z))
         if kinds[0] == "half":
             return EllipsoidPlane(*laws, (x, y, z))
+        if kinds[0] == BLOCK:
+            return BlockEllipsoid(*laws, (first[0], first[1], first[2]), (x, y, z))
         return EllipsoidEllipsoid(*laws, ((first[0], first[1], first[2]), (x, y, z)))
     if field is not None:
         return FieldRound(*laws, field, radius)

@@ -147,15 +147,6 @@ def test_what_is_wrong_with_a_shape_is_told(given: dict[str, Any], told: str) ->
         m.mechanism()
 
 
-@pytest.mark.parametrize("turned", [False, True])
-def test_an_ellipsoid_and_a_cuboid_do_not_meet(turned: bool) -> None:
-    m, (a, b) = flying(2)
-    shapes = [{**SHAPES["ellipsoid"], "on": a}, {**SHAPES["cuboid"], "on": b}]
-    m.contacts("touch", *(shapes[::-1] if turned else shapes), ELASTIC)
-    with pytest.raises(ModelError, match="do not meet.*each other, but for ellipsoid and cuboid"):
-        m.mechanism()
-
-
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("kind", ["ellipsoid", "cuboid"])
 def test_a_sphere_on_a_closed_solid(kind: str, swapped: bool) -> None:
