@@ -9,7 +9,7 @@ from ..graph.core import Expr, Graph
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
 from ..numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT
 
-SLOTS = 48  #: numbers of columns for each pair, three of seven for each of both bodies and a little
+SLOTS = 24  #: numbers of columns for each pair that is listed, of which few are near at a time
 COPIED = 16  #: entries of a list that are results one after the other, from which they are copied in a loop
 
 
