@@ -180,7 +180,7 @@ class PairLists:
         along, room = f"w + {given}, w + {rates}, w + {place}", self.again.get(function.name)
         slope = f"slope({along}, w + {work})" if room is None else f"again({along}, {room})"
         return [
-            f"for (int i = 0; i < {function.count}; i++) {{ w[{rates} + i] = same(0.0); }}",
+            f"memset(w + {rates}, 0, {function.count} * sizeof *w);",
             *filled,
             f"pairs_{function.name}_{slope};",
         ]
