@@ -178,7 +178,7 @@ def _areas_of_bodies(program: Program) -> list[tuple[str, int]]:
         ("COEFFICIENTS", known - n_q),
         ("TURNING", max(n_q, n)),  # a direction of q or of v
         ("MET", len(again)),  # of each sum over pairs how many are near, 0 before they are looked for
-        ("SHAPES", sum(map(kept_of, again))),  # these pairs
+        ("SHAPES", sum(kept_of(one.function) for one in again)),  # these pairs
         ("CHANGE", n_q + n),  # of q' and v'
         ("SPAN", 2 * f * (n_q + n)),
         ("SHARES", f * f),
@@ -193,7 +193,7 @@ def places_again(program: Program, block: Block) -> dict[str, str]:
     known = next(b.n_in for b in program.blocks if b.name == BY_BODIES[1]) - program.sizes.n_q
     count = known + max(program.sizes.n_q, program.sizes.n_v)
     found, at = {}, count + len(again)
-    for k, function in enumerate(again):
+    for k, function in enumerate(one.function for one in again):
         found[function.name] = f"w + (x - w) + {count + k}, w + (x - w) + {at}"
         at += kept_of(function)
     return found

@@ -20,10 +20,13 @@ from ..program import Program
 from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
 from .pair_statements import placed_length, plain_numbers, record_of, slots_of
-from .pair_sums_used import UsedSum, rates_again, sums_again, used_sums
+from .pair_sums_used import SumAgain, UsedSum, sums_again, used_sums
 from .row_runs import written
 from .sources import render
 from .straight import cut
+
+RATES = 6  #: results of a body: force and torque
+SINGLED = 8  #: bodies of which no result is read, up to which the text names them
 
 
 def _tables(function: PairFunction) -> list[dict[str, Any]]:
@@ -43,17 +46,16 @@ def _tables(function: PairFunction) -> list[dict[str, Any]]:
 
 def pair_files(program: Program) -> dict[str, str]:
     """The C files of the sums that a program uses."""
-    again = {function.name: rated for function, rated in rates_again(program)}
+    again = {one.function.name: one for one in sums_again(program)}
     return {
         f"{program.name}_pairs_{used.function.name}.c": _file(program, used, again.get(used.function.name))
         for used in used_sums(program)
     }
 
 
-def _file(program: Program, used: UsedSum, rated: frozenset[int] | None) -> str:
-    """The file of a sum; ``rated`` are the numbers that have rates where derivatives are taken again and again."""
+def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
+    """The file of a sum, with derivatives along one direction after another if they are taken."""
     function = used.function
-    begun, again = POSE * function.bodies, rated or frozenset()
     parts: list[tuple[PairPart, str]] = [("outputs", "")] if used.sums or used.slopes else []
     parts += [("slopes", "_slope")] if used.slopes else []
     parts += [("touch", "_touch")] if used.meets else []
@@ -134,9 +136,8 @@ def _file(program: Program, used: UsedSum, rated: frozenset[int] | None) -> str:
         "beyond": repr(BEYOND),
         "up_to": repr(UP_TO),
         "within": repr(WITHIN),
-        "again": rated is not None,
-        "rated": sorted({k % POSE for k in again if k < begun}),
-        "further": len(function.data) if any(k >= begun for k in again) else 0,
+        "again": again is not None,
+        **(_columns(again) if again is not None else {}),
         "kept": record_of(function),
         "slots": slots_of(function),
         "given": function.count,
@@ -144,6 +145,20 @@ def _file(program: Program, used: UsedSum, rated: frozenset[int] | None) -> str:
         "scratch": sum(table["count"] * table["length"] for table in tables),
     }
     return render("c/pairs.c.j2", context)
+
+
+def _columns(again: SumAgain) -> dict[str, Any]:
+    """Which numbers have rates and which results are read, as patterns that all bodies share."""
+    function = again.function
+    poses, forces = POSE * function.bodies, RATES * function.bodies
+    unread = set(range(function.bodies)).difference(k // RATES for k in again.read if k < forces)
+    return {
+        "rated": sorted({k % POSE for k in again.rated if k < poses}),
+        "further": len(function.data) if any(k >= poses for k in again.rated) else 0,
+        "components": sorted({k % RATES for k in again.read if k < forces}),
+        "unread": sorted(unread) if len(unread) <= SINGLED else [],
+        "behind": forces if forces in again.read else forces + 1,
+    }
 
 
 def _is_sorted(function: PairFunction, kind: PairKind) -> bool:
@@ -190,7 +205,7 @@ def _choosing(kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[s
 
 def pair_declarations(program: Program) -> list[str]:
     """Declarations of the sums, in every lane, for the files that call them."""
-    again = {function.name for function in sums_again(program)}
+    again = {one.function.name for one in sums_again(program)}
     return [_declared(program.name, used, used.function.name in again) for used in used_sums(program)]
 
 

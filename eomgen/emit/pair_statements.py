@@ -9,7 +9,7 @@ from ..graph.core import Expr, Graph
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
 from ..numeric.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT
 
-SLOTS = 48  #: numbers of columns for each pair, three of seven for each of both bodies and a little
+SLOTS = 24  #: numbers of columns for each pair that is listed, of which few are near at a time
 COPIED = 16  #: entries of a list that are results one after the other, from which they are copied in a loop
 
 
@@ -180,7 +180,7 @@ class PairLists:
         along, room = f"w + {given}, w + {rates}, w + {place}", self.again.get(function.name)
         slope = f"slope({along}, w + {work})" if room is None else f"again({along}, {room})"
         return [
-            f"for (int i = 0; i < {function.count}; i++) {{ w[{rates} + i] = same(0.0); }}",
+            f"memset(w + {rates}, 0, {function.count} * sizeof *w);",
             *filled,
             f"pairs_{function.name}_{slope};",
         ]

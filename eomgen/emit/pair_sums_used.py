@@ -35,25 +35,38 @@ def used_sums(program: Program) -> list[UsedSum]:
     ]
 
 
-def sums_again(program: Program) -> list[PairFunction]:
+class SumAgain(NamedTuple):
+    """A sum of which the Jacobian takes derivatives along one direction after another at one place."""
+
+    function: PairFunction
+    rated: frozenset[int]  #: numbers that have rates
+    read: frozenset[int]  #: results that are read
+
+
+def sums_again(program: Program) -> list[SumAgain]:
     """The sums of which the Jacobian takes derivatives along one direction after another at one place."""
-    return [function for function, _ in rates_again(program)]
-
-
-def rates_again(program: Program) -> list[tuple[PairFunction, frozenset[int]]]:
-    """The sums of :func:`sums_again` and which of their numbers have rates."""
     graph = program.graph
     roots = [y.id for block in program.blocks if block.name in BY_BODIES[1:] for y in block.outputs]
     places: dict[str, set[int]] = {}
     rated: dict[str, set[int]] = {}
+    read: dict[str, set[int]] = {}
     functions: dict[str, PairFunction] = {}
     for operation, first, *_ in (graph.nodes[i] for i in reachable(graph, roots) if graph.nodes[i][0] in graph.calls):
         call = pair_call(graph, operation)
-        if call is not None and call.part == "slope":
-            functions[call.function.name] = call.function
-            places.setdefault(call.function.name, set()).add(first)
-            rated.setdefault(call.function.name, set()).update(call.numbers)
-    return [(functions[name], frozenset(rated[name])) for name in sorted(functions) if len(places[name]) == 1]
+        if call is None:
+            continue
+        name = call.function.name
+        if call.part == "slope":
+            functions[name] = call.function
+            places.setdefault(name, set()).add(first)
+            rated.setdefault(name, set()).update(call.numbers)
+        elif call.part == "item":
+            read.setdefault(name, set()).update(call.numbers)
+    return [
+        SumAgain(functions[name], frozenset(rated[name]), frozenset(read.get(name, ())))
+        for name in sorted(functions)
+        if len(places[name]) == 1
+    ]
 
 
 def refuse_sums(program: Program, target: str) -> None:
