@@ -1,14 +1,14 @@
-"""Stage numeric: a problem of rigid contacts of one or two directions -> impulses by the edges of the cones of friction.
+"""Stage numeric: a problem of rigid contacts of one or two directions -> impulses by the edges of their cones.
 
-Impulses of a contact are sums of multipliers, 0 or more, of the edges (1, mu) and (1, -mu) of its cone.  With friction as
-if surfaces rose by mu |y_t| while they slide (G. de Saxcé, Z.-Q. Feng, The bipotential method, Math. Comput. Modelling 28
-(1998), 225-245) they are the solution of a convex quadratic problem, which edges that come and go one by one solve in a
-finite number of steps (D. Goldfarb, A. Idnani, A numerically stable dual method for solving strictly convex quadratic
-programs, Math. Program. 27 (1983), 1-33).  What slides is renewed until it is as it was (F. Cadoux, Ph.D. thesis,
-Grenoble, 2009).
+Impulses of a contact are sums of multipliers, 0 or more, of the edges (1, mu) and (1, -mu) of its cone.  With friction
+as if surfaces rose by mu times the speed at which they slide (G. de Saxcé, Z.-Q. Feng, The bipotential method, Math.
+Comput. Modelling 28 (1998), 225-245) they are the solution of a convex quadratic problem, which edges that come and go
+one by one solve in a finite number of steps (D. Goldfarb, A. Idnani, A numerically stable dual method for solving
+strictly convex quadratic programs, Math. Program. 27 (1983), 1-33).  What slides is renewed until it is as it was
+(F. Cadoux, Ph.D. thesis, Grenoble, 2009).
 
-Sweeps over single contacts move one impulse at a time and take thousands along a chain whose links are light beside what
-they hold; here the number of steps is that of the edges that change.
+Sweeps over single contacts move one impulse at a time and take thousands where light links lie between heavy bodies;
+here the number of steps is that of the edges that change.
 
 ``templates/c/contacts/pivots.c`` does the same.
 """

@@ -13,8 +13,8 @@ which a Newton method with the derivatives of the branch at hand solves.  Contac
 each round solves for contacts that are a little softer about the impulses of the round before (the proximal point
 method, R. T. Rockafellar, SIAM J. Control Optim. 14 (1976), 877-898), which leaves the matrix regular and the solution
 as it is.  Where Newton leads nowhere, sweeps over single contacts go on (M. Jean, The non-smooth contact dynamics
-method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257).  Before all that, many contacts are solved by the edges of
-their cones (:mod:`~eomgen.numeric.contact_edges`), or in space by sweeps.  What is left over goes to
+method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257).  Before all that, many contacts are solved by the edges
+of their cones (:mod:`~eomgen.numeric.contact_edges`), or in space by sweeps.  What is left over goes to
 :func:`solve_smoothed`.
 
 ``templates/c/contacts`` has the same iterations in C; modules with it do them as ``core.solve_contacts``.

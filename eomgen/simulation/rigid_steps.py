@@ -50,8 +50,8 @@ class RigidSteps:
     residual : float
         (m/s) The largest residual of the impulses of a step.
     missed : int
-        Steps one of whose solutions misses its tolerance: for the velocities with which forces act, for the impulses, or
-        for what removes penetrations.
+        Steps one of whose solutions misses its tolerance: for the velocities with which forces act, for the impulses,
+        or for what removes penetrations.
     iterations, most : int
         The most that a step took, and the most contacts that acted at once.
     depth : float

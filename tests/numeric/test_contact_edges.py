@@ -1,4 +1,4 @@
-"""Impulses found edge by edge: least squares by SciPy, stacks that sweeps leave unsolved, the laws themselves, order."""
+"""Impulses found edge by edge: least squares by SciPy, stacks that sweeps leave unsolved, the laws, the order."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def in_c() -> Any:
 def stack(rng: np.random.Generator, links: int, mu: float) -> ContactProblem:
     """A heavy body on light links on the ground, all of them pressed down: more contacts than freedoms hold it.
 
-    Freedoms are x, z and the turn of the body, and x and z of each link; contacts those of each link with the ground and
-    of the body with each link.
+    Freedoms are x, z and the turn of the body, and x and z of each link; contacts those of each link with the ground
+    and of the body with each link.
     """
     freedoms = 3 + 2 * links
     mass = np.ones(freedoms)
