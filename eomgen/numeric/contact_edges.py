@@ -15,16 +15,12 @@ here the number of steps is that of the edges that change.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..limits.rigid_contacts import FIRM, PIVOTS, RENEWED, SLIPPERY, VAIN
 from . import algebra
+from .contact_problem import ContactProblem
 from .space import Array
-
-if TYPE_CHECKING:
-    from .contact_impulses import ContactProblem
 
 
 class Edges:
@@ -49,7 +45,8 @@ class Edges:
             self.known[1::2] = mu > 0.0
         self.H = self.ways.T @ problem.W @ self.ways
         self.H += FIRM * np.diag(np.diag(self.H))
-        self.acting = [k for k in np.flatnonzero(own > FIRM * np.repeat(start[:, 0], d)) if self.H[k, k] > 0.0]
+        pressed = own > FIRM * np.repeat(start[:, 0], d)
+        self.acting: list[int] = [int(k) for k in np.flatnonzero(pressed & (np.diag(self.H) > 0.0))]
         self.own = np.zeros(m * d)
         self.free = np.zeros(m * d)
 

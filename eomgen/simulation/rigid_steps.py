@@ -28,7 +28,8 @@ import numpy as np
 from ..errors import SimulationError
 from ..limits.rigid_contacts import GENTLER, GROWN, HALVINGS, REMOVED, RESTING, ROUGH, YIELDING
 from ..numeric import algebra
-from ..numeric.contact_impulses import ContactImpulses, ContactProblem, solve_contacts
+from ..numeric.contact_impulses import ContactImpulses, solve_contacts
+from ..numeric.contact_problem import ContactProblem
 from ..numeric.scales import Array
 from ..runtime.late import eager
 from .rigid_in_c import DONE, TOO_LONG, rigid_stepper

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import nnls
 
 from eomgen.numeric.contact_edges import solve_edges
-from eomgen.numeric.contact_impulses import ContactProblem
+from eomgen.numeric.contact_problem import ContactProblem
 from eomgen.runtime.late import eager
 
 TOLERANCE = 1e-4
