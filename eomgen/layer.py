@@ -41,7 +41,10 @@ LAYER = {
     "eomgen_contact_steps.h": (
         "c/contacts/maps.c",
         "c/steppers/lu.c",
-        *(f"c/contacts/{name}.c" for name in ("newton", "rounded", "pivots", "solve", "held", "near", "collide", "step")),
+        *(
+            f"c/contacts/{name}.c"
+            for name in ("newton", "rounded", "pivots", "solve", "held", "near", "collide", "step")
+        ),
     ),
     "eomgen_contacts.c": ("c/contacts/plain.c",),
     "eomgen_wide_contacts.c": ("c/contacts/wide.c",),

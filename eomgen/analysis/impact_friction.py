@@ -30,7 +30,8 @@ from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..limits.impacts import COUPLED, GAINS, GIVES, REACHED, STRUCK
-from ..numeric.contact_impulses import ContactProblem, solve_contacts
+from ..numeric.contact_impulses import solve_contacts
+from ..numeric.contact_problem import ContactProblem
 from ..numeric.scales import Array
 from .impact_law import collide
 from .sliding_direction import impulses_in_space

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..limits.rounding import EPS
 from ..numeric import algebra
-from ..numeric.contact_impulses import ContactProblem
+from ..numeric.contact_problem import ContactProblem
 from ..numeric.scales import Array
 
 SAMPLES = 8  #: of a sum of waves up to those of 2 a: 5 or more determine it

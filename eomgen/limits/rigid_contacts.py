@@ -21,9 +21,9 @@ FIRM = 1e-8
 #: nothing is asked that rounding does not tell.
 SLIPPERY = 0.01
 PIVOTS = 3  #: times the edges: each comes and goes about once from a cold start, fewer from impulses of the last step
-#: Rounds in which what slides is renewed: its error shrinks by the friction or so in each, to 1e-4 at 0.5; and rounds in
-#: vain after which that leads nowhere.
-RENEWED, VAIN = 12, 3
+#: Rounds in which what slides is renewed: errors shrink by the friction or so in each, to 1e-15 at 0.5. They grow first
+#: where another contact is about to slide, seldom over more than ten rounds, after which it leads nowhere.
+RENEWED, VAIN = 50, 12
 #: The same in Newton's method for rounded laws, whose impulses go on farther in each step; the part by which the
 #: rounding shrinks when a step was good, at first and where that leads nowhere; and the part of the velocities at which
 #: laws count as sharp.

@@ -1,30 +1,26 @@
-"""Stage numeric: a problem of rigid contacts of one or two directions -> impulses by the edges of the cones of friction.
+"""Stage numeric: a problem of rigid contacts of one or two directions -> impulses by the edges of their cones.
 
-Impulses of a contact are sums of multipliers, 0 or more, of the edges (1, mu) and (1, -mu) of its cone.  With friction as
-if surfaces rose by mu |y_t| while they slide (G. de Saxcé, Z.-Q. Feng, The bipotential method, Math. Comput. Modelling 28
-(1998), 225-245) they are the solution of a convex quadratic problem, which edges that come and go one by one solve in a
-finite number of steps (D. Goldfarb, A. Idnani, A numerically stable dual method for solving strictly convex quadratic
-programs, Math. Program. 27 (1983), 1-33).  What slides is renewed until it is as it was (F. Cadoux, Ph.D. thesis,
-Grenoble, 2009).
+Impulses of a contact are sums of multipliers, 0 or more, of the edges (1, mu) and (1, -mu) of its cone.  With friction
+as if surfaces rose by mu times the speed at which they slide (G. de Saxcé, Z.-Q. Feng, The bipotential method, Math.
+Comput. Modelling 28 (1998), 225-245) they are the solution of a convex quadratic problem, which edges that come and go
+one by one solve in a finite number of steps (D. Goldfarb, A. Idnani, A numerically stable dual method for solving
+strictly convex quadratic programs, Math. Program. 27 (1983), 1-33).  What slides is renewed until it is as it was
+(F. Cadoux, Ph.D. thesis, Grenoble, 2009).
 
-Sweeps over single contacts move one impulse at a time and take thousands along a chain whose links are light beside what
-they hold; here the number of steps is that of the edges that change.
+Sweeps over single contacts move one impulse at a time and take thousands where light links lie between heavy bodies;
+here the number of steps is that of the edges that change.
 
 ``templates/c/contacts/pivots.c`` does the same.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..limits.rigid_contacts import FIRM, PIVOTS, RENEWED, SLIPPERY, VAIN
 from . import algebra
+from .contact_problem import ContactProblem
 from .space import Array
-
-if TYPE_CHECKING:
-    from .contact_impulses import ContactProblem
 
 
 class Edges:
@@ -49,7 +45,8 @@ class Edges:
             self.known[1::2] = mu > 0.0
         self.H = self.ways.T @ problem.W @ self.ways
         self.H += FIRM * np.diag(np.diag(self.H))
-        self.acting = [k for k in np.flatnonzero(own > FIRM * np.repeat(start[:, 0], d)) if self.H[k, k] > 0.0]
+        pressed = own > FIRM * np.repeat(start[:, 0], d)
+        self.acting: list[int] = [int(k) for k in np.flatnonzero(pressed & (np.diag(self.H) > 0.0))]
         self.own = np.zeros(m * d)
         self.free = np.zeros(m * d)
 

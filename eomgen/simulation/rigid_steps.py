@@ -28,7 +28,8 @@ import numpy as np
 from ..errors import SimulationError
 from ..limits.rigid_contacts import GENTLER, GROWN, HALVINGS, REMOVED, RESTING, ROUGH, YIELDING
 from ..numeric import algebra
-from ..numeric.contact_impulses import ContactImpulses, ContactProblem, solve_contacts
+from ..numeric.contact_impulses import ContactImpulses, solve_contacts
+from ..numeric.contact_problem import ContactProblem
 from ..numeric.scales import Array
 from ..runtime.late import eager
 from .rigid_in_c import DONE, TOO_LONG, rigid_stepper
@@ -48,9 +49,10 @@ class RigidSteps:
     Attributes
     ----------
     residual : float
-        (m/s) The largest residual of a step.
+        (m/s) The largest residual of the impulses of a step.
     missed : int
-        Steps whose residual is larger than it should be.
+        Steps one of whose solutions misses its tolerance: for the velocities with which forces act, for the impulses,
+        or for what removes penetrations.
     iterations, most : int
         The most that a step took, and the most contacts that acted at once.
     depth : float
@@ -163,7 +165,6 @@ class RigidSteps:
         if self._passes(middle, q_m, new, u, 0.5 * h):
             return None
         position = self.move(q_m, 0.5 * h * new)
-        self.missed += self._misses
         pushed = np.zeros((len(P), 3))
         pushed[:, : P.shape[1]] = P
         self.acting.append(np.concatenate([rows.pairs, rows.places, pushed], axis=1))
@@ -171,6 +172,7 @@ class RigidSteps:
         away = held.closing(position, t + h, end)
         if rows.gaps.size:
             away = away + self._out(held, rows, P, new, h)
+        self.missed += self._misses
         return (self.move(position, away) if away.any() else position), new
 
     def _near(self, rows: RigidRows, v: Array, free: Array, h: float) -> RigidRows:
@@ -218,7 +220,7 @@ class RigidSteps:
     def _note(self, found: ContactImpulses, scale: float, rough: float) -> None:
         if rough == 1.0:
             self.residual = max(self.residual, found.residual)
-            self._misses = self._misses or found.residual > self.tolerance * scale
+        self._misses = self._misses or not found.residual <= rough * self.tolerance * scale
         self.iterations, self.most = max(self.iterations, found.iterations), max(self.most, len(found.impulses))
 
     def _out(self, held: _Held, rows: RigidRows, P: Array, new: Array, h: float) -> Array:
@@ -234,7 +236,9 @@ class RigidSteps:
         W = J @ spread
         W += YIELDING * np.diag(np.diag(W))
         nothing = np.zeros(len(wanted))
-        found = self._impulses(W, -wanted[:, None], nothing, nothing[:, None], self.tolerance * float(wanted.max()))
+        allowed = self.tolerance * float(wanted.max())
+        found = self._impulses(W, -wanted[:, None], nothing, nothing[:, None], allowed)
+        self._misses = self._misses or not found.residual <= allowed
         return np.asarray(spread @ found.impulses.ravel())
 
 

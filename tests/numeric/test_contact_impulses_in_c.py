@@ -15,7 +15,8 @@ from eomgen.compilation.compiler import find_compiler
 from eomgen.compilation.cython_layer import HEADERS
 from eomgen.compilation.options import stepper_flags
 from eomgen.layer import read_header, read_layer
-from eomgen.numeric.contact_impulses import ContactProblem, solve_contacts
+from eomgen.numeric.contact_impulses import solve_contacts
+from eomgen.numeric.contact_problem import ContactProblem
 from eomgen.runtime.late import eager
 
 FILES = ("eomgen_contacts.c", "eomgen_wide_contacts.c")

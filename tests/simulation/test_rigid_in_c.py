@@ -124,3 +124,5 @@ def test_a_drive_loses_no_link() -> None:
     assert found["open"] < 1e-3
     assert found["gained"] < 0.01
     assert run.metadata["penetration"] < 0.01
+    assert run.metadata["missed_steps"] < 0.04 * run.metadata["steps"]  # of a tolerance of 1e-3
+    assert run.metadata["contact_residual"] < 0.01

@@ -10,7 +10,8 @@ import pytest
 from rigid_scenes import SHAPES, G, pile, rigid, thrown
 
 import eomgen as eg
-from eomgen.numeric.contact_impulses import ContactProblem, solve_contacts
+from eomgen.numeric.contact_impulses import solve_contacts
+from eomgen.numeric.contact_problem import ContactProblem
 
 KINDS = ("circle", "box", "triangle", "segment")
 

@@ -75,10 +75,8 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
             break; /* impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985) */
         }
     }
-    if (rough == 1.0) {
-        told->residual = fmax(told->residual, residual);
-        told->missed = told->missed || !(residual <= s->tolerance*scale);
-    }
+    if (rough == 1.0) { told->residual = fmax(told->residual, residual); }
+    told->missed = told->missed || !(residual <= rough*s->tolerance*scale);
     told->iterations = count > told->iterations ? count : told->iterations;
     along(s->n_v, n, at->X, at->P, out);
     release(s->n_v, held->L, out);
@@ -86,7 +84,8 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
 }
 
 /* A displacement that removes a part of the penetration of contacts that last; whether there is one. */
-static int push_out(const eomgen_rigid *s, const inertia *held, meeting *at, const double *next, double h, double *out)
+static int push_out(const eomgen_rigid *s, const inertia *held, meeting *at, const double *next, double h, double *out,
+                    eomgen_rigid *told)
 {
     const int m = at->m, d = s->d, n = at->n;
     double *const W = at->W, *const wanted = at->c, *const P = at->after;
@@ -111,6 +110,7 @@ static int push_out(const eomgen_rigid *s, const inertia *held, meeting *at, con
     }
     CHOSEN(solve_contacts)(count, 1, W, wanted, at->before, P, s->tolerance*largest, s->most, at->work, at->numbers, &iterations,
                           &residual);
+    told->missed = told->missed || !(residual <= s->tolerance*largest);
     for (int i = 0; i < s->n_v; i++) {
         out[i] = 0.0;
         for (int a = 0; a < count; a++) { out[i] += at->X[(ptrdiff_t)i*n + lasts[a]*d]*P[a]; }

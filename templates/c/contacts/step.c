@@ -275,7 +275,7 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
     }
     s->m = at.m;
     if (at.m) { keep_impulses(s, &at, keys); }
-    if (at.m && push_out(s, &held, &at, part[OF_NEW], h, part[OF_BIAS])) {
+    if (at.m && push_out(s, &held, &at, part[OF_NEW], h, part[OF_BIAS], &told)) {
         for (int i = 0; i < n; i++) { part[OF_AWAY][i] += part[OF_BIAS][i]; }
     }
     move(s, s->next, 1.0, part[OF_AWAY], s->next);
