@@ -95,7 +95,7 @@ def _find_core(name: str, file: str) -> ModuleType:
     core = util.module_from_spec(spec)
     loader.exec_module(core)
     core.offer_lanes(partial(_find_lanes, path))
-    core.__getattr__ = partial(_find_class, core, path)
+    vars(core)["__getattr__"] = partial(_find_class, core, path)
     sys.modules[name] = core
     return core
 

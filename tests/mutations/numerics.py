@@ -185,8 +185,8 @@ FAULTS = (
     ),
     Fault(
         "independent-rows", "eomgen/numeric/ranks.py",
-        "work -= np.outer(work @ direction, direction)",
-        "work -= 0.5 * np.outer(work @ direction, direction)",
+        "work[moved] -= np.outer(along[moved], direction)",
+        "work[moved] -= 0.5 * np.outer(along[moved], direction)",
         "redundant rows are told by half an orthogonalisation",
         ("tests/numeric/test_thresholds.py::test_rows_that_repeat_earlier_ones_are_redundant",),
     ),
