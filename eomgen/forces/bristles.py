@@ -37,7 +37,7 @@ class LuGre(LineFriction):
     gains energy where N rises while bristles are bent: their energy, stiffness N z^2 / 2, rises with it.  Here the
     power m e v of the bristles is (e^2 / 2)' + stiffness |v| / c(v) e^2, whatever N does.  Where N falls, e may stand
     for more than N can hold; then m is as large as c_s allows.  Where damping |v| > 4 c(v) the damping may give more
-    than that loss and the viscous part take (Barabanov and Ortega, IEEE Trans. Autom. Control 45, 2000, 675-686); it
+    than that loss and the viscous part take (Barahanov and Ortega, IEEE Trans. Autom. Control 45, 2000); it
     gives no more than they take here, and nothing where places of contact share states (``shared``).  Between surfaces
     that are apart the bristles spring back, e' = -(stiffness / damping) e.
     """
