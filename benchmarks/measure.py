@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from math import inf
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -62,6 +62,11 @@ def seconds_of(action: Callable[[], Any]) -> float:
     start = perf_counter()
     action()
     return perf_counter() - start
+
+
+def work() -> float:
+    """CPU seconds so far of this process and of those it has waited for: of compilers, too."""
+    return process_time() + resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
 
 
 def seconds_per_call(call: Callable[[], Any], budget: float) -> float:

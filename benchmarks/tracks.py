@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -18,6 +17,7 @@ import eomgen as eg
 from eomgen import pipeline
 from eomgen.emit import emit_c
 
+from .measure import work
 from .report import Limit, Report, Table
 from .robot_calls import in_turns
 
@@ -33,11 +33,6 @@ def track(links: int) -> eg.Model:
     m = eg.Model(f"track_{links}", gravity=(0, -9.81, 0))
     undercarriage(m, Track(links=links, rollers=links // 6), 400.0 * links, {"zz": 20.0 * links**2})
     return m
-
-
-def work() -> float:
-    """Seconds of processors, compilers among them."""
-    return process_time() + resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
 
 
 def timed(calls: int, call: Any) -> float:
