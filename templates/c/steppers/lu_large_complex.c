@@ -5,9 +5,9 @@
 #endif
 
 /* re + i im -= (a + i c) (b + i d), of rows x depth and depth x columns, rows of which are `step` apart. */
-EOMGEN_ROWS static void take_panel_complex(int rows, int depth, int columns, int step, const double *restrict a,
-                                           const double *restrict c, const double *restrict b, const double *restrict d,
-                                           double *restrict re, double *restrict im)
+static void take_panel_complex(int rows, int depth, int columns, int step, const double *restrict a,
+                               const double *restrict c, const double *restrict b, const double *restrict d,
+                               double *restrict re, double *restrict im)
 {
     int tall = 0, narrow = 0;
 #if defined(EOMGEN_VECTORS)

@@ -1,30 +1,30 @@
-/* Products of dense row-major matrices, several numbers at a time where the processor can; every entry is summed in the order
+/* Products of dense row-major matrices, two numbers at a time; every entry is summed in the order
    of its terms, and nothing is contracted, so that the bits are the same everywhere. */
 #include "eomgen_real.h"
 
 enum { PANEL = 32 }; /* terms of a product, and columns of a factor, that are gone through at a time */
 
 #if defined(EOMGEN_VECTORS)
-typedef double strip __attribute__((vector_size(32), aligned(8), may_alias));
+typedef double strip __attribute__((vector_size(16), aligned(8), may_alias));
 #define STRIP(a) (*(strip *)(a))
 #define LOAD(a) (*(const strip *)(a))
-enum { TALL = 4, BROAD = 8, NARROW = 4 };
+enum { TALL = 4, BROAD = 4, NARROW = 2 };
 
 /* c -= a b of TALL rows and BROAD columns. */
 #define TAKE_BLOCK(a, b, c) \
-    strip p0 = STRIP(c), q0 = STRIP(c + 4), p1 = STRIP(c + c_step), q1 = STRIP(c + c_step + 4); \
-    strip p2 = STRIP(c + 2 * c_step), q2 = STRIP(c + 2 * c_step + 4); \
-    strip p3 = STRIP(c + 3 * c_step), q3 = STRIP(c + 3 * c_step + 4); \
+    strip p0 = STRIP(c), q0 = STRIP(c + 2), p1 = STRIP(c + c_step), q1 = STRIP(c + c_step + 2); \
+    strip p2 = STRIP(c + 2 * c_step), q2 = STRIP(c + 2 * c_step + 2); \
+    strip p3 = STRIP(c + 3 * c_step), q3 = STRIP(c + 3 * c_step + 2); \
     for (int k = 0; k < depth; k++) { \
-        const strip x = LOAD(b + k * b_step), y = LOAD(b + k * b_step + 4); \
+        const strip x = LOAD(b + k * b_step), y = LOAD(b + k * b_step + 2); \
         p0 -= (a)[k] * x, q0 -= (a)[k] * y; \
         p1 -= (a)[a_step + k] * x, q1 -= (a)[a_step + k] * y; \
         p2 -= (a)[2 * a_step + k] * x, q2 -= (a)[2 * a_step + k] * y; \
         p3 -= (a)[3 * a_step + k] * x, q3 -= (a)[3 * a_step + k] * y; \
     } \
-    STRIP(c) = p0, STRIP(c + 4) = q0, STRIP(c + c_step) = p1, STRIP(c + c_step + 4) = q1; \
-    STRIP(c + 2 * c_step) = p2, STRIP(c + 2 * c_step + 4) = q2; \
-    STRIP(c + 3 * c_step) = p3, STRIP(c + 3 * c_step + 4) = q3;
+    STRIP(c) = p0, STRIP(c + 2) = q0, STRIP(c + c_step) = p1, STRIP(c + c_step + 2) = q1; \
+    STRIP(c + 2 * c_step) = p2, STRIP(c + 2 * c_step + 2) = q2; \
+    STRIP(c + 3 * c_step) = p3, STRIP(c + 3 * c_step + 2) = q3;
 #else
 enum { TALL = 1, BROAD = 1, NARROW = 1 };
 #define TAKE_BLOCK(a, b, c) \
@@ -34,8 +34,8 @@ enum { TALL = 1, BROAD = 1, NARROW = 1 };
 #endif
 
 /* c -= a b, of rows x depth and depth x columns, rows of which are so many steps apart. */
-EOMGEN_ROWS static void take_panel(int rows, int depth, int columns, const double *restrict a, int a_step,
-                                   const double *restrict b, int b_step, double *restrict c, int c_step)
+static void take_panel(int rows, int depth, int columns, const double *restrict a, int a_step, const double *restrict b,
+                       int b_step, double *restrict c, int c_step)
 {
     const int tall = rows - rows % TALL, broad = columns - columns % BROAD;
     for (int j = 0; j < broad; j += BROAD) {
