@@ -263,7 +263,11 @@ def _check_asked(reader: Reader, forces: tuple[Force, ...]) -> None:
     """Report faults: quantities such as ``length(k1)`` of force elements that do not act along a path."""
     known = {force.name: force for force in forces}
     for (quantity, name, *_, on), path in reader.asked.items():
-        if quantity != "power" and not on and name in known and not known[name].acts_along:
+        if name in known and known[name].is_rigid and not on:
+            told = f"the contacts {name!r} have normal_law: rigid, which exerts impulses, not forces"
+            columns = f"read the columns normal({name}) and friction({name}) of a run by method moreau, means of steps"
+            reader.faults.add(path, told, f"{columns}; run.contact_forces.on(BODY) has forces on bodies")
+        elif quantity != "power" and not on and name in known and not known[name].acts_along:
             remedy = f"power({name}) is known of every element; force, length and rate of elements along a path "
             reader.faults.add(
                 path, f"{name!r} does not act along a path", remedy + "or a coordinate, and of single contacts"

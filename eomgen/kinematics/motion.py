@@ -244,7 +244,10 @@ class MarkerMotion:
         found = part_exerted(self, force, quantity)
         if force.is_rigid:
             told = f"the contacts {force.name!r} have normal_law: rigid, which exerts impulses, not forces"
-            remedy = "give a normal law with a stiffness; runs by method moreau take such contacts as rigid too"
+            remedy = (
+                "read run.contact_forces.on(BODY) of a run by method moreau with contact_forces=True, means of steps; "
+            )
+            remedy += "or give a normal law with a stiffness"
             raise ModelError([mechanism.problem(quantity.path, told, remedy)])
         if isinstance(found, str):
             remedy = f"give a body on which it acts; power({force.name}) is known of every element"

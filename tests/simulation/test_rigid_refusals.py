@@ -78,3 +78,21 @@ def test_verification_leaves_runs_out(ball: Any) -> None:
     found = {one.check: one for one in ball.verify(states=1, seconds=0.0).findings}
     assert "only method moreau solves for" in found["runs: methods agree"].note
     assert all(one.ok for one in found.values() if "runs" not in one.check)
+
+
+@pytest.mark.parametrize("asked", ["power(c)", "force(c)", "force(c, on=b).y"])
+def test_forces_of_rigid_contacts_as_outputs(asked: str) -> None:
+    """They are refused, and the message names what runs have, which is there."""
+    m = eg.Model("asked", gravity=(0, -9.81, 0))
+    body = m.body("b", mass=1.0, inertia={"zz": 0.01})
+    m.planar("j", m.ground, body)
+    m.contacts("c", {**SHAPES["circle"], "on": body}, {"shape": "half_plane", "on": m.ground}, rigid(friction=0.3))
+    run = m.compile().simulate(0.01, {"j_y": 0.5}, method="moreau", step=1e-3, contact_forces=True)
+    m.output("f", asked)
+    with pytest.raises(ModelError, match=r"'c'.*normal_law: rigid.*exerts impulses, not forces") as told:
+        m.compile(target="numpy")
+    if "on=" not in asked:
+        assert "normal(c)" in str(told.value)
+        assert {"normal(c)", "friction(c)"} <= set(run.columns.names)
+    assert "run.contact_forces.on(BODY)" in str(told.value)
+    assert run.contact_forces.on("b").shape == (6, len(run))
