@@ -216,7 +216,7 @@ def test_redundant_rows_that_contradict_each_other_are_told(moving: bool, monkey
 
 
 def parallelograms(n: int) -> eg.Model:
-    """On one another; at the positions of all angles 0, all flat, cranks and couplers determine nothing of each other."""
+    """On one another; where all are flat, at angles of 0, independent angles are chosen that determine nothing else."""
     m = eg.Model("parallelograms", gravity=(0, -9.81, 0))
     length, width, dz = (m.parameter(*one) for one in (("length", 0.3), ("width", 0.4), ("dz", 0.0)))
     base = m.ground
