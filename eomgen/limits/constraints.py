@@ -71,7 +71,7 @@ PASSED = 1e-4
 #: Least square of the sine between a column of pivots and those before it, in straight-line code that may fall back to
 #: pivoting: an angle of 3e-3, beyond which accelerations keep eight digits; and where it must not, of rounding alone.
 LOST, VANISHED = 1e-5, 1e-20
-#: The same for pivots of products of columns, which rounding makes 1e-16 of a column's: six digits are told, and refined
+#: The same for pivots of products of columns, which rounding makes 1e-16 of a column's: six digits are told, refined
 #: solutions have ten.
 ROUNDED = 1e-10
 #: Least part of an inertia, or of what a constraint's multiplier moves, that elimination may leave of it in code that
