@@ -54,7 +54,12 @@ def scale(s: Expr, a: Vec3) -> Vec3:
 
 def dot(a: Vec3, b: Vec3) -> Expr:
     """a . b"""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    graph = a[0].graph
+    zero = total = graph.zero.id
+    for x, y in zip(a, b, strict=True):
+        if zero not in (x.id, y.id):  # most products vanish: of axes of frames, of what stands still
+            total = graph.add(total, (x * y).id)
+    return Expr(graph, total)
 
 
 def cross(a: Vec3, b: Vec3) -> Vec3:

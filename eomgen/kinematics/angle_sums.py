@@ -28,7 +28,9 @@ def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> tuple[Expr,
     terms : list of (index into q, factor)
     """
     angle = atan2(rotation[1][0], rotation[0][0])
-    slopes = gradient(angle, q)
+    held = symbols_of([angle])
+    turning = [j for j, x in enumerate(q) if x.node[1] in held]
+    slopes = gradient(angle, [q[j] for j in turning])
     tried = [rotation[2][2], *slopes]
     names = sorted(symbols_of(tried))
     random = np.random.default_rng(7)
@@ -40,8 +42,8 @@ def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> tuple[Expr,
     steps = np.round(found[0][1:])
     if any(not abs(x[0] - 1.0) < PLANE or not (np.abs(x[1:] - steps) < PLANE).all() for x in found):
         return None
-    terms = [(int(j), float(steps[j])) for j in np.flatnonzero(steps)]
-    start = substitute([angle], dict.fromkeys(q, graph.zero))[0]
+    terms = [(j, float(step)) for j, step in zip(turning, steps, strict=True) if step]
+    start = substitute([angle], {q[j]: graph.zero for j in turning})[0]
     for j, factor in terms:
         start = start + factor * q[j]
     return start, terms

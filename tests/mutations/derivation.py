@@ -279,7 +279,7 @@ FAULTS = (
     ),
     Fault(
         "sum-of-turns", "eomgen/kinematics/angle_sums.py",
-        "start = substitute([angle], dict.fromkeys(q, graph.zero))[0]",
+        "start = substitute([angle], {q[j]: graph.zero for j in turning})[0]",
         "start = graph.zero",
         "the angle of a plane loop's cut joint lacks its constant part",
         (
