@@ -69,7 +69,7 @@ class BodyLoops(LoopBlocks):
 
     def _far(self) -> Expr:
         """By the rows, of which redundant ones keep nothing, or by the columns of the dependent coordinates."""
-        graph, separate, angles = self.terms.graph, self._separate_rows(), self._angles_of_columns()
+        graph, separate, angles = self.terms.graph, self.separate_rows(), self._angles_of_columns()
         if angles is None:
             return separate
         columns = self.all_of([graph.apply("lt", size * NEAR_SQUARE, part) for size, part in angles])

@@ -81,7 +81,7 @@ class EmbeddedLoops(LoopBlocks):
         graph = self.terms.graph
         far = self.all_of([graph.apply("lt", size * NEAR_SQUARE, part) for size, part in self._angles])
         if self.gentle and far != graph.one and not self.redundant:
-            far = graph.apply("or", far, self._separate_rows())
+            far = graph.apply("or", far, self.separate_rows())
         return far
 
     # -- partition ------------------------------------------------------------------------------------------------

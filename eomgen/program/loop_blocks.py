@@ -254,7 +254,7 @@ class LoopBlocks(ABC):
         """Per row the group with which its length is compared."""
         return self.terms.row_groups or (ALL,) * len(self.J)
 
-    def _separate_rows(self) -> Expr:
+    def separate_rows(self) -> Expr:
         """Whether as many rows as the rank are neither short beside their group nor near to those before them."""
         graph, pivots = self.terms.graph, self._solver[0].pivots
         squares = [graph.zero if (x := dot(row, row)) is None else x for row in self.J]

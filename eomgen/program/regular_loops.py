@@ -15,6 +15,7 @@ from functools import cached_property
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
+from ..limits.constraints import LOST
 from ..limits.crossings import NEAR_SQUARE
 from .embedded_loops import SPREAD, embedded_accelerations
 from .loop_blocks import LoopBlocks, largest, total_magnitude
@@ -22,6 +23,7 @@ from .orthogonal import OrthogonalFactor, connected, fronts, work
 from .sparse import Row, SparseFactor, dot, factorize, times, transpose
 
 ENDLESS = 1e300  #: the length of a step that is not known here
+ROW = 64  #: connected columns from which on rows tell what is near, as columns of 160 four-bars no longer can
 
 
 class RegularLoops:
@@ -104,10 +106,26 @@ class RegularLoops:
         """y (f,) for which B y is nearest to x."""
         return self._nearest.solve(times(self._weighted, x))
 
+    @cached_property
+    def _in_a_row(self) -> bool:
+        """Whether so many columns are connected that what one has across all others is small away from change points,
+        too: the last crank of n four-bars in a row has 0.4 / n.
+        """
+        return max(map(len, self._factor.parts), default=0) > ROW
+
     def _follows(self) -> list[Expr]:
         """Whether the dependent velocities follow well from the independent ones: not by columns that are nearly
-        parallel, or short beside others.
+        parallel, or short beside others, nor so that they move many times as fast.
         """
+        graph, s = self.terms.graph, self.loops.s
+        found = self._across(LOST if self._in_a_row else NEAR_SQUARE)
+        for j, k in enumerate(self.terms.preferred):
+            square = self._products[j][j] * (s[k] * s[k])
+            found.append(graph.apply("lt", square, graph.constant(SPREAD * SPREAD)))
+        return found
+
+    def _across(self, limit: float) -> list[Expr]:
+        """Whether every column has more than this part of its square across those before it."""
         graph, s = self.terms.graph, self.loops.s
         scales = [s[k] * s[k] for k in self.dependent]
         lengths = [x * k for x, k in zip(self._factor.squares, scales, strict=True)]
@@ -118,11 +136,15 @@ class RegularLoops:
         for columns, usual, apart in self._factor.apart:
             for k in columns:
                 usual, apart = usual * graph.apply("max", lengths[k], least[k]), apart * scales[k]
-            found.append(graph.apply("lt", usual * NEAR_SQUARE, apart))
-        for j, k in enumerate(self.terms.preferred):
-            square = self._products[j][j] * (s[k] * s[k])
-            found.append(graph.apply("lt", square, graph.constant(SPREAD * SPREAD)))
+            found.append(graph.apply("lt", usual * limit, apart))
         return found
+
+    def _far(self) -> list[Expr]:
+        """Conditions besides by which no change point is near: none where columns tell that already."""
+        if not self._in_a_row:
+            return []
+        columns = self.loops.all_of(self._across(NEAR_SQUARE))
+        return [self.terms.graph.apply("or", columns, self.loops.separate_rows())]
 
     def _long(self) -> Expr:
         """Whether as many rows as their rank are not short beside their group."""
@@ -169,7 +191,7 @@ class RegularLoops:
         gamma = [x * i for x, i in zip(here[terms.n_v :], self.loops.inverse, strict=True)]
         given, _ = self._particular([-x for x in gamma])
         a, checks = embedded_accelerations(terms, self.loops.s, self._motions, given, here[: terms.n_v])
-        conditions = [*self._follows(), self._long()]
+        conditions = [*self._follows(), *self._far(), self._long()]
         if self.loops.redundant:  # whose rates may contradict each other
             conditions += [self.loops.held(self.moved, self._rate), self.loops.held(a, gamma)]
         return [*self.moved, *a, self.loops.all_of(conditions), terms.graph.one], checks

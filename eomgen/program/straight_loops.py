@@ -12,6 +12,7 @@ from .terms import SystemTerms
 
 SOLUTIONS = 4  #: that leave no trace of DIFFERENTIATED
 SAVED = 0.7  #: part of the operations of the usual blocks that others take at most which are tried before them
+LONGER = 4  #: times as many multiplications as usual blocks these may take, being printed in loops where many are alike
 
 
 def regular_loops(loops: LoopBlocks | None, longest: int) -> RegularLoops | None:
@@ -22,7 +23,7 @@ def regular_loops(loops: LoopBlocks | None, longest: int) -> RegularLoops | None
     if loops is None or not loops.gentle:
         return None
     regular = RegularLoops(loops)
-    if not regular.possible or regular.estimate > longest:
+    if not regular.possible or regular.estimate > LONGER * longest:
         return None
     return regular if _operations(regular) < SAVED * _operations(loops) else None
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
+from benchmarks.large_loops import four_bars as four_bars_in_a_row
 from benchmarks.loop_robots import ROBOTS
 from eomgen import pipeline
 from eomgen.graph.evaluate import compile_evaluator
@@ -247,3 +248,19 @@ def test_pivots_of_rounding_alone_do_not_count_as_sound() -> None:
     assert np.linalg.svd(columns, compute_uv=False)[-1] < 1e-12, "this choice is meant to fail"
     expected = pivoting.rhs(0.0, x)
     np.testing.assert_allclose(module.rhs(0.0, x), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_many_loops_in_a_row_are_told_by_their_rows() -> None:
+    beside = Beside(four_bars_in_a_row(40))  # the last column has 0.02 of its square across the others
+    n = beside.n
+
+    def state(angle: float) -> np.ndarray:
+        signs = np.array([1.0 if name[0] == "A" else -1.0 for name in beside.module.q_names])
+        return np.concatenate([angle * signs, 0.7 * signs])
+
+    found, usual = (beside.evaluate(name, state(0.3)) for name in ("regular_dynamics", "dynamics"))
+    assert found[2 * n] == 1.0
+    np.testing.assert_allclose(found[: 2 * n], usual[: 2 * n], rtol=0, atol=1e-12 * np.abs(usual).max())
+    assert beside.evaluate("regular_closing", state(0.3))[2] <= NEARBY
+    for flat in (0.5 * np.pi, 0.5 * np.pi - 0.01, 0.01 - 0.5 * np.pi):  # cranks along the ground: rows depend there
+        assert beside.evaluate("regular_dynamics", state(flat))[2 * n] != 1.0
