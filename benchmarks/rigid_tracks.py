@@ -9,6 +9,7 @@ from time import process_time
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from eomgen.simulation.moreau import ContactWarning
 
@@ -20,21 +21,47 @@ from tracked_excavator import build
 from .excavator_mujoco import Scene
 
 TITLE = "the tracked excavator with rigid contact, beside MuJoCo"
-STEP, FULL = 1e-3, 3.0  #: (s), and speed of the sprocket (rad/s) that is reached after 1 s
+STEP = 1e-3  #: (s)
+#: Speeds of the sprocket (rad/s) over times (s): of a start, and turned round within 0.3 s.
+DRIVE = ([0.0, 1.0], [0.0, 3.0])
+REVERSAL = ([0.0, 1.0, 2.0, 2.3], [0.0, 3.0, 3.0, -3.0])
 #: Of moreau: tolerance relative to the speeds of contacts, and iterations after the edges.
 TOLERANCE, ITERATIONS = 1e-3, 1
 
 
-def ours(module: Any, seconds: float) -> list[Any]:
-    """Real-time factor, way, speed, most contacts, largest residual and penetration of method moreau."""
+def by_moreau(module: Any, seconds: float, speeds: tuple[list[float], list[float]]) -> Any:
+    """A run of a drive."""
     options = {"method": "moreau", "step": STEP, "contact_tolerance": TOLERANCE, "contact_iterations": ITERATIONS}
-    drive = {"speed": ([0.0, 1.0], [0.0, FULL])}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ContactWarning)  # the residual is in the table
-        module.simulate(2 * STEP, inputs=drive, **options)  # compiles what such runs need
-        start = process_time()
-        run = module.simulate(seconds, inputs=drive, **options)
-        spent = process_time() - start
+        return module.simulate(seconds, inputs={"speed": speeds}, **options)
+
+
+def by_mujoco(
+    model: Any, module: Any, seconds: float, speeds: tuple[list[float], list[float]]
+) -> tuple[float, list[float], list[float], int, float]:
+    """CPU seconds, ways and speeds of the chassis at all steps, most contacts, deepest penetration at the end."""
+    world = mujoco.MjModel.from_xml_string(Scene(model, module, STEP).text())
+    data = mujoco.MjData(world)
+    x, rate = int(world.joint("x").qposadr[0]), int(world.joint("x").dofadr[0])
+    mujoco.mj_forward(world, data)
+    most, ways, rates = 0, list[float](), list[float]()
+    start = process_time()
+    for _ in range(round(seconds / STEP)):
+        data.ctrl[0] = np.interp(data.time, *speeds)
+        mujoco.mj_step(world, data)
+        most = max(most, data.ncon)
+        ways.append(float(data.qpos[x]))
+        rates.append(float(data.qvel[rate]))
+    return process_time() - start, ways, rates, most, -float(data.contact.dist.min())
+
+
+def ours(module: Any, seconds: float) -> list[Any]:
+    """Real-time factor, way, speed, most contacts, largest residual and penetration of method moreau."""
+    by_moreau(module, 2 * STEP, DRIVE)  # compiles what such runs need
+    start = process_time()
+    run = by_moreau(module, seconds, DRIVE)
+    spent = process_time() - start
     told = run.metadata
     way, speed = float(run["x"][-1]), float(run["x_dot"][-200:].mean())
     laws = [told["contacts"], told["contact_residual"], told["missed_steps"] / told["steps"], told["penetration"]]
@@ -43,20 +70,21 @@ def ours(module: Any, seconds: float) -> list[Any]:
 
 def theirs(model: Any, module: Any, seconds: float) -> list[Any]:
     """The same of MuJoCo, whose contacts are soft: no residual."""
-    world = mujoco.MjModel.from_xml_string(Scene(model, module, STEP).text())
-    data = mujoco.MjData(world)
-    x, rate = int(world.joint("x").qposadr[0]), int(world.joint("x").dofadr[0])
-    mujoco.mj_forward(world, data)
-    most, speeds = 0, []
-    start = process_time()
-    for _ in range(round(seconds / STEP)):
-        data.ctrl[0] = FULL * min(data.time, 1.0)
-        mujoco.mj_step(world, data)
-        most = max(most, data.ncon)
-        speeds.append(float(data.qvel[rate]))
-    spent = process_time() - start
-    deepest = -float(data.contact.dist.min())
-    return ["MuJoCo", seconds / spent, float(data.qpos[x]), sum(speeds[-200:]) / 200, most, None, None, deepest]
+    spent, ways, speeds, most, deepest = by_mujoco(model, module, seconds, DRIVE)
+    return ["MuJoCo", seconds / spent, ways[-1], sum(speeds[-200:]) / 200, most, None, None, deepest]
+
+
+def turned_round(model: Any, module: Any) -> list[list[Any]]:
+    """Least, greatest and mean speed of the chassis by both in parts of a drive that is turned round."""
+    seconds = 4.0
+    run, (_, _, theirs, _, _) = by_moreau(module, seconds, REVERSAL), by_mujoco(model, module, seconds, REVERSAL)
+    t, rows = np.arange(1, round(seconds / STEP) + 1) * STEP, list[list[Any]]()
+    own, other = np.interp(t, run.t, run["x_dot"]), np.array(theirs)
+    for begin, end in ((1.0, 2.0), (2.0, 2.3), (2.3, 2.6), (2.6, 3.0), (3.0, 4.0)):
+        part = (t > begin) & (t <= end)
+        found = [float(f(v[part])) for v in (own, other) for f in (np.min, np.max, np.mean)]
+        rows.append([f"{begin:g} to {end:g}", *found])
+    return rows
 
 
 def run(quick: bool) -> Report:
@@ -77,4 +105,11 @@ def run(quick: bool) -> Report:
         "MuJoCo: implicitfast, elliptic cones, Newton, time constants of 2 ms; the upper structure is rigid there.",
         "Penetration: the deepest of the run by moreau, its start among it; that at the end in MuJoCo.",
     )
-    return Report((Table("drive on flat ground", head, rows),), limits, notes, {"rows": rows})
+    tables = [Table("drive on flat ground", head, rows)]
+    if not quick:
+        turned = turned_round(model, module)
+        parts = ("time s", "least m/s", "greatest", "mean", "MuJoCo's least", "greatest", "mean")
+        tables.append(Table("turned round from 0.95 m/s within 0.3 s", parts, turned))
+        worst = float(max(abs(row[3] - row[6]) for row in turned))
+        limits = (*limits, Limit("turned round: mean speeds beside MuJoCo's", worst, 0.1, "m/s"))
+    return Report(tuple(tables), limits, notes, {"rows": rows})
