@@ -94,6 +94,11 @@ CASES: tuple[Judged, ...] = (
     contacts("bristle_stiffness", 1.0, NOT_POSITIVE, **LUGRE | {"bristle_stiffness": "@"}),
     contacts("bristle_damping", 1.0, NOT_POSITIVE, **LUGRE | {"bristle_damping": "@"}),
     contacts("static_friction", 0.4, NOT_POSITIVE, **LUGRE, static_friction="@", stribeck=0.1),
+    contacts("viscous_friction", 0.0, NEGATIVE, **RUB, viscous_friction="@"),
+    contacts("viscous_friction", 0.1, NEGATIVE, **LUGRE, viscous_friction="@"),
+    force("viscous", 0.0, NEGATIVE, type="friction", joint="ja", viscous="@"),
+    force("viscous", 0.1, NEGATIVE, type="friction", joint="ja", viscous="@", coulomb=1.0, smoothing=0.1),
+    force("viscous", 0.1, NEGATIVE, **REACT, viscous="@"),
     force("coulomb", 0.0, NEGATIVE, type="friction", joint="ja", coulomb="@", smoothing=0.1),
     force("static", 0.0, NEGATIVE, type="friction", joint="ja", coulomb=1.0, smoothing=0.1, static="@", stribeck=1.0),
     *(

@@ -10,6 +10,7 @@ from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field
 from ..graph.core import Expr
+from ..numeric.value_ranges import NOT_NEGATIVE
 from ..records import dataclass
 from .dry_friction import LineFriction
 from .force import Force, Load, View
@@ -51,6 +52,8 @@ class JointFriction(Force):
 
 def _joint_friction(e: Entry) -> Force | None:
     path, viscous = read_coordinate(e), e.given("viscous")
+    if viscous is not None:
+        e.require("viscous", viscous, NOT_NEGATIVE, "must be 0 or greater")
     if "coefficient" in e.values:
         return read_reaction_friction(e, path, viscous)
     for key in BY_REACTION:

@@ -181,6 +181,8 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
     e.require(dynamic, level, NOT_NEGATIVE, "must be 0 or greater")
     kind = e.choice("friction_law")
     along = e.given(viscous)
+    if along is not None and not alone:
+        e.require(viscous, along, NOT_NEGATIVE, "must be 0 or greater")
     drag = e.graph.zero if along is None else along
     if kind == "brown_mcphee":
         return _brown_mcphee(e, level, drag, static)
