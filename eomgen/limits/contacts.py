@@ -51,7 +51,7 @@ BESIDE = 0.98
 UPRIGHT = 0.83
 #: Part of K over which shear of a cell of soil follows its sliding, and which it gives back.  With UNSHEARED the sum of
 #: shear of a wheel is within 0.6 % of that of 1 - exp(-j / K) at slips of 0.1 to 0.6, within 1 % at 0.02, by quadrature
-#: over the arc at 2 and 5 cm in dry sand and heavy clay; the stiffness |v| / l stays below 1000 / s up to 0.7 m/s.
+#: over the arc at 2 and 5 cm in dry sand and heavy clay; its stiffness, v / l, stays below 1000 / s up to 0.7 m/s.
 GRIP = 0.03
 #: Part of the strength of a cell of soil that is there before it has been sheared: GRIP / 2 is what grip lags behind by
 #: the growth of d, and the rest of it what it lags behind by the growth of the load.
