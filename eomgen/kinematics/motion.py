@@ -246,8 +246,8 @@ class MarkerMotion:
             told = f"the contacts {force.name!r} have normal_law: rigid, which exerts impulses, not forces"
             remedy = (
                 "read run.contact_forces.on(BODY) of a run by method moreau with contact_forces=True, means of steps; "
+                "or give a normal law with a stiffness"
             )
-            remedy += "or give a normal law with a stiffness"
             raise ModelError([mechanism.problem(quantity.path, told, remedy)])
         if isinstance(found, str):
             remedy = f"give a body on which it acts; power({force.name}) is known of every element"

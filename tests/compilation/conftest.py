@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -11,6 +12,7 @@ from eomgen.compilation import Cache, compile_sources, load_core
 from eomgen.emit.sources import read_template
 
 MODEL = Path(__file__).with_name("model")
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 @pytest.fixture(autouse=True)
@@ -42,3 +44,16 @@ def sources() -> dict[str, str]:
 @pytest.fixture
 def core(sources: dict[str, str]) -> ModuleType:
     return load_core(compile_sources(sources, "pendulum"))
+
+
+@pytest.fixture
+def write(request: pytest.FixtureRequest, tmp_path: Path) -> Any:
+    """Writes a model whose code no other test has, and gives its file."""
+    module = request.module.__name__.rpartition("test_")[2]
+
+    def write(name: str, example: str = "two_link_manipulator") -> Path:
+        file = tmp_path / f"{name}.yaml"
+        file.write_text((EXAMPLES / f"{example}.yaml").read_text().replace(example, f"{module}_{name}"))
+        return file
+
+    return write

@@ -18,7 +18,6 @@ from eomgen.compilation import Cache, find_compiler
 from eomgen.compilation.late_classes import NAMES
 from eomgen.runtime.late import eager
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "two_link_manipulator.yaml"
 OTHER = """
 import pickle, sys
 import numpy as np
@@ -29,20 +28,8 @@ print('ensemble' in vars(eager(module.core)))
 """
 
 
-@pytest.fixture
-def write(tmp_path: Path) -> Any:
-    """Writes a model whose code no other test has, and gives its file."""
-
-    def write(name: str) -> Path:
-        file = tmp_path / f"{name}.yaml"
-        file.write_text(EXAMPLE.read_text().replace("two_link_manipulator", f"classes_{name}"))
-        return file
-
-    return write
-
-
 def kinds(cache: Cache, name: str) -> list[str]:
-    return sorted(entry.kind for entry in cache.entries() if entry.name == f"classes_{name}")
+    return sorted(entry.kind for entry in cache.entries() if entry.name == f"late_classes_{name}")
 
 
 def starts(k: int) -> np.ndarray:

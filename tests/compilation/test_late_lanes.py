@@ -19,7 +19,6 @@ import eomgen as eg
 from eomgen.compilation import Cache, find_compiler
 from eomgen.runtime.late import eager
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "two_link_manipulator.yaml"
 OTHER = """
 import sys
 import numpy as np
@@ -32,24 +31,12 @@ print(eager(module.core).lane_width)
 """
 
 
-@pytest.fixture
-def write(tmp_path: Path) -> Any:
-    """Writes a model whose code no other test has, and gives its file."""
-
-    def write(name: str) -> Path:
-        file = tmp_path / f"{name}.yaml"
-        file.write_text(EXAMPLE.read_text().replace("two_link_manipulator", f"late_{name}"))
-        return file
-
-    return write
-
-
 def states(k: int) -> np.ndarray:
     return np.random.default_rng(k).uniform(-3.0, 3.0, (4, k))
 
 
 def kinds(cache: Cache, name: str) -> list[str]:
-    return sorted(entry.kind for entry in cache.entries() if entry.name == f"late_{name}")
+    return sorted(entry.kind for entry in cache.entries() if entry.name == f"late_lanes_{name}")
 
 
 def test_a_batch_brings_the_lanes_and_the_bits_stay(write: Any, cache: Cache) -> None:
@@ -90,8 +77,7 @@ def test_many_small_batches_bring_them_and_loops_that_pivot_have_none(write: Any
     assert core.lane_width == 1
     module.energy(x)
     assert core.lane_width > 1
-    file = write("crank")
-    file.write_text(EXAMPLE.with_name("slider_crank.yaml").read_text().replace("slider_crank", "late_crank"))
+    file = write("crank", "slider_crank")
     for method, lanes in (("augmented", False), ("embedding", True)):
         crank = eg.load(file).compile(method=method)
         crank.rhs(0.0, np.repeat(crank.x0()[:, None], 5000, axis=1))
