@@ -6,8 +6,8 @@
 The text is the same for every model. It is compiled once and linked with a model's C source; everything it knows about
 the model it reads from the table and from the model's JSON metadata.
 
-Threads: contexts never change, and each call has its work array to itself, on the stack when small and on the heap
-otherwise. So any number of threads may call one kernel at once, in free-threaded Pythons too; only ``failure`` is
+Threads: contexts never change but for the work array that one call leaves to the next, and each call has its work array
+to itself, on the stack when small and on the heap otherwise. So any number of threads may call one kernel at once, in free-threaded Pythons too; only ``failure`` is
 shared: it holds the last failure of any thread. Batches and long kernels run without the GIL. What late lanes change
 is published by atomic operations (_lanes.pxi). Steppers and journeys are of one thread each; their solutions
 (interpolants, dense) may be read by many.
@@ -115,7 +115,7 @@ cdef cnp.ndarray copy(const double *data, cnp.npy_intp n):
 
 
 cdef class Context:
-    """Parameters and inputs bound to a model, with the constants that follow from them; never changes.
+    """Parameters and inputs bound to a model, with the constants that follow from them.
 
     Parameters
     ----------
@@ -133,6 +133,7 @@ cdef class Context:
     """
 
     cdef readonly cnp.ndarray p, u, c
+    cdef object spare  # work that an earlier call is done with
 
     def __cinit__(self, p=None, u=None, error=ValueError):
         p = declared("p_values") if p is None else p
@@ -142,6 +143,18 @@ cdef class Context:
         self.c = compute_constants(self.p, error)
         for array in (self.p, self.u, self.c):
             array.flags.writeable = False
+
+    cdef object take_work(self):
+        """Work for a call and for constants of its own. Large arrays, which systems map anew each time, are kept."""
+        cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_const
+        with cython.critical_section(self):
+            found, self.spare = self.spare, None
+        return cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if found is None else found
+
+    cdef int leave_work(self, object work) except -1:
+        """Keep the work of a call that went well for the next one."""
+        with cython.critical_section(self):
+            self.spare = work
 
 
 include "_batches.pxi"

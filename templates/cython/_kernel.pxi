@@ -110,7 +110,7 @@ cdef class Kernel:
         if p is not None:
             n_work += MODEL.n_const
         if n_work > STACK:
-            heap = cnp.PyArray_EMPTY(1, &n_work, cnp.NPY_DOUBLE, 0)
+            heap = (<Context>self.context).take_work()
             w = <double *>cnp.PyArray_DATA(<cnp.ndarray>heap)
         if p is not None:
             fill_constants(<cnp.ndarray>p, w, self.error)
@@ -129,6 +129,8 @@ cdef class Kernel:
                 data[i] = entry(data[i], status)
             given = () if p is None and u is None else (p, copy(inputs, MODEL.n_u))
             self.report(status, now, copy(state, self.n_in), given)
+        elif n_work > STACK:
+            (<Context>self.context).leave_work(heap)
         return out
 
     cdef int report(self, int status, double t, cnp.ndarray x, tuple given) except -1:
