@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
+from eomgen.runtime.late import eager
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 THREADS = 8
@@ -67,6 +68,22 @@ def states(module: Any, k: int, count: int = 40) -> np.ndarray:
     random = np.random.default_rng(k)
     x = module.x0()
     return x[:, None] + 0.01 * random.normal(size=(len(x), count))
+
+
+def test_calls_that_leave_their_work_to_the_next() -> None:
+    module = eg.load_example("excavator").compile()
+    assert eager(module.core).sizes["n_work"] > 1024, "work of this size is on the stack"
+    start = states(module, 0)[:, 0].copy()
+    expected = module.rhs(0.0, start)
+    with pytest.raises(eg.EomgenError):
+        module.rhs(0.0, np.full_like(start, 1e200))
+    np.testing.assert_array_equal(module.rhs(0.0, start), expected)
+
+    def task(k: int) -> list[Any]:
+        columns = [np.ascontiguousarray(column) for column in states(module, k).T]
+        return [module.rhs(0.0, x, p=module.p) if i % 2 else module.rhs(0.0, x) for i, x in enumerate(columns)]
+
+    agree(task)
 
 
 def test_kernels_and_batches(crank: Any) -> None:
