@@ -131,7 +131,7 @@ def derive_as(
     from .program.choice import choose
 
     seconds: dict[str, float] = {}
-    with _timed(seconds, "describe"):
+    with _alone(), _timed(seconds, "describe"):
         mechanism = model.mechanism()
     chosen = choose_method(mechanism, method)
     with _alone(), _timed(seconds, "kinematics"):
@@ -151,7 +151,8 @@ def derive_as(
             tree = METHODS[chosen](kinematics)
         else:
             tree, choice = choose(kinematics, mobility)
-    return kind(kinematics, mobility, tree, seconds, choice)
+    with _alone():
+        return kind(kinematics, mobility, tree, seconds, choice)
 
 
 def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float]) -> Kinematics:

@@ -56,12 +56,16 @@ class ConstraintFunctions:
     def _split(
         self, values: Sequence[Expr], slopes: Sequence[Sequence[Expr]]
     ) -> Callable[[Array, float], tuple[Array, Array]]:
-        """Functions and their slopes in one evaluation."""
-        evaluate, k, shape = self._compile([*values, *(e for row in slopes for e in row)]), len(values), len(slopes)
+        """Functions and their slopes in one evaluation; slopes that vanish identically are not evaluated."""
+        zero, k, shape = self.kinematics.graph.zero.id, len(values), (len(slopes), len(slopes[0]) if slopes else self.n)
+        held = [(i, j, e) for i, row in enumerate(slopes) for j, e in enumerate(row) if e.id != zero]
+        rows, columns = [i for i, _, _ in held], [j for _, j, _ in held]
+        evaluate = self._compile([*values, *(e for _, _, e in held)])
 
         def call(q: Array, t: float) -> tuple[Array, Array]:
-            flat = evaluate(q, t)
-            return flat[:k], flat[k:].reshape(shape, -1 if shape else self.n)
+            found, matrix = evaluate(q, t), np.zeros(shape)
+            matrix[rows, columns] = found[k:]
+            return found[:k], matrix
 
         return call
 

@@ -11,14 +11,9 @@ from ..errors import AssemblyError, ModelError
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
 from ..limits.constraints import CHOSEN
-from ..numeric import (
-    algebra,
-    choose_independent,
-    conditioning,
-    independent_rows,
-    rank,
-)
+from ..numeric import choose_independent, independent_rows
 from ..numeric.nearest_branch import differences
+from ..numeric.row_chains import SparseRows
 from ..records import dataclass
 from ..suggestions import hint, joined
 from .candidates import rate_candidates
@@ -182,8 +177,8 @@ def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
     random = np.random.default_rng(1)
     if not functions.h:
         return [scales.move(q, random.uniform(0.2, 0.9, len(scales.q))) for _ in range(PROBES)]
-    J = functions.place_jacobian(q)
-    basis = algebra.svd(J)[2][rank(J).rank :]
+    rows = SparseRows(functions.place_jacobian(q))
+    basis = rows.motions(rows.rank)
     for k in range(PROBES):
         step = random.normal(size=len(basis)) @ basis
         length = float(np.linalg.norm(step))
@@ -205,8 +200,8 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     q = configurations[0]
     jacobians = [functions.scaled_jacobian(x) if functions.m else np.empty((0, n)) for x in configurations]
     require_finite(functions, q)
-    jacobians = [J for J in jacobians if np.isfinite(J).all()]
-    ranks = tuple(rank(J).rank for J in jacobians)
+    judged = [SparseRows(J) for J in jacobians if np.isfinite(J).all()]
+    ranks = tuple(rows.rank for rows in judged)
     r = max(ranks)
     if functions.m and not r:
         refuse_idle_rows(kinematics, functions.values)
@@ -217,15 +212,15 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         raise ModelError(
             [kinematics.mechanism.problem("independent", message, f"choose {n_dof} of {', '.join(names)}")]
         )
-    chosen = _choose(kinematics, jacobians, r, wanted)
-    quality = conditioning(jacobians[0], chosen)
+    chosen = _choose(kinematics, judged, r, wanted)
+    quality = judged[0].conditioning(chosen)
     at_change_point = ranks[0] < r  # where nothing can be said of a choice: the samples may lie on other branches
-    others = [conditioning(J, chosen) for J in jacobians[1:]] if wanted and not at_change_point else []
+    others = [rows.conditioning(chosen) for rows in judged[1:]] if wanted and not at_change_point else []
     if wanted and not at_change_point and max(quality, *others, 0.0) < CHOSEN:
         message = f"{', '.join(wanted)} cannot move the mechanism on their own at the initial configuration"
-        better = [names[j] for j in choose_independent(jacobians, r)]
+        better = [names[j] for j in choose_independent(judged, r)]
         raise ModelError([kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can")])
-    rows = independent_rows(jacobians[int(np.argmax(ranks))], r) if r else np.empty(0, dtype=int)
+    rows = independent_rows(judged[int(np.argmax(ranks))].J, r) if r else np.empty(0, dtype=int)
     kept = tuple(int(i) for i in rows)
     return Mobility(
         q_reference=tuple(float(x) for x in q),
@@ -241,23 +236,23 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         configurations=len(configurations),
         ranks=ranks,
         samples=tuple(tuple(float(x) for x in sample) for sample in configurations),
-        n_positions=len(functions.system.scales.q) - max(_position_ranks(functions, configurations, jacobians, ranks)),
+        n_positions=len(functions.system.scales.q) - max(_position_ranks(functions, configurations, judged)),
         instantaneous=n - ranks[0],
-        candidates=tuple((names[k], value) for k, value in rate_candidates(jacobians[0], chosen).items()),
+        candidates=tuple((names[k], value) for k, value in rate_candidates(judged[0].J, chosen).items()),
         driven=any(not e.is_zero for e in kinematics.constraints.time_derivative),
     )
 
 
 def _position_ranks(
-    functions: ConstraintFunctions, configurations: Sequence[Array], jacobians: Sequence[Array], ranks: Sequence[int]
+    functions: ConstraintFunctions, configurations: Sequence[Array], judged: Sequence[SparseRows]
 ) -> list[int]:
     """Ranks of the constraints of positions; those known already of the same matrices are not found again."""
-    known = {J.tobytes(): r for J, r in zip(jacobians, ranks, strict=True)}
+    known = {rows.J.tobytes(): rows.rank for rows in judged}
     found = map(functions.place_jacobian, configurations)
-    return [known[key] if (key := J.tobytes()) in known else rank(J).rank for J in found]
+    return [known[key] if (key := J.tobytes()) in known else SparseRows(J).rank for J in found]
 
 
-def _choose(kinematics: Kinematics, jacobians: Sequence[Array], r: int, wanted: Sequence[str]) -> tuple[int, ...]:
+def _choose(kinematics: Kinematics, judged: Sequence[SparseRows], r: int, wanted: Sequence[str]) -> tuple[int, ...]:
     names = kinematics.velocity_labels
     n_dof = len(names) - r
     picked = [names.index(name) for name in wanted]
@@ -269,4 +264,4 @@ def _choose(kinematics: Kinematics, jacobians: Sequence[Array], r: int, wanted: 
     if kinematics.hints and not named:  # the angle of a contact point is nobody's choice
         named = set(names) - {name for name, _ in kinematics.hints}
     prefer = [*picked, *(j for j, name in enumerate(names) if name in named and j not in picked)]
-    return tuple(int(j) for j in choose_independent(jacobians, r, prefer))
+    return tuple(int(j) for j in choose_independent(judged, r, prefer))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .held_path import follow
     from .partitions import Partition, partition
     from .projection import correct_position, correct_velocity, project, tangent_projector
-    from .ranks import Rank, choose_independent, conditioning, independent_rows, rank, redundant_rows
+    from .ranks import Rank, conditioning, independent_rows, rank, redundant_rows
     from .scales import Scales
 
 #: Where each name is defined; loaded on first use, because a module that only evaluates needs none of them.
@@ -33,7 +33,7 @@ _HOMES = {
     "VelocityEquations": "assembly_velocity",
     "accelerate": "embedded",
     "assemble_velocity": "assembly_velocity",
-    "choose_independent": "ranks",
+    "choose_independent": "independent_columns",
     "conditioning": "ranks",
     "correct_position": "projection",
     "correct_velocity": "projection",

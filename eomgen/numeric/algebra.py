@@ -45,10 +45,10 @@ def svd(A: Any, full_matrices: bool = True) -> tuple[Array, Array, Array]:
     return U, sizes, Vt
 
 
-def qr(A: Any) -> tuple[Array, Array]:
-    """Q of orthonormal columns and the triangle R."""
+def qr(A: Any, complete: bool = False) -> tuple[Array, Array]:
+    """Q of orthonormal columns and the triangle R; ``complete``: Q is square."""
     with _Told("a matrix has no orthonormal basis", A):
-        Q, R = np.linalg.qr(A)
+        Q, R = np.linalg.qr(A, mode="complete" if complete else "reduced")
     return Q, R
 
 

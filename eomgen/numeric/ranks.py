@@ -1,10 +1,8 @@
-"""Stage numeric: scaled constraint Jacobians at several configurations -> rank, redundant rows, good coordinates."""
+"""Stage numeric: scaled constraint Jacobian -> rank, redundant rows, how good independent coordinates are."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
-from math import comb
 from typing import NamedTuple
 
 import numpy as np
@@ -13,9 +11,6 @@ from ..limits.constraints import PREFERENCE, UNMOVED
 from ..limits.constraints import STRUCTURE as TOLERANCE
 from . import algebra
 from .scales import Array, Indices
-
-#: At most so many sets of coordinates are compared one by one, where that takes at most so many singular values.
-ENUMERATED, DECOMPOSED = 500, 20_000
 
 
 class Rank(NamedTuple):
@@ -50,6 +45,8 @@ def independent_rows(J: Array, rank: int) -> Indices:
     Earlier rows are preferred: a row is skipped only when the best remaining one is a hundred times farther from the
     span of the chosen ones.
     """
+    if rank == len(J):
+        return np.arange(rank, dtype=np.intp)
     work, distance = np.array(J), np.linalg.norm(J, axis=1)
     chosen: list[int] = []
     for _ in range(rank):
@@ -83,77 +80,3 @@ def conditioning(J: Array, independent: Sequence[int] | Indices, size: float | N
         return 0.0
     size = algebra.norm2(J) if size is None else size
     return float(values[len(dependent) - 1] / size) if size else 0.0
-
-
-def choose_independent(jacobians: Sequence[Array], rank: int, prefer: Sequence[int] = ()) -> Indices:
-    """The independent coordinates that stay best conditioned over several configurations.
-
-    Parameters
-    ----------
-    jacobians : sequence of (m, n) arrays
-        Scaled Jacobians at assembled configurations.
-    rank : int
-        Rank of the constraints.
-    prefer : sequence of int
-        Columns to choose first where the worst conditioning stays within a factor of 100 of the best possible.
-
-    Returns
-    -------
-    (n - rank,) array of int
-        Columns in ascending order.
-    """
-    n = jacobians[0].shape[1]
-    size = n - rank
-    order = list(dict.fromkeys([*prefer, *range(n)]))  # earlier wins among equals
-
-    largest = [algebra.norm2(J) for J in jacobians]
-
-    def worst(columns: Sequence[int]) -> float:
-        return min(conditioning(J, columns, most) for J, most in zip(jacobians, largest, strict=True))
-
-    if comb(n, size) <= min(ENUMERATED, DECOMPOSED // n):
-        sets: list[tuple[int, ...]] = list(combinations(order, size))
-    else:
-        sets = list(dict.fromkeys(_eliminate(J, rank, order) for J in jacobians))
-        if len(prefer) >= size:
-            sets.append(tuple(order[:size]))
-    scores = [worst(columns) for columns in sets]
-    limit = max(scores)
-    favoured = set(prefer)
-    good = [(s, c) for s, c in zip(scores, sets, strict=True) if s >= PREFERENCE * limit]
-    most = max(len(favoured.intersection(c)) for _, c in good)
-    best = max((s for s, c in good if len(favoured.intersection(c)) == most), default=limit)
-    for score, columns in good:
-        if len(favoured.intersection(columns)) == most and score >= 0.999999 * best:
-            return np.array(sorted(columns), dtype=np.intp)
-    return np.array(sorted(sets[int(np.argmax(scores))]), dtype=np.intp)
-
-
-def _eliminate(J: Array, rank: int, order: Sequence[int]) -> tuple[int, ...]:
-    """Independent columns by pivoting, so that the front of `order` stays independent.
-
-    Few dependent columns are found from the back of `order` by elimination in J; few independent ones from its front,
-    by elimination in the motions that J allows.
-    """
-    if len(order) - rank < rank:
-        motions = algebra.svd(J)[2][rank:]
-        found = _pivots(motions, len(order) - rank, list(order))
-        return tuple(c for c in order if c in found)
-    dependent = _pivots(J, rank, list(reversed(order)))
-    return tuple(c for c in order if c not in dependent)
-
-
-def _pivots(rows: Array, count: int, order: Sequence[int]) -> set[int]:
-    """Columns that span the column space: each the first in `order` that is not much nearer to the span than others."""
-    work, chosen = np.array(rows), set[int]()
-    places = np.array(order, dtype=np.intp)
-    for _ in range(count):
-        length = np.linalg.norm(work, axis=0)
-        length[list(chosen)] = 0.0
-        column = int(places[np.flatnonzero(length[places] >= 0.3 * length.max())[0]])
-        if column in chosen:  # nothing is left to choose by
-            column = next(c for c in order if c not in chosen)
-        chosen.add(column)
-        direction = work[:, column] / (length[column] or 1.0)
-        work -= np.outer(direction, direction @ work)
-    return chosen
