@@ -8,25 +8,25 @@ from __future__ import annotations
 
 import importlib.machinery
 import platform
-import shutil
 import sys
-import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import MissingDependencyError, ToolchainError
+from ..errors import ToolchainError
 from ..layer import LAYER
-from .cache import Cache, CacheEntry, compute_key
+from .cache import Cache, compute_key
 from .commands import COMPILE, Running, raise_failure
 from .compiler import CompilerInfo
+from .installed import find_installed
 from .options import layer_flags, stepper_flags
 from .processor import lane_width
 from .products import require_object, stamp, write_stamp
+from .translation import MADE, Translation, choose_translation, translate
 
-SOURCE, _OBJECT = "_core.pyx", "_core.o"
+_OBJECT = "_core.o"
 #: Of a model, that the layer reads too.
 HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_processor.h", "eomgen_contraction.h")
 
@@ -61,7 +61,6 @@ LATE = Half(
     frozenset({"_kernel.pxi", "_calls.pxi", "_integrators.pxi"}),
     tuple(name for name in LAYER if name.endswith(".c") and name not in FIRST.c_files),
 )
-_lock = threading.Lock()  # Cython keeps state of its own
 
 
 def describe_interpreter() -> dict[str, str]:
@@ -93,8 +92,9 @@ def build_layer(
     compiler: CompilerInfo,
     progress: Callable[[str], None] | None = None,
     half: Half = FIRST,
+    translation: Translation | None = None,
 ) -> list[Path]:
-    """Find object files of the layer in the cache, or make them; that of the Cython text is the first of them.
+    """Find object files of the layer in the cache or the package, or make them; the Cython text's is the first.
 
     Parameters
     ----------
@@ -110,6 +110,8 @@ def build_layer(
         Told what is being done.
     half : Half
         Which of them.
+    translation : Translation, optional
+        Of the half's text; chosen here by default.
 
     Raises
     ------
@@ -118,17 +120,12 @@ def build_layer(
     ToolchainError
         If Python's headers are missing, or Cython or the compiler fails.
     """
-    try:
-        from Cython.Shadow import __version__ as version
-    except ImportError as error:
-        raise MissingDependencyError(
-            'target="cython" needs Cython to build its layer once: pip install cython. target="numpy" needs neither '
-            "Cython nor a compiler"
-        ) from error
     texts = half.choose(texts)
-    key = compute_key({**describe_layer(texts, headers, compiler), "cython": version})
-    if (entry := cache.find(key)) is not None:
-        return _objects(entry, half)
+    translation = translation or choose_translation(texts)
+    key = compute_key({**describe_layer(texts, headers, compiler), "cython": translation.version})
+    found = cache.find(key) or find_installed(key)
+    if found is not None:
+        return _objects(found.directory, half)
     from concurrent.futures import ThreadPoolExecutor  # slow to import
 
     includes = [f"-I{find_python_headers()}", f"-I{np.get_include()}"]
@@ -142,7 +139,7 @@ def build_layer(
                 [*compiler.command, *_c_flags(compiler, name), "-I.", "-c", name, "-o", f"{name}.o"]
                 for name in half.c_files
             ),
-            [*compiler.command, *layer_flags(compiler), "-I.", *includes, "-c", "_core.c", "-o", _OBJECT],
+            [*compiler.command, *layer_flags(compiler), "-I.", *includes, "-c", MADE, "-o", _OBJECT],
         ]
 
         def compile_one(command: list[str]) -> None:
@@ -158,16 +155,16 @@ def build_layer(
         with ThreadPoolExecutor(1) as pool:  # steppers and ensembles while Cython translates
             try:
                 others = pool.map(compile_one, commands[:-1])
-                _translate(directory)
+                translate(translation, directory)
                 compile_one(commands[-1])
                 list(others)
             except BaseException:
                 running.stop()
                 pool.shutdown(wait=True, cancel_futures=True)
                 raise
-        (directory / "_core.c").unlink()
-        recipe = {"commands": commands, "cython": version}
-        return _objects(cache.publish(directory, key, "layer", "_core", _OBJECT, recipe), half)
+        (directory / MADE).unlink()
+        recipe = {"commands": commands, "cython": translation.version}
+        return _objects(cache.publish(directory, key, "layer", "_core", _OBJECT, recipe).directory, half)
 
 
 def _c_flags(compiler: CompilerInfo, file: str) -> list[str]:
@@ -177,42 +174,8 @@ def _c_flags(compiler: CompilerInfo, file: str) -> list[str]:
     return [*flags, f"-DEOMGEN_LANES={sum(w for w in (2, 4, 8) if w <= widest)}"]
 
 
-def _objects(entry: CacheEntry, half: Half) -> list[Path]:
-    return [entry.directory / name for name in (_OBJECT, *(f"{name}.o" for name in half.c_files))]
-
-
-def _translate(directory: Path) -> None:
-    """Make _core.c, elsewhere if the name of the folder is none that Cython can write into C."""
-    if str(directory).isascii():
-        _run_cython(directory / SOURCE)
-        return
-    import tempfile  # rarely needed
-
-    with tempfile.TemporaryDirectory(prefix="eomgen-") as plain:
-        for path in directory.glob("*.p[yx]*"):
-            shutil.copy(path, plain)
-        try:
-            _run_cython(Path(plain, SOURCE))
-        except UnicodeError as error:
-            raise ToolchainError(
-                f"Cython cannot write the name of {plain}: {error}. Set TMPDIR or EOMGEN_CACHE_DIR to a name in ASCII"
-            ) from error
-        shutil.copy(Path(plain, "_core.c"), directory)
-
-
-def _run_cython(source: Path) -> None:
-    """Translate the layer to C in this process; cythonize would want setuptools."""
-    import contextlib
-    import io
-
-    from Cython.Compiler import Main
-
-    translate: Callable[..., Any] = Main.compile
-    said = io.StringIO()
-    with _lock, contextlib.redirect_stderr(said):
-        result = translate(str(source), output_file=str(source.with_suffix(".c")), language_level=3)
-    if result.num_errors:
-        raise ToolchainError(f"Cython cannot translate {source}:\n{said.getvalue()}", "cython", said.getvalue())
+def _objects(directory: Path, half: Half) -> list[Path]:
+    return [directory / name for name in (_OBJECT, *(f"{name}.o" for name in half.c_files))]
 
 
 def find_python_headers() -> Path:

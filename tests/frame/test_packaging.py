@@ -60,6 +60,7 @@ def test_wheel_and_sdist_hold_everything(built: Path) -> None:
         )
         assert {f"{folder}/{name}" for name in shipped(folder, copy)} <= sources
     assert {f"eomgen/{name}" for name in shipped("eomgen", copy)} <= names
+    assert sum(name.startswith("eomgen/built/") and name.endswith("/_core.o") for name in names) == 1
     assert not any(name.startswith(("tests/", "docs/", "benchmarks/")) for name in names)
     assert any(name.endswith("LICENSE") for name in names)
 
@@ -72,8 +73,27 @@ def test_the_wheel_works_away_from_the_checkout(built: Path, tmp_path: Path, war
     origin = run("-c", "import eomgen; print(eomgen.__file__)", cwd=tmp_path, **where).strip()
     assert Path(origin).is_relative_to(home)
     run("-m", "eomgen", "examples", "pendulum", cwd=tmp_path, **where)
+    where["EOMGEN_CACHE_DIR"] = str(tmp_path / "empty")  # the layer comes with the package
     out = run("-m", "eomgen", "run", "pendulum.yaml", "--end", "0.1", cwd=tmp_path, **where)
     assert "energy" in out
+    code = "from eomgen.compilation import Cache, cache_directory as c; print([e.kind for e in Cache(c()).entries()])"
+    assert run("-c", code, cwd=tmp_path, **where).strip() == "['extension']"
+
+
+@pytest.mark.slow
+def test_a_wheel_without_code_of_this_computer_is_for_all(built: Path, tmp_path: Path) -> None:
+    """With the layer translated: by request, or without a compiler; an editable install puts it in the clone."""
+    copy = built.parent
+    build = "import sys; from setuptools import build_meta; getattr(build_meta, sys.argv[1])(sys.argv[2])"
+    for hook, variables in {
+        "build_wheel": {"EOMGEN_BUILD_LAYER": "0"},
+        "build_editable": {"CC": str(tmp_path / "no_compiler")},
+    }.items():
+        run("-c", build, hook, tmp_path / hook, cwd=copy, **variables)
+    with zipfile.ZipFile(next((tmp_path / "build_wheel").glob("eomgen-*-py3-none-any.whl"))) as wheel:
+        names = [Path(name).name for name in wheel.namelist() if name.startswith("eomgen/built/")]
+    assert sorted(names) == ["_core.c", "_core.c", "manifest.json", "manifest.json"]
+    assert sorted(Path(name).name for name in shipped("eomgen/built", copy)) == sorted(names)
 
 
 def test_the_editable_install_sees_templates_and_examples() -> None:
