@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 
 from ..graph.core import Graph
 from ..records import dataclass
+from .branches import Pairs
 from .straight import PrintedFunction
 
 CIRCULAR = ("sin", "cos")
@@ -27,8 +28,8 @@ class Angles:
     arguments: tuple[int, ...]
 
 
-def gather_angles(graph: Graph, piece: PrintedFunction) -> Angles:
-    """The angles of a piece that do not themselves depend on a sin or cos computed in it."""
+def gather_angles(graph: Graph, piece: PrintedFunction, pairs: Pairs | None = None) -> Angles:
+    """The angles of a piece that do not themselves depend on a sin or cos computed in it; first those of pairs."""
     nodes = graph.nodes
     inside = set(piece.statements)
     late: set[int] = set()
@@ -40,8 +41,18 @@ def gather_angles(graph: Graph, piece: PrintedFunction) -> Angles:
             arguments[node[1]] = None
         if circular or not late.isdisjoint(node[1:]):
             late.add(i)
+    if pairs is not None:
+        arguments = _side_by_side(arguments, pairs)
     first = _behind(graph, arguments, inside)
     return Angles(tuple(i for i in piece.statements if i in first), tuple(arguments))
+
+
+def _side_by_side(arguments: dict[int, None], pairs: Pairs) -> dict[int, None]:
+    found: dict[int, None] = {}
+    for operands in pairs.operands.values():
+        if len(operands) == 1 and arguments.keys() >= {operands[0][0], operands[0][1]}:
+            found |= {operands[0][0]: None, operands[0][1]: None}
+    return found | arguments
 
 
 def _behind(graph: Graph, roots: Collection[int], inside: set[int]) -> set[int]:

@@ -12,8 +12,9 @@ from ..program import KERNELS, Block, Program
 from ..program.loop_blocks import LARGE
 from ..program.series import NoSeriesError
 from .c_bounds import operations_of, stack_of, states_beside_change_points
+from .c_branches import print_block_of_branches
 from .c_functions import declarations, function_files, used_calls
-from .c_lanes import lane_files, lane_kernels
+from .c_lanes import lane_blocks, lane_files, lane_kernels
 from .c_layout import driver_files, work_areas
 from .c_pairs import pair_declarations, pair_files
 from .c_parts import distribute, part_names
@@ -66,11 +67,18 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
     if precision:
         about["precision"] = precision
     program = replace(program, metadata={**program.metadata, **about})
-    printed = _print(program)
+    printed = _print(program, lanes and precision is None)
     parts = distribute(program, printed) if separate else []
     calls = used_calls(program)
-    context = _context(program, printed) | {"parts": parts, "part_names": part_names(printed) if parts else []}
-    context |= {"library": precision is not None, "costs": {}, "most_states": states_beside_change_points()}
+    for_lanes = _printed_for_lanes(program, printed) if in_lanes else {}
+    work = max((p.work for p in (*printed[1:], *for_lanes.values())), default=0)
+    context = _context(program, printed, work) | {"parts": parts, "part_names": part_names(printed) if parts else []}
+    context |= {
+        "printed": for_lanes,
+        "library": precision is not None,
+        "costs": {},
+        "most_states": states_beside_change_points(),
+    }
     further = {
         f"{program.name}_part{k}.c": render(
             "c/part.c.j2",  # each declares its own pieces alone, so that the text grows as the pieces do
@@ -103,9 +111,9 @@ def _costs(program: Program, sources: Mapping[str, str]) -> dict[str, tuple[str,
     return {name: (operations_of(program, name), stacks[f"{program.name}_{name}"]) for name in names}
 
 
-def _print(program: Program) -> list[Printed]:
-    """Every straight-line function, the precompute first."""
-    blocks = [_print_function(program, b) for b in program.blocks if b.name not in program.twins]
+def _print(program: Program, branches: bool = False) -> list[Printed]:
+    """Every straight-line function, the precompute first; ``branches``: statements of alike branches as vectors."""
+    blocks = [_print_function(program, b, branches) for b in program.blocks if b.name not in program.twins]
     return [_print_precompute(program) if program.hoisted else Printed("", (), 0), *blocks]
 
 
@@ -114,14 +122,23 @@ def _print_precompute(program: Program) -> Printed:
     return rolled or print_precompute(program)
 
 
-def _print_function(program: Program, block: Block) -> Printed:
+def _print_function(program: Program, block: Block, branches: bool) -> Printed:
     rolled = print_rolled(program, block) if program.is_rolled(block.name) else None
-    return rolled or print_block(program, block)
+    return rolled or (print_block_of_branches if branches else print_block)(program, block)
 
 
-def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
+def _printed_for_lanes(program: Program, printed: list[Printed]) -> dict[str, Printed]:
+    """The straight-line functions that have lanes, by name, without vectors of their own."""
+    found = dict(zip((b.name for b in program.blocks if b.name not in program.twins), printed[1:], strict=True))
+    return {
+        name: print_block(program, block) if found[name].in_pairs else found[name]
+        for name, block in lane_blocks(program).items()
+    }
+
+
+def _context(program: Program, printed: list[Printed], work: int) -> dict[str, Any]:
     twins, in_lanes = program.twins, program.metadata["lanes"]
-    areas, n_work = work_areas(program, max((p.work for p in printed[1:]), default=0))
+    areas, n_work = work_areas(program, work)
     n_const = count_constants(program, printed[0])
     sizes = program.sizes
     results = {k.name: k.result for k in KERNELS}
@@ -179,7 +196,6 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         ],
         "lanes": in_lanes,
         "series": program.metadata["series"],
-        "printed": dict(zip((b.name for b in program.blocks if b.name not in twins), printed[1:], strict=True)),
         "layouts": describe_layouts(program),
         "metadata_lines": _number_lines(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
     }

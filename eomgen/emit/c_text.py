@@ -19,7 +19,7 @@ from .angles import CIRCULAR, gather_angles, print_angles
 from .c_functions import each_lane, each_name
 from .c_layout import places_again
 from .pair_statements import CopiedRun, PairLists, copied_runs
-from .straight import Pieces, PrintedFunction, cut, references
+from .straight import FindPairs, Pieces, PrintedFunction, cut, references
 
 SIGNATURE = (
     "real t, const real *restrict x, const real *restrict u,\n"
@@ -43,6 +43,7 @@ class BlockPrinter:
     def __init__(self, program: Program, references: dict[int, str], pieces: Pieces) -> None:
         every = (i for piece in pieces.pieces for i in piece.statements)
         self.lists = PairLists(program.graph, every, pieces.work)
+        self.pairs = pieces.pairs
         self._graph, self._nodes, self._calls = program.graph, program.graph.nodes, program.graph.calls
         self.zero = program.graph.zero.id
         self._angles: dict[int, int] = {}  #: angles whose sin and cos are there -> their places
@@ -108,7 +109,7 @@ class BlockPrinter:
     def lines(self, piece: PrintedFunction) -> list[str]:
         result: list[str] = []
         loaded: set[int] = set()
-        angles = gather_angles(self._graph, piece)
+        angles = gather_angles(self._graph, piece, self.pairs)
         self._angles = {}
         first = frozenset(angles.first)
         for i in angles.first:
@@ -172,18 +173,21 @@ class Printed(NamedTuple):
     text: str
     pieces: tuple[tuple[str, str], ...]  #: name and text of each
     work: int  #: doubles of work needed
+    in_pairs: bool = False  #: whether statements of alike branches are vectors, so that the text has no lanes
 
 
-def print_block(program: Program, block: Block) -> Printed:
-    """The C functions of a block, ``<name>_block`` and its pieces."""
+def print_block(
+    program: Program, block: Block, printing: type[BlockPrinter] = BlockPrinter, find: FindPairs | None = None
+) -> Printed:
+    """The C functions of a block, ``<name>_block`` and its pieces; ``find`` is that of :func:`~.straight.cut`."""
     graph, outputs = program.graph, list(block.outputs)
     runs = copied_runs(graph, outputs)
     for run in runs:
         outputs[run.first : run.first + run.length] = [graph.zero] * run.length
     lists = [Expr(graph, made) for made in dict.fromkeys(run.made for run in runs)]
-    pieces = cut(graph, outputs, block.checks, program.parameter_only, program.limits.statements, lists)
+    pieces = cut(graph, outputs, block.checks, program.parameter_only, program.limits.statements, lists, find)
     texts = references(program, block.inputs)
-    return print_pieces(program, f"{block.name}_block", pieces, texts, runs, places_again(program, block))
+    return print_pieces(program, f"{block.name}_block", pieces, texts, runs, places_again(program, block), printing)
 
 
 def print_pieces(
@@ -193,12 +197,13 @@ def print_pieces(
     texts: dict[int, str],
     runs: Sequence[CopiedRun] = (),
     again: Mapping[str, str] = NOWHERE,
+    printing: type[BlockPrinter] = BlockPrinter,
 ) -> Printed:
     """Print cut statements as one function, or as several and one that calls them.
 
     ``runs`` are copied at the end; ``again`` is that of :class:`~.pair_statements.PairLists`.
     """
-    printer = BlockPrinter(program, texts, pieces)
+    printer = printing(program, texts, pieces)
     printer.lists.again = again
     main = direct_results(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
     used = {*printer.used, *(["out"] if pieces.direct else [])}
@@ -216,7 +221,9 @@ def print_pieces(
             main.append(f"EOMGEN_REJECT({part}(t, x, u, c, out, w))")
     main += printer.lists.copies(runs)
     used |= {"out", "w"} if runs else set()
-    return Printed(function_text(f"static flag {name}", used, main), tuple(functions), printer.lists.end)
+    return Printed(
+        function_text(f"static flag {name}", used, main), tuple(functions), printer.lists.end, pieces.pairs is not None
+    )
 
 
 def direct_results(printer: BlockPrinter, pieces: Pieces) -> list[str]:

@@ -5,7 +5,7 @@ Language-independent; :mod:`.c_text` and :mod:`.numpy_text` print the pieces.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 
 from ..graph.core import Expr, Graph
 from ..graph.schedule import chunk, order
@@ -13,8 +13,10 @@ from ..graph.traverse import LEAVES
 from ..operations import CONDITION, operations_with
 from ..program import Program
 from ..records import dataclass
+from .branches import Pairs
 
 Slot = int | str  #: a place in an array, or the text of one
+FindPairs = Callable[[Sequence[int], Collection[int]], Pairs | None]
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ class Pieces:
     direct: tuple[tuple[int, int], ...]  #: (place in the result, id of a leaf or a hoisted value)
     checks: tuple[int, ...]  #: checks that are leaves or hoisted values
     work: int
+    pairs: Pairs | None = None  #: statements that are computed together
 
 
 def cut(
@@ -60,6 +63,7 @@ def cut(
     skipped: frozenset[int],
     statements: int,
     lists: Sequence[Expr] = (),
+    find: FindPairs | None = None,
 ) -> Pieces:
     """Order the statements behind outputs and checks and cut them into pieces.
 
@@ -71,6 +75,8 @@ def cut(
         Most statements in one piece; what is longer is cut into pieces of at most half of that, which compile faster.
     lists : sequence of Expr
         What is made too, for its own sake.
+    find : callable, optional
+        Statements, results and checks -> pairs that stay together and cross in places side by side.
     """
     nodes = graph.nodes
     places: dict[int, list[int]] = {}
@@ -78,35 +84,54 @@ def cut(
         places.setdefault(y.id, []).append(k)
     wanted = [*outputs, *checks, *lists]
     sequence = _pair(graph, [i for i in order(wanted) if i not in skipped])
-    chunks = chunk(sequence, wanted, statements if len(sequence) <= statements else max(1, statements // 2))
-    last_use = {i: k for k, c in enumerate(chunks) for i in c.imports}
-    slots: dict[int, int] = {}
-    free: list[int] = []
-    work = 0
     check_ids = {y.id for y in checks}
+    pairs = None if find is None else find(sequence, {*places, *check_ids})
+    second: Mapping[int, int] = {}
+    if pairs is not None:
+        sequence, second = pairs.in_order(graph, sequence), pairs.second
+    longest = statements if len(sequence) <= statements else max(1, statements // 2)
+    chunks = chunk(sequence, wanted, longest, second)
+    first = {b: a for a, b in second.items()}
+    last_use = {first.get(i, i): k for k, c in enumerate(chunks) for i in c.imports}
+    slots: dict[int, int] = {}
+    free: dict[int, list[int]] = {1: [], 2: []}  #: by number of places side by side
+    work = 0
     pieces = []
     for k, c in enumerate(chunks):
-        for i in c.exports:
-            if not free:
-                free.append(work)
-                work += 1
-            slots[i] = free.pop()
+        exports = dict.fromkeys(j for i in c.exports for j in _together(first.get(i, i), second))
+        for i in exports:
+            size = 1 + (i in second)
+            if i in first:
+                continue
+            if not free[size]:
+                free[size].append(work)
+                work += size
+            slots[i] = free[size].pop()
+            if i in second:
+                slots[second[i]] = slots[i] + 1
         pieces.append(
             PrintedFunction(
                 statements=c.statements,
                 loads={i: slots[i] for i in c.imports},
-                stores={i: slots[i] for i in c.exports},
+                stores={i: slots[i] for i in exports},
                 results={i: tuple(places[i]) for i in c.statements if i in places},
                 checks=frozenset(check_ids.intersection(c.statements)),
                 inlined=conditions(graph, c.statements, {*c.exports, *places}, check_ids),
             )
         )
-        free.extend(sorted((slots[i] for i in c.imports if last_use[i] == k), reverse=True))
+        ended = {first.get(i, i) for i in c.imports if last_use[first.get(i, i)] == k}
+        for i in sorted(ended, key=slots.__getitem__, reverse=True):
+            free[1 + (i in second)].append(slots[i])
     made = {i for p in pieces for i in p.statements}
     direct = tuple((k, y.id) for k, y in enumerate(outputs) if y.id not in made)
     bare = tuple(sorted(check_ids - made))
     assert all(nodes[i][0] in LEAVES or i in skipped for _, i in direct)
-    return Pieces(tuple(pieces), direct, bare, work)
+    return Pieces(tuple(pieces), direct, bare, work, pairs)
+
+
+def _together(i: int, second: Mapping[int, int]) -> tuple[int, ...]:
+    """A statement, with the other of its pair."""
+    return (i, second[i]) if i in second else (i,)
 
 
 def _pair(graph: Graph, sequence: list[int]) -> list[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from itertools import pairwise
 
 from ..records import dataclass
@@ -141,7 +141,9 @@ def crossings(graph: Graph, statements: Sequence[int]) -> list[int]:
     return result
 
 
-def chunk(statements: Sequence[int], outputs: Sequence[Expr], size: int = 2000) -> list[Chunk]:
+def chunk(
+    statements: Sequence[int], outputs: Sequence[Expr], size: int = 2000, followed: Container[int] = ()
+) -> list[Chunk]:
     """Cut an order into chunks at its narrow waists.
 
     Each chunk has between half of ``size`` and ``size`` statements (the last one perhaps fewer) and ends where the
@@ -154,7 +156,9 @@ def chunk(statements: Sequence[int], outputs: Sequence[Expr], size: int = 2000) 
     outputs : sequence of Expr
         The outputs, to tell which statements are results.
     size : int
-        Most statements in one chunk.
+        Most statements in one chunk, and one more where the last is of ``followed``.
+    followed : container of int
+        Statements that stay in one chunk with the next.
 
     Returns
     -------
@@ -175,7 +179,8 @@ def chunk(statements: Sequence[int], outputs: Sequence[Expr], size: int = 2000) 
     cuts = [0]
     while len(statements) - cuts[-1] > size:
         window = range(cuts[-1] + size, cuts[-1] + max(1, size // 2) - 1, -1)
-        cuts.append(min(window, key=live.__getitem__))
+        cut = min(window, key=live.__getitem__)
+        cuts.append(cut + (statements[cut - 1] in followed))
     cuts.append(len(statements))
 
     nodes = graph.nodes

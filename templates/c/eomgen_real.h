@@ -62,6 +62,56 @@ typedef int flag;
 #define same(a) (a)
 #define choose(condition, a, b) ((condition) ? (a) : (b))
 #define abs_of(a) fabs(a)
+
+/* The same value of two alike branches, such as the legs of a robot. */
+#ifdef EOMGEN_VECTORS
+typedef double both __attribute__((vector_size(16)));
+typedef double both_anywhere __attribute__((vector_size(16), aligned(8), may_alias));
+typedef uint64_t bits_of_both __attribute__((vector_size(16)));
+#define first_of(a) (a)[0]
+#define second_of(a) (a)[1]
+#define both_at(place) (*(const both_anywhere *)(place))
+#define both_put(place, a) *(both_anywhere *)(place) = (a)
+#define both_plus(a, b) ((a) + (b))
+#define both_minus(a, b) ((a) - (b))
+#define both_times(a, b) ((a)*(b))
+#define both_over(a, b) ((a)/(b))
+#define both_negated(a) (-(a))
+
+static inline both both_of(double a, double b)
+{
+    const both result = { a, b };
+    return result;
+}
+
+/* The second with the other sign. */
+static inline both both_turned(both a)
+{
+    const bits_of_both sign = { 0, 0x8000000000000000u };
+    return (both)((bits_of_both)a ^ sign);
+}
+#else
+typedef struct { double first, second; } both;
+#define first_of(a) (a).first
+#define second_of(a) (a).second
+#define both_at(place) both_of((place)[0], (place)[1])
+#define both_put(place, a) (place)[0] = (a).first, (place)[1] = (a).second
+
+static inline both both_of(double a, double b)
+{
+    both result;
+    result.first = a;
+    result.second = b;
+    return result;
+}
+
+static inline both both_plus(both a, both b) { return both_of(a.first + b.first, a.second + b.second); }
+static inline both both_minus(both a, both b) { return both_of(a.first - b.first, a.second - b.second); }
+static inline both both_times(both a, both b) { return both_of(a.first*b.first, a.second*b.second); }
+static inline both both_over(both a, both b) { return both_of(a.first/b.first, a.second/b.second); }
+static inline both both_negated(both a) { return both_of(-a.first, -a.second); }
+static inline both both_turned(both a) { return both_of(a.first, -a.second); }
+#endif
 #endif
 
 /* NAME(a), NAME(a, b): a function of doubles in every lane; of files that include eomgen.h. */
