@@ -27,8 +27,8 @@ LOOPS: dict[str, tuple[str, ...]] = {
 }
 
 TREES: dict[str, tuple[str, ...]] = {
-    "rhs": ("tree", "tree_rhs"),
-    "outputs": ("tree", "tree_outputs"),
+    "rhs": ("tree", "tree_accelerate", "tree_rhs"),
+    "outputs": ("tree", "tree_accelerate", "tree_outputs"),
 }
 
 
@@ -44,7 +44,7 @@ def shift_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
     if program.tree_by_columns:
         return ("shift_columns", name)
     if not program.has_loops:
-        return ("tree", "shift_tree", name)
+        return ("tree", "tree_accelerate", "shift_tree", name)
     return (*ACCELERATE, "multipliers", direct, "correct_change", "shift_projection", "shift_loops", name)
 
 
@@ -104,9 +104,10 @@ def driver_files(program: Program) -> list[str]:
         elif driver.name == "mass_matrix" or (program.tree_by_columns and "terms" not in driver.blocks):
             needed = COLUMNS[driver.name]
         elif not program.has_loops and driver.name == "jacobian":
-            columns = "tree_jacobian_along" if program.held is None else "tree_jacobian_held"
-            along = (direct, columns) if direct == "residuals_along" else ("tree_jacobian",)
-            needed = ("tree", *along)
+            along = (direct, "tree_jacobian_along") if direct == "residuals_along" else ("tree_jacobian",)
+            needed = ("tree", "tree_accelerate", *along)
+            if program.held is not None:
+                needed = ("tree", direct, "tree_jacobian_held")
         elif not program.has_loops:
             needed = TREES[driver.name]
         elif driver.name == "rhs":
@@ -224,11 +225,12 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     residual = (n + m) * (n_q + n) + m * n_q if "residual_jacobian" in names else 0
     shifted = {SHIFTS[d.name] for d in program.drivers if d.name in SHIFTS}
     seeds = max((program.sizes.n_u if what == "input" else program.sizes.n_p for what in shifted), default=0)
+    matrix = n if program.held is None or program.composes_terms else n - program.n_states
     loads = len(program.held.loads) if program.held is not None else 0
     lengths = [
         ("X", n_q + 2 * n + m + max(n_q + n, seeds, loads)),  # q, v, a, multipliers, dq, dv; du, dp or loads in place
         ("SCALES", n + m),
-        ("TERMS", n * (n + 1) // 2 + n + m * n + m),  # M packed, h, C_q, gamma
+        ("TERMS", matrix * (matrix + 1) // 2 + n + m * n + m),  # M packed, h, C_q, gamma
         ("RESIDUAL", residual),  # r1_q, r1_v, r2_q, r2_v, r3_q
         ("ALONG", n + 2 * m),  # r1, r2, r3 along a direction
         ("RATES", n_q),

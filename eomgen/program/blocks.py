@@ -290,7 +290,7 @@ class BlockMaker:
             terms = ("mass_matrix", "bias", "scales")
             return {
                 "rhs": terms,
-                "jacobian": (*terms, residual, *(HELD if self.held is not None else ())),
+                "jacobian": (*terms, residual) if self.held is None else ("scales", residual, *HELD),
                 "outputs": (*terms, "accelerated_outputs"),
             }[name]
         project = ("scales", "position", "rate")
@@ -352,6 +352,9 @@ class BlockMaker:
                 return self._internal(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
                 return self._internal(name, "q v a multipliers", self.slopes.packed())
+            case "held_terms":  # M of bodies lower packed, h
+                lower = [terms.mass_matrix[i][k] for i in range(n - terms.n_states) for k in range(i + 1)]
+                return self._internal(name, "q v", [*lower, *terms.bias], self._turned)
             case "held_operands":
                 assert self.held is not None
                 return self._internal(name, "q v", self.held.operands)

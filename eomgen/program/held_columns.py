@@ -19,8 +19,8 @@ from ..graph.traverse import reachable
 from ..numeric.pair_sums import POSE
 from .terms import SystemTerms
 
-#: Blocks of the operands of the sums, and of the residual along wrenches on their bodies.
-HELD = ("held_operands", "held_loads")
+#: Blocks of M of the bodies and h, of the operands of the sums, and of the residual along wrenches on their bodies.
+HELD = ("held_terms", "held_operands", "held_loads")
 LEAST = 48  #: states of contacts from which the driver is worth its text
 WRENCH = 6  #: numbers of what a body gets
 LOADED = -1  #: in a set of velocities: what a body gets

@@ -1,8 +1,27 @@
+/* As tree_accelerate; states have an inertia of 1, and are not in the factor of M. */
+static int held_accelerate(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                           double *restrict w)
+{
+    double *const a = w + AT_ACC;
+    const double *const bias = w + AT_TERMS + MOVING * (MOVING + 1) / 2;
+    (void)scales_block(t, x, u, c, w + AT_SCALES, w);
+    (void)held_terms_block(t, x, u, c, w + AT_TERMS, w);
+    memcpy(w + AT_X, x, (NQ + N) * sizeof(double));
+    for (int k = 0; k < N; k++) {
+        a[k] = -bias[k];
+    }
+    const int status = tree_factor(MOVING, w + AT_TERMS, w + AT_SCALES);
+    if (status == 0) {
+        tree_solve(MOVING, w + AT_TERMS, a);
+    }
+    return status;
+}
+
 /* Adds what the direction in w + AT_ALONG makes of the accelerations of a column. */
 static void take_column(int column, int rows, double *restrict out, double *restrict w)
 {
     double *const r1 = w + AT_ALONG;
-    tree_solve(w + AT_TERMS, r1);
+    tree_solve(MOVING, w + AT_TERMS, r1);
     for (int k = 0; k < rows; k++) {
         out[(NQ + k) * (NQ + N) + column] -= r1[k];
     }
@@ -79,7 +98,7 @@ static int held_bodies(double t, const double *restrict u, const double *restric
 static int jacobian_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                           double *restrict out, double *restrict w)
 {
-    const int status = tree_accelerate(t, x, u, c, w);
+    const int status = held_accelerate(t, x, u, c, w);
     char held[NQ + N] = {0};
     if (status != 0) {
         return status;
