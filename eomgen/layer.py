@@ -14,7 +14,7 @@ STEPPERS = (
     *("control", "signals", "tape"),
     *("plain", "rk4_step", "rk4"),
     *("dense_begin", "products", "lu", "lu_large", "lu_complex", "lu_large_complex"),
-    *("newton_parts", "newton", "radau", "radau_step", "dense_end"),
+    *("newton_parts", "newton_sparse", "newton", "radau", "radau_step", "dense_end"),
     *("taylor_terms", "taylor"),
     *("event_values", "event_zero", "crossings", "loop"),
 )

@@ -21,6 +21,7 @@ from .c_parts import distribute, part_names
 from .c_rolled import print_rolled, print_rolled_precompute
 from .c_series import series_files
 from .c_text import Printed, print_block, print_precompute, used_helpers
+from .held_states import held_tables
 from .layouts import describe_layouts
 from .single_precision import in_single_precision, refuse_double
 from .sources import SourceSet, metadata_json, read_template, render
@@ -178,6 +179,7 @@ def _context(program: Program, printed: list[Printed], work: int) -> dict[str, A
         "quaternion_slots": program.quaternion_slots,
         "coordinate_of": program.coordinate_of,
         "has_loops": program.has_loops and program.projects,
+        "held": held_tables(program),
         "rates_are_velocities": not (program.quaternion_slots or program.given_rates or program.n_states),
         "by_columns": program.by_columns,
         "system": program.system if "system" in program.block_names else None,

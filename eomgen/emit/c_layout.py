@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..program import Block, Program
 from ..program.block_groups import ALONG, SHIFTS
 from ..program.loop_slopes import BY_BODIES
+from .held_states import held_areas
 from .pair_statements import kept_of
 from .pair_sums_used import sums_again
 
@@ -26,8 +27,8 @@ LOOPS: dict[str, tuple[str, ...]] = {
 }
 
 TREES: dict[str, tuple[str, ...]] = {
-    "rhs": ("tree", "tree_rhs"),
-    "outputs": ("tree", "tree_outputs"),
+    "rhs": ("tree", "tree_accelerate", "tree_rhs"),
+    "outputs": ("tree", "tree_accelerate", "tree_outputs"),
 }
 
 
@@ -43,7 +44,7 @@ def shift_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
     if program.tree_by_columns:
         return ("shift_columns", name)
     if not program.has_loops:
-        return ("tree", "shift_tree", name)
+        return ("tree", "tree_accelerate", "shift_tree", name)
     return (*ACCELERATE, "multipliers", direct, "correct_change", "shift_projection", "shift_loops", name)
 
 
@@ -104,7 +105,9 @@ def driver_files(program: Program) -> list[str]:
             needed = COLUMNS[driver.name]
         elif not program.has_loops and driver.name == "jacobian":
             along = (direct, "tree_jacobian_along") if direct == "residuals_along" else ("tree_jacobian",)
-            needed = ("tree", *along)
+            needed = ("tree", "tree_accelerate", *along)
+            if program.held is not None:
+                needed = ("tree", direct, "tree_jacobian_held")
         elif not program.has_loops:
             needed = TREES[driver.name]
         elif driver.name == "rhs":
@@ -222,10 +225,12 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     residual = (n + m) * (n_q + n) + m * n_q if "residual_jacobian" in names else 0
     shifted = {SHIFTS[d.name] for d in program.drivers if d.name in SHIFTS}
     seeds = max((program.sizes.n_u if what == "input" else program.sizes.n_p for what in shifted), default=0)
+    matrix = n if program.held is None or program.composes_terms else n - program.n_states
+    loads = len(program.held.loads) if program.held is not None else 0
     lengths = [
-        ("X", n_q + 2 * n + m + max(n_q + n, seeds)),  # q, v, a, multipliers, dq, dv; or du or dp in place of these
+        ("X", n_q + 2 * n + m + max(n_q + n, seeds, loads)),  # q, v, a, multipliers, dq, dv; du, dp or loads in place
         ("SCALES", n + m),
-        ("TERMS", n * (n + 1) // 2 + n + m * n + m),  # M packed, h, C_q, gamma
+        ("TERMS", matrix * (matrix + 1) // 2 + n + m * n + m),  # M packed, h, C_q, gamma
         ("RESIDUAL", residual),  # r1_q, r1_v, r2_q, r2_v, r3_q
         ("ALONG", n + 2 * m),  # r1, r2, r3 along a direction
         ("RATES", n_q),
@@ -269,6 +274,7 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     if "dae_tangent" in names:
         lengths += [("DAE", 4 * program.sizes.n_dae), ("SLOPE", program.sizes.n_dae)]  # y, y', dy, dy'; dF
     lengths += _areas_of_bodies(program)
+    lengths += held_areas(program)
     if "inverse_tangent" in names:
         lengths.append(("TORQUES", 2 * (n_q + 2 * n) + n))  # q, v, a, dq, dv, da; d(M a + h)
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area

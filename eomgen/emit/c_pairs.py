@@ -19,6 +19,7 @@ from ..numeric.polygon_edges import OTHER, OWN
 from ..program import Program
 from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
+from .held_states import HELD_RECORD, held_room, is_held
 from .pair_statements import placed_length, plain_numbers, record_of, slots_of
 from .pair_sums_used import SumAgain, UsedSum, sums_again, used_sums
 from .row_runs import written
@@ -137,6 +138,9 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
         "up_to": repr(UP_TO),
         "within": repr(WITHIN),
         "again": again is not None,
+        "held": is_held(program, function),
+        "held_record": HELD_RECORD,
+        "held_room": held_room(function),
         **(_columns(again) if again is not None else {}),
         "kept": record_of(function),
         "slots": slots_of(function),
@@ -206,10 +210,13 @@ def _choosing(kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[s
 def pair_declarations(program: Program) -> list[str]:
     """Declarations of the sums, in every lane, for the files that call them."""
     again = {one.function.name for one in sums_again(program)}
-    return [_declared(program.name, used, used.function.name in again) for used in used_sums(program)]
+    return [
+        _declared(program.name, used, used.function.name in again, is_held(program, used.function))
+        for used in used_sums(program)
+    ]
 
 
-def _declared(program: str, used: UsedSum, again: bool) -> str:
+def _declared(program: str, used: UsedSum, again: bool, held: bool) -> str:
     function = used.function
     prefix, n, results = f"{program}_pairs_{function.name}", function.count, function.results
     text = f"#define pairs_{function.name}_numbers {prefix}_numbers\n"
@@ -231,6 +238,8 @@ def _declared(program: str, used: UsedSum, again: bool) -> str:
             f"EOMGEN_PIECE void {prefix}_slope(const double *given, const double *rates, double *out, double *work);\n"
         )
         text += _each(f"pairs_{function.name}_slope", f"{prefix}_slope", (n, n, results))
+    if held:
+        text += f"EOMGEN_PIECE void {prefix}_held(const double *given, double *out, double *work);\n"
     if again:
         text += (
             f"EOMGEN_PIECE void {prefix}_again(const double *given, const double *rates, double *out, double *met, "

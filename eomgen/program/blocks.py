@@ -15,6 +15,7 @@ from .block_groups import ALONG, COMPOSED, RATES, REGULAR, SHIFTS, USUAL, flat
 from .body_loops import BodyLoops
 from .dae_rows import dae_kinematics
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
+from .held_columns import HELD, HeldColumns, held_columns
 from .factor import articulated_positivity, factorize, is_unrolled, positivity, solve
 from .inverse_slopes import inverse_slopes
 from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
@@ -92,6 +93,13 @@ class BlockMaker:
     def _touching(self) -> bool:
         """Whether contacts between groups couple too many pairs of bodies for their derivatives to be written out."""
         return pairs_of_bodies(self.terms.graph) > self.limits.jacobian_pairs
+
+    @cached_property
+    def held(self) -> HeldColumns | None:
+        """The columns of states of contacts, where the Jacobian of a tree is made direction by direction."""
+        terms = self.terms
+        plain = not (self.has_loops or terms.by_columns or terms.system or terms.given_rates)
+        return held_columns(terms) if plain and self.by_direction else None
 
     @cached_property
     def slopes(self) -> ResidualSlopes:
@@ -175,7 +183,8 @@ class BlockMaker:
 
     @cached_property
     def _port_symbols(self) -> Mapping[str, tuple[str, ...]]:
-        return port_symbols(self.terms, self.sizes.n_h)
+        loads = {"loads": self.held.loads} if self.held is not None else {}
+        return {**port_symbols(self.terms, self.sizes.n_h), **loads}
 
     def _internal(self, name: str, ports: str, outputs: Sequence[Expr], checks: Sequence[Expr] = ()) -> Block:
         inputs = tuple(map(self.port, ports.split()))
@@ -281,7 +290,7 @@ class BlockMaker:
             terms = ("mass_matrix", "bias", "scales")
             return {
                 "rhs": terms,
-                "jacobian": (*terms, residual),
+                "jacobian": (*terms, residual) if self.held is None else ("scales", residual, *HELD),
                 "outputs": (*terms, "accelerated_outputs"),
             }[name]
         project = ("scales", "position", "rate")
@@ -343,6 +352,15 @@ class BlockMaker:
                 return self._internal(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
                 return self._internal(name, "q v a multipliers", self.slopes.packed())
+            case "held_terms":  # M of bodies lower packed, h
+                lower = [terms.mass_matrix[i][k] for i in range(n - terms.n_states) for k in range(i + 1)]
+                return self._internal(name, "q v", [*lower, *terms.bias], self._turned)
+            case "held_operands":
+                assert self.held is not None
+                return self._internal(name, "q v", self.held.operands)
+            case "held_loads":  # dr1 of bodies along the wrenches of contacts
+                assert self.held is not None
+                return self._internal(name, "q v a multipliers loads", self.held.along)
             case "dae_tangent":  # dF along (dy, dy')
                 return self._dae_tangent()
             case "inverse_tangent":  # d(M a + h) along (dq, dv, da)

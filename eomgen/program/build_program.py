@@ -18,6 +18,7 @@ from ..kernel_table import KERNELS, Kernel, Sizes
 from ..suggestions import hint, joined
 from .block_groups import SHIFTS
 from .blocks import BlockMaker
+from .held_columns import HELD
 from .hoist import count_apart, hoist
 from .jacobian_blocks import sparsity
 from .program import Block, KernelDriver, Limits, Program
@@ -158,6 +159,7 @@ def build_program(
         system=terms.system,
         projects=terms.projects,
         n_states=terms.n_states,
+        held=maker.held if HELD[0] in blocks else None,
     )
 
 

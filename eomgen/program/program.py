@@ -14,6 +14,7 @@ from ..graph.count import Operations
 from ..kernel_table import Sizes
 from ..records import dataclass
 from .block_groups import REGULAR, USUAL
+from .held_columns import HeldColumns
 
 #: Blocks that only trees have whose accelerations are known without their mass matrix.
 BY_COLUMNS = ("mass_times", "acceleration_tangent", "input_acceleration", "parameter_acceleration")
@@ -166,6 +167,7 @@ class Program:
     limits: Limits = field(default_factory=Limits)
     system: LinearSystem | None = None
     projects: bool = True
+    held: HeldColumns | None = None
 
     @property
     def has_loops(self) -> bool:

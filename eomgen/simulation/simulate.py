@@ -220,6 +220,8 @@ def simulate(
             settings = check_tolerances(module.n_x, abs(end - start), settings)
             require_steps("max_step", float(settings.get("max_step", np.inf)), start, end)
     if not compiled and takes_jacobian(solver):
+        if kept is None and solver.__module__.startswith("scipy.") and solver.__name__ in ("BDF", "Radau"):
+            run.sparse = None  # its factors cannot be kept in a file
         settings.setdefault("jac", run.jacobian)
     watch = watch_run(start, end, progress)
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)

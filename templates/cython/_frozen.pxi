@@ -39,19 +39,9 @@ cdef dict freeze(Journey j, long status):
 
 
 cdef int require_order(Journey j) except -1:
-    """The rows that an implicit method exchanges, which are whole numbers among the others, must be there."""
-    cdef int n = j.run.n, i, m
-    cdef double *state
-    cdef int *order
-    if j.method.squares > 0:
-        state = j.run.K + n * j.method.rows_K + j.method.squares * n * n
-        order = <int *>(state + 16)
-        m = n if state[0] == 0.0 else n // 2 if state[0] == 1.0 else n - j.run.n_q  # as in newton.c: HALVED
-        if state[0] > 1.0 and (j.run.n_q < 1 or 2 * m * m > n * n):
-            raise ValueError("parts of a matrix that has none")
-        for i in range(2 * n):
-            if not 0 <= order[i] < max(m, 1):
-                raise ValueError("rows of a matrix that are not there")
+    """The places that an implicit method keeps, which are whole numbers among the others, must be there."""
+    if j.method.squares > 0 and not eomgen_is_sound(j.method, &j.run):
+        raise ValueError("places in a matrix that are not there")
     return 0
 
 

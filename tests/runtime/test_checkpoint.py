@@ -343,3 +343,43 @@ def test_hostile_numbers_are_refused(pendulum: Any, tmp_path: Path, killed: Any)
     file.write_bytes(rewritten(file, block=np.full_like(block, np.nan)))
     with pytest.raises(eg.UsageError, match="damaged"):  # NaN is no row
         pendulum.simulate(checkpoint=file, **run)
+
+
+def test_sparse_factors_go_on(tmp_path: Path, killed: Any) -> None:
+    """80 masses that do not know each other; places among the numbers of their factors are looked at too."""
+    m = eg.Model("apart")
+    for k in range(80):
+        m.prismatic(f"s{k}", m.ground, m.body(f"b{k}", mass=1.0), axis="x")
+        m.joint_spring(f"k{k}", f"s{k}", stiffness=1.0 + k)
+        m.joint_damper(f"d{k}", f"s{k}", damping=0.1)
+        m.initial(**{f"s{k}": 0.1})
+    module, run = m.compile(), {"span": 3.0, "method": "Radau", "rtol": 1e-6}
+    found = module.simulate(**run)["s79"][-1]
+    assert found == pytest.approx(0.1 * np.exp(-0.15) * np.cos(3 * np.sqrt(80)), abs=2e-3)
+    file, n = tmp_path / "run.ckpt", module.n_x
+    go_through(module, tmp_path / "whole.ckpt", killed, 3, **run)
+    killed(2)
+    with pytest.raises(Killed):
+        module.simulate(checkpoint=file, checkpoint_every=0.0, **run)
+    killed(0)
+    block, good = np.load(file)["block"], file.read_bytes()
+    real = 22 * n + n * n
+    state = 22 * n + 4 * n * n
+    assert (block[state], block[state + 9]) == (3.0, 3.0 * n)  # sparse; a mass is [g, -1; k, g + d]
+    filled, places = int(block[state + 9]), block[real:].view(np.intc)[2 * int(block[state + 9]) :]
+    changes = [(real, 0, 10**8), (real, n, -1), (real, 2 * n + 1, 0), (real, 3 * n + 1 + filled - 1, n)]
+    for start, place, value in changes:
+        other = block.copy()
+        other[start:].view(np.intc)[2 * filled + place] = value
+        assert places[place] != value
+        file.write_bytes(rewritten(file, block=other))
+        with pytest.raises(eg.UsageError, match="damaged"):
+            module.simulate(checkpoint=file, **run)
+        file.write_bytes(good)
+    for value in (np.nan, 1.0, 1e9):
+        other = block.copy()
+        other[state + 9] = value
+        file.write_bytes(rewritten(file, block=other))
+        with pytest.raises(eg.UsageError, match="damaged"):
+            module.simulate(checkpoint=file, **run)
+        file.write_bytes(good)

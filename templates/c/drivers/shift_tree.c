@@ -16,7 +16,7 @@ static int shift_driver(block_function *block, int columns, double t, const doub
             seeds[k] = k == column ? 1.0 : 0.0;
         }
         (void)block(t, w + AT_X, u, c, r1, w);
-        tree_solve(w + AT_TERMS, r1);
+        tree_solve(N, w + AT_TERMS, r1);
         for (int k = 0; k < NQ; k++) {
             out[k * columns + column] = 0.0;
         }

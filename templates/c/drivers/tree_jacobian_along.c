@@ -12,7 +12,7 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
             dq[k] = k == column ? 1.0 : 0.0;
         }
         residuals_along(t, u, c, w);
-        tree_solve(w + AT_TERMS, r1);
+        tree_solve(N, w + AT_TERMS, r1);
         change_rates(x, dq, dv, rates);
         for (int k = 0; k < NQ; k++) {
             out[k * (NQ + N) + column] = rates[k];

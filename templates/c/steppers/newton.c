@@ -1,5 +1,6 @@
 /* Systems (g - J) x = r of implicit methods. Where J = [0 1; K D], of a state [q; v] with q' = v, only
-   (g - D - K / g) v = r_v + K r_q / g is solved, and q = (r_q + v) / g; other large ones by parts (newton_parts.c). */
+   (g - D - K / g) v = r_v + K r_q / g is solved, and q = (r_q + v) / g; other large ones by parts (newton_parts.c), or by what
+   of J is not 0 (newton_sparse.c), whatever takes the least work. */
 #include <math.h>
 #include <string.h>
 
@@ -12,9 +13,10 @@ typedef struct {
     int *order, *order_complex; /* n each */
 } newton_area;
 
-/* Numbers of the state: how J is made, and by how much q drifts by itself; LARGE: states from which parts are worth while. */
-enum { NEWTON_STATE = 16, HALVED = 0, DRIFT = 8 };
-enum { WHOLE = 0, HALF = 1, PARTS = 2, LARGE = 24 };
+/* Numbers of the state: how J is made, by how much q drifts by itself, how many numbers sparse factors have; LARGE: states from
+   which parts are worth while. */
+enum { NEWTON_STATE = 16, HALVED = 0, DRIFT = 8, FILLED = 9 };
+enum { WHOLE = 0, HALF = 1, PARTS = 2, SPARSE = 3, LARGE = 24 };
 
 static newton_area newton_areas(const eomgen_run *run, int rows)
 {
@@ -43,15 +45,38 @@ static int is_halved(int n, const double *J)
     return 1;
 }
 
-/* How J is made, which a step that is too long for parts ends (newton_factor). */
-static void newton_look(const eomgen_run *run, const newton_area *a)
+/* Whether J may be taken by parts. */
+static int has_parts(const eomgen_run *run)
+{
+    const int n = run->n, m = n - run->n_q;
+    return n >= LARGE && run->n_q > 0 && 2 * m * m <= n * n;
+}
+
+/* How J is made where its zeros are of no use. */
+static void newton_look_whole(const eomgen_run *run, const newton_area *a)
 {
     const int n = run->n, n_q = run->n_q, m = n - n_q;
     a->state[HALVED] = is_halved(n, a->J) ? HALF : WHOLE;
-    if (a->state[HALVED] == WHOLE && n >= LARGE && n_q > 0 && 2 * m * m <= n * n) {
+    if (a->state[HALVED] == WHOLE && has_parts(run)) {
         a->state[HALVED] = PARTS;
         a->state[DRIFT] = parts_products(n, n_q, a->J, a->real + m * m, a->re + m * m, a->im);
     }
+}
+
+/* How J is made, which a step that is too long for parts ends, and a pivot that is too small (newton_factor). */
+static void newton_look(const eomgen_run *run, const newton_area *a)
+{
+    const double n = run->n, n_q = run->n_q, m = n - n_q;
+    double dense = n * n * n / 3.0;
+    if (run->n >= SPARSE_FROM) {
+        dense = is_halved(run->n, a->J) ? dense / 8.0 : has_parts(run) ? m * m * m / 3.0 + n_q * m * (n + m) : dense;
+        a->state[FILLED] = sparse_look(run->n, a->J, dense, a->real, a->re, a->im);
+        if (a->state[FILLED] > 0.0) {
+            a->state[HALVED] = SPARSE;
+            return;
+        }
+    }
+    newton_look_whole(run, a);
 }
 
 /* dx'/dx at (t, y) into J, inputs that are expressions of the state included; 0, or the status of a failure. */
@@ -95,6 +120,15 @@ static int newton_factor(eomgen_run *run, const newton_area *a, double g, double
     const int n = run->n, n_q = run->n_q;
     const double square = x * x + y * y;
     run->factorizations += 2;
+    if (a->state[HALVED] == SPARSE) {
+        const int filled = (int)a->state[FILLED];
+        double *const room = a->im + filled;
+        if (sparse_factor(n, filled, a->J, g, a->real, room) == 0 &&
+            sparse_factor_complex(n, filled, a->J, x, y, a->real, a->re, a->im, room) == 0) {
+            return 0;
+        }
+        newton_look_whole(run, a);
+    }
     if (a->state[HALVED] == PARTS && a->state[DRIFT] < RUNS_DRIFTING * fmin(fabs(g), sqrt(square))) {
         const int m = n - n_q;
         parts_matrices(n, n_q, a->J, a->real + m * m, a->re + m * m, g, x / square, -y / square, a->real, a->re, a->im);
@@ -119,6 +153,10 @@ static int newton_factor(eomgen_run *run, const newton_area *a, double g, double
 static void newton_solve(const eomgen_run *run, const newton_area *a, double g, double *restrict r)
 {
     const int n = run->n, m = n / 2;
+    if (a->state[HALVED] == SPARSE) {
+        sparse_solve(n, (int)a->state[FILLED], a->real, r, a->im + (int)a->state[FILLED]);
+        return;
+    }
     if (a->state[HALVED] == PARTS) {
         const int n_q = run->n_q, n_v = n - n_q;
         double *const room = a->im + n_v * n_v;
@@ -152,6 +190,11 @@ static void newton_solve_complex(const eomgen_run *run, const newton_area *a, do
 {
     const int n = run->n, m = n / 2;
     const double square = x * x + y * y, u = x / square, v = -y / square;
+    if (a->state[HALVED] == SPARSE) {
+        const int filled = (int)a->state[FILLED];
+        sparse_solve_complex(n, filled, a->real, a->re, a->im, r, s, a->im + filled);
+        return;
+    }
     if (a->state[HALVED] == PARTS) {
         const int n_q = run->n_q, n_v = n - n_q;
         double *const room = a->im + n_v * n_v;
@@ -179,4 +222,20 @@ static void newton_solve_complex(const eomgen_run *run, const newton_area *a, do
         const double p = r[i] + r[m + i], q = s[i] + s[m + i];
         r[i] = p * u - q * v, s[i] = p * v + q * u;
     }
+}
+
+/* Whether what an implicit method keeps from step to step names no place that is not there. */
+int eomgen_is_sound(const eomgen_method *method, const eomgen_run *run)
+{
+    const int n = run->n;
+    const newton_area a = newton_areas(run, method->rows_K);
+    if (a.state[HALVED] == SPARSE) { /* which has no use for the rows that others exchange */
+        return n >= SPARSE_FROM && sparse_is_sound(n, a.state[FILLED], a.real, a.order);
+    }
+    const int m = a.state[HALVED] == WHOLE ? n : a.state[HALVED] == HALF ? n / 2 : n - run->n_q;
+    int sound = a.state[HALVED] == WHOLE || a.state[HALVED] == HALF || (a.state[HALVED] == PARTS && has_parts(run));
+    for (int i = 0; i < 2 * n; i++) {
+        sound = sound && a.order[i] >= 0 && a.order[i] < (m > 1 ? m : 1);
+    }
+    return sound;
 }
