@@ -55,7 +55,7 @@ fuzz: $(VENV)/.installed-test
 	  $(if $(JOBS),--jobs $(JOBS)) $(if $(OUT),--out $(abspath $(OUT))) $(if $(RESULTS),--results)
 
 clean:
-	@rm -rf $(VENV) build dist demo_output docs/_build docs/tutorials/*.ipynb docs/tutorials/*.png eomgen.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@rm -rf $(VENV) build dist eomgen/built demo_output docs/_build docs/tutorials/*.ipynb docs/tutorials/*.png eomgen.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-plot: EXTRAS := plot
