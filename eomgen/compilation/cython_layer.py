@@ -1,13 +1,15 @@
 """Cython layer: _core.pyx and the steppers -> object files, compiled once per interpreter, linked with every model.
 
-There are two builds of it. The first has what a single run needs. The late one has ensembles and rigid contacts; it is
-made when a model first asks for them (:mod:`.late_classes`).
+There are three builds of it. The first has what a single run needs. The two others have ensembles and rigid contacts;
+each is made when a model first asks for it (:mod:`.late_classes`).
 """
 
 from __future__ import annotations
 
 import importlib.machinery
+import os
 import platform
+import re
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -31,8 +33,8 @@ _OBJECT = "_core.o"
 HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_processor.h", "eomgen_contraction.h")
 
 
-class Half(NamedTuple):
-    """One of the two builds of the layer.
+class Share(NamedTuple):
+    """One of the three builds of the layer.
 
     Attributes
     ----------
@@ -55,12 +57,18 @@ class Half(NamedTuple):
         }
 
 
-FIRST = Half(frozenset({"_ensembles.pxi", "_contacts.pxi"}), ("eomgen_steppers.c", "eomgen_wide_steps.c"))
+FIRST = Share(frozenset({"_ensembles.pxi", "_contacts.pxi"}), ("eomgen_steppers.c", "eomgen_wide_steps.c"))
+_CALLS = {"_kernel.pxi", "_calls.pxi", "_integrators.pxi"}
 #: Linked with the C files of the first.
-LATE = Half(
-    frozenset({"_kernel.pxi", "_calls.pxi", "_integrators.pxi"}),
-    tuple(name for name in LAYER if name.endswith(".c") and name not in FIRST.c_files),
+ENSEMBLES = Share(
+    frozenset({*_CALLS, "_contacts.pxi"}),
+    tuple(name for name in LAYER if re.fullmatch(r"eomgen_(ensembles|runs\d)\.c", name)),
 )
+CONTACTS = Share(
+    frozenset({*_CALLS, "_journeys.pxi", "_frozen.pxi", "_ensembles.pxi"}),
+    tuple(name for name in LAYER if re.fullmatch(r"eomgen_(wide_)?contacts\.c", name)),
+)
+_OF = {ENSEMBLES: " of ensembles", CONTACTS: " of rigid contacts"}
 
 
 def describe_interpreter() -> dict[str, str]:
@@ -91,7 +99,7 @@ def build_layer(
     headers: Mapping[str, str],
     compiler: CompilerInfo,
     progress: Callable[[str], None] | None = None,
-    half: Half = FIRST,
+    share: Share = FIRST,
     translation: Translation | None = None,
 ) -> list[Path]:
     """Find object files of the layer in the cache or the package, or make them; the Cython text's is the first.
@@ -108,10 +116,10 @@ def build_layer(
         Who compiles.
     progress : callable, optional
         Told what is being done.
-    half : Half
+    share : Share
         Which of them.
     translation : Translation, optional
-        Of the half's text; chosen here by default.
+        Of the share's text; chosen here by default.
 
     Raises
     ------
@@ -120,24 +128,24 @@ def build_layer(
     ToolchainError
         If Python's headers are missing, or Cython or the compiler fails.
     """
-    texts = half.choose(texts)
+    texts = share.choose(texts)
     translation = translation or choose_translation(texts)
     key = compute_key({**describe_layer(texts, headers, compiler), "cython": translation.version})
     found = cache.find(key) or find_installed(key)
     if found is not None:
-        return _objects(found.directory, half)
+        return _objects(found.directory, share)
     from concurrent.futures import ThreadPoolExecutor  # slow to import
 
     includes = [f"-I{find_python_headers()}", f"-I{np.get_include()}"]
     if progress is not None:
-        progress(f"building the Cython layer{'' if half is FIRST else ' of ensembles and contacts'} (once)")
+        progress(f"building the Cython layer{_OF.get(share, '')} (once)")
     with cache.attempt(key) as directory:
         for name, text in {**texts, **headers}.items():
             (directory / name).write_text(text, encoding="utf-8")
         commands = [
             *(
                 [*compiler.command, *_c_flags(compiler, name), "-I.", "-c", name, "-o", f"{name}.o"]
-                for name in half.c_files
+                for name in share.c_files
             ),
             [*compiler.command, *layer_flags(compiler), "-I.", *includes, "-c", MADE, "-o", _OBJECT],
         ]
@@ -152,7 +160,7 @@ def build_layer(
             (directory / f"{made}.stamp.h").unlink()
 
         running = Running()
-        with ThreadPoolExecutor(1) as pool:  # steppers and ensembles while Cython translates
+        with ThreadPoolExecutor(max(1, (os.cpu_count() or 2) - 1)) as pool:  # while this thread sees to Cython's text
             try:
                 others = pool.map(compile_one, commands[:-1])
                 translate(translation, directory)
@@ -164,18 +172,19 @@ def build_layer(
                 raise
         (directory / MADE).unlink()
         recipe = {"commands": commands, "cython": translation.version}
-        return _objects(cache.publish(directory, key, "layer", "_core", _OBJECT, recipe).directory, half)
+        return _objects(cache.publish(directory, key, "layer", "_core", _OBJECT, recipe).directory, share)
 
 
 def _c_flags(compiler: CompilerInfo, file: str) -> list[str]:
     """Flags of a C file, with all lanes that this processor takes: models choose."""
     widest = lane_width()
-    flags = stepper_flags(compiler, wide=file != "eomgen_steppers.c" or widest < 4)
+    plain = file in ("eomgen_steppers.c", "eomgen_contacts.c")  # where there are wide ones, these are not run
+    flags = stepper_flags(compiler, wide=widest < 4 or not plain)
     return [*flags, f"-DEOMGEN_LANES={sum(w for w in (2, 4, 8) if w <= widest)}"]
 
 
-def _objects(directory: Path, half: Half) -> list[Path]:
-    return [directory / name for name in (_OBJECT, *(f"{name}.o" for name in half.c_files))]
+def _objects(directory: Path, share: Share) -> list[Path]:
+    return [directory / name for name in (_OBJECT, *(f"{name}.o" for name in share.c_files))]
 
 
 def find_python_headers() -> Path:

@@ -11,7 +11,7 @@ from pathlib import Path
 from ..layer import read_header, read_layer
 from .cache import Cache
 from .compiler import find_compiler
-from .cython_layer import FIRST, HEADERS, LATE, build_layer
+from .cython_layer import CONTACTS, ENSEMBLES, FIRST, HEADERS, build_layer
 from .installed import write_installed
 from .translation import MADE, SOURCE, Translation, choose_translation, run_cython, translation_key
 
@@ -36,8 +36,8 @@ def install_layer(folder: Path, *, compiled: bool) -> None:
     layer, headers = read_layer(), {header: read_header(header) for header in HEADERS}
     with tempfile.TemporaryDirectory(prefix="eomgen-") as private:
         made, translations = Path(private, "built"), []
-        for half in (FIRST, LATE):
-            texts = half.choose(layer)
+        for share in (FIRST, ENSEMBLES, CONTACTS):
+            texts = share.choose(layer)
             version, ready = choose_translation(texts)
             text = _translate(texts, Path(private)) if ready is None else ready.read_bytes()
             write_installed(made, key := translation_key(texts), {MADE: text}, {"cython": version})
@@ -48,7 +48,7 @@ def install_layer(folder: Path, *, compiled: bool) -> None:
             cache = Cache(Path(private, "cache"))
             objects = build_layer(cache, layer, headers, find_compiler(), tell, FIRST, translations[0])
             files = {path.name: path.read_bytes() for path in objects}
-            write_installed(folder, objects[0].parent.name, files, {"half": "first"})
+            write_installed(folder, objects[0].parent.name, files, {"for": "single runs"})
 
 
 def tell(line: str) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from eomgen.compilation import Cache, compile_sources, cython_layer, find_compiler, install, installed, load_core
-from eomgen.compilation.cython_layer import FIRST, LATE
+from eomgen.compilation.cython_layer import CONTACTS, ENSEMBLES, FIRST
 from eomgen.compilation.translation import choose_translation, translation_key
 from eomgen.errors import MissingDependencyError
 from eomgen.layer import read_layer
@@ -71,13 +71,13 @@ def test_without_the_package_s_cython_must_be_there(
         built({**sources, "a.h": "/* none */"}, fresh_cache)
 
 
-@pytest.mark.parametrize("half", [FIRST, LATE])
+@pytest.mark.parametrize("share", [FIRST, ENSEMBLES, CONTACTS])
 def test_a_translation_is_of_its_text_and_of_no_older_cython(
-    half: cython_layer.Half, package: Path, monkeypatch: pytest.MonkeyPatch
+    share: cython_layer.Share, package: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from Cython import Shadow
 
-    texts = half.choose(read_layer())
+    texts = share.choose(read_layer())
     ready = choose_translation(texts).ready
     assert ready is not None
     text = ready.read_text()
@@ -96,9 +96,9 @@ def test_a_translation_is_of_its_text_and_of_no_older_cython(
 @pytest.mark.parametrize("harm", ["changed", "cut", "gone", "renamed", "no manifest", "nonsense"])
 def test_what_is_not_whole_is_not_found(harm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(installed, "FOLDER", tmp_path)
-    installed.write_installed(tmp_path, "k", {"_core.o": b"object", "other.o": b""}, {"half": "first"})
+    installed.write_installed(tmp_path, "k", {"_core.o": b"object", "other.o": b""}, {"for": "runs"})
     found = installed.find_installed("k")
-    assert found == (tmp_path / "k", {"half": "first"})
+    assert found == (tmp_path / "k", {"for": "runs"})
     assert installed.find_installed("other") is None
     file, manifest, key = found.directory / "_core.o", found.directory / "manifest.json", "k"
     match harm:

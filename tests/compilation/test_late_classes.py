@@ -15,7 +15,9 @@ import pytest
 
 import eomgen as eg
 from eomgen.compilation import Cache, find_compiler
-from eomgen.compilation.late_classes import NAMES
+from eomgen.compilation.cython_layer import CONTACTS, ENSEMBLES, FIRST
+from eomgen.compilation.late_classes import NAMES, _tell
+from eomgen.layer import LAYER, read_layer
 from eomgen.runtime.late import eager
 
 OTHER = """
@@ -157,3 +159,20 @@ def test_a_library_that_cannot_be_loaded_is_not_kept(
     monkeypatch.setenv("CC", str(compiler))
     goes_in_python(eg.load(write("lost")).compile(), "cannot be loaded")
     assert "classes" not in kinds(cache, "lost")
+
+
+def test_who_waits_at_a_terminal_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    _tell("building")
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    _tell("building")
+    assert capsys.readouterr() == ("", "eomgen: building\n")
+
+
+def test_no_share_holds_what_another_is_for() -> None:
+    texts = {share: share.choose(read_layer()) for share in (FIRST, ENSEMBLES, CONTACTS)}
+    files = [{name for name in found if name.endswith(".c")} for found in texts.values()]
+    assert set.union(*files) == {name for name in LAYER if name.endswith(".c")}
+    assert sum(map(len, files)) == len(set.union(*files))
+    assert "cdef class Ensemble" not in "".join(texts[CONTACTS].values())
+    assert "cdef class RigidStepper" not in "".join(texts[ENSEMBLES].values())
