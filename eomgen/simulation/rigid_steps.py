@@ -6,9 +6,9 @@ Systems, 2008, section 10.1).  With the position q_m = q + h/2 N v half a step o
 
     M (v+ - v) + h b(q_m, (v + v+)/2) = J^T P + C^T L,      C(q+) v+ + C_t = 0,      q+ = q_m + h/2 N v+,
 
-with M, J and C of the middle where nothing else is said, and the laws of :mod:`~eomgen.numeric.contact_impulses` between
-impulses P and velocities J v+.  The normal velocity is to be at least -e times the one before where shapes touch, and
--g/h where they are a gap g apart and come to rest on each other (D. E. Stewart, J. C. Trinkle, An implicit
+with M, J and C of the middle where nothing else is said, and the laws of :mod:`~eomgen.numeric.contact_impulses`
+between impulses P and velocities J v+.  The normal velocity is to be at least -e times the one before where shapes
+touch, and -g/h where they are a gap g apart and come to rest on each other (D. E. Stewart, J. C. Trinkle, An implicit
 time-stepping scheme for rigid body dynamics with inelastic collisions and Coulomb friction, Int. J. Numer. Methods Eng.
 39 (1996), 2673-2691).  What is left of penetrations and of open loops is removed from the positions alone (V. Acary,
 Projected event-capturing time-stepping schemes, Comput. Methods Appl. Mech. Eng. 256 (2013), 224-250).
