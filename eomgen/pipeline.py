@@ -26,6 +26,7 @@ from .kinematics import Kinematics, analyse
 from .kinematics.mobility import Mobility, find_mobility
 from .kinematics.other_branches import other_branches
 from .kinematics.report import MechanismReport, report
+from .runtime.near_names import unknown
 from .targets import TARGETS, find_target
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def choose_method(mechanism: Mechanism, method: str) -> str:
     if method == "auto" and bare:
         return "lagrange"
     if method not in ("auto", *METHODS):
-        raise UsageError(f"no method {method!r}; there are: auto, {', '.join(METHODS)}")
+        raise unknown("method", method, ("auto", *METHODS))
     if bare and method not in OF_LAGRANGIANS:
         raise UsageError(
             f"method {method!r} needs bodies; for a bare Lagrangian there are: auto, {', '.join(OF_LAGRANGIANS)}"

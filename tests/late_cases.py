@@ -86,21 +86,21 @@ CASES: tuple[Judged, ...] = (
     # friction
     contacts("friction", 0.0, NEGATIVE, **RUB | {"friction": "@"}),
     contacts("smoothing", 0.1, NOT_POSITIVE, **RUB | {"smoothing": "@"}),
-    contacts("static_friction", 0.4, NEGATIVE, **RUB, static_friction="@", stribeck=0.1),
+    contacts("static_friction", 0.3, (0.2, -0.1), **RUB, static_friction="@", stribeck=0.1),
     contacts("stribeck", 0.1, NOT_POSITIVE, **RUB, static_friction=0.4, stribeck="@"),
     contacts("transition", 0.1, NOT_POSITIVE, **BROWN | {"transition": "@"}),
     contacts("static_friction", 0.3, (0.2, -0.1), **BROWN, static_friction="@"),
     contacts("friction", 0.1, NOT_POSITIVE, **LUGRE | {"friction": "@"}),
     contacts("bristle_stiffness", 1.0, NOT_POSITIVE, **LUGRE | {"bristle_stiffness": "@"}),
     contacts("bristle_damping", 1.0, NOT_POSITIVE, **LUGRE | {"bristle_damping": "@"}),
-    contacts("static_friction", 0.4, NOT_POSITIVE, **LUGRE, static_friction="@", stribeck=0.1),
+    contacts("static_friction", 0.3, (0.2, -0.1), **LUGRE, static_friction="@", stribeck=0.1),
     contacts("viscous_friction", 0.0, NEGATIVE, **RUB, viscous_friction="@"),
     contacts("viscous_friction", 0.1, NEGATIVE, **LUGRE, viscous_friction="@"),
     force("viscous", 0.0, NEGATIVE, type="friction", joint="ja", viscous="@"),
     force("viscous", 0.1, NEGATIVE, type="friction", joint="ja", viscous="@", coulomb=1.0, smoothing=0.1),
     force("viscous", 0.1, NEGATIVE, **REACT, viscous="@"),
     force("coulomb", 0.0, NEGATIVE, type="friction", joint="ja", coulomb="@", smoothing=0.1),
-    force("static", 0.0, NEGATIVE, type="friction", joint="ja", coulomb=1.0, smoothing=0.1, static="@", stribeck=1.0),
+    force("static", 1.0, (0.9, -0.1), type="friction", joint="ja", coulomb=1.0, smoothing=1.0, static="@", stribeck=1),
     *(
         force(key, 0.1, bad, **{**REACT, key: "@", **more})
         for key, bad, more in (

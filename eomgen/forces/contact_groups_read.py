@@ -119,9 +119,9 @@ def _refuse_on_soil(e: Entry, first: Sequence[ContactShape], second: Sequence[Co
             elif 0 < len(wheels) < len(others) and not any(shape.kind == BED for shape in shapes):
                 e.fault(key, "has wheels and plates, which remember differently", "give each contacts of their own")
             on_bed = any(shape.kind == BED for shape in shapes)  # whose cells remember
-            for word in ("recovery", "lateral") if wheels and not on_bed else ("peak_angle", "reversal"):
-                e.refuse(word, f"has no meaning for {'wheels' if wheels else 'plates'}")
             if not on_bed:
+                for word in ("recovery", "lateral") if wheels else ("peak_angle", "reversal"):
+                    e.refuse(word, f"has no meaning for {'wheels' if wheels else 'plates'}")
                 e.refuse("settling", "belongs to the cells of a bed")
             return
     e.fault("", "has soil, but no ground", "give half_plane or a profile as one group, plates or wheels as the other")

@@ -178,8 +178,11 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
                 e.fault(key, f"is given without {dynamic}", f"give {dynamic}, or leave {key} out")
         return None
     level = e.law(dynamic)
-    e.require(dynamic, level, NOT_NEGATIVE, "must be 0 or greater")
     kind = e.choice("friction_law")
+    if kind == BRISTLES:
+        e.require(dynamic, level, POSITIVE, "must be greater than 0 in friction_law: lugre")
+    else:
+        e.require(dynamic, level, NOT_NEGATIVE, "must be 0 or greater")
     along = e.given(viscous)
     if along is not None and not alone:
         e.require(viscous, along, NOT_NEGATIVE, "must be 0 or greater")
@@ -187,17 +190,17 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
     if kind == "brown_mcphee":
         return _brown_mcphee(e, level, drag, static)
     if kind == BRISTLES:
-        return _lugre(e, level, drag, dynamic, static)
+        return _lugre(e, level, drag, static)
     for key in _PLAIN[2:]:
         e.refuse(key, f"has no meaning in friction_law: {kind}")
     if "smoothing" not in e.values:
         e.fault("smoothing", "is missing", "give the velocity (greater than 0) below which friction is smoothed")
         return None
-    pair = _onset(e, static)
+    pair = _onset(e, level, static)
     return None if pair is None else Friction(level, e.positive("smoothing"), drag, *pair)
 
 
-def _onset(e: Entry, static: str) -> tuple[Expr | None, Expr | None] | None:
+def _onset(e: Entry, level: Expr, static: str) -> tuple[Expr | None, Expr | None] | None:
     """Static friction and Stribeck velocity, or neither; None where only one is given, which is noted."""
     if (static in e.values) != ("stribeck" in e.values):
         missing = "stribeck" if static in e.values else static
@@ -205,8 +208,13 @@ def _onset(e: Entry, static: str) -> tuple[Expr | None, Expr | None] | None:
         return None
     onset = e.given(static)
     if onset is not None:
-        e.require(static, onset, NOT_NEGATIVE, "must be 0 or greater")
+        _require_greater(e, level, onset, static)
     return onset, e.positive("stribeck") if "stribeck" in e.values else None
+
+
+def _require_greater(e: Entry, level: Expr, onset: Expr, static: str) -> None:
+    """Require static friction that is not below sliding friction, which is itself not below 0."""
+    e.require(static, onset - level, NOT_NEGATIVE, "this is static minus sliding friction; static is the greater")
 
 
 def _brown_mcphee(e: Entry, level: Expr, viscous: Expr, static: str) -> BrownMcPhee | None:
@@ -218,21 +226,17 @@ def _brown_mcphee(e: Entry, level: Expr, viscous: Expr, static: str) -> BrownMcP
     onset = e.given(static)
     if onset is None:
         onset = level
-    e.require(static, onset, NOT_NEGATIVE, "must be 0 or greater")
-    e.require(static, onset - level, NOT_NEGATIVE, "this is static minus sliding friction; static is the greater")
+    _require_greater(e, level, onset, static)
     return BrownMcPhee(level, onset, e.positive("transition"), viscous)
 
 
-def _lugre(e: Entry, level: Expr, viscous: Expr, dynamic: str, static: str) -> LuGre | None:
+def _lugre(e: Entry, level: Expr, viscous: Expr, static: str) -> LuGre | None:
     for key in ("smoothing", "transition"):
         e.refuse(key, "has no meaning in friction_law: lugre")
     for key in _PLAIN[3:]:
         if key not in e.values:
             e.fault(key, "is missing", "friction_law: lugre needs bristle_stiffness and bristle_damping")
-    pair = _onset(e, static)
-    e.require(dynamic, level, POSITIVE, "must be greater than 0 in friction_law: lugre")
+    pair = _onset(e, level, static)
     if pair is None or e.at_fault():
         return None
-    if pair[0] is not None:
-        e.require(static, pair[0], POSITIVE, "must be greater than 0 in friction_law: lugre")
     return LuGre(level, e.positive("bristle_stiffness"), e.positive("bristle_damping"), viscous, *pair, e.states())

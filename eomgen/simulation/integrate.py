@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
+NAMES = (*METHODS, "Taylor", "RK4", "moreau", "kinematic")  #: all that simulate knows
 
 
 class Solution(NamedTuple):
@@ -82,7 +83,7 @@ def choose_solver(method: Any) -> Any:
     scipy = require("scipy.integrate", "scipy", "simulate")
     if isinstance(method, str):
         if method not in METHODS:
-            raise unknown("method", method, (*METHODS, "Taylor", "RK4"))
+            raise unknown("method", method, NAMES)
         return getattr(scipy, method)
     if isinstance(method, type) and issubclass(method, scipy.OdeSolver):
         return method

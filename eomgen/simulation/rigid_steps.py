@@ -4,14 +4,20 @@ The scheme is Moreau's midpoint rule (J. J. Moreau, Unilateral contact and dry f
 Nonsmooth Mechanics and Applications, 1988, 1-82; V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical
 Systems, 2008, section 10.1).  With the position q_m = q + h/2 N v half a step on,
 
-    M (v+ - v) + h b(q_m, (v + v+)/2) = J^T P + C^T L,      C v+ + C_t = 0,      q+ = q_m + h/2 N v+,
+    M (v+ - v) + h b(q_m, (v + v+)/2) = J^T P + C^T L,      C(q+) v+ + C_t = 0,      q+ = q_m + h/2 N v+,
 
-and the laws of :mod:`~eomgen.numeric.contact_impulses` between impulses P and velocities J v+.  The normal velocity is
-to be at least -e times the one before where shapes touch, and -g/h where they are a gap g apart and come to rest on
-each other (D. E. Stewart, J. C. Trinkle, An implicit time-stepping scheme for rigid body dynamics with inelastic
-collisions and Coulomb friction, Int. J. Numer. Methods Eng. 39 (1996), 2673-2691).  What is left of penetrations and of
-open loops is removed from the positions alone (V. Acary, Projected event-capturing time-stepping schemes, Comput.
-Methods Appl. Mech. Eng. 256 (2013), 224-250).
+with M, J and C of the middle where nothing else is said, and the laws of :mod:`~eomgen.numeric.contact_impulses`
+between impulses P and velocities J v+.  The normal velocity is to be at least -e times the one before where shapes
+touch, and -g/h where they are a gap g apart and come to rest on each other (D. E. Stewart, J. C. Trinkle, An implicit
+time-stepping scheme for rigid body dynamics with inelastic collisions and Coulomb friction, Int. J. Numer. Methods Eng.
+39 (1996), 2673-2691).  What is left of penetrations and of open loops is removed from the positions alone (V. Acary,
+Projected event-capturing time-stepping schemes, Comput. Methods Appl. Mech. Eng. 256 (2013), 224-250).
+
+Constraints hold for the velocities at the end of a step and push in the middle, as in SHAKE and its form by velocities
+(J. P. Ryckaert, G. Ciccotti, H. J. C. Berendsen, J. Comput. Phys. 23 (1977), 327-341; H. C. Andersen, J. Comput. Phys.
+52 (1983), 24-34): but for the closing of loops, of order h^3, a step read backwards is the same step, and loops are of
+second order.  C(q+) is not formed: C v+ is aimed at what makes C(q+) v+ + C_t vanish, first at that with which the
+constraints hold for the mean of v and v+, and contacts are solved again until they do not feel the difference.
 
 Contacts are those that are near at q_m.  Before and after it bodies move at constant velocities, v and v+, and
 ``meeting_time`` says how long no two shapes that are apart meet, or go far beside their thickness.  A step whose halves
@@ -26,7 +32,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import SimulationError
-from ..limits.rigid_contacts import GENTLER, GROWN, HALVINGS, REMOVED, RESTING, ROUGH, YIELDING
+from ..limits.rigid_contacts import (
+    CLOSINGS,
+    GENTLER,
+    GROWN,
+    HALVINGS,
+    REMOVED,
+    RESTING,
+    ROUGH,
+    ROUNDS,
+    YIELDING,
+)
 from ..numeric import algebra
 from ..numeric.contact_impulses import ContactImpulses, solve_contacts
 from ..numeric.contact_problem import ContactProblem
@@ -150,30 +166,74 @@ class RigidSteps:
             return None  # shapes that touch at the start and approach: later steps end with velocities that part them
         held = _Held(self.module, middle, q_m, u)
         bias = self.bias(middle, x, u=u)
+        held.turn_round(v)
         free = held.free(v - h * (held.inverse @ bias))
         rows = self._near(self.contacts.rows(middle, q_m, u), v, free, h)
         meeting = _Meeting(held, rows, v, self._last) if rows.gaps.size else None
         x[n_q:] = 0.5 * (v + free)
         # forces that do not change with velocities need one solution, which then is the one that counts
         rough = 1.0 if np.array_equal(self.bias(middle, x, u=u), bias) else ROUGH
-        new, P = self._contact(meeting, free, h, rough)
-        x[n_q:] = 0.5 * (v + new)
-        again = self.bias(middle, x, u=u)
-        if rough != 1.0 or not np.array_equal(again, bias):
-            free = held.free(v - h * (held.inverse @ again))
-            new, P = self._contact(meeting, free, h, 1.0)
+        for k in range(ROUNDS):
+            new, P = self._contact(meeting, free, h, 1.0 if k else rough)
+            if k and held.rows is None:
+                break
+            x[n_q:] = 0.5 * (v + new)
+            again = self.bias(middle, x, u=u)
+            settled = k > 0 or (rough == 1.0 and np.array_equal(again, bias))
+            if held.rows is not None:
+                position = self.move(q_m, 0.5 * h * new)
+                position = self.move(position, held.closing(position, t + h, self._at_end(t + h, position, new)))
+                excess = held.excess(position, new, t + h, self._at_end(t + h, position, new))
+                settled = self._bears(meeting, excess, last=k == ROUNDS - 1) and settled
+                held.aim(excess)
+            if settled:
+                break
+            bias = again
+            free = held.free(v - h * (held.inverse @ bias))
         if self._passes(middle, q_m, new, u, 0.5 * h):
             return None
         position = self.move(q_m, 0.5 * h * new)
         pushed = np.zeros((len(P), 3))
         pushed[:, : P.shape[1]] = P
         self.acting.append(np.concatenate([rows.pairs, rows.places, pushed], axis=1))
-        end = self.forcing(t + h, np.concatenate([position, new])) if self.forcing else None
-        away = held.closing(position, t + h, end)
         if rows.gaps.size:
-            away = away + self._out(held, rows, P, new, h)
+            away = self._out(held, rows, P, new, h)
+            position = self.move(position, away) if away.any() else position
+        if held.rows is not None:
+            position, new = self._closed(held, t + h, position, new)
         self.missed += self._misses
-        return (self.move(position, away) if away.any() else position), new
+        return position, new
+
+    def _at_end(self, t: float, q: Array, v: Array) -> Any:
+        return self.forcing(t, np.concatenate([q, v])) if self.forcing else None
+
+    def _bears(self, meeting: _Meeting | None, excess: Array, last: bool) -> bool:
+        """Whether contacts do not feel that velocities are projected by so much; if not in the last round, a miss."""
+        felt = 0.0 if meeting is None else float(np.abs(meeting.rows.jacobian @ excess).max())
+        if meeting is None or felt <= self.tolerance * meeting.scale:
+            return True
+        if last:
+            self._misses, self.residual = True, max(self.residual, felt)
+        return last
+
+    def _closed(self, held: _Held, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+        """Position and velocities on the constraints at t to rounding, by Newton steps along those of the middle."""
+        u = self._at_end(t, q, v)
+        before = np.inf
+        for _ in range(CLOSINGS):
+            d = held.closing(q, t, u)
+            size = float(np.abs(d).max())
+            if not size < 0.5 * before:
+                break
+            q, before = self.move(q, d), size
+        before = np.inf
+        for _ in range(CLOSINGS):
+            d = held.excess(q, v, t, u)
+            size = float(np.abs(d).max())
+            if not size < 0.5 * before:
+                break
+            v, before = v - d, size
+        return q, v
 
     def _near(self, rows: RigidRows, v: Array, free: Array, h: float) -> RigidRows:
         """Contacts that may act in this step: those that touch, or would soon."""
@@ -193,7 +253,7 @@ class RigidSteps:
         strikes = fast & (rows.restitution > 0.0) & (rows.gaps + h * undisturbed[:, 0] < 0.0)
         arrive = np.where(rows.gaps > 0.0, -rows.gaps / h, 0.0)
         back = np.where(strikes, -rows.restitution * before[:, 0] - arrive, 0.0)
-        scale = max(float(np.abs(before).max()), float(np.abs(undisturbed).max()))
+        scale = meeting.scale = max(float(np.abs(before).max()), float(np.abs(undisturbed).max()))
         for k in range(GENTLER + 1):
             part = 0.0 if k == GENTLER else 0.5**k
             c = undisturbed.copy()
@@ -264,12 +324,14 @@ class _Meeting:
         Velocities by impulses.
     compliance : (m d, m d) array
         Velocities of contacts by impulses.
+    scale : float
+        (m/s) What the tolerance of their impulses is relative to.
     """
 
     def __init__(self, held: _Held, rows: RigidRows, v: Array, last: dict[Spot, Array]) -> None:
         m = len(rows.gaps)
         d = len(rows.jacobian) // m
-        self.rows = rows
+        self.rows, self.scale = rows, 0.0
         self.before = (rows.jacobian @ v).reshape(m, d)
         self.spread = held.inverse @ rows.jacobian.T
         self.compliance = rows.jacobian @ self.spread
@@ -303,9 +365,22 @@ class _Held:
         self.inverse = whole - self.back @ spread.T
         self.inverse = 0.5 * (self.inverse + self.inverse.T)
 
+    def turn_round(self, v: Array) -> None:
+        """Aim at velocities v+ with which the constraints hold for the mean of v and v+."""
+        if self.rows is not None:
+            self.wanted = -2.0 * self.drift - self.rows @ v
+
+    def aim(self, excess: Array) -> None:
+        """Aim at velocities smaller by an excess."""
+        self.wanted = self.wanted - self.rows @ excess
+
     def free(self, v: Array) -> Array:
-        """Velocities that obey the constraints, from what forces alone would make of them."""
-        return v if self.rows is None else v - self.back @ (self.rows @ v + self.drift)
+        """Velocities as aimed at, from what forces alone would make of them."""
+        return v if self.rows is None else v - self.back @ (self.rows @ v - self.wanted)
+
+    def excess(self, q: Array, v: Array, t: float, u: Any) -> Array:
+        """What velocities v (n_v,) at a position have too much for the constraints there, in the metric of here."""
+        return np.asarray(self.back @ self.module.kernels.velocity_constraints(np.concatenate([q, v]), u=u, t=t))
 
     def closing(self, q: Array, t: float, u: Any) -> Array:
         """A displacement (n_v,) that closes the loops: a Newton step."""

@@ -13,9 +13,11 @@ from ..errors import UsageError
 from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start, last_state
+from ..runtime.near_names import unknown
 from ..runtime.room import as_real, read_number, read_numbers, read_times
 from ..runtime.signals import Forcing
 from ..texts import shown
+from .integrate import NAMES
 from .tolerances import check_step
 
 if TYPE_CHECKING:
@@ -60,8 +62,10 @@ def check_method(method: Any, step: Any) -> float | None:
     """The size of the steps of RK4 (s), or None for another method; a UsageError if they do not go together."""
     if method is not None and not isinstance(method, (str, type)):
         raise UsageError(f"method must be a name or a subclass of OdeSolver, not {shown(method)}")
+    if isinstance(method, str) and method not in NAMES:
+        raise unknown("method", method, NAMES)
     if (isinstance(method, str) and method == "RK4") != (step is not None):
-        raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
+        raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it but moreau")
     return None if step is None else check_step("step", step)
 
 

@@ -41,7 +41,7 @@ def test_run_holds_constraints_by_stabilisation(call: Call) -> None:
 
 def test_what_does_not_fit_is_refused(call: Call) -> None:
     for words, fault in (
-        (["--method", "kane"], "there are: auto, embedding"),
+        (["--method", "kane"], "there are auto, embedding"),
         (["--baumgarte", "3"], "not two numbers ALPHA,BETA"),
         (["--baumgarte", "3,4"], "works with method 'augmented' only"),
     ):

@@ -248,11 +248,14 @@ def test_verification_and_components_know_bristles(tmp_path: Path) -> None:
         ({**BROWN, "smoothing": 1}, "smoothing", "has no meaning in friction_law: brown_mcphee"),
         ({**BROWN, "transition": 0}, "transition", "is 0"),
         ({**BROWN, "static_friction": 0.1}, "static_friction", "static is the greater"),
+        ({**COULOMB, "static_friction": 0.1, "stribeck": 0.1}, "static_friction", "static is the greater"),
+        ({**LUGRE, "static_friction": 0.1, "stribeck": 0.1}, "static_friction", "static is the greater"),
         ({"friction_law": "brown_mcphee", "friction": 1}, "transition", "is missing"),
         ({**LUGRE, "smoothing": 1}, "smoothing", "has no meaning in friction_law: lugre"),
         ({**LUGRE, "bristle_damping": 0}, "bristle_damping", "is 0"),
         ({**LUGRE, "bristle_stiffness": -1}, "bristle_stiffness", "is -1"),
         ({**LUGRE, "friction": 0}, "friction", "must be greater than 0"),
+        ({**LUGRE, "friction": -0.1}, "friction", "must be greater than 0"),
         ({"friction_law": "lugre", "friction": 0.1}, "bristle_stiffness", "is missing"),
     ],
 )
@@ -260,6 +263,7 @@ def test_what_is_wrong_with_a_law_of_friction_is_told(law: dict[str, Any], place
     with pytest.raises(ModelError) as error:
         block(0.1, law).mechanism()
     found = {p.path: f"{p.message}; {p.remedy}" for p in error.value.problems}
+    assert len(found) == len(error.value.problems)  # each fault is told once
     assert told in found.get(f"forces.touch.{place}", f"nothing there: {found}"), found
 
 

@@ -456,5 +456,7 @@ def test_what_is_refused(shape: Any, bed: Any, law: Any, told: str) -> None:
     m = eg.Model("bed")
     m.planar("j", m.ground, m.body("b", mass=1.0, inertia={"zz": 1.0}))
     m.contacts("soil", {**shape, "on": "b"}, {"shape": "bed", "on": m.ground, "length": 2.0, "cells": 5, **bed}, law)
-    with pytest.raises(ModelError, match=f"(?s){told}"):
+    with pytest.raises(ModelError, match=f"(?s){told}") as error:
         m.compile(target="numpy")
+    paths = [problem.path for problem in error.value.problems]
+    assert len(set(paths)) == len(paths)  # each fault is told once

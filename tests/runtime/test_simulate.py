@@ -194,6 +194,7 @@ def test_wrong_options_are_told(pendulum):
     for options, words in [
         ({"method": "RK54"}, "did you mean RK4 or RK45"),
         ({"method": "taylor"}, "did you mean Taylor"),
+        ({"method": "moreu", "step": 1e-3}, "did you mean moreau"),
         ({"method": 3}, "OdeSolver"),
         ({"span": (0, 1, 2)}, "span must be"),
         ({"t_eval": [0.5, 0.2]}, "t_eval must be times in order"),

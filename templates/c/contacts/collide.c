@@ -6,7 +6,7 @@ typedef struct {
     double *J, *X, *W;                            /* rows by velocities; L^-T J^T without what constraints take; X^T X */
     double *before, *undisturbed, *after, *c, *P; /* velocities, what the laws start from, impulses */
     double *friction, *arrive, *back, *out;
-    double *work;
+    double *work, scale;                          /* scale: what the tolerance of impulses is relative to */
     int *rests, *numbers;
 } meeting;
 
@@ -43,7 +43,7 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
     double scale, residual = 0.0;
     int rebounds = 0, count = 0;
     across(s->n_v, n, at->J, free, at->undisturbed);
-    scale = fmax(largest_of(n, at->before, 1), largest_of(n, at->undisturbed, 1));
+    scale = at->scale = fmax(largest_of(n, at->before, 1), largest_of(n, at->undisturbed, 1));
     for (int c = 0; c < m; c++) {
         const double gap = -at->records[RECORD_OF*c + 5], e = at->records[RECORD_OF*c + 13];
         const double before = at->before[c*d], undisturbed = at->undisturbed[c*d];

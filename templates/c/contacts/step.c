@@ -71,8 +71,8 @@ static int find_inertia(const eomgen_rigid *s, double t, inertia *at, double *C,
     return failed;
 }
 
-/* Velocities that obey the constraints, from v and a step of h of the forces b without contacts. */
-static void fall(const inertia *at, const double *C, const int *rows, const double *drift, const double *v, double h,
+/* Velocities without contacts with C v+ = aim, from v and a step of h of the forces b. */
+static void fall(const inertia *at, const double *C, const int *rows, const double *aim, const double *v, double h,
                  const double *b, double *work, double *out)
 {
     const int n = at->n;
@@ -82,7 +82,7 @@ static void fall(const inertia *at, const double *C, const int *rows, const doub
     hold(at, work);
     release(n, at->L, work);
     for (int i = 0; i < n; i++) { work[i] = v[i] - h*work[i]; }
-    for (int r = 0; r < at->n_c; r++) { wanted[r] = -(dot(n, C + rows[r]*n, work) + drift[r]); }
+    for (int r = 0; r < at->n_c; r++) { wanted[r] = aim[r] - dot(n, C + rows[r]*n, work); }
     meet_rows(at, at->n_c, wanted, out);
     for (int i = 0; i < n; i++) { out[i] += work[i]; }
 }
@@ -153,6 +153,83 @@ static void keep_impulses(eomgen_rigid *s, const meeting *at, const int *keys)
     }
 }
 
+/* Inputs at t and s->next. */
+static int find_inputs(eomgen_rigid *s, double t)
+{
+    return s->inputs != NULL && s->inputs(s->forcing, t, s->next, s->u) ? EOMGEN_NO_INPUT : EOMGEN_STEPPED;
+}
+
+/* A Newton step that closes the loops at s->next, by the factors of the middle; its largest part. */
+static double close_loops(eomgen_rigid *s, const inertia *held, double t, double *work, double *d, int *failed)
+{
+    *failed = *failed ? *failed : call(s, &s->closure, t, s->next, work + s->n_v);
+    if (*failed) {
+        return 0.0;
+    }
+    for (int r = 0; r < s->n_h; r++) { work[r] = -work[s->n_v + s->rows[r]]; }
+    meet_rows(held, s->n_h, work, d);
+    return largest_of(s->n_v, d, 1);
+}
+
+/* What the velocities of s->next have too much for the constraints there, and how much of it rows see; the largest part. */
+static double find_excess(eomgen_rigid *s, const inertia *held, double t, double *work, double *seen, double *d, int *failed)
+{
+    *failed = *failed ? *failed : call(s, &s->drift, t, s->next, work + s->n_v);
+    if (*failed) {
+        return 0.0;
+    }
+    for (int r = 0; r < s->n_c; r++) { work[r] = seen[r] = work[s->n_v + s->rows[r]]; }
+    meet_rows(held, s->n_c, work, d);
+    return largest_of(s->n_v, d, 1);
+}
+
+/* Position and velocities of s->next onto the constraints to rounding. */
+static void close_all(eomgen_rigid *s, const inertia *held, double t, double *work, double *seen, double *d, int *failed)
+{
+    double before = DBL_MAX, size = 0.0;
+    for (int k = 0; k < RIGID_CLOSINGS && s->n_h; k++, before = size) {
+        size = close_loops(s, held, t, work, d, failed);
+        if (*failed || !(size < 0.5*before)) {
+            break;
+        }
+        move(s, s->next, 1.0, d, s->next);
+    }
+    before = DBL_MAX;
+    for (int k = 0; k < RIGID_CLOSINGS; k++, before = size) {
+        size = find_excess(s, held, t, work, seen, d, failed);
+        if (*failed || !(size < 0.5*before)) {
+            break;
+        }
+        for (int i = 0; i < s->n_v; i++) { s->next[s->n_q + i] -= d[i]; }
+    }
+}
+
+/* Whether contacts do not feel that velocities are projected onto the constraints at the end, at which the next solution aims. */
+static int bears(eomgen_rigid *s, const inertia *held, meeting *at, double t, double h, const double *v, int last, double *work,
+                 double *seen, double *aim, double *d, eomgen_rigid *told, int *failed)
+{
+    double felt;
+    move(s, s->x_m, 0.5*h, v, s->next);
+    memcpy(s->next + s->n_q, v, (size_t)s->n_v*sizeof(double));
+    *failed = *failed ? *failed : find_inputs(s, t);
+    if (s->n_h) {
+        close_loops(s, held, t, work, d, failed);
+        if (!*failed) { move(s, s->next, 1.0, d, s->next); }
+    }
+    find_excess(s, held, t, work, seen, d, failed);
+    for (int r = 0; r < s->n_c; r++) { aim[r] -= seen[r]; }
+    if (*failed || !at->m) {
+        return 1;
+    }
+    across(s->n_v, at->n, at->J, d, at->undisturbed);
+    felt = largest_of(at->n, at->undisturbed, 1);
+    if (felt <= s->tolerance*at->scale) {
+        return 1;
+    }
+    if (last) { told->missed = 1, told->residual = fmax(told->residual, felt); }
+    return 0;
+}
+
 static long sum_of(const long *sizes, int count)
 {
     long sum = 0;
@@ -161,12 +238,14 @@ static long sum_of(const long *sizes, int count)
 }
 
 /* Places of all that a step needs, whatever its contacts. */
-enum { OF_L, OF_Q, OF_R, OF_C, OF_SIZES, OF_DRIFT, OF_BIAS, OF_AGAIN, OF_FREE, OF_NEW, OF_AWAY, OF_WORK, OF_SPOTS, OF_AXES, FIXED };
+enum { OF_L, OF_Q, OF_R, OF_C, OF_SIZES, OF_DRIFT, OF_BIAS, OF_AGAIN, OF_FREE, OF_NEW, OF_AWAY, OF_WORK, OF_SPOTS, OF_AXES, OF_AIM,
+       OF_SEEN, OF_INPUTS, FIXED };
 
 static void fixed_sizes(const eomgen_rigid *s, long sizes[FIXED])
 {
     const long n = s->n_v, n_c = s->n_c, wide = n + s->n_rows;
-    const long found[FIXED] = {n*n, n_c*n, n_c*n_c, s->n_rows*n, wide, n_c, n, n, n, n, n, 2*wide, s->n_spots, 6*n};
+    const long found[FIXED] = {n*n, n_c*n, n_c*n_c, s->n_rows*n, wide, n_c, n, n, n, n, n, 2*wide, s->n_spots, 6*n, n_c, n_c,
+                                s->n_u};
     memcpy(sizes, found, sizeof found);
 }
 
@@ -230,26 +309,37 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
         || find_inertia(s, middle, &held, part[OF_C], part[OF_SIZES], x_m, part[OF_DRIFT])) {
         return EOMGEN_LOOK;
     }
-    fall(&held, part[OF_C], s->rows, part[OF_DRIFT], v, h, part[OF_BIAS], part[OF_WORK], part[OF_FREE]);
+    for (int r = 0; r < s->n_c; r++) { /* constraints hold for the mean of the velocities at first */
+        part[OF_AIM][r] = -2.0*part[OF_DRIFT][r] - dot(n, part[OF_C] + s->rows[r]*n, v);
+    }
+    memcpy(part[OF_INPUTS], s->u, (size_t)s->n_u*sizeof(double));
+    fall(&held, part[OF_C], s->rows, part[OF_AIM], v, h, part[OF_BIAS], part[OF_WORK], part[OF_FREE]);
     failed = find_contacts(s, middle, &held, h, part[OF_FREE], part[OF_SPOTS], part[OF_AXES], &at, keys, &told);
     for (int i = 0; i < n; i++) { x_m[n_q + i] = 0.5*(v[i] + part[OF_FREE][i]); }
     failed = failed ? failed : call(s, &s->bias, middle, x_m, part[OF_AGAIN]);
     /* forces that do not change with velocities need one solution, which then is the one that counts */
     rough = memcmp(part[OF_AGAIN], part[OF_BIAS], (size_t)n*sizeof(double)) ? RIGID_ROUGH : 1.0;
-    for (int round = 0; round < 2 && !failed; round++) {
+    for (int round = 0; round < RIGID_ROUNDS && !failed; round++) {
+        int settled = round > 0;
         if (at.m) {
             collide(s, &held, &at, part[OF_FREE], h, round ? 1.0 : rough, part[OF_NEW], &told);
         } else {
             memcpy(part[OF_NEW], part[OF_FREE], (size_t)n*sizeof(double));
         }
-        if (round == 0) {
+        if (!settled || s->n_c) {
             for (int i = 0; i < n; i++) { x_m[n_q + i] = 0.5*(v[i] + part[OF_NEW][i]); }
             failed = call(s, &s->bias, middle, x_m, part[OF_AGAIN]);
-            if (rough == 1.0 && memcmp(part[OF_AGAIN], part[OF_BIAS], (size_t)n*sizeof(double)) == 0) {
-                break;
-            }
-            fall(&held, part[OF_C], s->rows, part[OF_DRIFT], v, h, part[OF_AGAIN], part[OF_WORK], part[OF_FREE]);
+            settled = settled || (rough == 1.0 && memcmp(part[OF_AGAIN], part[OF_BIAS], (size_t)n*sizeof(double)) == 0);
         }
+        if (s->n_c && !failed) {
+            settled = bears(s, &held, &at, t + h, h, part[OF_NEW], round == RIGID_ROUNDS - 1, part[OF_WORK], part[OF_SEEN],
+                            part[OF_AIM], part[OF_AWAY], &told, &failed) && settled;
+            memcpy(s->u, part[OF_INPUTS], (size_t)s->n_u*sizeof(double));
+        }
+        if (settled) {
+            break;
+        }
+        fall(&held, part[OF_C], s->rows, part[OF_AIM], v, h, part[OF_AGAIN], part[OF_WORK], part[OF_FREE]);
     }
     if (failed) {
         return failed;
@@ -260,25 +350,21 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
     }
     move(s, x_m, 0.5*h, part[OF_NEW], s->next);
     memcpy(s->next + n_q, part[OF_NEW], (size_t)n*sizeof(double));
-    if (s->inputs != NULL && s->n_h && s->inputs(s->forcing, t + h, s->next, s->u)) {
-        return EOMGEN_NO_INPUT;
+    s->m = at.m;
+    if (at.m) { keep_impulses(s, &at, keys); }
+    if (at.m && push_out(s, &held, &at, part[OF_NEW], h, part[OF_AWAY], &told)) {
+        move(s, s->next, 1.0, part[OF_AWAY], s->next);
     }
-    memset(part[OF_AWAY], 0, (size_t)n*sizeof(double));
-    if (s->n_h) {
-        double *const wanted = part[OF_WORK];
-        failed = failed || call(s, &s->closure, t + h, s->next, part[OF_SIZES]);
-        for (int r = 0; r < s->n_h; r++) { wanted[r] = -part[OF_SIZES][s->rows[r]]; }
-        meet_rows(&held, s->n_h, wanted, part[OF_AWAY]);
+    if (s->n_c && !failed) {
+        failed = find_inputs(s, t + h);
+        if (failed) {
+            return failed;
+        }
+        close_all(s, &held, t + h, part[OF_WORK], part[OF_SEEN], part[OF_AWAY], &failed);
     }
     if (failed) {
         return EOMGEN_LOOK;
     }
-    s->m = at.m;
-    if (at.m) { keep_impulses(s, &at, keys); }
-    if (at.m && push_out(s, &held, &at, part[OF_NEW], h, part[OF_BIAS], &told)) {
-        for (int i = 0; i < n; i++) { part[OF_AWAY][i] += part[OF_BIAS][i]; }
-    }
-    move(s, s->next, 1.0, part[OF_AWAY], s->next);
     s->residual = fmax(s->residual, told.residual), s->depth = fmax(s->depth, told.depth);
     s->missed += told.missed, s->iterations = told.iterations > s->iterations ? told.iterations : s->iterations;
     s->contacts = at.m > s->contacts ? at.m : s->contacts;
