@@ -38,7 +38,7 @@ def _tables(function: PairFunction) -> list[dict[str, Any]]:
     for k, rows in enumerate(function.tables):
         table = written([(row[0], *(x - begun if x >= 0 else x for x in row[1:])) for row in rows])
         sizes, length = len(rows[0]) - PLACE - REST, placed_length(rows)
-        own = {"k": k, "count": len(rows), "columns": len(rows[0]), "sizes": sizes, "length": length}
+        own = {"k": k, "count": len(rows), "columns": len(rows[0]), "sizes": sizes, "length": length, "lined": False}
         found.append({**table, **own, "start": start, "number": number})
         number += len(rows)
         start += len(rows) * length
@@ -62,6 +62,8 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
     parts += [("touch", "_touch")] if used.meets else []
     parts += [("spot", "_spot")] if used.lists else []
     tables = _tables(function)
+    for k in {kind.first for kind in function.kinds if kind.lines}:
+        tables[k]["lined"] = True
     functions: list[str] = []
     helpers: list[str] = []
     kinds: list[dict[str, Any]] = []
@@ -86,7 +88,8 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
                 "function": named,
                 "first": tables[kind.first],
                 "second": tables[kind.second],
-                "planar": int(kind.planar),
+                "planar": kind.extent,
+                "lines": kind.lines,
                 "law": kind.law,
                 "states": kind.states,
                 "pieces": kind.corners[0] if len(kind.corners) == 1 else 0,
@@ -120,6 +123,7 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
         "called": plain_declarations(program.name, calls.values()),
         "moving": len(function.data) - function.states,
         "most": max((kind["second"]["count"] for kind in kinds if kind["sorted"]), default=0),
+        "lined": any(table["lined"] for table in tables),
         "longest": max(table["length"] for table in tables),
         "apart": repr(APART),
         "sums": used.sums,
@@ -168,7 +172,11 @@ def _columns(again: SumAgain) -> dict[str, Any]:
 def _is_sorted(function: PairFunction, kind: PairKind) -> bool:
     """Whether pairs are found along an axis: where they are many and every shape has bounds."""
     rows = function.tables[kind.first], function.tables[kind.second]
-    return len(rows[0]) * len(rows[1]) >= SORTED and all(row[-REST] >= 0 for table in rows for row in table)
+    return (
+        not kind.lines
+        and len(rows[0]) * len(rows[1]) >= SORTED
+        and all(row[-REST] >= 0 for table in rows for row in table)
+    )
 
 
 def _law(

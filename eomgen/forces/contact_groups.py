@@ -6,6 +6,7 @@ model's graph (:mod:`~eomgen.graph.pair_calls`), so that equations do not grow w
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, NamedTuple
@@ -240,7 +241,8 @@ class ContactGroups(Force):
                     height = own[0].shape.sizes[0] if part_of(first) == FIELD else None
                     kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost, height)
                     if self.on_bed:
-                        kind = replace(kind, held=(tuple(self._slots * x.column for x in own), (0,) * len(other)))
+                        places = tuple(self._slots * x.column for x in own)
+                        kind = replace(kind, held=(places, (0,) * len(other)), lines=_lines(own))
                     elif self.states:
                         block = blocks[g, h, class_of(first, second), part_of(second)]
                         rows = tuple(self._slots * block.of_first(x.number, x.column) for x in own)
@@ -280,6 +282,13 @@ class _Part(NamedTuple):
     feature: Feature
     number: int
     column: int
+
+
+def _lines(parts: Sequence[_Part]) -> tuple[tuple[int, int], ...]:
+    """Rows of cells that are of one bed: the first of each and how many."""
+    rows = [list(group) for _, group in itertools.groupby(parts, lambda part: part.number)]
+    starts = itertools.accumulate((len(group) for group in rows), initial=0)
+    return tuple((start, len(group)) for start, group in zip(starts, rows, strict=False))
 
 
 def _features(shapes: Sequence[ContactShape]) -> dict[str, list[_Part]]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..limits.contacts import BESIDE, FOLLOWED, GRIP, UNSHEARED, UPRIGHT
+from ..limits.contacts import BESIDE, FOLLOWED, GRIP, SIDES, UNSHEARED
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .contact import Contact, Touch
@@ -27,11 +27,14 @@ COUNTS = 2  #: numbers of a cell beside its states: how far it is pressed, the s
 
 
 class _Column(NamedTuple):
-    """Where an underside crosses the axis of a cell: there or not, how deep, normal out of it (along x and y), gap."""
+    """Where an underside crosses the axis of a cell, in the axes x and y of the cell."""
 
-    inside: Expr
+    inside: Expr  #: whether it does
     depth: Expr
-    normal: tuple[Expr, Expr]
+    normal: tuple[Expr, Expr]  #: out of what presses
+    steep: Expr  #: change of the depth as what presses moves along it: 1 / c
+    arm: tuple[Expr, Expr]  #: from the marker of what presses to where the force acts
+    away: tuple[Expr, Expr]  #: direction in which the gap grows
     gap: Expr  #: distance from the cell's place, negative inside
 
 
@@ -96,17 +99,17 @@ class SoilCell(Contact):
         return _under_sole(self.sizes[0], x, y, (vec.dot(axis, ahead), vec.dot(axis, up)))
 
     def touch(self, view: View) -> Touch:
-        reach, _, _, _, up = self._place(view)
+        reach, _, _, ahead, up = self._place(view)
         column = self._column(view)
         depth = where(column.inside, column.depth, -self.sizes[0])
-        here = vec.scale(-depth, up)
-        first = here if self.height is None else vec.add(here, self.height)
-        return up, depth, first, vec.sub(here, reach)
+        arm = vec.add(vec.scale(column.arm[0], ahead), vec.scale(column.arm[1], up))
+        first = vec.add(reach, arm)
+        return up, depth, first if self.height is None else vec.add(first, self.height), arm
 
     def nearness(self, view: View) -> tuple[Vec3, Expr]:
         _, _, _, ahead, up = self._place(view)
         column = self._column(view)
-        return vec.neg(vec.add(vec.scale(column.normal[0], ahead), vec.scale(column.normal[1], up))), -column.gap
+        return vec.add(vec.scale(column.away[0], ahead), vec.scale(column.away[1], up)), -column.gap
 
     # -- forces -------------------------------------------------------------------------------------------------------
     def _pressing(self, view: View) -> _Pressing:
@@ -121,15 +124,15 @@ class SoilCell(Contact):
             for marker, arm in ((self.first, first), (self.second, second))
         )
         velocity = vec.sub(v2, v1)
-        rate, sliding = vec.dot(outward, velocity) / -ny, vec.dot(along, velocity)
+        rate, sliding = vec.dot(outward, velocity) * column.steep, vec.dot(along, velocity)
         law, shear = self._laws()
         area = self.sizes[1] * self.size
-        push = law.on_pad(area, self.sizes[1]).force(depth, rate) / -ny
+        push = law.on_pad(area, self.sizes[1]).force(depth, rate) * column.steep
         graph = view.graph
         pressed = graph.apply("lt", 0.0, push)
         begun = law.modulus_of(self.sizes[1]) * (FOLLOWED * self.size) ** law.exponent
-        met = where(pressed, graph.apply("min", 1.0, push * -ny / (area * begun)), 0.0)
-        strength = where(pressed, met * shear.cohesion * area / -ny + push * shear.slope, 0.0)
+        met = where(pressed, graph.apply("min", 1.0, push / (column.steep * area * begun)), 0.0)
+        strength = where(pressed, met * shear.cohesion * area * column.steep + push * shear.slope, 0.0)
         quick = met / graph.apply("max", 1.0, graph.apply("abs", sliding) * law.settling / (GRIP * shear.modulus))
         most = strength * self._part()
         return _Pressing(outward, along, (first, second), depth, rate, sliding, push, met, most, quick)
@@ -193,37 +196,65 @@ class SoilCell(Contact):
 
 
 def _under_rim(radius: Expr, x: Expr, y: Expr) -> _Column:
-    """Of a wheel, whose centre is at x, y."""
+    """Of a wheel, whose centre is at x, y.
+
+    Cells beside a wheel come to it at a distance of BESIDE R.  Its rim is above the ground there until the axle is at
+    0.3 R = e_0 R; the deeper a wheel, the less of its further way counts towards the ends of its diameter: with c = cos
+    of the rim's angle, s its part from BESIDE to the lowest point, and e = y / R,
+
+        z / R = c - e - (1 - s) T(e),  T'(e) = -min(1, (e_0 - e) / (e_0 - e_1)) below e_0, 0 above
+
+    is not above 0 at BESIDE, R - y at the lowest point, and has continuous slopes.
+    """
     graph = radius.graph
+    apply, least, begin, end = graph.apply, (1.0 - BESIDE * BESIDE) ** 0.5, *SIDES
     far = BESIDE * radius
-    inside = graph.apply("lt", x * x, far * far)
+    inside = apply("lt", x * x, far * far)
     root = sqrt(where(inside, radius * radius - x * x, radius * radius))
-    distance = beyond_zero(x * x + y * y, sqrt)
-    across = where(inside, -x / radius, 0.0)
-    return _Column(inside, root - y, (across, -root / radius), distance - radius)
+    c, e = root / radius, y / radius
+    part = apply("max", 0.0, apply("min", 1.0, (begin - e) / (begin - end)))
+    lost = 0.5 * (begin - end) * part * part + apply("max", 0.0, end - e)
+    rest = (1.0 - c) / (1.0 - least)  # 1 - s
+    depth = radius * (c - e - rest * lost)
+    slope_x = where(inside, -x / root, 0.0) * (1.0 + lost / (1.0 - least))
+    slope_y = rest * part - 1.0
+    steep = sqrt(slope_x * slope_x + slope_y * slope_y)
+    normal = slope_x / steep, slope_y / steep
+    above = apply("max", 0.0, y)
+    distance = beyond_zero(x * x + above * above, sqrt)
+    apart = apply("lt", 0.0, distance)
+    length = where(apart, distance, 1.0)
+    away = where(apart, x / length, 0.0), where(apart, above / length, 1.0)
+    gap = where(apply("and", inside, apply("lt", 0.0, depth)), -depth, distance - radius)
+    return _Column(inside, depth, normal, steep, (radius * normal[0], radius * normal[1]), away, gap)
 
 
 def _under_sole(length: Expr, x: Expr, y: Expr, axis: tuple[Expr, Expr]) -> _Column:
-    """Of a plate, whose middle is at x, y and whose axis has two parts: its line, and edges that rise at 45 degrees."""
+    """Of a plate, whose middle is at x, y and whose axis has two parts: its line, and edges of 45 degrees.
+
+    Of all points of a plate the lowest cone of 45 degrees counts: its line, unless it is steeper, and beyond its ends,
+    or on both sides of the lower end of a steep plate, lines that rise from there.
+    """
     graph = length.graph
+    half = 0.5 * length
     turned = graph.apply("lt", axis[0], 0.0)
     ex, ey = (where(turned, -part, part) for part in axis)
-    inside = graph.apply("lt", UPRIGHT, ex)
-    ex, ey = where(inside, ex, 1.0), where(inside, ey, 0.0)
-    half, slant = 0.5 * length, 0.5**0.5
-    lines = [
-        (x, y, ex, ey),
-        (x + half * ex, y + half * ey, slant * (ex - ey), slant * (ex + ey)),
-        (x - half * ex, y - half * ey, slant * (ex + ey), slant * (ey - ex)),
-    ]
-    (px, py, dx, dy), *edges = lines
-    level, normal = py - px * dy / dx, (dy, -dx)
-    for px, py, dx, dy in edges:
-        other = py - px * dy / dx
-        higher = graph.apply("lt", level, other)
-        level = where(higher, other, level)
-        normal = where(higher, dy, normal[0]), where(higher, -dx, normal[1])
-    return _Column(inside, -level, normal, level * -normal[1])
+    flat = graph.apply("lt", graph.apply("abs", ey), ex)
+    run = where(flat, ex, 1.0)
+    level, normal, arm = y - x * ey / run, (where(flat, ey, 0.0), -run), (-x, -x * ey / run)
+    level = where(flat, level, graph.apply("min", y - half * ey, y + half * ey))  # of a steep one its lower end
+    ends = [(-half * ex, -half * ey), (half * ex, half * ey)]
+    for side in (-1.0, 1.0):  # rises to this side
+        first, second = (y + b - side * (x + a) for a, b in ends)
+        lower = graph.apply("lt", second, first)
+        edge = where(lower, second, first)
+        higher = graph.apply("lt", level, edge)
+        level = where(higher, edge, level)
+        slant = 0.5**0.5
+        normal = where(higher, side * slant, normal[0]), where(higher, -slant, normal[1])
+        place = where(lower, ends[1][0], ends[0][0]), where(lower, ends[1][1], ends[0][1])
+        arm = where(higher, place[0], arm[0]), where(higher, place[1], arm[1])
+    return _Column(graph.one, -level, normal, -1.0 / normal[1], arm, (-normal[0], -normal[1]), level * -normal[1])
 
 
 def bed_rates(states: Sequence[Expr], sums: Sequence[Expr], recovery: Expr) -> list[Expr]:

@@ -120,7 +120,7 @@ class PairFunction:
         """Its loops on numbers, with an evaluator of expressions for the laws."""
         kinds = [
             (
-                *(k.first, k.second, k.planar, k.law),
+                *(k.first, k.second, k.extent, k.law),
                 *(self._law(k, part, made) for part in ("outputs", "slopes", "touch", "spot")),
                 *k.beside,
             )

@@ -50,6 +50,10 @@ class PairKind:
         Of two polygons: how many corners they have.  The numbers of the shapes are those that matter then, which
         :mod:`~eomgen.numeric.polygon_edges` finds.  Of the inside of an outline and another shape: how many pieces it
         has, of which :mod:`~eomgen.numeric.outline_pieces` finds the nearest.
+    lines : tuple of (start, count)
+        Of first shapes that are columns of soil: rows of the first table that stand in line along their x axis, each
+        its first size farther than the one before.  Columns reach down without end, so that what is below their top
+        is as near as it is beside them.
     """
 
     name: str
@@ -67,6 +71,7 @@ class PairKind:
     states: int = 0
     calls: tuple[tuple[str, tuple[Function, tuple[int, ...]]], ...] = ()
     corners: tuple[int, ...] = ()
+    lines: tuple[tuple[int, int], ...] = ()
 
     def graph(self) -> Graph:
         """Its nodes as a graph."""
@@ -85,6 +90,11 @@ class PairKind:
     def plain(self) -> tuple[str, ...]:
         """The symbols that its results depend on."""
         return self.symbols[: len(self.symbols) // 2]
+
+    @property
+    def extent(self) -> int:
+        """In which directions distances count: 0 all, 1 across z of the first shape, 2 beside columns."""
+        return 2 if self.lines else int(self.planar)
 
     @property
     def beside(self) -> tuple[int, tuple[tuple[int, ...], ...]] | tuple[()]:

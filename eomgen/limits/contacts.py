@@ -46,9 +46,9 @@ FOCAL = 1e-6
 #: Part of a wheel's radius beside its axle where the rim still presses a cell of soil: at 0.98 the rim stands at 11
 #: degrees to the column, where the depth at which it crosses it changes five times as fast as the wheel moves ahead.
 BESIDE = 0.98
-#: Cosine of the inclination up to which a plate presses cells of soil, 34 degrees: the edges of 45 degrees stand at 11
-#: degrees to the column there, as rims at BESIDE do.
-UPRIGHT = 0.83
+#: Heights of a wheel's axle over a bed, by its radius, between which the sides of its rim come to press less;
+#: their mean is that at which the rim comes to the ground at BESIDE, 0.199, so that nothing presses there.
+SIDES = (0.3, 0.1)
 #: Part of K over which shear of a cell of soil follows its sliding, and which it gives back.  With UNSHEARED the sum of
 #: shear of a wheel is within 0.6 % of that of 1 - exp(-j / K) at slips of 0.1 to 0.6, within 1 % at 0.02, by quadrature
 #: over the arc at 2 and 5 cm in dry sand and heavy clay; its stiffness, v / l, stays below 1000 / s up to 0.7 m/s.

@@ -32,6 +32,7 @@ SPOT = 12
 #: The same in a list, behind the numbers of both shapes.
 RECORD = 2 + SPOT
 SORTED = 256  #: pairs of tables from which on near ones are found along an axis: below, testing all is as quick
+COLUMNS = 2  #: distances count beside columns
 NEVER = 1e300  #: (s) where no shapes come towards each other
 
 Narrow = Callable[[Sequence[Any]], Sequence[Any]]
@@ -48,7 +49,8 @@ class PairSum:
         Shapes of one kind: body, then places in the data of the position (3) and rotation (9) in the body, of the
         sizes, of the radius of a sphere that bounds the shape (-1: none does), and of the thickness of the body.
     kinds : sequence of (first, second, planar, law, value, slope, touch, spot), and of pairs with states (states, held)
-        Tables of the first and the second shape; whether distances count across z of the first only; places of the
+        Tables of the first and the second shape; in which directions distances count (0 all, 1 across z of the first, 2
+        beside columns that reach down along y of the first without end); places of the
         law's numbers; the function of one pair and its directional derivative, of the numbers of the first shape, of
         the second, of the law, and of the pair's states (and of their rates in the same order); normal, penetration and
         turning radius of the pair; the ``SPOT`` numbers of :meth:`spots`; how many states a pair has, and the numbers
@@ -129,7 +131,7 @@ class PairSum:
             bound = tables[0][i, -REST], tables[1][j, -REST]
             gap = distance - data[np.maximum(bound[0], 0)] - data[np.maximum(bound[1], 0)]
             free = ((bound[0] < 0) | (bound[1] < 0)).reshape(-1, *([1] * (data.ndim - 1)))
-            near = free | ~(gap > 0.0)
+            near = free | ~(gap > 0.0) | (planar == COLUMNS)
             closing, towards = (
                 -dot(reach, speed) / np.where(distance > 0.0, distance, 1.0),
                 np.sqrt(dot(change, change)),
@@ -287,14 +289,14 @@ class PairSum:
         return found
 
     def _candidates(
-        self, a: np.ndarray, b: np.ndarray, planar: bool, which: tuple[int, int], data: np.ndarray, more: Any = 0.0
+        self, a: np.ndarray, b: np.ndarray, planar: int, which: tuple[int, int], data: np.ndarray, more: Any = 0.0
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Pairs whose spheres may meet, from the order of their centres along an axis; None where all are to be tested.
 
         They come in the order of all pairs, so that sums keep their bits.
         """
         first, second = (self.tables[k] for k in which)
-        if data.ndim > 1 or data.dtype != float or len(first) * len(second) < SORTED:
+        if planar == COLUMNS or data.ndim > 1 or data.dtype != float or len(first) * len(second) < SORTED:
             return None
         if min(first[:, -REST].min(), second[:, -REST].min()) < 0:
             return None
@@ -323,7 +325,7 @@ class PairSum:
         self,
         a: np.ndarray,
         b: np.ndarray,
-        planar: bool,
+        planar: int,
         i: np.ndarray,
         j: np.ndarray,
         tables: tuple[np.ndarray, np.ndarray],
@@ -339,6 +341,9 @@ class PairSum:
             square = square - along * along
         size = data[np.maximum(bounds[0], 0)] + data[np.maximum(bounds[1], 0)] + more
         apart = np.asarray(square > size * size, dtype=bool)
+        if planar == COLUMNS:
+            x, y = ((reach * a[i][:, axis]).sum(axis=1) for axis in ([3, 6, 9], [4, 7, 10]))
+            apart = np.asarray((abs(x) > size + np.maximum(-y, 0.0)) | (y > size), dtype=bool)
         every = np.asarray(apart.all(axis=tuple(range(1, apart.ndim))))
         return np.asarray(~every | (bounds[0] < 0) | (bounds[1] < 0))
 

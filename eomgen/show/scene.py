@@ -12,6 +12,7 @@ import numpy as np
 
 from ..limits.pictures import SAME
 from .data import GROUND, Array, JointData, PictureData, PlacedFrame
+from .hollow_plates import hollow_lines, hollow_plate
 from .mesh_files import mesh_of
 from .solids import ROUND, Mesh, Triangles, box, rounded, solid, sphere, turned
 
@@ -271,7 +272,14 @@ def link_items(
     for k, name in enumerate(data.bodies):
         if k in shaped or k in hidden:
             continue
+        hollows = hollow_lines(data, k)
         own = distinct(points[k], NEAR * extent)
+        if hollows:  # the hull of all points would hide them
+            items += [Item("shape", name, k, *hollow_plate(line, BAR * symbol), convex=False) for line in hollows]
+            on_lines = np.abs(own[:, None] - np.vstack(hollows)).max(axis=2).min(axis=1) <= NEAR * extent
+            own = own[~on_lines]
+            if len(own) < 2:
+                continue
         com = data.com[k]
         if k in rods - blocks and len(own) == 1 and _telescopes(data, k, symbol):
             continue  # a barrel or a rod, which its joint draws
