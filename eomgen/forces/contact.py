@@ -21,7 +21,7 @@ from .bristles import UNIT, LuGre
 from .dry_friction import DryFriction, Slip
 from .force import Force, Load, MarkerLoad, Measured, View
 from .friction_laws import FRICTION, FRICTION_CHOICE, has_bristles, read_friction
-from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, HertzBodies, NormalLaw, read_normal_law
+from .normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, HertzBodies, NormalLaw, PartlyDamped, read_normal_law
 
 #: Normal (ground axes, from the first body to the second), penetration (m), arms of the contact point from the markers.
 Touch = tuple[Vec3, Expr, Vec3, Vec3]
@@ -62,9 +62,14 @@ class Contact(Force):
         """The part of the law that counts here, of a surface made of pieces; None means all."""
         return None
 
+    def grip(self, view: View) -> Expr | None:
+        """The part of damping and friction that counts here; None means all."""
+        return None
+
     def law_here(self, view: View) -> NormalLaw:
         """The law of the normal force as it acts here."""
-        return self.normal_law
+        grip = self.grip(view)
+        return self.normal_law if grip is None else PartlyDamped(self.normal_law, grip)
 
     def couple(self, view: View) -> Vec3 | None:
         """A couple on the second body that the energy has beside the force; its opposite acts on the first."""
@@ -139,6 +144,9 @@ class Contact(Force):
         return normal, depth, (first, second), vec.sub(relative, vec.scale(parting, normal)), -parting
 
     def _slip(self, view: View, normal: Vec3, depth: Expr, sliding: Vec3, push: Expr) -> Slip:
+        grip = self.grip(view)
+        if grip is not None:  # that part of the whole law
+            push = push - (1.0 - grip) * self.normal_law.elastic(depth)
         return Slip(sliding, normal, depth, push, view.rotation(self.first))
 
     def _drag(self, view: View, slip: Slip) -> Vec3:

@@ -124,7 +124,7 @@ class BowlRound(ProfilePiece):
 
     def share(self, view: View) -> Expr:
         x, y, _ = self._place(view)
-        bend, half, rise, cosine, sine, width, _ = self.sizes
+        bend, half, rise, cosine, sine, width = self.sizes[:6]
         left = (x + half) * cosine - (y - rise) * sine
         right = (half - x) * cosine - (y - rise) * sine
         return where(view.graph.apply("lt", 0.0, bend), -part(-left, width) * part(-right, width), 0.0)

@@ -15,7 +15,7 @@ from ..graph.core import Expr, cos, sin, sqrt
 from ..limits.contacts import SHARED
 from .branches import where
 from .contact_insides import notch
-from .contact_profiles import Point, ProfilePart, arc, biarcs, edge, length, minus, tangent, times, unit
+from .contact_profiles import Point, ProfilePart, arc, beside_bowls, biarcs, edge, length, minus, tangent, times, unit
 
 Pair = tuple[float, float]
 
@@ -37,7 +37,7 @@ def smooth_ring(points: Sequence[Point]) -> list[ProfilePart]:
     found: list[ProfilePart] = []
     for k in range(n):
         found += biarcs(points[k], points[(k + 1) % n], ways[k], ways[(k + 1) % n], width)
-    return found
+    return beside_bowls(found)
 
 
 class Tooth(NamedTuple):
@@ -109,7 +109,8 @@ def sprocket_ring(
         turn = (graph.constant(a), graph.constant(b))
         pieces += [one._replace(origin=_turned(one.origin, turn), along=_turned(one.along, turn)) for one in tooth]
         places += [_turned(point, turn) for point in line]
-    return pieces, [point for k, point in enumerate(places) if k % len(line) in (0, len(line) - 1)], places
+    tops = [point for k, point in enumerate(places) if k % len(line) in (0, len(line) - 1)]
+    return beside_bowls(pieces), tops, places
 
 
 def _pitch_radius(teeth: int, pitch: Expr) -> Expr:

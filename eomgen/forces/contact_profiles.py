@@ -7,6 +7,7 @@ counts for them alone, so that every circle meets one piece, or several where it
 from __future__ import annotations
 
 import itertools
+from abc import abstractmethod
 from collections.abc import Sequence
 from functools import reduce
 from typing import NamedTuple
@@ -62,19 +63,34 @@ def edge(
     """A straight piece between neighbours of two directions.
 
     Sizes: half of its length; at the left and the right end x and y of the bisector and 1, or 0 without an end; 1 if it
-    is felt beside its neighbours where these turn towards it (``walls``), else 0.
+    is felt beside its neighbours where these turn towards it (``walls``), else 0; the width over which neighbours share
+    a circle; of both ends what is hollow there (:func:`hollow`), of an edge with walls.
     """
     graph, way, half = width.graph, unit(reach), 0.5 * length(reach)
     ends: list[Expr] = []
+    passes: list[Expr] = []
     for other, inward in ((before, 1.0), (after, -1.0)):
+        turned = None if other is None or not walls else (dot(way, other), -inward * cross(way, other))
+        passes += hollow(graph.zero, turned)
         if other is None:
             ends += [graph.zero, graph.one, graph.zero]
             continue
         bisector = unit((-way[1] - other[1], way[0] + other[0]))  # the sum of both normals
         ends += [inward * dot(bisector, way), way[0] * bisector[1] - way[1] * bisector[0], graph.one]
     middle = (start[0] + 0.5 * reach[0], start[1] + 0.5 * reach[1])
-    sizes = (half, *ends, graph.constant(float(walls)), width)
+    sizes = (half, *ends, graph.constant(float(walls)), width, *passes)
     return ProfilePart("edge", middle, way, sizes, half, before is None or after is None)
+
+
+def hollow(radius: Expr, turned: Point | None) -> tuple[Expr, Expr, Expr]:
+    """What is hollow between an end of a piece and the next piece: cosine and sine of the angle of both, and a radius.
+
+    It is the corner itself, of radius 0, or a hollow arc; where the outline turns the other way all three are 0.
+    """
+    if turned is None:
+        return radius.graph.zero, radius.graph.zero, radius.graph.zero
+    inwards = radius.graph.apply("lt", 0.0, turned[1])
+    return where(inwards, turned[0], 0.0), where(inwards, turned[1], 0.0), where(inwards, radius, 0.0)
 
 
 def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
@@ -136,7 +152,8 @@ def _mirrored(way: Point, chord: Point) -> Point:
 def arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: Point | None = None) -> ProfilePart:
     """A circular arc, given the direction at its start or its end.
 
-    Sizes: curvature; half of the chord; height of the ends over the middle; cos and sin of the half angle.
+    Sizes: curvature; half of the chord; height of the ends over the middle; cos and sin of the half angle; the width
+    over which neighbours share a circle; of both ends what is hollow beyond them (:func:`hollow`), nothing so far.
     """
     chord = minus(end, start)
     c, half = unit(chord), 0.5 * length(chord)
@@ -147,9 +164,23 @@ def arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: P
         cosine, sine = dot(at_end, c), c[0] * at_end[1] - c[1] * at_end[0]
     rise = half * sine / (1.0 + cosine)
     middle = (start[0] + half * c[0] + rise * c[1], start[1] + half * c[1] - rise * c[0])
-    return ProfilePart(
-        "arc", middle, c, (sine / half, half, rise, cosine, sine, width), sqrt(half * half + rise * rise), False
-    )
+    sizes = (sine / half, half, rise, cosine, sine, width, *[width.graph.zero] * 6)
+    return ProfilePart("arc", middle, c, sizes, sqrt(half * half + rise * rise), False)
+
+
+def beside_bowls(ring: Sequence[ProfilePart]) -> list[ProfilePart]:
+    """The pieces of a smooth ring, with the hollow arcs that lie beyond their ends."""
+    found = []
+    for k, one in enumerate(ring):
+        passes = list(one.sizes[-6:])
+        for place, other in ((0, ring[k - 1]), (3, ring[(k + 1) % len(ring)])):
+            if other.kind == "arc":
+                bend, _, _, cosine, sine = other.sizes[:5]
+                inwards = bend.graph.apply("lt", 0.0, bend)
+                turned = (cosine * cosine - sine * sine, where(inwards, 2.0 * sine * cosine, 0.0))
+                passes[place : place + 3] = hollow(1.0 / where(inwards, bend, 1.0), turned)
+        found.append(one._replace(sizes=(*one.sizes[:-6], *passes)))
+    return found
 
 
 def arc_points(one: ProfilePart) -> list[Point]:
@@ -232,12 +263,53 @@ class ProfilePiece(Contact):
         return out, depth, vec.add(reach, second), second
 
 
-class EdgeRound(ProfilePiece):
+class SurfaceRound(ProfilePiece):
+    """On a piece beside others: two places of contact grow together where the circle holds what is hollow between them.
+
+    A place begins there with all the depth d of the hollow.  So damping and friction count by d_place - w d_hollow, of
+    which w is 1 where this place begins, 0 where the one beyond the hollow does, and between them the rest of that
+    one's w; beside a hollow that the circle does not hold they count in full.
+    """
+
+    @abstractmethod
+    def _ends(self, x: Expr, y: Expr) -> tuple[Point, Point]:
+        """How far a place is from the left and the right end: inwards along the piece, and out of the solid."""
+
+    def grip(self, view: View) -> Expr | None:
+        graph = view.graph
+        if self.normal_law.elastic(graph.one).is_zero:
+            return None
+        *passes, thick = self.sizes[-7:]
+        if all(number.is_zero for number in passes):
+            return None
+        x, y, _ = self._place(view)
+        ends, less = self._ends(x, y), graph.zero
+        for (along, up), (far, _), (c, s, radius) in (
+            (ends[0], ends[1], passes[:3]),
+            (ends[1], ends[0], passes[3:]),
+        ):
+            high, inwards = up - radius, graph.apply("max", 0.0, along)
+            beyond = graph.apply("max", 0.0, high * s - along * c)  # how far over the piece beyond the hollow
+            both = inwards + beyond
+            square = along * along + high * high
+            apart = graph.apply("lt", 0.0, square)
+            away = radius + where(apart, sqrt(where(apart, square, 1.0)), 0.0)
+            weight = beyond / where(graph.apply("lt", 0.0, both), both, 1.0)
+            on = graph.apply("lt", 0.0, far)  # towards its other end the piece hands the circle over to the next
+            room = where(on, graph.apply("min", 1.0, 2.0 * far / where(on, far + inwards, 1.0)), 0.0)
+            less = less + weight * room * graph.apply("max", 0.0, self.radius - away)
+        depth = self.touch(view)[1]
+        meets = graph.apply("lt", 0.0, depth)
+        inside = graph.apply("min", 1.0, graph.apply("max", 0.0, 1.0 + (self.radius - depth) / thick))
+        return graph.apply("max", 0.0, 1.0 - inside * less / where(meets, depth, 1.0))
+
+
+class EdgeRound(SurfaceRound):
     """On a straight piece, whose ends are corners of the profile or go on."""
 
     def share(self, view: View) -> Expr:
         x, y, _ = self._place(view)
-        half, left_x, left_y, left, right_x, right_y, right, walls, width, _ = self.sizes
+        half, left_x, left_y, left, right_x, right_y, right, walls, width = self.sizes[:9]
         above = walls * view.graph.apply("max", 0.0, y)
         first, second = (
             part(along * by - y * bx + above * view.graph.apply("max", 0.0, bx), width)
@@ -245,10 +317,14 @@ class EdgeRound(ProfilePiece):
         )
         return (1.0 - left * (1.0 - first)) * (1.0 - right * (1.0 - second))
 
+    def _ends(self, x: Expr, y: Expr) -> tuple[Point, Point]:
+        half = self.sizes[0]
+        return (x + half, y), (half - x, y)
+
     def touch(self, view: View) -> Touch:
         graph = view.graph
         x, y, reach = self._place(view)
-        half, _, _, left, _, _, right, _, _, _ = self.sizes
+        half, _, _, left, _, _, right = self.sizes[:7]
         over = right * graph.apply("max", 0.0, x - half) - left * graph.apply("max", 0.0, -half - x)
         beside = graph.apply("lt", 0.0, over * over)
         distance = sqrt(where(beside, over * over + y * y, 1.0))
@@ -257,7 +333,7 @@ class EdgeRound(ProfilePiece):
         return self._touching(view, gap, (where(beside, over / signed, 0.0), where(beside, y / signed, 1.0)), reach)
 
 
-class ArcRound(ProfilePiece):
+class ArcRound(SurfaceRound):
     """On a circular arc of curvature k: gap (2 y - k (x^2 + y^2)) / (1 + q), q = |(k x, 1 - k y)|.
 
     The formula holds for k = 0 too.
@@ -265,10 +341,16 @@ class ArcRound(ProfilePiece):
 
     def share(self, view: View) -> Expr:
         x, y, _ = self._place(view)
-        _, half, rise, cosine, sine, width, _ = self.sizes
-        left = (x + half) * cosine - (y - rise) * sine
-        right = (half - x) * cosine - (y - rise) * sine
+        width, ((left, _), (right, _)) = self.sizes[5], self._ends(x, y)
         return part(left, width) * part(right, width)
+
+    def _ends(self, x: Expr, y: Expr) -> tuple[Point, Point]:
+        _, half, rise, cosine, sine = self.sizes[:5]
+        high, left, right = y - rise, x + half, half - x
+        return (
+            (left * cosine - high * sine, left * sine + high * cosine),
+            (right * cosine - high * sine, right * sine + high * cosine),
+        )
 
     def touch(self, view: View) -> Touch:
         graph = view.graph

@@ -138,6 +138,9 @@ class AtHeight(Contact):
     def share(self, view: View) -> Expr | None:
         return self.flat.share(view)
 
+    def grip(self, view: View) -> Expr | None:
+        return self.flat.grip(view)
+
     def law_here(self, view: View) -> NormalLaw:
         return self.flat.law_here(view)
 

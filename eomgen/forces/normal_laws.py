@@ -181,6 +181,27 @@ class PartOfLaw(NormalLaw):
 
 
 @dataclass(frozen=True)
+class PartlyDamped(NormalLaw):
+    """Another law with a part of its damping, of 0 to 1."""
+
+    law: NormalLaw
+    grip: Expr
+
+    def force(self, depth: Expr, rate: Expr) -> Expr:
+        elastic = self.law.elastic(depth)
+        return elastic + self.grip * (self.law.force(depth, rate) - elastic)
+
+    def elastic(self, depth: Expr) -> Expr:
+        return self.law.elastic(depth)
+
+    def energy(self, depth: Expr) -> Expr:
+        return self.law.energy(depth)
+
+    def mapped(self, own: Callable[[Expr], Expr]) -> PartlyDamped:
+        return PartlyDamped(self.law.mapped(own), own(self.grip))
+
+
+@dataclass(frozen=True)
 class ElasticPart(NormalLaw):
     """The part of another law that has a potential."""
 
