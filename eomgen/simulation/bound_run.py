@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from .stalling import StallCheck
 
 #: States, and the part of a Jacobian's numbers that are not 0, from and up to which SciPy's sparse factors take less
-#: time than its dense ones.  Measured on Jacobians of soil under wheels, ms: 0.9 and 0.4 at 192 states, 1.2 and 1.4 at 300,
-#: 3.0 and 6.0 at 600, 8.4 and 42 at 1,212.
+#: time than its dense ones.  Measured on Jacobians of soil under wheels, ms: 0.9 and 0.4 at 192 states, 1.2 and
+#: 1.4 at 300, 3.0 and 6.0 at 600, 8.4 and 42 at 1,212.
 SPARSE_FROM, SPARSE_PART = 400, 0.05
 
 
