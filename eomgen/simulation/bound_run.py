@@ -82,7 +82,7 @@ class Run:
         extra = self.forcing.jacobian(t, np.asarray(x), self.kernel)
         J = J if extra is None else J + extra
         if self.sparse is None:
-            self.sparse = len(J) >= SPARSE_FROM and np.count_nonzero(J) <= SPARSE_PART * J.size
+            self.sparse = len(J) >= SPARSE_FROM and bool(np.count_nonzero(J) <= SPARSE_PART * J.size)
         if not self.sparse:
             return J
         from scipy.sparse import csc_matrix
