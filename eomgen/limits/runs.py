@@ -34,8 +34,8 @@ SUNK = 0.1  #: penetration at the start, relative to the thickness of both shape
 #: Rate of coordinates by themselves (dq'/dq) times the step below which implicit systems are solved by parts: what the
 #: series leaves out is its square, far below the rate at which Newton's iterations converge.
 DRIFTING = 1e-2
-#: Part of the terms of a pivot below which it is not taken without exchanges of rows: Newton's iterations bear an error of
-#: the factors of a thousandth, and rounding grows by as much as is lost.
+#: Part of the terms of a pivot below which it is not taken without exchanges of rows: Newton's iterations bear an error
+#: of the factors of a thousandth, and rounding grows by as much as is lost.
 FAINT = 1e-8
 SLOW = 1e-3  #: rate of Newton's iterations in a Radau step above which the Jacobian is renewed
 

@@ -15,8 +15,8 @@ from .block_groups import ALONG, COMPOSED, RATES, REGULAR, SHIFTS, USUAL, flat
 from .body_loops import BodyLoops
 from .dae_rows import dae_kinematics
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
-from .held_columns import HELD, HeldColumns, held_columns
 from .factor import articulated_positivity, factorize, is_unrolled, positivity, solve
+from .held_columns import HELD, HeldColumns, held_columns
 from .inverse_slopes import inverse_slopes
 from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .loop_blocks import LoopBlocks

@@ -1,9 +1,9 @@
 """Stage program: the columns of a tree's Jacobian that belong to states of contacts, from their pairs alone.
 
-A state of a pair of shapes, or of a cell of soil, acts on bodies by what its pairs exert, and otherwise on the states of
-its own pair.  So the rows of states follow from as many directions as a pair has states, all pairs at a time (A. R.
-Curtis, M. J. D. Powell, J. K. Reid, J. Inst. Maths Applics 13 (1974) 117-119), and the rows of bodies from the pairs that
-are near: what one exerts by its own states, times what wrenches on bodies make of the residual.
+A state of a pair of shapes, or of a cell of soil, acts on bodies by what its pairs exert, and otherwise on the states
+of its own pair.  So the rows of states follow from as many directions as a pair has states, all pairs at a time (A. R.
+Curtis, M. J. D. Powell, J. K. Reid, J. Inst. Maths Applics 13 (1974) 117-119), and the rows of bodies from the pairs
+that are near: what one exerts by its own states, times what wrenches on bodies make of the residual.
 """
 
 from __future__ import annotations

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from .progress import Progress
     from .stalling import StallCheck
 
-#: States, and the part of a Jacobian's numbers that are not 0, from and up to which SciPy's sparse factors take less time
-#: than its dense ones.  Measured on Jacobians of soil under wheels, ms: 0.9 and 0.4 at 192 states, 1.2 and 1.4 at 300,
-#: 3.0 and 6.0 at 600, 8.4 and 42 at 1,212.
+#: States, and the part of a Jacobian's numbers that are not 0, from and up to which SciPy's sparse factors take less
+#: time than its dense ones.  Measured on Jacobians of soil under wheels, ms: 0.9 and 0.4 at 192 states, 1.2 and
+#: 1.4 at 300, 3.0 and 6.0 at 600, 8.4 and 42 at 1,212.
 SPARSE_FROM, SPARSE_PART = 400, 0.05
 
 
@@ -34,7 +34,9 @@ class Run:
         self.forcing = forcing
         self.tangent: Timed | None = None
         self.last: tuple[str, int, float, Array] | None = None
-        self.sparse: bool | None = False  #: whether the solver gets a sparse Jacobian; None: where the first is worth it
+        self.sparse: bool | None = (
+            False  #: whether the solver gets a sparse Jacobian; None: where the first is worth it
+        )
 
     @cached_property
     def kernel(self) -> Timed:
@@ -80,7 +82,7 @@ class Run:
         extra = self.forcing.jacobian(t, np.asarray(x), self.kernel)
         J = J if extra is None else J + extra
         if self.sparse is None:
-            self.sparse = len(J) >= SPARSE_FROM and np.count_nonzero(J) <= SPARSE_PART * J.size
+            self.sparse = len(J) >= SPARSE_FROM and bool(np.count_nonzero(J) <= SPARSE_PART * J.size)
         if not self.sparse:
             return J
         from scipy.sparse import csc_matrix

@@ -1,4 +1,4 @@
-"""Sparse factors of the implicit stepper in plain C, clean under the sanitizers: what they solve, put into the equations."""
+"""Sparse factors of the implicit stepper in plain C, clean under the sanitizers: solutions put into the equations."""
 
 from __future__ import annotations
 

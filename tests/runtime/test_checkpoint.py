@@ -365,9 +365,9 @@ def test_sparse_factors_go_on(tmp_path: Path, killed: Any) -> None:
     block, good = np.load(file)["block"], file.read_bytes()
     real = 22 * n + n * n
     state = 22 * n + 4 * n * n
-    assert (block[state], block[state + 9]) == (3.0, 3.0 * n)  # sparse; a mass is [g, -1; k, g + d]
+    assert (block[state], block[state + 9]) == (3.0, 2.0 * n)  # sparse; four numbers for each mass
     filled, places = int(block[state + 9]), block[real:].view(np.intc)[2 * int(block[state + 9]) :]
-    changes = [(real, 0, 10**8), (real, n, -1), (real, 2 * n + 1, 0), (real, 3 * n + 1 + filled - 1, n)]
+    changes = [(real, 0, 10**8), (real, n, -1), (real, 2 * n + 1, 5), (real, 3 * n + 1 + filled - 1, n)]
     for start, place, value in changes:
         other = block.copy()
         other[start:].view(np.intc)[2 * filled + place] = value

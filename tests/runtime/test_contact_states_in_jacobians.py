@@ -1,4 +1,4 @@
-"""Jacobians and implicit runs of many states that hardly know each other: cells of soil, and balls that touch few others."""
+"""Jacobians and implicit runs of states that hardly know each other: cells of soil, balls that touch few others."""
 
 from __future__ import annotations
 
