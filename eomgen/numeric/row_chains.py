@@ -44,7 +44,7 @@ def parts(J: Array) -> list[list[Level]]:
     order = np.argsort(columns, kind="stable")
     of_columns = np.split(rows[order], np.searchsorted(columns[order], np.arange(1, n)))
     held, found = [x.tolist() for x in of_rows], [x.tolist() for x in of_columns]
-    open_columns, result = np.ones(n, dtype=bool), []
+    open_columns, result = np.ones(n, dtype=bool), list[list[Level]]()
     for k in range(n):
         if not open_columns[k]:
             continue
@@ -105,6 +105,7 @@ class Chain:
 
     def __init__(self, J: Array, levels: Sequence[Level], least: float) -> None:
         self.start, self.steps, self.rank, self.dropped = levels[0].columns, list[Step](), 0, 0.0
+        self.size = sum(len(level.columns) for level in levels)
         none = np.empty(0, dtype=np.intp)
         front = J[np.ix_(levels[0].rows, levels[0].columns)].T
         for (rows, _), (following, new) in zip(levels, [*levels[1:], Level(none, none)], strict=True):
@@ -130,7 +131,7 @@ class Chain:
 
     def motions(self, n: int) -> Array:
         """Orthonormal directions (n - r, n) along which no row changes."""
-        found, open_ = np.zeros((n, n)), np.empty((0, 0))
+        found, open_ = np.zeros((n, self.size - self.rank)), np.empty((0, 0))
         for turn, sizes, _, rest, new in reversed(self.steps):
             width = open_.shape[1] + len(rest) - len(open_)
             ahead = np.zeros((len(rest), width))
@@ -140,7 +141,7 @@ class Chain:
             here = len(turn) - len(new)
             found[new, :width], open_ = open_[here:], open_[:here]
         found[self.start, : open_.shape[1]] = open_
-        return found[:, : open_.shape[1]].T
+        return found.T
 
 
 class Decomposed:
@@ -177,7 +178,11 @@ class SparseRows:
     @cached_property
     def _parts(self) -> list[list[Level]]:
         m, n = self.J.shape
-        return parts(self.J) if self.J.size > SMALL else [[Level(np.arange(m), np.arange(n))]]
+        return (
+            parts(self.J)
+            if self.J.size > SMALL
+            else [[Level(np.arange(m, dtype=np.intp), np.arange(n, dtype=np.intp))]]
+        )
 
     @cached_property
     def _told(self) -> list[Chain | Decomposed]:
