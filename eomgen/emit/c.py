@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import accumulate
 from typing import Any
 
 from ..limits.in_c import definitions
@@ -146,6 +147,8 @@ def _context(program: Program, printed: list[Printed], work: int) -> dict[str, A
     numbers = {**sizes._asdict(), "n_const": n_const, "n_work": n_work, "n_step_work": n_work + 5 * sizes.n_x}
     numbers["closed_at"] = closed_at(program, areas)
     others = [i for i in range(sizes.n_v) if i not in program.preferred]
+    moving = range(sizes.n_v - program.n_states)
+    known = program.metadata.get("row_velocities") or [moving] * sizes.n_c
     drivers = [read_template(f"c/drivers/{file}.c") for file in driver_files(program)]
     roots = [y for b in program.blocks for y in (*b.outputs, *b.checks)]
     return {
@@ -174,6 +177,8 @@ def _context(program: Program, printed: list[Printed], work: int) -> dict[str, A
         "order": [*program.preferred, *others],
         "dependent": [int(i in others) for i in range(sizes.n_v)],
         "row_groups": program.metadata.get("row_groups") or [0] * sizes.n_c,
+        "row_starts": [0, *accumulate(map(len, known))],
+        "row_velocities": [k for row in known for k in row],
         "parent": program.parent,
         "n_states": program.n_states,
         "quaternion_slots": program.quaternion_slots,

@@ -35,3 +35,23 @@ def row_groups(kinematics: Kinematics) -> tuple[int, ...]:
         else:
             found.append(ALL)
     return tuple(found)
+
+
+def row_velocities(kinematics: Kinematics) -> tuple[tuple[int, ...], ...]:
+    """The velocities that each row and its rate can know (m,), those of a gap together; none where all rows know all.
+
+    The noise of a row near a change point is of the size of these velocities, whatever else moves faster.
+    Nonholonomic rows count as knowing all, as their factors depend on coordinates that do not move them.
+    """
+    c, n = kinematics.constraints, len(kinematics.velocity_names)
+    known = [{k for k, entry in enumerate(row) if not entry.is_zero} for row in c.jacobian]
+    known[len(c.values) :] = [set(range(n))] * c.nonholonomic
+    of_gaps: dict[int, set[int]] = {}
+    groups = row_groups(kinematics)
+    for group, own in zip(groups, known, strict=True):
+        if group > 0:
+            of_gaps.setdefault(group, set()).update(own)
+    found = [of_gaps[group] if group > 0 else own for group, own in zip(groups, known, strict=True)]
+    if kinematics.given_rates or all(len(own) == n for own in found):
+        return ()
+    return tuple(tuple(sorted(own)) for own in found)

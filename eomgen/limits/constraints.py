@@ -68,6 +68,8 @@ UNMOVED = 1e-12
 STILL = 3e-5
 #: Singular value at a passed change point: its minimum is found to the root of what stored states are closed to.
 PASSED = 1e-4
+#: Singular value that counts as lost where another one is: that of lengths that agree to rounding is its root, 1e-7.
+GONE = 1e-6
 #: Least square of the sine between a column of pivots and those before it, in straight-line code that may fall back to
 #: pivoting: an angle of 3e-3, beyond which accelerations keep eight digits; and where it must not, of rounding alone.
 LOST, VANISHED = 1e-5, 1e-20

@@ -110,7 +110,7 @@ def accelerate(terms: Terms, v: Array, scales: Scales, system: Embedded) -> Arra
         fastest = scales.speed(v)  # times itself: a power of a float that overflows is no number but an OverflowError
         if not np.isfinite(fastest * fastest):
             raise NonFiniteError("the squares of the velocities overflow")
-        a_p = minimum_norm(terms.C_q, -terms.gamma[:, None], scales, fastest * fastest, 2)[:, 0] / s
+        a_p = minimum_norm(terms.C_q, -terms.gamma[:, None], scales, scales.row_speeds(v) ** 2, 2)[:, 0] / s
     a = s * (a_p - system.solve(s * terms.h + system.M @ a_p))
     if not np.isfinite(a).all():
         raise NonFiniteError("the accelerations are not finite")

@@ -10,7 +10,8 @@ Near a configuration of lost rank that takes care (P. C. Hansen, *Rank-Deficient
 so C_q v is known to V eps / s and gamma, with the square of v, to V^2 eps / s^2.  A smaller rest along those rows tells
 nothing: taking it for true would divide it by s once more.  A mechanism that nearly changes its mode swings round with
 gamma of the size V^2, and has its rest taken down to s = 1e-6; one that passes through the change point has gamma of
-the size s V^2 and is left to go straight on within s = 1e-5, where only noise would turn it.
+the size s V^2 and is left to go straight on within s = 1e-5, where only noise would turn it.  V is that of
+the loop: rocker and coupler of another one that turn a thousand times as fast are no noise here.
 """
 
 from __future__ import annotations
@@ -58,12 +59,18 @@ def weakness(J: Array, z: Array) -> float:
     return float((d * d).sum()) / size if size > 0.0 else 1.0
 
 
+def along(z: Array, noise: Array | float) -> float:
+    """The root mean square of the noise of rows (m,) over a combination z of them, (m,) or (m, k)."""
+    square = float((z * z).sum())
+    return float(np.sqrt(((z.T * noise) ** 2).sum() / square)) if square > 0.0 else float(np.max(noise, initial=0.0))
+
+
 def smaller(weak: float) -> float:
     """The term for rows that are so weak."""
     return max(TIKHONOV, BELOW * weak)
 
 
-def least(J: Array, y: Array, x: Array, noise: float, order: int = 1) -> Array:
+def least(J: Array, y: Array, x: Array, noise: Array | float, order: int = 1) -> Array:
     """The x nearest to a given one with J x = y.
 
     Parameters
@@ -73,8 +80,9 @@ def least(J: Array, y: Array, x: Array, noise: float, order: int = 1) -> Array:
     y : (m,) or (m, k) array
     x : (n,) or (n, k) array
         To begin with; not changed.
-    noise : float
-        What 1e-15 of the position makes of y: for rates V, the size of v; for accelerations, V^2.
+    noise : (m,) array or float
+        What 1e-15 of the position makes of y: for rates V, the size of the velocities that a row knows; for
+        accelerations, V^2.
     order : int
         How often y was differentiated: 1 for rates, 2 for accelerations.
 
@@ -99,7 +107,7 @@ def least(J: Array, y: Array, x: Array, noise: float, order: int = 1) -> Array:
         length = float(np.abs(e).max())
         if length > FAST * before:
             weak = weakness(J, z)
-            if not float(np.sqrt((e * e).sum())) * weak ** (0.5 * order) > EXACT * size * noise:
+            if not float(np.sqrt((e * e).sum())) * weak ** (0.5 * order) > EXACT * size * along(z, noise):
                 break
             if relative > TIKHONOV:
                 relative = min(0.1 * relative, smaller(weak))

@@ -95,7 +95,8 @@ def correct_position(
 def correct_velocity(C_q: Array, C_t: Array, v: Array, scales: Scales) -> Array:
     """The nearest v (n,) with C_q v + C_t = 0."""
     x, y = v / scales.q, -scales.residual(C_t)
-    return np.asarray(scales.q * least(scales.jacobian(C_q), y, x, max(scales.speed(v), largest(y))))
+    noise = np.maximum(scales.row_speeds(v), np.abs(y))
+    return np.asarray(scales.q * least(scales.jacobian(C_q), y, x, noise))
 
 
 def project(
@@ -143,7 +144,7 @@ def _is_closed(C: Array, C_q: Array, C_t: Array, q: Array, v: Array, scales: Sca
     return largest(scales.residual(C_q @ v + C_t)) <= max(EXACT * max(1.0, scales.speed(v)), rounding * moved)
 
 
-def minimum_norm(C_q: Array, y: Array, scales: Scales, noise: float | None = None, order: int = 1) -> Array:
+def minimum_norm(C_q: Array, y: Array, scales: Scales, noise: Array | None = None, order: int = 1) -> Array:
     """The smallest scaled x (n, k) with C_q x = y (m, k); y must be consistent, as rates of redundant rows are.
 
     Never form the pseudo-inverse by y = I: with redundant rows its parts outside the range are 1e12 times as large as

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..limits.crossings import SMALL
 from ..limits.rounding import ROUNDED
@@ -34,6 +35,7 @@ class Scales(NamedTuple):
     space: Space | None = None  #: where q' = N(q) v, how coordinates move with velocities
     long: Array | None = None  #: (n,) 1.0 for velocities of lengths, 0.0 for those of angles
     groups: Indices | None = None  #: (m,) of rows, by eomgen/kinematics/row_groups.py; None: all are compared
+    known: NDArray[np.bool_] | None = None  #: (m, n) velocities that rows can know; None: all know all
 
     @classmethod
     def of_kinds(
@@ -97,6 +99,12 @@ class Scales(NamedTuple):
         """The largest scaled velocity of v (n,), first-order states left out."""
         moving = len(self.q) if self.space is None else len(self.q) - self.space.n_states
         return float(np.abs(v[:moving] / self.q[:moving]).max(initial=0.0))
+
+    def row_speeds(self, v: Array) -> Array:
+        """The largest scaled velocity that each row can know (m,), first-order states left out."""
+        if self.known is None:
+            return np.full(len(self.c), self.speed(v))
+        return np.asarray((self.known * np.abs(v / self.q)).max(axis=1, initial=0.0))
 
     def coordinates(self, velocities: Sequence[int] | Indices) -> Indices:
         """The coordinates that stand still when these velocities do."""

@@ -24,7 +24,7 @@ from ..kinematics.inertial_terms import inertial_terms
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
 from ..kinematics.near_pairs import describe_contacts, motion_axes, near_pairs
-from ..kinematics.row_groups import row_groups
+from ..kinematics.row_groups import row_groups, row_velocities
 from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
@@ -249,6 +249,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "constraint_kinds": list(c.kinds),
         "constraint_scales": list(mobility.row_scales),
         **({"row_groups": list(groups)} if any(groups := row_groups(kinematics)) else {}),
+        **({"row_velocities": [list(row) for row in known]} if (known := row_velocities(kinematics)) else {}),
         "alignment_labels": list(c.aligned_joints),
         "fragile_forces": [name for name, _ in flag_forces(kinematics)],
         **({"not_finite_where": where} if (where := not_finite_where(kinematics)) else {}),

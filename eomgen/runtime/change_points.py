@@ -2,7 +2,8 @@
 
 At a change point the constraint Jacobian loses rank: a parallelogram lies flat and could go on as an antiparallelogram.
 The steps of the integrator are looked at, whatever times were stored, and between them Hermite's polynomial through
-their ends, so closely that no pass falls between two looks.
+their ends, so closely that no pass falls between two looks.  Where the least singular value dips, the polynomial is
+laid again through closed states nearer to the dip, until what is lost is lost to rounding.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import EvaluationError
+from ..limits.constraints import GONE
 from ..limits.constraints import PASSED as SINGULAR
 from ..limits.rounding import TINY
 from ..numeric import algebra
@@ -27,7 +29,8 @@ MOST = 200_000  #: samples of a run
 DIP = 0.5  #: a smallest singular value that falls below this part of its largest over the run is looked at
 ENTRIES = 2_000_000  #: of constraint Jacobians held at a time
 PARTS = 24  #: of the neighbourhood of a dip, again and again
-LEVELS = 7  #: times that it is looked at more closely
+LEVELS = 10  #: times that it is looked at more closely: 1e-11 of the scaled motion between two samples is left
+CLOSER = 1  #: of these times at which the ends are closed again: nearer to the change point that tells no more
 SAME = 1e-3  #: of a neighbourhood: dips closer together are one
 
 
@@ -85,7 +88,12 @@ def find_change_points(module: BoundModel, t: Array, x: Array, u: Array) -> list
     ends = [0, *(np.flatnonzero(np.diff(t) == 0.0) + 1).tolist(), len(t)]
     looks = [Looks(module, t[a:b], x[:, a:b], u[:, a:b]) for a, b in pairwise(ends) if b - a > 1]
     largest = max((look.least.max() for look in looks), default=0.0)
-    return [point for look in looks for point in look.find(DIP * largest)]
+    found: list[ChangePoint] = []
+    for k, look in enumerate(looks):
+        if k and looks[k - 1].times[-1] == look.times[0] and look.continues(looks[k - 1]):
+            found.append(look.at_start())
+        found += look.find(DIP * largest)
+    return found
 
 
 class StatesBetween:
@@ -146,6 +154,21 @@ class Looks:
         self.times = np.append(np.concatenate(pieces), t[-1])
         values = singular_values(module, self.times, self.curve(self.times), self._inputs(self.times))
         self.least = values[:, self.rank - 1]
+        self.held = held
+
+    def continues(self, before: Looks) -> bool:
+        """Whether a reset at a change point, where the part before ended, lets the mechanism go on across it."""
+        if max(before.least[-1], self.least[0]) > GONE:
+            return False
+        v, w = before.curve.x[self.n_q :, -1], self.curve.x[self.n_q :, 0]
+        return bool((v / self.module.layout.scales.q**2 * w)[self.held].sum() > 0.0)
+
+    def at_start(self) -> ChangePoint:
+        """The change point at which this part starts."""
+        times, state = self.times[:1], self.curve.x[:, :1]
+        return self._point(
+            float(times[0]), state[:, 0], singular_values(self.module, times, state, self._inputs(times))[0]
+        )
 
     def _inputs(self, times: Array) -> Array | None:
         """Inputs (n_u, k) at times (k,) where constraints depend on them."""
@@ -161,32 +184,47 @@ class Looks:
         for k in dips.tolist():
             first, last = self.times[max(k - 1, 0)], self.times[min(k + 1, len(self.times) - 1)]
             point = self._closest(float(first), float(last))
-            if point is not None and not (found and abs(point.time - found[-1].time) <= SAME * abs(last - first)):
+            if point is None or (found and abs(point.time - found[-1].time) <= SAME * abs(last - first)):
+                continue
+            if self._crossed(point.time, found[-1].time if found else None):
                 found.append(point)
         return found
 
+    def _crossed(self, time: float, before: float | None) -> bool:
+        """Whether the run comes to a change point from farther away, the one before too, and leaves it again."""
+        forward = self.times[-1] >= self.times[0]
+        earlier, later = (self.times < time, self.times > time) if forward else (self.times > time, self.times < time)
+        if before is not None:
+            earlier &= self.times > before if forward else self.times < before
+        return bool((self.least[earlier] > GONE).any() and (self.least[later] > GONE).any())
+
     def _closest(self, first: float, last: float) -> ChangePoint | None:
         """The state between two times nearest to a loss of rank, if it is one."""
-        ends = np.array([first, last])
-        u = np.array([np.interp(ends, *_rising(self.t, row)) for row in self.u]).reshape(-1, 2)
-        curve = StatesBetween(self.module, ends, self._closed(ends), u)
-        for _ in range(LEVELS):
+        curve = self.curve
+        for level in range(LEVELS):
+            if level <= CLOSER:
+                ends = np.array([first, last])
+                u = np.array([np.interp(ends, *_rising(self.t, row)) for row in self.u]).reshape(-1, 2)
+                curve = StatesBetween(self.module, ends, self._closed(curve, ends), u)
             times = np.linspace(first, last, PARTS + 1)
             states = curve(times)
             values = singular_values(self.module, times, states, self._inputs(times))
-            k = int(np.argmin(values[:, self.rank - 1]))
+            least = values[:, self.rank - 1]
+            k = int(np.argmin(least))
             first, last = times[max(k - 1, 0)], times[min(k + 1, PARTS)]
-            if first == last or values[k, self.rank - 1] == 0.0:
+            if first == last or least[k] == 0.0:
                 break  # as near as times can be told apart
-        if values[k, self.rank - 1] > SINGULAR:
-            return None
-        freedoms = self.module.layout.n_v - int(np.count_nonzero(values[k] > 10.0 * SINGULAR))
-        coordinates = dict(zip(self.module.q_names, states[: self.n_q, k].tolist(), strict=True))
-        return ChangePoint(float(times[k]), freedoms, coordinates)
+        return None if least[k] > SINGULAR else self._point(float(times[k]), states[:, k], values[k])
 
-    def _closed(self, times: Array) -> Array:
-        """States at times, on the constraints; one that cannot be brought there stays as it is."""
-        states = self.curve(times)
+    def _point(self, time: float, state: Array, values: Array) -> ChangePoint:
+        gone = max(GONE, 10.0 * values[self.rank - 1])
+        freedoms = self.module.layout.n_v - int(np.count_nonzero(values > gone))
+        coordinates = dict(zip(self.module.q_names, state[: self.n_q].tolist(), strict=True))
+        return ChangePoint(time, freedoms, coordinates)
+
+    def _closed(self, curve: StatesBetween, times: Array) -> Array:
+        """States of a curve at times, on the constraints; one that cannot be brought there stays as it is."""
+        states = curve(times)
         for k, at in enumerate(times):
             try:
                 u = self._inputs(times[k : k + 1])

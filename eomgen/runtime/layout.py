@@ -102,7 +102,8 @@ class Layout:
         rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
         groups = data.get("row_groups")
         self.scales = Scales.of_kinds(self.velocity_kinds, rows, self.length, self.space)._replace(
-            groups=np.array(groups, dtype=np.intp) if groups else None
+            groups=np.array(groups, dtype=np.intp) if groups else None,
+            known=_table(data["row_velocities"], self.n_v) if "row_velocities" in data else None,
         )
         self.row_lengths = np.array([kind == "length" for kind in data.get("constraint_kinds", ())], dtype=bool)
         self.independent_moving = self.independent[self.independent < self.moving]  #: of the mechanism
@@ -252,6 +253,14 @@ class Layout:
         if given != self._allowed:
             require_allowed(self.metadata, p)
             self._allowed = given
+
+
+def _table(rows: Sequence[Sequence[int]], n: int) -> Any:
+    """Which of n columns each row names (m, n)."""
+    found = np.zeros((len(rows), n), dtype=bool)
+    for own, columns in zip(found, rows, strict=True):
+        own[list(columns)] = True
+    return found
 
 
 def acceleration_name(velocity: str) -> str:

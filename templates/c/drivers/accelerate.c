@@ -53,12 +53,13 @@ static int accelerate(double t, const double *restrict u, const double *restrict
     for (int i = 0; i < M; i++) {
         r[i] = gamma[i] / s[N + i];
     }
-    double fastest = 0.0;
-    for (int k = 0; k < MOVING; k++) {
-        fastest = fmax(fastest, fabs(w[AT_V + k] / s[k]));
+    double noise[M + 1], v[N + 1];
+    for (int k = 0; k < N; k++) {
+        v[k] = w[AT_V + k] / s[k];
     }
+    find_noise(v, NULL, 2, noise);
     /* of minimum norm: no small pivot makes it large */
-    status = correct_linear(M, w + AT_G, r, scaled, CONSTRAINTS_EXACT * fastest * fastest, 2, w);
+    status = correct_linear(M, w + AT_G, r, scaled, noise, 2, w);
     if (status != 0) {
         return status;
     }

@@ -21,7 +21,9 @@ static int close_loops(double t, const double *restrict x, const double *restric
     for (int k = 0; k < N; k++) {
         v[k] /= s[k];
     }
-    status = correct_linear(M, w + AT_G, r, v, CONSTRAINTS_EXACT * fmax(longest_of(v, MOVING), longest_of(r, M)), 1, w);
+    double noise[M + 1];
+    find_noise(v, r, 1, noise);
+    status = correct_linear(M, w + AT_G, r, v, noise, 1, w);
     for (int k = 0; k < N; k++) {
         v[k] *= s[k];
     }
