@@ -372,7 +372,8 @@ class _Held:
 
     def aim(self, excess: Array) -> None:
         """Aim at velocities smaller by an excess."""
-        self.wanted = self.wanted - self.rows @ excess
+        if self.rows is not None:
+            self.wanted = self.wanted - self.rows @ excess
 
     def free(self, v: Array) -> Array:
         """Velocities as aimed at, from what forces alone would make of them."""
