@@ -343,7 +343,8 @@ class PairSum:
         apart = np.asarray(square > size * size, dtype=bool)
         if planar == COLUMNS:
             x, y = ((reach * a[i][:, axis]).sum(axis=1) for axis in ([3, 6, 9], [4, 7, 10]))
-            apart = np.asarray((abs(x) > size + np.maximum(-y, 0.0)) | (y > size), dtype=bool)
+            wide, above = size + np.maximum(-y, 0.0), np.maximum(y, 0.0)
+            apart = np.asarray(x * x + above * above > wide * wide, dtype=bool)
         every = np.asarray(apart.all(axis=tuple(range(1, apart.ndim))))
         return np.asarray(~every | (bounds[0] < 0) | (bounds[1] < 0))
 
