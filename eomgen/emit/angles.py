@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 from ..graph.core import Graph
 from ..records import dataclass
-from .branches import Pairs
+from .alike_branches import Pairs
 from .straight import PrintedFunction
 
 CIRCULAR = ("sin", "cos")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import partial
 
 from ..program import Block, Program
+from .alike_branches import Operand, Pairs, find_pairs
 from .angles import CIRCULAR
-from .branches import Operand, Pairs, find_pairs
 from .c_text import BlockPrinter, Printed, print_block
 from .straight import Pieces, PrintedFunction
 

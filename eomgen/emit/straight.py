@@ -13,7 +13,7 @@ from ..graph.traverse import LEAVES
 from ..operations import CONDITION, operations_with
 from ..program import Program
 from ..records import dataclass
-from .branches import Pairs
+from .alike_branches import Pairs
 
 Slot = int | str  #: a place in an array, or the text of one
 FindPairs = Callable[[Sequence[int], Collection[int]], Pairs | None]

@@ -82,7 +82,7 @@ def _joined(levels: Sequence[tuple[list[int], list[int]]]) -> Iterator[tuple[lis
         yield rows, columns
 
 
-class Step(NamedTuple):
+class ChainStep(NamedTuple):
     """One level turned: Q^T of the coordinates that are open and of those that are new."""
 
     turn: Array  #: Q (c, c), its first columns what the rows of the level hold
@@ -104,7 +104,7 @@ class Chain:
     """
 
     def __init__(self, J: Array, levels: Sequence[Level], least: float) -> None:
-        self.start, self.steps, self.rank, self.dropped = levels[0].columns, list[Step](), 0, 0.0
+        self.start, self.steps, self.rank, self.dropped = levels[0].columns, list[ChainStep](), 0, 0.0
         self.size = sum(len(level.columns) for level in levels)
         none = np.empty(0, dtype=np.intp)
         front = J[np.ix_(levels[0].rows, levels[0].columns)].T
@@ -117,7 +117,7 @@ class Chain:
             self.rank, self.dropped = self.rank + kept, self.dropped + float((sizes[kept:] ** 2).sum())
             more = turn[len(front) :].T @ J[np.ix_(following, new)].T
             rest, front = _qr(more[kept:])
-            self.steps.append(Step(turn, sizes[:kept], more[:kept], rest, new))
+            self.steps.append(ChainStep(turn, sizes[:kept], more[:kept], rest, new))
             front = front[: len(following)]
 
     @property

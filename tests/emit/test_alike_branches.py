@@ -8,7 +8,7 @@ import pytest
 import eomgen as eg
 from benchmarks.robot_calls import ROBOTS, build
 from eomgen import pipeline
-from eomgen.emit import branches, emit_c
+from eomgen.emit import alike_branches, emit_c
 from eomgen.graph.evaluate import evaluate
 from eomgen.graph.schedule import order
 
@@ -62,7 +62,7 @@ def test_vectors_have_the_bits_of_single_statements(libraries, program, statemen
     vectors, sources = compile_text(libraries, folders[0], program)
     assert sum(text.count("const both b") for text in sources.values()) > 300
     portable, _ = compile_text(libraries, folders[1], program, "-DEOMGEN_PORTABLE")
-    monkeypatch.setattr(branches, "WORTH", 2.0)
+    monkeypatch.setattr(alike_branches, "WORTH", 2.0)
     single, sources = compile_text(libraries, folders[2], program)
     assert not any("const both b" in text for text in sources.values())
     rng = np.random.default_rng(3)
@@ -83,7 +83,7 @@ def test_vectors_have_the_bits_of_single_statements(libraries, program, statemen
 def test_pairs_stand_after_their_operands(program):
     block = next(b for b in program.blocks if b.name == "rhs")
     wanted = [*block.outputs, *block.checks]
-    pairs = branches.find_pairs(program, order(wanted), {y.id for y in wanted})
+    pairs = alike_branches.find_pairs(program, order(wanted), {y.id for y in wanted})
     sequence = pairs.in_order(program.graph, order(wanted))
     assert sorted(sequence) == sorted(order(wanted))
     at = {i: k for k, i in enumerate(sequence)}
@@ -102,7 +102,7 @@ def test_branches_that_differ_are_left_alone():
     m.revolute("turn", "ground", "bar", axis="z")
     m.gravity = (0.0, -9.81, 0.0)
     program = pipeline.build(m.derive(), "c", ["rhs"])
-    assert branches.alike_coordinates(program)
+    assert alike_branches.alike_coordinates(program)
     assert not any("const both b" in text for text in emit_c(program).values())
 
 
@@ -111,5 +111,5 @@ def test_statements_that_legs_and_arms_save(robot):
     _, program = build(robot)
     block = next(b for b in program.blocks if b.name == "rhs")
     wanted = [*block.outputs, *block.checks]
-    pairs = branches.find_pairs(program, order(wanted), {y.id for y in wanted})
+    pairs = alike_branches.find_pairs(program, order(wanted), {y.id for y in wanted})
     assert len(pairs.second) == FOUND[robot.name]
