@@ -179,12 +179,13 @@ class _Finder:
         joined = [k for k in operands if k in self.second]
         if len(operands) != 2 or len(symbols) != 1 or len(joined) != 1:
             return
+        kind = PAIRED[self.nodes[i][0]]
         like = [
             (j, k)
             for j in self.users[self.second[joined[0]]]
-            if PAIRED.get(self.nodes[j][0]) == PAIRED[self.nodes[i][0]]
-            for k in self.nodes[j][1:]
-            if self._is_free(k)
+            if PAIRED.get(self.nodes[j][0]) == kind
+            for place, k in enumerate(self.nodes[j][1:])
+            if self._is_free(k) and (kind in "+*" or operands[place] == symbols[0])
         ]
         if len(like) == 1 and like[0][0] not in self.first and like[0][1] != symbols[0]:
             self.join(symbols[0], like[0][1])
@@ -203,6 +204,12 @@ class _Finder:
         if len(ours) == 2 and not (fits(ours[0], theirs[0]) and fits(ours[1], theirs[1])):
             return ours, theirs[::-1], True
         return ours, theirs, False
+
+    def _belongs(self, a: int, operands: Sequence[tuple[int, int]]) -> bool:
+        """Whether both statements make the same of these operands, of which those that are joined are one vector."""
+        kind, theirs = PAIRED[self.nodes[a][0]], tuple(y for _, y in operands)
+        in_order = theirs == tuple(self.nodes[self.second[a]][1:])
+        return (in_order or kind in "+*") and all(self.second.get(x, y) == y for x, y in operands)
 
     def set_signs(self) -> None:
         """The sign of every second element, and the operands; products with numbers take the sign that is asked for."""
@@ -234,7 +241,10 @@ class _Finder:
                 if nodes[a][0] == "mul" and any(numbers):
                     free.add(a)
             free.difference_update(ours)
-            self.operands[a] = list(zip(ours, theirs, signs, strict=True))
+            if self._belongs(a, list(zip(ours, theirs, strict=True))):
+                self.operands[a] = list(zip(ours, theirs, signs, strict=True))
+            else:
+                free.discard(a)
 
     def _turn(self, a: int) -> None:
         """Give a product with a number the other sign."""
