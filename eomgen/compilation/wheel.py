@@ -67,7 +67,7 @@ def require_wheel(target: str) -> None:
     UsageError
         A target of which no wheel is built; a flag compiles for this very processor.
     MissingDependencyError
-        setuptools is not installed, or too old.
+        setuptools is not installed, or too old; Cython is not installed.
     """
     able = [name for name, row in TARGETS.items() if row.module]
     if target not in able:
@@ -78,6 +78,8 @@ def require_wheel(target: str) -> None:
     _require_setuptools()
     if target == "cython":
         _refuse_native()
+        if util.find_spec("Cython") is None:
+            raise MissingDependencyError("a wheel of target cython is built with Cython: pip install cython")
 
 
 def build_wheel(folder: Path | str, directory: Path | str | None = None) -> BuiltWheel:

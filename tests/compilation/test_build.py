@@ -21,6 +21,7 @@ from eomgen.compilation import (
     compile_c_library,
     compile_sources,
     find_compiler,
+    installed,
     load_core,
 )
 from eomgen.compilation import options as options_module
@@ -175,11 +176,15 @@ def test_no_python_headers(
     sources: dict[str, str], fresh_cache: Cache, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sysconfig, "get_path", lambda name: str(tmp_path))
+    monkeypatch.setattr(installed, "FOLDER", tmp_path)  # nothing came with the package
     with pytest.raises(ToolchainError, match=r"no .*Python\.h(.|\n)*python3-dev"):
         compile_sources(sources, "pendulum")
 
 
-def test_no_cython(sources: dict[str, str], fresh_cache: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_cython(
+    sources: dict[str, str], fresh_cache: Cache, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(installed, "FOLDER", tmp_path)  # nothing came with the package
     for name in [name for name in sys.modules if name.split(".")[0] == "Cython"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "Cython", None)
