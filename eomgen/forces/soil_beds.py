@@ -13,7 +13,7 @@ from typing import NamedTuple
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..limits.contacts import BESIDE, FOLLOWED, GRIP, SIDES, UNSHEARED
+from ..limits.contacts import BESIDE, BLADE, FOLLOWED, GRIP, SIDES, UNSHEARED, WEDGE
 from ..records import dataclass
 from .branches import beyond_zero, where
 from .contact import Contact, Touch
@@ -96,7 +96,7 @@ class SoilCell(Contact):
         if self.kind != SOLE:
             return _under_rim(self.sizes[0], x, y)
         axis = vec.transpose(view.rotation(self.second))[0]
-        return _under_sole(self.sizes[0], x, y, (vec.dot(axis, ahead), vec.dot(axis, up)))
+        return _under_sole(self.sizes[0], self.size, x, y, (vec.dot(axis, ahead), vec.dot(axis, up)))
 
     def touch(self, view: View) -> Touch:
         reach, _, _, ahead, up = self._place(view)
@@ -229,32 +229,34 @@ def _under_rim(radius: Expr, x: Expr, y: Expr) -> _Column:
     return _Column(inside, depth, normal, steep, (radius * normal[0], radius * normal[1]), away, gap)
 
 
-def _under_sole(length: Expr, x: Expr, y: Expr, axis: tuple[Expr, Expr]) -> _Column:
-    """Of a plate, whose middle is at x, y and whose axis has two parts: its line, and edges of 45 degrees.
+def _under_sole(length: Expr, size: Expr, x: Expr, y: Expr, axis: tuple[Expr, Expr]) -> _Column:
+    """Of a plate, whose middle is at x, y and whose axis has two parts: every point of it presses by a rounded wedge.
 
-    Of all points of a plate the lowest cone of 45 degrees counts: its line, unless it is steeper, and beyond its ends,
-    or on both sides of the lower end of a steep plate, lines that rise from there.
+    Where its axis is (e_x, e_y), at -x from its middle, the lowest of these wedges counts, that of the point s:
+
+        z = -(y + s e_y + f(w)),  w = -x - s e_x,  f(w) = m^2 r (sqrt(1 + (w / (m r))^2) - 1),  r = WEDGE a, m = BLADE
+
+    f is strictly convex, so that s, where f'(w) e_x = e_y or else an end, is unique and continuous in all places and at
+    all angles, and with it the slopes of z: (f', -1) of the place, and these at the arm s (e_x, e_y) of the angle.
     """
-    graph = length.graph
-    half = 0.5 * length
-    turned = graph.apply("lt", axis[0], 0.0)
+    graph, rounded = length.graph, WEDGE * size
+    apply, half = graph.apply, 0.5 * length
+    turned = apply("lt", axis[0], 0.0)
     ex, ey = (where(turned, -part, part) for part in axis)
-    flat = graph.apply("lt", graph.apply("abs", ey), ex)
-    run = where(flat, ex, 1.0)
-    level, normal, arm = y - x * ey / run, (where(flat, ey, 0.0), -run), (-x, -x * ey / run)
-    level = where(flat, level, graph.apply("min", y - half * ey, y + half * ey))  # of a steep one its lower end
-    ends = [(-half * ex, -half * ey), (half * ex, half * ey)]
-    for side in (-1.0, 1.0):  # rises to this side
-        first, second = (y + b - side * (x + a) for a, b in ends)
-        lower = graph.apply("lt", second, first)
-        edge = where(lower, second, first)
-        higher = graph.apply("lt", level, edge)
-        level = where(higher, edge, level)
-        slant = 0.5**0.5
-        normal = where(higher, side * slant, normal[0]), where(higher, -slant, normal[1])
-        place = where(lower, ends[1][0], ends[0][0]), where(lower, ends[1][1], ends[0][1])
-        arm = where(higher, place[0], arm[0]), where(higher, place[1], arm[1])
-    return _Column(graph.one, -level, normal, -1.0 / normal[1], arm, (-normal[0], -normal[1]), level * -normal[1])
+    reach = BLADE * ex
+    flat = apply("lt", apply("abs", ey), reach)  # where f' comes to its slope
+    aside = rounded * BLADE * ey / sqrt(where(flat, (reach - ey) * (reach + ey), 1.0))
+    lower = where(apply("lt", 0.0, ey), -half, half)
+    place = apply("max", -half, apply("min", half, (-x - aside) / where(flat, ex, 1.0)))
+    place = where(flat, place, lower)
+    w = -x - place * ex
+    part = w / (BLADE * rounded)
+    root = sqrt(1.0 + part * part)
+    slope = BLADE * part / root
+    level = y + place * ey + BLADE * BLADE * rounded * part * part / (1.0 + root)
+    steep = sqrt(1.0 + slope * slope)
+    normal = slope / steep, -1.0 / steep
+    return _Column(graph.one, -level, normal, steep, (place * ex, place * ey), (-normal[0], -normal[1]), level / steep)
 
 
 def bed_rates(states: Sequence[Expr], sums: Sequence[Expr], recovery: Expr) -> list[Expr]:

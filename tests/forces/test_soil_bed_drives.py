@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -125,12 +126,13 @@ def test_what_begins_deep_rebounds_as_if_it_had_been_pressed_there(plate: eg.Mod
     assert held[0] == 0.0
     k = SAND.cohesive / 0.2 + SAND.frictional
     area = 10 * 0.2 * 0.02  # cells below the plate
-    sides = 2 * 0.2 * 0.02 * k * 0.01**SAND.exponent  # of each edge of 45 degrees one cell, 10 mm higher
+    higher = 0.045 * (math.hypot(1, 0.01 / 0.015) - 1)  # of each end one cell presses, 10 mm beside it, 9 mm higher
+    sides = 2 * 0.2 * 0.02 * k * (0.02 - higher) ** SAND.exponent
     assert lift[0] == pytest.approx(area * k * 0.02**SAND.exponent + sides, rel=1e-9)
     assert np.all(lift[z < 0.0179] < 1e-9)
     half = np.argmin(np.abs(z - 0.0195))
     top = k * 0.02**SAND.exponent
-    below = np.maximum(0.0, 1 - (0.0205 - 0.01 - z[half] + 0.0095) / (0.1 * 0.01))
+    below = np.maximum(0.0, 1 - (0.02 - z[half]) / (0.1 * (0.02 - higher)))
     wanted = area * top * (1 - (0.02 - z[half]) / 0.002) + sides * below
     assert lift[half] == pytest.approx(wanted, rel=2e-3)
 

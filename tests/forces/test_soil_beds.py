@@ -98,12 +98,18 @@ def test_a_wheel_in_a_rut_of_one_depth(wheels: eg.Module, z: float, deepest: flo
 @pytest.mark.parametrize("angle", [0.0, math.pi])
 @pytest.mark.parametrize(("z", "deepest"), [(0.0525, 0.0), (0.0525, 0.05), (0.05, 0.052), (0.02, 0.04)])
 def test_a_plate_and_its_edges(plates: eg.Module, z: float, deepest: float, angle: float) -> None:
-    """p L on the plate, and the columns that its edges of 45 degrees reach; also upside down."""
+    """p L on the plate, and the columns that the wedges of its ends reach; also upside down."""
     up = plates.rhs(0.0, state(plates, deepest, j0_x=0.3, j0_y=-z, j0_3=angle), p=SLIPPERY)[7]
     k = modulus(0.2)
-    beside = np.maximum(np.abs((np.arange(40) + 0.5) * 0.015 - 0.3) - 0.15, 0.0)
+
+    def wedge(s: Any) -> Any:
+        """A hyperbola of the slope 3, whose radius is a quarter of a cell."""
+        half = 3 * 0.015 / 4
+        return 3 * (np.sqrt(half**2 + s**2) - half)
+
+    beside = wedge(np.maximum(np.abs((np.arange(40) + 0.5) * 0.015 - 0.3) - 0.15, 0.0))
     assert up == pytest.approx(0.2 * 0.015 * wong(z - beside, deepest, k).sum(), rel=1e-9)
-    edge = quad(lambda s: float(wong(z - s, deepest, k)), 0, z, points=[max(0.0, z - deepest)], limit=200)[0]
+    edge = quad(lambda s: float(wong(z - wedge(s), deepest, k)), 0, z, limit=200)[0]
     wanted = 0.2 * (0.3 * float(wong(z, deepest, k)) + 2 * edge)
     assert up == pytest.approx(wanted, rel=0.05, abs=1e-9)
 
