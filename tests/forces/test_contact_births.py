@@ -45,9 +45,9 @@ def exerted(mod: eg.Module, places: np.ndarray, v: np.ndarray, moving: bool = Tr
     return np.array(mod.rhs(0.0, x))[3:6] * np.array([1.0, 1.0, 0.1])[:, None]
 
 
-def jumps(mod: eg.Module, ways: int, points: int = 1200) -> list[tuple[float, np.ndarray]]:
-    """Where what motion adds to the force jumps though the force of a circle at rest does not."""
-    random, found = np.random.default_rng(1), []
+def jumps(mod: eg.Module, ways: int, points: int = 1200) -> tuple[int, list[tuple[float, np.ndarray]]]:
+    """Ways on which motion adds a force, and where that jumps though the force of a circle at rest does not."""
+    random, judged, found = np.random.default_rng(1), 0, []
     for _ in range(ways):
         a, b = random.uniform(-1.5 * S, 1.5 * S, (2, 2))
         v = random.standard_normal(3)
@@ -61,6 +61,7 @@ def jumps(mod: eg.Module, ways: int, points: int = 1200) -> list[tuple[float, np
         every = np.abs(added(t)).max(axis=(1, 2))
         if not every.all():
             continue
+        judged += 1
         steps = np.abs(np.diff(added(t)[0], axis=1)).max(axis=0) / every[0]
         for k in np.argsort(steps)[-6:]:
             low, high = t[k], t[k + 1]
@@ -71,17 +72,19 @@ def jumps(mod: eg.Module, ways: int, points: int = 1200) -> list[tuple[float, np
             change, still = np.abs(np.diff(added(np.array([low, high])), axis=2)).max(axis=(1, 2)) / every
             if change > JUMP and still < CONTINUOUS:
                 found.append((float(change), a + low * (b - a)))
-    return found
+    return judged, found
 
 
 @pytest.mark.parametrize("law", [COULOMB, BRISTLES], ids=["coulomb", "lugre"])
 @pytest.mark.parametrize("kind", SHAPES)
 def test_damping_and_friction_begin_at_zero(kind: str, law: dict[str, Any]) -> None:
-    assert jumps(module(SHAPES[kind], law), 12) == []
+    judged, found = jumps(module(SHAPES[kind], law), 12)
+    assert judged >= 10
+    assert found == []
 
 
 @pytest.mark.parametrize("kind", SHAPES)
-def test_what_motion_adds_takes_energy_and_lies_within_the_law(kind: str) -> None:
+def test_what_motion_adds_takes_energy(kind: str) -> None:
     mod, random = module(SHAPES[kind], COULOMB), np.random.default_rng(2)
     places = random.uniform(-1.5 * S, 1.5 * S, (2, 4000))
     for _ in range(4):
@@ -111,4 +114,5 @@ def test_a_corner_that_hardly_turns_is_no_corner(dent: float) -> None:
     places = np.stack([np.linspace(-0.02, 0.02, 801), np.full(801, 0.06)])
     v = np.array([0.5, -0.3, 2.0])
     one, two = (exerted(module({"shape": "outline", "points": p}, COULOMB, 0.1), places, v) for p in (plain, bent))
+    assert np.abs(one).max(axis=1).min() > 1.0
     np.testing.assert_allclose(one, two, atol=3e-3 * np.abs(one).max())
