@@ -99,6 +99,7 @@ class BlockMaker:
         """The columns of states of contacts, where the Jacobian of a tree is made direction by direction."""
         terms = self.terms
         plain = not (self.has_loops or terms.by_columns or terms.system or terms.given_rates)
+        plain = plain and self.limits.unrolled_loops > 0  # drivers over arrays take all terms
         return held_columns(terms) if plain and self.by_direction else None
 
     @cached_property
