@@ -17,8 +17,8 @@ from .dae_rows import dae_kinematics
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
 from .factor import articulated_positivity, factorize, is_unrolled, positivity, solve
 from .held_columns import HELD, HeldColumns, held_columns
-from .inverse_slopes import inverse_slopes
-from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
+from .inverse_slopes import written_derivative
+from .jacobian_blocks import ResidualSlopes
 from .loop_blocks import LoopBlocks
 from .loop_slopes import BY_BODIES, LoopSlopes
 from .port_symbols import port_symbols
@@ -97,10 +97,8 @@ class BlockMaker:
     @cached_property
     def held(self) -> HeldColumns | None:
         """The columns of states of contacts, where the Jacobian of a tree is made direction by direction."""
-        terms = self.terms
-        plain = not (self.has_loops or terms.by_columns or terms.system or terms.given_rates)
-        plain = plain and self.limits.unrolled_loops > 0  # drivers over arrays take all terms
-        return held_columns(terms) if plain and self.by_direction else None
+        plain = self.limits.unrolled_loops > 0 and not self.has_loops  # drivers over arrays take all terms
+        return held_columns(self.terms) if plain and self.by_direction else None
 
     @cached_property
     def slopes(self) -> ResidualSlopes:
@@ -253,7 +251,7 @@ class BlockMaker:
             outputs = [*(terms.rates or self._symbols(terms.v)), *accelerations]
         elif name == "rhs_hessian_product":
             outputs, checks = self._rhs_hessian_product()
-        elif (found := self._unrolled_derivative(name)) is not None:
+        elif (found := written_derivative(terms, self.slopes, name, self.unrolled, self._touching)) is not None:
             outputs, checks = found[0], [*self._turned, *found[1]]
         elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
             outputs = terms.outputs
@@ -353,15 +351,10 @@ class BlockMaker:
                 return self._internal(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
                 return self._internal(name, "q v a multipliers", self.slopes.packed())
-            case "held_terms":  # M of bodies lower packed, h
-                lower = [terms.mass_matrix[i][k] for i in range(n - terms.n_states) for k in range(i + 1)]
-                return self._internal(name, "q v", [*lower, *terms.bias], self._turned)
-            case "held_operands":
+            case "held_terms" | "held_operands" | "held_loads":
                 assert self.held is not None
-                return self._internal(name, "q v", self.held.operands)
-            case "held_loads":  # dr1 of bodies along the wrenches of contacts
-                assert self.held is not None
-                return self._internal(name, "q v a multipliers loads", self.held.along)
+                ports, outputs = self.held.block(name, terms)
+                return self._internal(name, ports, outputs, self._turned if name == "held_terms" else ())
             case "dae_tangent":  # dF along (dy, dy')
                 return self._dae_tangent()
             case "inverse_tangent":  # d(M a + h) along (dq, dv, da)
@@ -397,20 +390,6 @@ class BlockMaker:
         """The port of the changes of inputs or parameters, and what changes -> the symbol of its change."""
         port, names = ("du", self.terms.u) if what == "input" else ("dp", self.terms.p)
         return port, dict(zip(self._symbols(names), self._symbols(self.port(port).symbols), strict=True))
-
-    def _unrolled_derivative(self, name: str) -> tuple[list[Expr], list[Expr]] | None:
-        """A derivative of the inverse dynamics, or of a small tree's right-hand side, and checks of its mass matrix."""
-        if self._touching and name not in SHIFTS:
-            return None
-        if name == "inverse_dynamics_derivatives":
-            found = inverse_slopes(self.terms, self.slopes)
-            return None if found is None else (found, [])
-        if not self.unrolled or name not in ("jacobian", *SHIFTS):
-            return None
-        if name == "jacobian":
-            return unrolled_jacobian(self.terms, self.slopes)
-        names = self.terms.u if SHIFTS[name] == "input" else self.terms.p
-        return unrolled_shift(self.terms, self.slopes, names)
 
     @property
     def _directions(self) -> dict[Expr, Expr]:

@@ -59,11 +59,18 @@ class HeldColumns(NamedTuple):
     loads: tuple[str, ...]
     along: tuple[Expr, ...]
 
+    def block(self, name: str, terms: SystemTerms) -> tuple[str, list[Expr]]:
+        """Ports and outputs of one of the blocks."""
+        if name == "held_terms":  # M of bodies lower packed, h
+            lower = [terms.mass_matrix[i][k] for i in range(terms.n_v - terms.n_states) for k in range(i + 1)]
+            return "q v", [*lower, *terms.bias]
+        return ("q v", [*self.operands]) if name == "held_operands" else ("q v a multipliers loads", [*self.along])
+
 
 def held_columns(terms: SystemTerms) -> HeldColumns | None:
     """The columns of states of contacts, or None where they are few, or where the states act in other ways too."""
     graph, n, begun = terms.graph, terms.n_v, terms.n_v - terms.n_states
-    if terms.n_c or terms.n_states < LEAST:
+    if terms.n_c or terms.n_states < LEAST or terms.by_columns or terms.system or terms.given_rates:
         return None
     index = {graph.symbol(name).id: k for k, name in enumerate(terms.v) if k >= begun}
     residual = list(terms.inverse_dynamics)

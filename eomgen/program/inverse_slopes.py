@@ -6,7 +6,8 @@ from ..graph.core import Expr
 from ..graph.count import count
 from ..graph.differentiate import jacobian
 from ..graph.traverse import reachable
-from .jacobian_blocks import Entries, ResidualSlopes
+from .block_groups import SHIFTS
+from .jacobian_blocks import Entries, ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .terms import SystemTerms
 
 
@@ -29,3 +30,19 @@ def inverse_slopes(terms: SystemTerms, slopes: ResidualSlopes) -> list[Expr] | N
     entries = min(found, key=lambda one: count(list(one.values())).total)
     zero = terms.graph.zero
     return [entries.get((i, k), zero) for i in range(terms.n_v) for k in range(width + terms.n_v)]
+
+
+def written_derivative(
+    terms: SystemTerms, slopes: ResidualSlopes, name: str, unrolled: bool, touching: bool
+) -> tuple[list[Expr], list[Expr]] | None:
+    """A derivative of the inverse dynamics, or of a small tree's right-hand side, and checks of its mass matrix."""
+    if touching and name not in SHIFTS:
+        return None
+    if name == "inverse_dynamics_derivatives":
+        found = inverse_slopes(terms, slopes)
+        return None if found is None else (found, [])
+    if not unrolled or name not in ("jacobian", *SHIFTS):
+        return None
+    if name == "jacobian":
+        return unrolled_jacobian(terms, slopes)
+    return unrolled_shift(terms, slopes, terms.u if SHIFTS[name] == "input" else terms.p)

@@ -34,9 +34,7 @@ class Run:
         self.forcing = forcing
         self.tangent: Timed | None = None
         self.last: tuple[str, int, float, Array] | None = None
-        self.sparse: bool | None = (
-            False  #: whether the solver gets a sparse Jacobian; None: where the first is worth it
-        )
+        self.sparse: bool | None = False  #: whether solvers get sparse Jacobians; None: where the first is worth it
 
     @cached_property
     def kernel(self) -> Timed:

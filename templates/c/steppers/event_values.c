@@ -86,11 +86,16 @@ int eomgen_depart(eomgen_run *run, eomgen_events *ev)
         /* it goes the other way: less than the accuracy is left */
         stuck = stuck || (at_zero && abs(ev->fired[i]) == 1 && came < 0.0);
         ev->trial[i] = fmax(fabs(ev->slope[i]), fabs(ev->slope_new[i])); /* about how fast it came */
+        ev->touch[i] = !at_zero && !ev->fired[i] && ev->action[i] == EOMGEN_RESET && abs(ev->direction[i]) == 1;
     }
     run->step = 0.0;
     event_values(run, ev, run->t, run->y, ev->g);
     event_slopes(run, ev, ev->g, ev->slope, 1.0);
     for (int i = 0; i < ev->n; i++) {
+        if (ev->touch[i] && fabs(ev->g[i]) <= RUNS_TOUCHING * ev->size[i]) {
+            ev->leaving[i] = ev->direction[i]; /* that a reset brings to zero is no fall to zero: it has to rise before */
+        }
+        ev->touch[i] = 0;
         if (!ev->fired[i] || ev->action[i] == EOMGEN_GO_ON) {
             ev->fired[i] = 0;
             continue;
