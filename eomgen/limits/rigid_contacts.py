@@ -52,8 +52,8 @@ DEPENDENT = 3e-8
 #: error in these no more than the change of forces within a step, a hundredth, comes back.
 ROUGH = 10.0
 #: Solutions of one step at most, until contacts do not feel the projection of velocities onto the constraints at its
-#: end: it shrinks by h times a speed of turning in each, 0.03 to 0.003. Forces that change
-#: with velocities take two.
-ROUNDS = 4
+#: end: it shrinks by h times a speed of turning in each, 0.03 to 0.003, at an impact from the size of velocities on.
+#: Forces that change with velocities take two.
+ROUNDS = 12
 #: Newton steps at most that close loops at the end of a step, by the factors of its middle: errors shrink as above.
 CLOSINGS = 8

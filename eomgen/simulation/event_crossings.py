@@ -307,7 +307,7 @@ class Crossings:
         self.arrive(t, x, length)
         for i in np.flatnonzero(~at_zero & (np.abs(self.g) <= TOUCHING * self.size)).tolist():
             if i not in self.fired and self.events[i].action == RESET and abs(self.events[i].direction) == 1:
-                self.leaving[i] = self.events[i].direction  # that a reset brings to zero has not fallen to it
+                self.leaving[i] = self.events[i].direction  # what a reset brings to zero has not fallen to it
         stuck = False
         for i, way in zip(self.fired, self.ways, strict=True):
             rate, action = self.forward * float(self.slope[i]), self.events[i].action

@@ -93,7 +93,7 @@ int eomgen_depart(eomgen_run *run, eomgen_events *ev)
     event_slopes(run, ev, ev->g, ev->slope, 1.0);
     for (int i = 0; i < ev->n; i++) {
         if (ev->touch[i] && fabs(ev->g[i]) <= RUNS_TOUCHING * ev->size[i]) {
-            ev->leaving[i] = ev->direction[i]; /* that a reset brings to zero is no fall to zero: it has to rise before */
+            ev->leaving[i] = ev->direction[i]; /* what a reset brings to zero has not fallen to it */
         }
         ev->touch[i] = 0;
         if (!ev->fired[i] || ev->action[i] == EOMGEN_GO_ON) {
