@@ -81,7 +81,7 @@ def test_mixtures_of_branches_are_refused_also_as_states(turn: float, target: st
     pure = across @ start[mod.n_q :]
     mixed = start.copy()
     mixed[mod.n_q :] = across.T @ (pure + np.array([0.3, -0.7, 0.5]) * SPEED)
-    assert np.abs(mod.velocity_constraints(mixed)).max() <= 1e-12
+    assert np.abs(mod.velocity_constraints(mixed)).max() <= (1e-8 if turn else 1e-12)
     if not turn:  # turned, rounding leaves 1e-10 of the position, and project() brings the state onto a branch itself
         with pytest.raises(eg.AssemblyError, match="no motion goes on with the given velocities"):
             mod.simulate((0, 1), initial=mixed)
