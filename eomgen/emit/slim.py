@@ -20,6 +20,7 @@ LEFT_OUT = {
     "runtime/late_rules": "rules of several parameters",
     "runtime/origin": "the origin of a result",
     "runtime/rate_checks": "inputs whose rates are in the equations",
+    "runtime/start_branch": "starts at change points",
     "runtime/signal_rates": "rates of inputs",
     "simulation/moreau": "rigid contact",
     "simulation/led_state": "inputs that move constraints and depend on the state",

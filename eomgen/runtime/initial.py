@@ -9,14 +9,14 @@ closed from the nearest guess, and a warning says so.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import AssemblyError
-from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
+from ..limits.constraints import GONE, INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
 from ..numeric.assembly_velocity import VelocityEquations, assemble_velocity
 from ..numeric.closure import close, closed
@@ -225,11 +225,37 @@ class Initial:
         if self.layout.n_c:
             require_rank(self.kernels, self.scales.jacobian(self._C_q(q, t=self.t)))
         declared = self.sort(self.layout.initial).rates
-        if given is None:
-            return self._solve_rates(q, declared)
-        self._require_motion(q, given)
-        rest = {name: value for name, value in declared.items() if name not in given}
-        return self._solve_rates(q, {**given, **(self.compatible(q, given, rest, positions=False) if rest else {})})
+        held: Mapping[str, float | Array] = declared
+        if given is not None:
+            self._require_motion(q, given)
+            rest = {name: value for name, value in declared.items() if name not in given}
+            held = {**given, **(self.compatible(q, given, rest, positions=False) if rest else {})}
+        return self.on_branch(q, self._solve_rates(q, held), list(held))
+
+    def on_branch(self, q: Array, v: Array, names: Sequence[str]) -> Array:
+        """Velocities (n,) or (n, m), of which those named were given, as those of a motion also at a change point.
+
+        Raises
+        ------
+        AssemblyError
+            The position is a change point, and no branch has the velocities given, or several have.
+        """
+        rank = self.layout.rank
+        if not rank or not np.any(v):
+            return v
+        sizes = algebra.singular_values(self.scaled_jacobian(q))
+        if sizes[rank - 1] > GONE * sizes[0]:
+            return v
+        from .start_branch import StartBranch  # not in a slim package
+
+        branch = StartBranch(self, q, names)
+        if v.ndim == 1:
+            return branch.complete(v)
+        return np.array([branch.complete(column) for column in v.T]).T
+
+    def scaled_jacobian(self, q: Array) -> Array:
+        """J (n_c, n_v): C_q, scaled."""
+        return self.scales.jacobian(self._C_q(q, t=self.t))
 
     def _require_motion(self, q: Array, given: Mapping[str, float | Array]) -> None:
         """Refuse the rate of a coordinate that stands still at q, whatever moves: it would need boundless rates.

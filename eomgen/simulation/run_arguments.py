@@ -13,6 +13,7 @@ from ..errors import UsageError
 from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start, last_state
+from ..runtime.initial import Initial
 from ..runtime.near_names import unknown
 from ..runtime.room import as_real, read_number, read_numbers, read_times
 from ..runtime.signals import Forcing
@@ -112,4 +113,7 @@ def _find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing |
     if x.shape != (module.n_x,):
         names = ", ".join(module.x_names)
         raise UsageError(f"initial must name values or have shape ({module.n_x},) [{names}], not {x.shape}")
-    return module.project(x, t=t)
+    x = module.project(x, t=t)
+    if module.layout.rank:
+        Initial(module.kernels, t).on_branch(x[: module.n_q], x[module.n_q :], module.layout.v)
+    return x

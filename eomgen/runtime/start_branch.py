@@ -1,0 +1,148 @@
+"""Stage runtime: velocities at a change point -> those of a motion that goes on; those not given, from its branches.
+
+Where rank is lost, C_q v + C_t = 0 lets through mixtures of the velocities of several branches, which no motion has.
+One has accelerations too: with L^T C_q = 0, the rates of C_q v + C_t at constant v, b(v), must fulfil L^T b(v) = 0.
+These equations are quadratic in v, and each branch is a solution: the tangent cone of the constraints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import AssemblyError
+from ..limits.constraints import COUPLED, GONE, ONE_BRANCH
+from ..numeric import algebra
+from ..numeric.scales import Array
+from .failure import place
+
+if TYPE_CHECKING:
+    from .initial import Initial
+
+STEP = 1e-4  #: scaled motion to either side, over which rates of constraints are taken
+STARTS = 60  #: from which the branches are looked for
+ROUNDS = 40  #: of Newton's method from each
+
+
+class StartBranch:
+    """The branches at one position where rank is lost.
+
+    Parameters
+    ----------
+    initial : Initial
+    q : (n_q,) array
+        A closed position.
+    names : sequence of str
+        Of the velocities given.
+    """
+
+    def __init__(self, initial: Initial, q: Array, names: Sequence[str]) -> None:
+        self.initial, self.q, self.names = initial, q, names
+        self.scales, self.layout = initial.scales, initial.layout
+        U, sizes, V = algebra.svd(initial.scaled_jacobian(q))
+        kept = int(np.count_nonzero(sizes > GONE * sizes[0]))
+        self.lost, free = U[:, kept:], V[kept:].T
+        given = np.array([row for name in names for row in initial.gradients(q, name)])
+        if len(given):
+            _, sizes, V = algebra.svd(given @ free)
+            free = free @ V[int(np.count_nonzero(sizes > GONE)) :].T
+        self.free = free
+
+    def bends(self, v: Array, speed: float) -> Array:
+        """L^T b(v) (k,) over the square of a speed, of scaled velocities v."""
+        h = STEP / speed
+        ends = []
+        for side in (h, -h):
+            x = np.concatenate([self.scales.move(self.q, side * v), v * self.scales.q])
+            ends.append(self.initial.kernels.velocity_constraints.every(x, t=self.initial.t + side) / self.scales.c)
+        return np.asarray(self.lost.T @ (ends[0] - ends[1]) / (2.0 * h * speed**2))
+
+    def complete(self, v: Array) -> Array:
+        """The velocities (n,) of the only branch that has the given ones.
+
+        Raises
+        ------
+        AssemblyError
+            No branch has them, or several.
+        """
+        speed = self.scales.speed(v)
+        if not speed > 0.0:
+            return v  # at rest nothing decides the branch
+        d = v / self.scales.q
+        here = self.bends(d, speed)
+        steps = [speed * w for w in self.free.T]
+        up, down = (np.array([self.bends(d + side * w, speed) for w in steps]) for side in (1.0, -1.0))
+        slopes = 0.5 * (up - down).reshape(len(steps), len(here)).T
+        if slopes.size:
+            _, sizes, V = algebra.svd(slopes)
+            undecided = self.free @ V[: int(np.count_nonzero(sizes > COUPLED))].T
+        else:
+            undecided = np.empty((len(d), 0))
+        if not undecided.shape[1]:
+            if np.abs(here).max(initial=0.0) > ONE_BRANCH:
+                raise self._refusal(v, here, undecided, [])
+            return v
+        found = self._roots(d, undecided * speed, speed, here)
+        if len(found) != 1:
+            raise self._refusal(v, slopes @ (self.free.T @ undecided), undecided, found)
+        return found[0]
+
+    def _roots(self, d: Array, W: Array, speed: float, here: Array) -> list[Array]:
+        """Velocities d + W y of branches; quadratic in y, so that their coefficients are differences."""
+        k = W.shape[1]
+        unit = np.eye(k)
+
+        def value(y: Array) -> Array:
+            return self.bends(d + W @ y, speed)
+
+        up, down = (np.array([value(side * e) for e in unit]) for side in (1.0, -1.0))
+        K = 0.5 * (up - down).T
+        H = np.empty((len(here), k, k))
+        for i in range(k):
+            H[:, i, i] = 0.5 * (up[i] + down[i]) - here
+            for j in range(i):
+                both = value(unit[i] + unit[j]) - up[i] - up[j] + here
+                H[:, i, j] = H[:, j, i] = 0.5 * both
+        random, found = np.random.default_rng(1), list[Array]()
+        for n in range(STARTS):
+            y = random.normal(size=k) * (0.0, 1.0, 3.0)[min(n, 1 + n % 2)]
+            for _ in range(ROUNDS):
+                F = here + K @ y + (H @ y) @ y
+                y = y - algebra.pinv(K + 2.0 * H @ y, rcond=GONE) @ F
+            size = 1.0 + float(np.abs(y).max())
+            if not np.abs(here + K @ y + (H @ y) @ y).max() <= ONE_BRANCH * size**2:
+                continue
+            v = (d + W @ y) * self.scales.q
+            if all(self.scales.speed(v - other) > COUPLED * speed * size for other in found):
+                found.append(v)
+        return found
+
+    def _refusal(self, v: Array, faults: Array, undecided: Array, found: list[Array]) -> AssemblyError:
+        layout = self.layout
+        rows = np.abs(self.lost @ faults.reshape(len(faults), -1)).max(axis=1)
+        labels = [layout.constraint_labels[i] for i in np.flatnonzero(rows > 0.1 * rows.max())]
+        where = f"the mechanism is at a change point of {', '.join(labels[:6])}{place(layout.q, self.q)}"
+        if not undecided.shape[1]:
+            shown = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.v, v, strict=True) if n in self.names)
+            return AssemblyError(
+                f"{where}, and no motion goes on with the given velocities {shown or 'there'}; give those of one "
+                "branch, or start a little beside this position"
+            )
+        wanted, left = list[str](), undecided.copy()
+        size = np.abs(undecided).max(axis=1)
+        for _ in range(undecided.shape[1]):
+            i = int(np.argmax(np.linalg.norm(left, axis=1) >= 0.5 * np.linalg.norm(left, axis=1).max()))
+            wanted.append(layout.v[i])
+            row = left[i] / np.linalg.norm(left[i])
+            left = left - np.outer(left @ row, row)
+            left[size == 0.0] = 0.0
+        shown = " or ".join(
+            "(" + ", ".join(f"{n} = {x[layout.v.index(n)]:.6g}" for n in wanted) + ")" for x in found[:4]
+        ) + (" or ..." if len(found) > 4 else "")
+        several = f"branches found have {shown}" if found else "no branch was found that has them"
+        return AssemblyError(
+            f"{where}, where the given velocities do not tell its branches apart: {several}; give "
+            f"{' and '.join(wanted)} too, or start a little beside this position"
+        )

@@ -1,0 +1,94 @@
+"""Runs that start where parallelograms lie flat, against the motion of arms that stay parallel, in closed form."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import eomgen as eg
+
+ARM, SPEED = 0.3, 5.0
+TARGETS = ("numpy", "cython")
+
+
+@cache
+def compiled(loops: int, target: str, turn: float = 0.0) -> Any:
+    """Parallelograms of arms of 0.3 m and couplers of 1 m in a row; all frames turned by an angle, gravity too."""
+    m = eg.Model(f"row_{loops}_{round(10 * turn)}", gravity=(9.81 * np.sin(turn), -9.81 * np.cos(turn), 0))
+    base = m.ground.at(0, 0, 0, rpy=(0, 0, turn)) if turn else m.ground
+    c, s = np.cos(turn), np.sin(turn)
+
+    def bar(name: str, length: float) -> Any:
+        return m.body(name, mass=1.0, com=(length / 2, 0, 0), inertia={"zz": length**2 / 12})
+
+    arms = [bar(f"a{i}", ARM) for i in range(loops + 1)]
+    couplers = [bar(f"c{i}", 1.0) for i in range(loops)]
+    m.revolute("A0", base, arms[0], coordinate="th")
+    for i in range(1, loops + 1):
+        m.revolute(f"A{i}", m.ground.at(i * c, i * s, 0), arms[i])
+    for i in range(loops):
+        m.revolute(f"B{i}", arms[i].at(ARM, 0, 0), couplers[i])
+        m.revolute(f"C{i}", couplers[i].at(1, 0, 0), arms[i + 1].at(ARM, 0, 0))
+    return m.derive("embedding", independent=["th"]).compile(target=target)
+
+
+def parallel(mod: Any, turn: float = 0.0) -> dict[str, float]:
+    """All velocities of arms that stay parallel."""
+    return {n: -SPEED if n.startswith(("B", "C")) else SPEED for n in mod.x_names if n.endswith("_dot")}
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("loops", [1, 2])
+@pytest.mark.parametrize("angle", [0.0, 1e-9, np.pi])
+def test_velocities_of_several_branches_are_refused_by_name(loops: int, angle: float, target: str) -> None:
+    mod = compiled(loops, target)
+    with pytest.raises(eg.AssemblyError, match=r"change point .*give .*_dot.* too, or start a little beside") as error:
+        mod.simulate((0, 0.2), initial={"th": angle, "th_dot": SPEED})
+    named = str(error.value).rsplit("give ", 1)[1].split(" too")[0].split(" and ")
+    assert len(named) == loops
+    wanted = {name: parallel(mod)[name] for name in named}
+    x = mod.x0({"th": angle, "th_dot": SPEED, **wanted})  # what the message asks for is enough
+    assert np.abs(x[mod.n_q :] - np.array([parallel(mod)[n] for n in mod.x_names[mod.n_q :]])).max() <= 1e-7 * SPEED
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize(("loops", "turn"), [(1, 0.0), (2, 0.0), (2, 0.7)])
+@pytest.mark.parametrize("angle", [0.0, 1e-9, np.pi])
+def test_all_velocities_of_a_branch_start_it(loops: int, turn: float, angle: float, target: str) -> None:
+    mod = compiled(loops, target, turn)
+    run = mod.simulate((0, 0.1), initial={"th": angle, **parallel(mod)}, rtol=1e-9, atol=1e-11)
+    inertia = (loops + 1) * ARM**2 / 3 + loops * ARM**2
+    weight = 9.81 * ((loops + 1) * ARM / 2 + loops * ARM)
+    exact = solve_ivp(lambda t, y: [y[1], -weight / inertia * np.cos(y[0])], (0, 0.1), [angle, SPEED],
+                      rtol=1e-11, atol=1e-13, dense_output=True)  # fmt: skip
+    assert np.abs(run["th"] - exact.sol(run.t)[0]).max() <= 1e-7
+    assert np.ptp(run["energy"]) <= 1e-7
+    assert abs(run["energy"][0] - 0.5 * inertia * SPEED**2 - weight * np.sin(angle)) <= 1e-7
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_mixtures_of_branches_are_refused_also_as_states(turn: float, target: str) -> None:
+    """Tangents at th = 0 to rounding, and of no motion: halfway between both branches of each loop."""
+    mod = compiled(2, target, turn)
+    start = mod.x0({"th": 0.0, **parallel(mod)})
+    J = mod.constraint_jacobian(start[: mod.n_q])
+    across = np.linalg.svd(J)[2][np.linalg.matrix_rank(J, 1e-9) :]
+    pure = across @ start[mod.n_q :]
+    mixed = start.copy()
+    mixed[mod.n_q :] = across.T @ (pure + np.array([0.3, -0.7, 0.5]) * SPEED)
+    assert np.abs(mod.velocity_constraints(mixed)).max() <= (1e-8 if turn else 1e-12)
+    if not turn:  # turned, rounding leaves 1e-10 of the position, and project() brings the state onto a branch itself
+        with pytest.raises(eg.AssemblyError, match="no motion goes on with the given velocities"):
+            mod.simulate((0, 1), initial=mixed)
+    with pytest.raises(eg.AssemblyError, match="no motion goes on with the given velocities"):
+        mod.x0(dict(zip(mod.x_names, mixed, strict=True)))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_at_rest_every_branch_has_the_velocities(target: str) -> None:
+    assert not compiled(2, target).x0(th=0.0)[compiled(2, target).n_q :].any()
