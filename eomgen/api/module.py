@@ -125,12 +125,19 @@ class LateMethod:
         self.name = name
 
     def __get__(self, model: Any, kind: type[Any]) -> Any:
-        return self.function if model is None else MethodType(self.function, model)
+        if model is None:
+            return self.function
+        return MethodType(self.function if model.layout.instances else self.direct, model)
 
     @cached_property
     def function(self) -> Any:
+        return plain_names(self.direct)
+
+    @cached_property
+    def direct(self) -> Any:
+        """That of models without instances, whose names have no dots."""
         found = CALLS[self.name]
-        return plain_names(both_names(found if callable(found) else find_function(found, self.name)))
+        return both_names(found if callable(found) else find_function(found, self.name))
 
 
 class Module(BoundModel):

@@ -285,7 +285,7 @@ class Forcing:
 
     def encode(self) -> list[tuple[Any, ...]]:
         """The inputs that vary, as the compiled loop takes them."""
-        if not self:
+        if not (self.varying or self.formulas):
             return []
         tables: list[tuple[Any, ...]] = [(i, *s.encode()) for i, s in self.varying.items() if isinstance(s, Tabulated)]
         return [*tables, *((i, formula.tape) for i, formula in self.formulas.items())]

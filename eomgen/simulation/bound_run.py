@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,10 +60,20 @@ class Run:
 
         return told
 
-    def stall_check(self, start: float, end: float, x: Array, longest: float, kept: int) -> StallCheck | None:
-        """What ends the run where its steps lead nowhere; a slim package has none."""
+    def begin(self, start: float, end: float, x: Array, longest: float, kept: int) -> None:
+        """Take what the check of steps that lead nowhere begins with."""
+        self._first = (start, end, x, self.module.n_q, longest, partial(_troubled, self.module), kept)
+
+    @cached_property
+    def stall_check(self) -> StallCheck | None:
+        """What ends the run where its steps lead nowhere, made when first looked at; a slim package has none."""
         check = find_stall_check()
-        return None if check is None else check(start, end, x, self.module.n_q, longest, self.troubled, kept)
+        return None if check is None else check(*self._first)
+
+    def look(self, t: float, x: Array, steps: int = 1) -> None:
+        """Take note of further steps."""
+        if self.stall_check is not None:
+            self.stall_check.look(t, x, steps)
 
     def remember(self, name: str, kernel: Timed) -> None:
         """Keep a failure as the cause, unless its state came out of an earlier failure as NaN."""
@@ -96,7 +106,7 @@ class Run:
 
     def troubled(self, t: float, x: Array) -> bool:
         """Whether a state is at a singularity that can be named."""
-        return self.module.kernels.fail.trouble(x, t) is not None
+        return _troubled(self.module, t, x)
 
     def gave_up(self, crawl: Crawling, end: float, method: str, options: Mapping[str, Any]) -> SimulationError:
         """The error for a run whose steps led nowhere."""
@@ -125,6 +135,10 @@ class Run:
         return SimulationError(f"{method} stopped near {when} of {end:.6g} s. Last failure: {cause}")
 
 
+def _troubled(module: BoundModel, t: float, x: Array) -> bool:
+    return module.kernels.fail.trouble(x, t) is not None
+
+
 @cache
 def find_stall_check() -> type[StallCheck] | None:
     """The class of what ends runs whose steps lead nowhere; None in a slim package."""
@@ -138,7 +152,7 @@ def find_stall_check() -> type[StallCheck] | None:
 def watch_run(start: float, end: float, progress: bool | None) -> Progress | None:
     """What shows the progress of a run: if that is asked for, or by default on a terminal."""
     found = _progress()
-    if isinstance(found, UnavailableError):
+    if type(found) is not tuple:
         if progress:
             raise found
         return None

@@ -6,7 +6,7 @@ for an interrupt.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from typing import TYPE_CHECKING, Any
 
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from .checkpoint import Checkpoint
     from .progress import Progress
-    from .stalling import StallCheck
 
 OPTIONS = ("rtol", "atol", "max_step", "first_step")
 ENDED, TERMINAL, WAITING, ZENO, STOPPED, RESET_FAILED = 1, 2, 3, -102, -101, -103  #: as in eomgen_loop.h
+STATUS = {ENDED: 0, TERMINAL: 1}  #: SciPy's
 TOO_SMALL = "Required step size is less than spacing between numbers."
 MESSAGES = {
     ENDED: WORDS[0],
@@ -112,7 +112,7 @@ def integrate_compiled(
     dense: bool,
     options: dict[str, Any],
     watch: Progress | None,
-    stall_check: StallCheck | None = None,
+    look: Callable[[float, Array, int], None] | None = None,
     events: Events | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> tuple[Solution, tuple[int, float, Array] | None, BaseException | None]:
@@ -133,7 +133,7 @@ def integrate_compiled(
         "nodes": nodes[1:], "t_eval": t_eval, "dense": dense, "events": events.encode() if events else None,
         "trail": KEPT if module.layout.rank else 0,
         "watch": None if watch is None else watch.look,
-        "stall_check": None if stall_check is None else stall_check.look,
+        "stall_check": look,
         "keep": None if checkpoint is None else (checkpoint.every, checkpoint.save),
     }  # fmt: skip
     rtol, atol = require_one(options["rtol"]), options["atol"]
@@ -169,7 +169,7 @@ def integrate_compiled(
             t_events,
             x_events,
             journey.dense() if dense else None,
-            {ENDED: 0, TERMINAL: 1}.get(status, -1),
+            STATUS.get(status, -1),
             MESSAGES.get(status, TOO_SMALL),
             {"nfev": journey.evaluations, "njev": journey.differentiations, "nlu": journey.factorizations},
             (start, journey.t),

@@ -105,7 +105,10 @@ class _Bar:
 
 def in_notebook() -> bool:
     """Whether this runs in the kernel of a notebook."""
-    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    module = sys.modules.get("IPython")
+    if module is None:
+        return False
+    shell = getattr(module, "get_ipython", lambda: None)()
     return getattr(shell, "kernel", None) is not None
 
 

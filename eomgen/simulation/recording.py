@@ -41,10 +41,11 @@ def record(
     varies = bool(forcing.values)
     if varies or not PLAIN.issuperset(map(type, options.values())):  # the user may change them
         described = described().copy
+    rtol, atol = options.get("rtol"), options.get("atol")
     header: dict[str, Any] = {
         "method": method,
-        "rtol": _plain(options.get("rtol")),
-        "atol": _plain(options.get("atol")),
+        "rtol": rtol if type(rtol) is float else _plain(rtol),
+        "atol": atol if type(atol) is float else _plain(atol),
         "span": list(solution.ends),
         "status": solution.status,
         "message": solution.message,
@@ -59,8 +60,10 @@ def record(
         steps = lambda: (*walked, forcing.sample(*walked))  # noqa: E731
     sampled = forcing.sample(solution.t, x) if varies else partial(forcing.sample, solution.t, x)
     columns = Columns(module, solution.t, x, sampled, steps)
-    happened = zip(solution.t_events, solution.x_events, strict=True) if solution.t_events else ()
-    events = [project(module, t, found, forcing)[1] for t, found in happened]
+    events: list[Array] = []
+    if solution.t_events:
+        happened = zip(solution.t_events, solution.x_events, strict=True)
+        events += [project(module, t, found, forcing)[1] for t, found in happened]
     dense = solution.dense
     sample: Callable[[Array], Trajectory] | None = None
     if dense is not None:
@@ -84,4 +87,4 @@ def _described(module: BoundModel, forcing: Forcing, options: dict[str, Any]) ->
 
 
 def _plain(value: Any) -> Any:
-    return value if value is None or type(value) is float else np.asarray(value).tolist()
+    return None if value is None else np.asarray(value).tolist()

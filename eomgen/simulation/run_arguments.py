@@ -31,7 +31,12 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     """Start and end (s) of what a user gives as the span of a run."""
     if span is None or (type(span) is float and isfinite(span)):
         return 0.0, declared if span is None else span
-    if type(span) is tuple and [*map(type, span)] == [float, float] and isfinite(span[0]) and isfinite(span[1]):
+    if (
+        type(span) is tuple
+        and len(span) == 2
+        and type(span[0]) is type(span[1]) is float
+        and isfinite(span[0] - span[1])
+    ):
         return span
     if isinstance(span, (tuple, list)):
         what = "span must be (start, end) in seconds: an end"

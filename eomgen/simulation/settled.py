@@ -29,6 +29,7 @@ class Settled(NamedTuple):
     title: str  #: the method
     end: float  #: by default (s)
     settings: dict[str, Any]  #: rtol and atol, checked
+    shared: bool  #: whether runs that bind no values change nothing of the forcing: no rates, no sampled states
 
 
 def settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | None:
@@ -63,4 +64,5 @@ def _settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | 
     forcing.attach(module)
     given = {"rtol": declared["rtol"] if rtol is None else rtol, "atol": declared["atol"] if atol is None else atol}
     settings = check_tolerances(module.n_x, float("inf"), given)
-    return Settled(forcing, Events(module.layout, None), str(title), float(declared["end"]), settings)
+    shared = not (module.layout.input_rates or module.metadata.get("clocks") or module.metadata.get("switched"))
+    return Settled(forcing, Events(module.layout, None), str(title), float(declared["end"]), settings, shared)

@@ -138,6 +138,7 @@ def simulate(
     """
     settings: dict[str, Any] = {**options}
     kept = pause = usual = size = None
+    shared = False
     alone = inputs is None and events is None and controllers is None and checkpoint is None and resume is None
     if alone and max_step is None and first_step is None and step is None and not settings:
         usual = settle(module, method, rtol, atol)
@@ -165,9 +166,12 @@ def simulate(
         others: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
         others |= {"dense_output": dense_output, "checkpoint": checkpoint, "controllers": controllers, **settings}
         return step_rigidly(module, span, initial, parameters, inputs, method, step, t_eval, events, progress, others)
-    dense_output = read_flag("dense_output", dense_output)
+    if dense_output is not False:
+        dense_output = read_flag("dense_output", dense_output)
     if usual is not None:
-        forcing, (_, watched, title, last, settings) = usual.forcing.again(), usual
+        forcing, watched, title, last, settings, shared = usual
+        shared = shared and parameters is None
+        forcing = forcing if shared else forcing.again()
         compiled, solver = True, None
     else:
         size = check_method(method, step)
@@ -196,11 +200,14 @@ def simulate(
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     if usual is None or bound is not module:
         forcing.attach(bound)
-    nodes = [start, *forcing.corners(start, end, compiled), end]
-    varies = bool(forcing)
+    nodes = [start, end] if shared else [start, *forcing.corners(start, end, compiled), end]
+    varies = not shared and bool(forcing)
     if varies:
         forcing.enter(*nodes[:2])
-    x0 = find_state(bound, initial, start, forcing)
+    if shared and initial is None and not start:
+        x0 = bound._declared_start.copy()
+    else:
+        x0 = find_state(bound, initial, start, forcing)
     if varies:
         u0 = forcing(start, x0)
         forcing.require_finite()
@@ -220,7 +227,15 @@ def simulate(
             settings = check_tolerances(module.n_x, abs(end - start), settings)
             require_steps("max_step", float(settings.get("max_step", np.inf)), start, end)
     if not compiled and takes_jacobian(solver):
+<<<<<<< HEAD
         if kept is None and solver in (choose_solver("BDF"), choose_solver("Radau")):
+=======
+        if (
+            kept is None
+            and isinstance(solver, type)
+            and issubclass(solver, (choose_solver("BDF"), choose_solver("Radau")))
+        ):
+>>>>>>> w/start2
             run.sparse = None  # its factors cannot be kept in a file
         settings.setdefault("jac", run.jacobian)
     watch = watch_run(start, end, progress)
@@ -234,11 +249,11 @@ def simulate(
         pause = None if compiled else Pause(kept, solver, dense_output)
         own = {name: value for name, value in settings.items() if name != "jac" or value != run.jacobian}
         kept.open(identify(bound, forcing, watched, nodes, x0, title, stored, dense_output, own))
-    stall_check = run.stall_check(start, end, x0, longest, numbers)
+    run.begin(start, end, x0, longest, numbers)
     try:
         if compiled:
             solution, failure, raised = integrate_compiled(
-                bound, forcing, nodes, x0, title, stored, dense_output, settings, watch, stall_check, watched, kept
+                bound, forcing, nodes, x0, title, stored, dense_output, settings, watch, run.look, watched, kept
             )
             run.last = None if failure is None else ("rhs", *failure)
             if isinstance(raised, KeyboardInterrupt):
@@ -249,7 +264,7 @@ def simulate(
             with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
                 listed = watched.listed(bound, forcing)
                 solution = integrate(
-                    run.watched(watch), nodes, x0, solver, stored, listed, dense_output, settings, stall_check,
+                    run.watched(watch), nodes, x0, solver, stored, listed, dense_output, settings, run.stall_check,
                     partial(watched.reset, bound, forcing), forcing.enter, pause,
                 )  # fmt: skip
                 warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])
