@@ -227,15 +227,7 @@ def simulate(
             settings = check_tolerances(module.n_x, abs(end - start), settings)
             require_steps("max_step", float(settings.get("max_step", np.inf)), start, end)
     if not compiled and takes_jacobian(solver):
-<<<<<<< HEAD
         if kept is None and solver in (choose_solver("BDF"), choose_solver("Radau")):
-=======
-        if (
-            kept is None
-            and isinstance(solver, type)
-            and issubclass(solver, (choose_solver("BDF"), choose_solver("Radau")))
-        ):
->>>>>>> w/start2
             run.sparse = None  # its factors cannot be kept in a file
         settings.setdefault("jac", run.jacobian)
     watch = watch_run(start, end, progress)
