@@ -17,6 +17,7 @@ from ..graph.spatial import Twist, Wrench
 from ..graph.vectors import Mat3, Vec3
 from ..joints.rotation_coordinates import about
 from ..records import dataclass
+from .axis_turns import about_z
 from .joint_rates import JointRates
 from .link_inertia import SpatialInertia
 from .tree import Link, link_twists
@@ -79,7 +80,7 @@ def resolve_parallel(
         angle = _hinge_angle(link)
         holder = axes[link.parent] if link.parent != GROUND else None
         follows = angle is not None and link.parent != GROUND and _hinge_angle(links[link.parent]) is not None
-        if follows and angle is not None and _about_z(link.turn):
+        if follows and angle is not None and about_z(link.turn):
             before = sums[link.parent]
             total = angle if before is None else before + angle
             constant = vec.product(constants[link.parent], link.turn)
@@ -111,7 +112,7 @@ def resolve_parallel(
 
 def _hinge_angle(link: Link) -> Expr | None:
     """The angle about z of a link that does nothing but turn about it; else None."""
-    if len(link.columns) != 1 or not _about_z(link.joint_rotation):
+    if len(link.columns) != 1 or not about_z(link.joint_rotation):
         return None
     angular, linear = link.columns[0]
     if not all(x.is_zero for x in (angular[0], angular[1], *linear)):
@@ -123,9 +124,3 @@ def _hinge_angle(link: Link) -> Expr | None:
         return None
     angle = Expr(graph, c.node[1])
     return angle if positive else -angle
-
-
-def _about_z(rotation: Mat3) -> bool:
-    """Whether a rotation leaves the z axis alone."""
-    others = (rotation[0][2], rotation[1][2], rotation[2][0], rotation[2][1])
-    return rotation[2][2].value == 1.0 and all(x.is_zero for x in others)

@@ -14,6 +14,7 @@ from ..graph.rounding_bounds import settled_rotation
 from ..graph.spatial import Twist, Wrench
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
+from .axis_turns import AxisTurns, turn_frame
 from .link_inertia import SpatialInertia, body_inertia, place_point, settled_matrix
 from .topology import Topology
 
@@ -82,6 +83,7 @@ def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Exp
     index = {GROUND: GROUND}
     frames = {GROUND: ground}
     links: list[Link] = []
+    turns = AxisTurns(mechanism, topology, symbols)
     first = 0
     for branch in graph.marked(topology.branches):
         spec = mechanism.joints[branch.joint]
@@ -94,9 +96,13 @@ def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Exp
             columns = [_reverse(rotation, position, column) for column in columns]
             position = vec.neg(vec.transpose_times(rotation, position))
             rotation = vec.transpose(rotation)
-        holder = place(frames[branch.parent], outer.frame)
+        held, frame = outer.frame, inner.frame
+        holder = place(frames[branch.parent], held)
+        turn = turns.turned(branch, holder.rotation, frame)
+        if turn is not None:
+            held, frame = turn_frame(held, turn), turn_frame(frame, turn)
+            holder = place(frames[branch.parent], held)
         body = mechanism.bodies[branch.body]
-        frame = inner.frame
         back = vec.transpose(frame.rotation)
         links.append(
             Link(
