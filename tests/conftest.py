@@ -25,6 +25,8 @@ PROGRAMS = {
 }
 #: The same for libraries of Python: name -> its module, and how it is installed.
 LIBRARIES = {"NVRTC": ("cuda.bindings.nvrtc", "pip install '.[cuda]'")}
+#: The same for instructions of the processor: name -> what Linux calls them.
+INSTRUCTIONS = {"AVX2": "avx2", "AVX-512": "avx512dq"}
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -52,7 +54,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def is_there(program: str) -> bool:
-    """Whether one of PROGRAMS is on the path, or one of LIBRARIES is installed."""
+    """Whether one of PROGRAMS is on the path, one of LIBRARIES is installed, or the processor has INSTRUCTIONS."""
+    if program in INSTRUCTIONS:
+        info = Path("/proc/cpuinfo")
+        return info.exists() and INSTRUCTIONS[program] in info.read_text().split()
     if program in LIBRARIES:
         try:
             return find_spec(LIBRARIES[program][0]) is not None
@@ -73,6 +78,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     told = {name: f"apt install {package}" for name, (_, package) in PROGRAMS.items()}
     told |= {name: command for name, (_, command) in LIBRARIES.items()}
+    told |= dict.fromkeys(INSTRUCTIONS, "take a processor that has them")
     for name, command in told.items():
         if not is_there(name):
             terminalreporter.write_line(f"tests that need {name} were left out; to run them: {command}")
