@@ -1,5 +1,6 @@
 # make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png and .gif
 # make test   ruff, mypy, then every test, fast ones first, on all processors; fails if anything was skipped
+# make thorough  make test with all of the sweeps of which it runs a part
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
 # make notebooks  executes the notebooks anew and stores their outputs; NOTEBOOKS=FILE only this one
 # make lint   ruff and mypy alone
@@ -19,14 +20,15 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
-.PHONY: demo test bench notebooks lint docs pictures mutations fuzz clean
+.PHONY: demo test thorough bench notebooks lint docs pictures mutations fuzz clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed-plot
 	@$(BIN)/eomgen run examples/slider_crank.yaml --plot demo_output/slider_crank.png --animate demo_output/slider_crank.gif
 
-test: lint
-	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal
+test thorough: lint
+	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal \
+	  $(if $(filter thorough,$@),--thorough)
 
 lint: $(VENV)/.installed-test
 	@$(BIN)/ruff check .

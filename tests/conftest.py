@@ -51,6 +51,7 @@ def is_worker(config: pytest.Config) -> bool:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--no-skips", action="store_true", help="fail the run when a test was skipped or expected to fail")
+    parser.addoption("--thorough", action="store_true", help="run also what is marked thorough, as make thorough does")
 
 
 def is_there(program: str) -> bool:
@@ -68,9 +69,11 @@ def is_there(program: str) -> bool:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     needs = {item: [name for mark in item.iter_markers("needs") for name in mark.args] for item in items}
-    left_out = [item for item in items if not all(map(is_there, needs[item]))]
+    left_out = {item for item in items if not all(map(is_there, needs[item]))}
+    if not config.getoption("--thorough"):
+        left_out |= {item for item in items if item.get_closest_marker("thorough") is not None}
     if left_out:
-        config.hook.pytest_deselected(items=left_out)
+        config.hook.pytest_deselected(items=list(left_out))
     items[:] = [item for item in items if item not in left_out]
     items.sort(key=lambda item: (item.get_closest_marker("slow") is not None, "acceptance" in item.path.parts))
 
@@ -79,6 +82,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     told = {name: f"apt install {package}" for name, (_, package) in PROGRAMS.items()}
     told |= {name: command for name, (_, command) in LIBRARIES.items()}
     told |= dict.fromkeys(INSTRUCTIONS, "take a processor that has them")
+    if not terminalreporter.config.getoption("--thorough"):
+        terminalreporter.write_line("tests marked thorough were left out; to run them: make thorough, pytest --thorough")
     for name, command in told.items():
         if not is_there(name):
             terminalreporter.write_line(f"tests that need {name} were left out; to run them: {command}")
