@@ -14,6 +14,7 @@ from ..graph.core import Expr
 from ..graph.vectors import Vec3
 from ..limits.contacts import AT_REST
 from ..numeric.value_ranges import NOT_NEGATIVE, POSITIVE
+from ..numeric.value_rules import LIMITS
 from ..records import dataclass
 from .bristles import LuGre
 from .dry_friction import LineFriction, Slip, stribeck_level
@@ -214,7 +215,8 @@ def _onset(e: Entry, level: Expr, static: str) -> tuple[Expr | None, Expr | None
 
 def _require_greater(e: Entry, level: Expr, onset: Expr, static: str) -> None:
     """Require static friction that is not below sliding friction, which is itself not below 0."""
-    e.require(static, onset - level, NOT_NEGATIVE, "this is static minus sliding friction; static is the greater")
+    told = "is {1:g}, below sliding friction {0:g}", "static is the greater"
+    e.judge(static, LIMITS, [level, onset], told)
 
 
 def _brown_mcphee(e: Entry, level: Expr, viscous: Expr, static: str) -> BrownMcPhee | None:

@@ -14,8 +14,8 @@ each round solves for contacts that are a little softer about the impulses of th
 method, R. T. Rockafellar, SIAM J. Control Optim. 14 (1976), 877-898), which leaves the matrix regular and the solution
 as it is.  Where Newton leads nowhere, sweeps over single contacts go on (M. Jean, The non-smooth contact dynamics
 method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257).  Before all that, many contacts are solved by the edges
-of their cones (:mod:`~eomgen.numeric.contact_edges`), or in space by sweeps.  What is left over goes to
-:func:`solve_smoothed`.
+of their cones (:mod:`~eomgen.numeric.contact_edges`), or in space by sweeps, and one in the plane by its four cases: it
+opens, holds, or slides to either side.  What is left over goes to :func:`solve_smoothed`.
 
 ``templates/c/contacts`` has the same iterations in C; modules with it do them as ``core.solve_contacts``.
 """
@@ -63,6 +63,11 @@ def solve_contacts(problem: ContactProblem, start: Array, tolerance: float, most
         best, least = solve_edges(problem, best, least, tolerance)
         sweeps = WARM if not least < known else 0
         P = np.array(best)
+    if P.shape == (1, 2) and least > tolerance:
+        cases = _cases(problem)
+        sizes = [problem.size(problem.misses(case)[0]) for case in cases]
+        if min(sizes) < least:
+            best, least = cases[int(np.argmin(sizes))], min(sizes)
     for _ in range(sweeps):
         if least <= tolerance:
             break
@@ -95,6 +100,20 @@ def solve_contacts(problem: ContactProblem, start: Array, tolerance: float, most
         if size < least:
             best, least = P, size
     return ContactImpulses(best, count, least)
+
+
+def _cases(problem: ContactProblem) -> list[Array]:
+    """What a single contact in the plane bears if it opens, holds, or slides to either side, where that can be."""
+    (a, b), (_, d) = problem.W.tolist()
+    (normal, across), mu = problem.c[0].tolist(), float(problem.mu[0])
+    found = [np.zeros((1, 2))]
+    if (det := a * d - b * b) > 0.0:
+        found.append(np.array([[b * across - d * normal, b * normal - a * across]]) / det)
+    for side in (mu, -mu):
+        if (stiff := a + side * b) > 0.0 and normal < 0.0:
+            push = -normal / stiff
+            found.append(np.array([[push, side * push]]))
+    return found
 
 
 def solve_smoothed(problem: ContactProblem, tolerance: float, most: int, shrinks: float) -> tuple[Array, int, float]:

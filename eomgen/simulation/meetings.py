@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class PenetrationWarning(UserWarning):
-    """A run starts with shapes of contacts deep in each other, which will drive them apart at high speed."""
+    """A run starts with shapes of contacts deep in each other, which stiff contacts drive apart at high speed."""
 
 
 def deep_start(module: BoundModel, t: float, x: Array, u: Any) -> str | None:
@@ -42,8 +42,9 @@ def warn_of_depth(module: BoundModel, t: float, x: Array, u: Any) -> None:
     found = None if is_told_by_the_caller() else deep_start(module, t, x, u)
     if found is not None:
         warnings.warn(
-            f"{module.name} starts with shapes inside each other; {found}. Their force drives them apart at once: "
-            "change the initial values, or put only shapes into groups that are apart",
+            f"{module.name} starts with shapes inside each other; {found}. Stiff contacts drive them apart at once, "
+            "and a bed of soil bears what is deep in it as if it had sunk there: change the initial values, or put "
+            "only shapes into groups that are apart",
             PenetrationWarning,
             stacklevel=calls_within() + 1,
         )

@@ -247,7 +247,7 @@ def test_verification_and_components_know_bristles(tmp_path: Path) -> None:
         ({**COULOMB, "transition": 1}, "transition", "has no meaning in friction_law: coulomb"),
         ({**BROWN, "smoothing": 1}, "smoothing", "has no meaning in friction_law: brown_mcphee"),
         ({**BROWN, "transition": 0}, "transition", "is 0"),
-        ({**BROWN, "static_friction": 0.1}, "static_friction", "static is the greater"),
+        ({**BROWN, "static_friction": 0.1}, "static_friction", "is 0.1, below sliding friction 0.3"),
         ({**COULOMB, "static_friction": 0.1, "stribeck": 0.1}, "static_friction", "static is the greater"),
         ({**LUGRE, "static_friction": 0.1, "stribeck": 0.1}, "static_friction", "static is the greater"),
         ({"friction_law": "brown_mcphee", "friction": 1}, "transition", "is missing"),

@@ -128,3 +128,17 @@ def test_bits_do_not_depend_on_the_width(tmp_path: Path) -> None:
 
 def address(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
+
+
+def test_one_contact_in_the_plane_is_solved_whatever_its_compliance(in_c: Any) -> None:
+    """Compliances of condition 1e4 and more: impulses of one direction nearly stand for those of the other."""
+    rng = np.random.default_rng(0)
+    for _ in range(1500):
+        A = rng.normal(size=(2, 2)) * 10.0 ** rng.uniform(-1.5, 0.5, size=(1, 2))
+        given = ContactProblem(A.T @ A + 1e-12 * np.eye(2), rng.normal(size=(1, 2)), rng.uniform(0.0, 2.0, 1))
+        found = solve_contacts(given, np.zeros((1, 2)), 1e-10, 50)
+        P, count, residual = in_c(given.W, given.c, given.mu, np.zeros((1, 2)), 1e-10, 50)
+        assert max(found.residual, residual) <= 1e-10
+        assert faults(given, P) < 1e-7
+        assert count == found.iterations == 0
+        np.testing.assert_allclose(P, found.impulses, rtol=1e-9)

@@ -1,3 +1,22 @@
+/* A single contact in the plane: it opens, holds, or slides to either side; P is room. */
+static void try_cases(contacts *s, double *P, double *least)
+{
+    const double a = s->W[0], b = s->W[1], d = s->W[3], normal = s->given[0], across = s->given[1], det = a*d - b*b;
+    P[0] = P[1] = 0.0;
+    keep_better(s, P, least);
+    if (det > 0.0) {
+        P[0] = (b*across - d*normal)/det, P[1] = (b*normal - a*across)/det;
+        keep_better(s, P, least);
+    }
+    for (int k = 0; k < 2; k++) {
+        const double side = k ? -s->friction[0] : s->friction[0], stiff = a + side*b;
+        if (stiff > 0.0 && normal < 0.0) {
+            P[0] = -normal/stiff, P[1] = side*P[0];
+            keep_better(s, P, least);
+        }
+    }
+}
+
 /* The whole of solve_contacts in numeric/contact_impulses.py. */
 static int iterate(contacts *s, double *P, double tolerance, int most, double *residual)
 {
@@ -9,6 +28,7 @@ static int iterate(contacts *s, double *P, double tolerance, int most, double *r
     const int tried = s->m >= RIGID_MANY && least > tolerance;
     const int sweeps = tried && (s->d > 2 || !solve_edges(s, P, &least, tolerance)) ? RIGID_WARM : 0;
     if (sweeps) { (void)residual_of(s, P); /* velocities */ }
+    if (s->n == 2 && s->m == 1 && least > tolerance) { try_cases(s, P, &least); }
     for (int k = 0; k < sweeps && least > tolerance; k++) {
         sweep(s, P, RIGID_SWEEPS);
         keep_better(s, P, &least);
