@@ -40,8 +40,9 @@ YIELDING = 1e-3  #: part of its compliance by which a contact is softer where pe
 GROWN = 1e-12  #: part of the energy that impacts move by which their sum may grow by rounding
 #: Halvings of one step until no shapes pass each other in its halves: speeds of 65,000 times what the step suits.
 HALVINGS = 16
-#: Halvings of the restitution of one instant until impacts with friction take energy: below, it is 0.
+#: Halvings of the restitution of one instant until impacts with friction take energy and can be: below, it is 0.
 GENTLER = 4
+UNSOLVED = 1e-5  #: part of the velocities that a solution leaves where there is none
 #: A pivot of the inertia below this part of its own diagonal is no more than rounding, 1e-16 times a condition of 1e6
 #: as above: constraint rows then stand in for it.
 PIVOT = 1e-10
@@ -55,5 +56,8 @@ ROUGH = 10.0
 #: end: it shrinks by h times a speed of turning in each, 0.03 to 0.003, at an impact from the size of velocities on.
 #: Forces that change with velocities take two.
 ROUNDS = 12
+#: Part of the velocities that impulses bring about, summed without signs, that is rounding: in a jam at rest these are
+#: many times what is left.
+ROUNDED = 1e-14
 #: Newton steps at most that close loops at the end of a step, by the factors of its middle: errors shrink as above.
 CLOSINGS = 8

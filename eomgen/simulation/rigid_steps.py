@@ -40,7 +40,9 @@ from ..limits.rigid_contacts import (
     REMOVED,
     RESTING,
     ROUGH,
+    ROUNDED,
     ROUNDS,
+    UNSOLVED,
     YIELDING,
 )
 from ..numeric import algebra
@@ -210,7 +212,7 @@ class RigidSteps:
     def _bears(self, meeting: _Meeting | None, excess: Array, last: bool) -> bool:
         """Whether contacts do not feel that velocities are projected by so much; if not in the last round, a miss."""
         felt = 0.0 if meeting is None else float(np.abs(meeting.rows.jacobian @ excess).max())
-        if meeting is None or felt <= self.tolerance * meeting.scale:
+        if meeting is None or felt <= self.tolerance * meeting.scale + meeting.rounding:
             return True
         if last:
             self._misses, self.residual = True, max(self.residual, felt)
@@ -258,15 +260,20 @@ class RigidSteps:
             part = 0.0 if k == GENTLER else 0.5**k
             c = undisturbed.copy()
             c[:, 0] -= arrive + part * back
-            found = self._impulses(W, c, rows.friction, meeting.start, rough * self.tolerance * scale)
+            allowed = rough * self.tolerance * scale + meeting.rounding
+            found = self._impulses(W, c, rows.friction, meeting.start, allowed)
             P = found.impulses.ravel()
+            if not back.any():
+                break
             after = undisturbed.ravel() + W @ P
-            work = P @ after, P @ before.ravel()  # twice: forces act with the velocity of the middle
-            if not back.any() or float(sum(work)) <= GROWN * float(
-                np.abs(P) @ (np.abs(after) + np.abs(before.ravel()))
-            ):
-                break  # impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985)
-        self._note(found, scale, rough)
+            work = float(P @ (after + before.ravel()))  # twice: forces act with the velocity of the middle
+            grown = GROWN * float(np.abs(P) @ (np.abs(after) + np.abs(before.ravel())))
+            # impacts with friction and restitution may give energy by Newton's law (Kane and Levinson, 1985), and
+            # mechanisms that friction jams have none
+            if work <= grown and found.residual <= UNSOLVED * scale:
+                break
+        meeting.rounding = ROUNDED * float((np.abs(W) @ np.abs(P)).max())
+        self._note(found, rough * self.tolerance * scale + meeting.rounding, rough)
         self._rests = ~strikes
         self._last = dict(zip(meeting.keys, found.impulses, strict=True))
         meeting.start = found.impulses
@@ -277,10 +284,10 @@ class RigidSteps:
             return solve_contacts(ContactProblem(W, c, friction), start, tolerance, self.allowed)
         return ContactImpulses(*self._solve(W, c, friction, start, tolerance, self.allowed))
 
-    def _note(self, found: ContactImpulses, scale: float, rough: float) -> None:
+    def _note(self, found: ContactImpulses, allowed: float, rough: float) -> None:
         if rough == 1.0:
             self.residual = max(self.residual, found.residual)
-        self._misses = self._misses or not found.residual <= rough * self.tolerance * scale
+        self._misses = not found.residual <= allowed  # the last solution of a step is the one that counts
         self.iterations, self.most = max(self.iterations, found.iterations), max(self.most, len(found.impulses))
 
     def _out(self, held: _Held, rows: RigidRows, P: Array, new: Array, h: float) -> Array:
@@ -326,12 +333,14 @@ class _Meeting:
         Velocities of contacts by impulses.
     scale : float
         (m/s) What the tolerance of their impulses is relative to.
+    rounding : float
+        (m/s) What rounding of the last impulses leaves, 0 before the first.
     """
 
     def __init__(self, held: _Held, rows: RigidRows, v: Array, last: dict[Spot, Array]) -> None:
         m = len(rows.gaps)
         d = len(rows.jacobian) // m
-        self.rows, self.scale = rows, 0.0
+        self.rows, self.scale, self.rounding = rows, 0.0, 0.0
         self.before = (rows.jacobian @ v).reshape(m, d)
         self.spread = held.inverse @ rows.jacobian.T
         self.compliance = rows.jacobian @ self.spread

@@ -21,7 +21,9 @@ FAR = -50.0  #: height of a floor that nothing reaches
 
 
 @cache
-def four_bar(floor: float, restitution: float = 0.0, cut: str = "C", turn: float = 0.0, target: str = "cython") -> Any:
+def four_bar(
+    floor: float, restitution: float = 0.0, cut: str = "C", turn: float = 0.0, target: str = "cython", mu: float = 0.0
+) -> Any:
     """A four-bar whose coupler carries a circle, beside a floor; turned about z with its gravity."""
     a, b, c, d = LENGTHS
     s, co = np.sin(turn), np.cos(turn)
@@ -39,7 +41,7 @@ def four_bar(floor: float, restitution: float = 0.0, cut: str = "C", turn: float
     m.guess(d=held[8], **({"b": held[5] - held[2]} if cut != "B" else {}))
     ball = {"shape": "circle", "on": coupler.at(*CIRCLE, 0), "radius": RADIUS}
     plane = {"shape": "half_plane", "on": m.ground.at(-floor * s, floor * co, 0, rpy=(0, 0, turn))}
-    m.contacts("floor", ball, plane, rigid(restitution=restitution))
+    m.contacts("floor", ball, plane, rigid(restitution=restitution, friction=mu))
     return m.compile(target=target)
 
 
@@ -171,3 +173,21 @@ def test_a_bouncing_coupler(restitution: float, target: str) -> None:
     angle = run["a"] + run["b"]
     height = LENGTHS[0] * np.sin(run["a"]) + CIRCLE[0] * np.sin(angle) + CIRCLE[1] * np.cos(angle)
     assert np.min(height) - RADIUS - floor > -1e-5
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 0.8])
+def test_a_coupler_that_friction_jams(restitution: float, target: str) -> None:
+    """One freedom: the circle moves along one line, within the cone of friction, so that no impulse brings it back."""
+    mod = four_bar(-0.05, restitution, target=target, mu=0.3)
+    run = mod.simulate(0.55, {"a": 0.3, "a_dot": 4.0}, method="moreau", step=1e-3)
+    angle = run["a"] + run["b"]
+    centre = np.array([LENGTHS[0] * turned(a)[:, 0] + turned(c) @ CIRCLE for a, c in zip(run["a"], angle, strict=True)])
+    last = int(np.flatnonzero(np.abs(run["a_dot"]) > 1e-6)[-1])
+    (x, y), turn = centre[last] - centre[last - 1], angle[last] - angle[last - 1]
+    assert abs(y) < 0.3 * abs(x + RADIUS * turn)  # how the place that touches moves
+    y = centre[:, 1]
+    assert y[-1] == pytest.approx(RADIUS - 0.05, abs=1e-3)
+    assert np.abs(run.x[mod.n_q :, -1]).max() < 1e-9
+    assert np.diff(run["energy"]).max() < 1e-3  # in flight, of second order
+    assert run.metadata["missed_steps"] == 0
