@@ -96,12 +96,11 @@ def run_python(
     parent = _parent(*options)
     assert parent.stdin is not None
     assert parent.stdout is not None
-    argv = [str(word) for word in words]
+    argv: list[str] = [str(word) for word in words]
     with TemporaryDirectory() as folder:
         out, err = Path(folder, "out"), Path(folder, "err")
-        told = {
-            "argv": argv, "cwd": str(cwd or Path.cwd()), "env": dict(env or os.environ), "out": str(out), "err": str(err)
-        }  # fmt: skip
+        told = {"argv": argv, "cwd": str(cwd or Path.cwd()), "env": dict(env or os.environ)}
+        told |= {"out": str(out), "err": str(err)}
         parent.stdin.write(json.dumps(told) + "\n")
         parent.stdin.flush()
         answer = parent.stdout.readline()

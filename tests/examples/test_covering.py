@@ -7,7 +7,9 @@ from pathlib import Path
 
 from covering import COVERING
 
-TEXTS = {path.stem: path.read_text(encoding="utf-8") for path in (Path(__file__).parents[2] / "examples").glob("*.yaml")}
+TEXTS = {
+    path.stem: path.read_text(encoding="utf-8") for path in (Path(__file__).parents[2] / "examples").glob("*.yaml")
+}
 
 
 def words_of(text: str) -> set[str]:

@@ -23,7 +23,9 @@ FILES = [*sorted(EXAMPLES.glob("*.yaml")), EXAMPLES / "arm.urdf"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", part_of(FILES, lambda file: file.stem in {*COVERING, "arm"}), ids=lambda file: file.stem)
+@pytest.mark.parametrize(
+    "file", part_of(FILES, lambda file: file.stem in {*COVERING, "arm"}), ids=lambda file: file.stem
+)
 def test_every_example_keeps_all_limits(file: Path) -> None:
     found = eg.load(file).derive().compile().verify()  # variants: tests/invariance
     assert found.ok, str(found)
