@@ -57,8 +57,9 @@ def _calls(module: BoundModel) -> str:
     """Signatures of the calls that can be made, folded up."""
     rows = []
     for kernel in KERNELS:
-        call = getattr(type(module), kernel.name, None) or getattr(module, kernel.name, None)
-        if kernel.late or call is None or kernel.name not in module.core.names:
+        if kernel.late or kernel.name not in module.core.names:
+            continue
+        if (getattr(type(module), kernel.name, None) or getattr(module, kernel.name, None)) is None:
             continue
         shape = module.layout.shape(kernel.name)
         size = " x ".join(map(str, shape))

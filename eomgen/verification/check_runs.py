@@ -115,23 +115,38 @@ def _time_scale(bench: Bench, case: Case) -> float:
 
 
 def _reference(bench: Bench, case: Case) -> Reference:
-    """The state a time after the case, by SciPy; on the constraints."""
+    """The state a time after the case, by SciPy; on the constraints.
+
+    Runs of all lengths take the same steps but for their last: what stops one stops all that come that far.
+    """
     integrate = require("scipy.integrate", "scipy", "verify")
     bound = bench.module.bind(case.p, case.u)
+    stopped = np.inf
 
     def at(h: float) -> Array:
-        left = MOST
+        nonlocal stopped
+        if h > stopped:
+            raise SimulationError(f"no run of {h:g} s: it stops within {stopped:g} s")
+        left, reached = MOST, case.t
 
         def rhs(t: float, x: Array) -> Array:
-            nonlocal left
-            left -= 1
+            nonlocal left, reached
+            left, reached = left - 1, max(reached, t)
             if not left:
                 raise SimulationError(f"more than {MOST} evaluations for a run of {h:g} s")
             return bound.rhs(t, x)
 
-        run = integrate.solve_ivp(rhs, (case.t, case.t + h), case.x, method="DOP853", rtol=TIGHT, atol=ABSOLUTE * TIGHT)
+        span, tolerances = (case.t, case.t + h), {"rtol": TIGHT, "atol": ABSOLUTE * TIGHT}
+        try:
+            run = integrate.solve_ivp(rhs, span, case.x, method="DOP853", **tolerances)
+        except EomgenError:
+            stopped = min(stopped, reached - case.t)
+            raise
         steps = np.diff(run.t)[2:-1]
-        if not run.success or (steps.size and steps.min() < EVEN * steps.max()):
+        uneven = np.minimum.accumulate(steps) < EVEN * np.maximum.accumulate(steps)
+        if not run.success or uneven.any():
+            end = run.t[3 + int(np.argmax(uneven))] if uneven.any() else reached
+            stopped = min(stopped, float(end) - case.t)
             raise SimulationError(f"no run of {h:g} s: {run.message}")
         return bound.project(run.y[:, -1], t=case.t + h)
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from forked import run_python
 
 MODEL = Path(__file__).parents[2] / "examples" / "double_wishbone.yaml"
 
@@ -17,7 +16,7 @@ def printed(columns: str | None, *words: str) -> list[str]:
     setting = {key: value for key, value in os.environ.items() if key != "COLUMNS"}
     if columns is not None:
         setting["COLUMNS"] = columns
-    done = subprocess.run([sys.executable, "-m", "eomgen", *words], env=setting, capture_output=True, text=True)
+    done = run_python("-m", "eomgen", *words, env=setting)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from sweeps import part_of
 
 from eomgen.cli import verb_examples
 from eomgen.shipped import example_files
 
 from .conftest import EXAMPLES, Call
+
+#: A tree, a loop, a robot and a script.
+SOME = ("double_pendulum", "slider_crank", "arm.urdf", "two_link_manipulator.py")
 
 FALLS = """
 name: falls
@@ -34,13 +38,18 @@ def add(found: dict[str, Path], folder: Path, name: str, text: str) -> None:
 
 
 @pytest.mark.slow
-def test_every_example_runs(call: Call) -> None:
+@pytest.mark.parametrize("some", part_of((True, False), lambda some: some), ids=["some", "all"])
+def test_every_example_runs(call: Call, some: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of all of them the motion and its energy are judged in test_run."""
+    chosen = {name: file for name, file in example_files().items() if not some or name in SOME}
+    assert len(chosen) >= len(SOME)
+    monkeypatch.setattr(verb_examples, "example_files", lambda: chosen)
     result = call("examples", "--all", "--json")
     assert result.code == 0
     told = result.json
     assert set(told) == {"ok", "target", "seconds", "examples"}
     assert told["ok"] is True
-    assert [entry["name"] for entry in told["examples"]] == list(example_files())
+    assert [entry["name"] for entry in told["examples"]] == list(chosen)
     for entry in told["examples"]:
         assert set(entry) == {
             "name", "file", "ok", "exit_code", "error", "degrees_of_freedom", "steps", "end", "seconds",

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import inspect
-import os
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from forked import run_python
 from PIL import Image
 
 import eomgen
@@ -50,7 +48,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_python_blocks_run_in_order(path: Path, here: Path) -> None:
     script = here / "document.py"
     script.write_text("\n".join(blocks(path, "python")), encoding="utf-8")
-    result = subprocess.run([sys.executable, "-W", "error", script], capture_output=True, text=True)
+    result = run_python(script, options=("-W", "error"))
     assert result.returncode == 0, result.stderr
     for name in re.findall(r"!\[[^\]]*\]\((?:\.\./)?pictures/([^)]+)\)", path.read_text(encoding="utf-8")):
         if (here / name).exists():  # the block that saves it stands on the page
@@ -80,7 +78,7 @@ def assert_same_picture(made: Path, stored: Path) -> None:
 )
 def test_example_scripts_run(here: Path, name: str, words: list[str], said: str) -> None:
     script = ROOT / "examples" / name
-    result = subprocess.run([sys.executable, "-W", "error", script, *words], capture_output=True, text=True)
+    result = run_python(script, *words, options=("-W", "error"))
     assert result.returncode == 0, result.stderr
     assert said in result.stdout
     for error in re.findall(r"(?:kept to|book:|length to|equal to) ([0-9.e+-]+)", result.stdout):
@@ -108,9 +106,7 @@ def test_commands_run_in_order(path: Path, here: Path) -> None:
     for command in commands:
         program, *words = shlex.split(command)
         assert program == "eomgen"
-        result = subprocess.run(
-            [sys.executable, "-m", "eomgen", *words], capture_output=True, text=True, env=dict(os.environ)
-        )
+        result = run_python("-m", "eomgen", *words)
         assert result.returncode == 0, f"{command}\n{result.stderr}"
 
 

@@ -19,6 +19,7 @@ import eomgen as eg
 from eomgen import pipeline, texts
 from eomgen.describe.yaml_file import describe_yaml
 from eomgen.emit import emit_package
+from eomgen.files import inline_pictures
 from eomgen.generation import generate
 
 
@@ -176,8 +177,14 @@ class Tags(html.parser.HTMLParser):
     handle_pi = unknown_decl = handle_decl
 
 
+#: Of these the pictures of all pages are drawn, and among them is every mark that matplotlib takes for a formula.
+DRAWN = {*[*NASTY][::12], "LaTeX", "dollar", "two dollars", "dollars"}
+
+
 @pytest.mark.parametrize("key", NASTY)
-def test_what_is_shown_shows_the_text_and_obeys_none_of_it(key: str) -> None:
+def test_what_is_shown_shows_the_text_and_obeys_none_of_it(key: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if key not in DRAWN:  # figures are made of all of them, their dots, which take most of the time, of some
+        monkeypatch.setattr(inline_pictures, "trimmed_png", lambda figure: (b"drawn elsewhere", 1))
     equations = equations_of(key)
     module = equations.compile(target="numpy", kernels=["rhs"])
     model = model_of(described(NASTY[key]))

@@ -11,6 +11,7 @@ from xml.sax import saxutils
 import pytest
 from hostile.held_texts import PLACES, assert_held, described, model_of
 from hostile.nasty_texts import LONE, NASTY, PAIR
+from sweeps import part_of
 
 import eomgen as eg
 from eomgen import texts
@@ -90,14 +91,22 @@ def is_text_field(at: tuple[Any, ...]) -> bool:
     return dotted in PLACES.values()
 
 
+@pytest.mark.parametrize("model", OTHERS)
+def test_the_models_are_right_without_nasty_texts(model: str) -> None:
+    assert model_of(OTHERS[model]).mechanism().name == model
+
+
+@pytest.mark.parametrize("turn", part_of(range(4), lambda turn: turn == 0))
 @pytest.mark.parametrize(
     ("model", "at", "is_key"),
     [pytest.param(*where, id=f"{where[0]}-{'.'.join(map(str, where[1]))}-{where[2]}") for where in POSITIONS],
 )
-def test_everywhere_else_a_nasty_text_is_refused_by_name(model: str, at: tuple[Any, ...], is_key: bool) -> None:
-    start = POSITIONS.index((model, at, is_key)) % 6  # a sixth of the texts in each place, the next in the next
-    model_of(OTHERS[model]).mechanism()
-    for text in [*NASTY.values()][start::6]:
+def test_everywhere_else_a_nasty_text_is_refused_by_name(
+    model: str, at: tuple[Any, ...], is_key: bool, turn: int
+) -> None:
+    """A few of the texts in each place, the next in the next: each text in about nine places in a turn."""
+    start = (POSITIONS.index((model, at, is_key)) + 6 * turn) % 24
+    for text in [*NASTY.values()][start::24]:
         hostile = changed(OTHERS[model], at, text, is_key)
         if is_text_field(at) and not is_key:
             model_of(hostile).mechanism()

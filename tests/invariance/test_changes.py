@@ -8,9 +8,8 @@ from typing import Any
 import models
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from invariance.random_models import random_tree
+from sweeps import part_of
 
 import eomgen as eg
 from eomgen.describe.description import Description
@@ -24,8 +23,9 @@ from eomgen.verification.variants.short_runs import run_findings
 from eomgen.verification.variants.variant import drop
 
 #: Small examples that together have every change: loops, redundant rows, rods, rolling, cams, gears, drivers, a table.
-EXAMPLES = ("slider_crank", "four_bar", "double_wishbone", "rolling_disc", "cam_follower", "planetary_gear", "car_axis",
-            "hoecken")  # fmt: skip
+EXAMPLES = ("four_bar", "double_wishbone", "planetary_gear", "car_axis", "hoecken")
+#: Those that are tried in every way besides.
+EVERY_WAY = ("slider_crank", "rolling_disc", "cam_follower", "pendulum", "gear_train", "hydraulic_boom")
 
 
 def failures(findings: list[Finding]) -> list[str]:
@@ -48,14 +48,17 @@ def test_examples_as_variants(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", sorted(models.EXAMPLES.glob("*.yaml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    part_of(sorted(models.EXAMPLES.glob("*.yaml")), lambda path: path.stem in EVERY_WAY),
+    ids=lambda path: path.stem,
+)
 def test_every_way_of_an_example(path: Any) -> None:
     """With every method, target, way to give parameters, inputs and states, and reactions."""
     assert failures(variant_findings(eg.load(path), seconds=math.inf)) == []
 
 
-@settings(max_examples=6)
-@given(st.integers(0, 500))
+@pytest.mark.parametrize("seed", part_of((0, 83, 166, 249, 332, 415, 498), lambda seed: seed in (0, 249)))
 def test_random_trees_as_variants(seed: int) -> None:
     assert failures(changed(random_tree(seed), seed)) == []
 

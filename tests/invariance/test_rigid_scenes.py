@@ -78,7 +78,7 @@ def push(order: int) -> np.ndarray:
         m.contacts("d", left[1:], right, SOFT)
     places, speeds = [0.0, 0.0, 0.1, 0.3, 0.01, -0.2, 0.15, 0.02, 0.4], [0.3, -0.2, 1.0, 0.1, 0.2, -1.0, 0.0, 0.5, 2.0]
     x = np.array([*places, *speeds])
-    mod = m.compile(target="numpy")
+    mod = m.compile(target="numpy", kernels=["rhs"])
     return mod.rhs(0.0, x)[9:] * np.repeat(masses, 3)
 
 

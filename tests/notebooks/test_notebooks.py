@@ -14,6 +14,7 @@ import nbformat
 import pytest
 from kernels import executed
 from PIL import Image
+from sweeps import part_of
 
 FOLDER = Path(__file__).parents[2] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"), key=lambda path: int(path.stem.split("_")[0]))
@@ -60,7 +61,7 @@ def test_they_are_numbered_without_gaps() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", part_of(NAMES, lambda name: name not in LARGE))
 def test_a_fresh_run_gives_what_is_stored(name: str, tmp_path: Path) -> None:
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     fresh, stored = executed(FOLDER / f"{name}.ipynb", tmp_path), read(name)

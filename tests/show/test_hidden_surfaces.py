@@ -61,7 +61,7 @@ def test_what_a_ray_meets_first_is_drawn_last(elevation: float, azimuth: float) 
     scene = scene._replace(items=[item for item in scene.items if item.role == "shape"])
     assert len(scene.items) == 5
     eye = eye_of(ax.M)
-    assert proj_transform(*eye[:3], ax.M)[2] != 0.0  # no place on the page, but a depth
+    assert (ax.M @ [*eye[:3], 1.0])[2] != 0.0  # no place on the page (divided by 0, up to rounding), but a depth
     pieces = ScenePieces(scene)
     shown = pieces.seen(pieces.at(0), eye)
     flat = np.column_stack(proj_transform(*shown.corners.reshape(-1, 3).T, ax.M)[:2]).reshape(-1, 3, 2)

@@ -19,6 +19,7 @@ from eomgen.api.equations import Equations
 from eomgen.api.module import Module
 from eomgen.forces.springs import Spring
 from eomgen.verification import Verification, check_reactions, check_runs
+from eomgen.verification.verify import GROUPS
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 MODEL = EXAMPLES / "slider_crank.yaml"
@@ -32,9 +33,14 @@ def found_by(result: Verification) -> set[str]:
     return {finding.check for finding in result.breaches}
 
 
-def verified(equations: Equations) -> set[str]:
-    """Breaches of equations changed by hand; a new record of them, since compiling starts from what one was made of."""
-    return found_by(dataclasses.replace(equations).compile(target="numpy").verify(states=3))
+def verified(equations: Equations, but: str = "runs") -> set[str]:
+    """Breaches of equations changed by hand; a new record of them, since compiling starts from what one was made of.
+
+    Runs take long and say nothing of faults of equations that the groups before them do not say.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("eomgen.verification.verify.GROUPS", tuple(group for group in GROUPS if group != but))
+        return found_by(dataclasses.replace(equations).compile(target="numpy").verify(states=3))
 
 
 def negated(row: tuple[Any, ...], k: int) -> tuple[Any, ...]:
@@ -42,7 +48,7 @@ def negated(row: tuple[Any, ...], k: int) -> tuple[Any, ...]:
 
 
 def test_the_unbroken_module_has_no_breach() -> None:
-    assert verified(derived()) == set()
+    assert verified(derived(), but="") == set()
 
 
 # -- faults of the derivation, which the generated code repeats

@@ -17,9 +17,9 @@ typedef struct {
     int *column; /* of every number */
 } sparse_pattern;
 
-static sparse_pattern sparse_at(int n, int filled, double *real)
+static sparse_pattern sparse_at(int n, int filled, double *rows)
 {
-    int *const at = (int *)(real + filled);
+    int *const at = (int *)(rows + filled);
     const sparse_pattern p = {at, at + n, at + 2 * n + 1, at + 3 * n + 1};
     return p;
 }
@@ -91,11 +91,11 @@ static long sparse_eliminate(int n, int words, uint64_t *restrict near, int *res
     return filled;
 }
 
-/* Writes the pattern down in `real`, by rows: what comes before a row are those that meet it after their turn. `turn`: n. */
+/* Writes the pattern down in `rows`, by rows: what comes before a row are those that meet it after their turn. `turn`: n. */
 static void sparse_write(int n, int words, long filled, const uint64_t *restrict near, const int *restrict order,
-                         int *restrict turn, double *restrict real)
+                         int *restrict turn, double *restrict rows)
 {
-    const sparse_pattern p = sparse_at(n, (int)filled, real);
+    const sparse_pattern p = sparse_at(n, (int)filled, rows);
     int *const end = p.middle;
     for (int i = 0; i < n; i++) {
         p.order[i] = order[i], turn[order[i]] = i, end[i] = 1;
@@ -140,7 +140,7 @@ static void sparse_write(int n, int words, long filled, const uint64_t *restrict
 }
 
 /* How many numbers the factors have where they take less work than `dense` products, and their pattern; else 0. */
-static int sparse_look(int n, const double *restrict J, double dense, double *restrict real, double *restrict re,
+static int sparse_look(int n, const double *restrict J, double dense, double *restrict rows, double *restrict re,
                        double *restrict im)
 {
     const int words = (n + WORD - 1) / WORD;
@@ -154,15 +154,15 @@ static int sparse_look(int n, const double *restrict J, double dense, double *re
     if (2 * filled > (long)n * n || SPARSE_TIMES * (products + SPARSE_ROW * (double)n) > dense) {
         return 0;
     }
-    sparse_write(n, words, filled, near, order, degree, real);
+    sparse_write(n, words, filled, near, order, degree, rows);
     return (int)filled;
 }
 
-/* Factors g - J in place of `real` before the pattern; 1 where little is left of a pivot. room: n numbers. */
-static int sparse_factor(int n, int filled, const double *restrict J, double g, double *restrict real,
+/* Factors g - J in place of `rows` before the pattern; 1 where little is left of a pivot. room: n numbers. */
+static int sparse_factor(int n, int filled, const double *restrict J, double g, double *restrict rows,
                          double *restrict room)
 {
-    const sparse_pattern p = sparse_at(n, filled, real);
+    const sparse_pattern p = sparse_at(n, filled, rows);
     for (int i = 0; i < n; i++) {
         const double *const row = J + (long)p.order[i] * n;
         for (int at = p.start[i]; at < p.start[i + 1]; at++) {
@@ -172,10 +172,10 @@ static int sparse_factor(int n, int filled, const double *restrict J, double g, 
         double size = fabs(room[i]);
         for (int at = p.start[i]; at < p.middle[i]; at++) {
             const int k = p.column[at];
-            const double ratio = room[k] * real[p.middle[k]], before = room[i];
+            const double ratio = room[k] * rows[p.middle[k]], before = room[i];
             room[k] = ratio;
             for (int l = p.middle[k] + 1; l < p.start[k + 1]; l++) {
-                room[p.column[l]] -= ratio * real[l];
+                room[p.column[l]] -= ratio * rows[l];
             }
             size += fabs(room[i] - before);
         }
@@ -184,17 +184,17 @@ static int sparse_factor(int n, int filled, const double *restrict J, double g, 
         }
         room[i] = 1.0 / room[i];
         for (int at = p.start[i]; at < p.start[i + 1]; at++) {
-            real[at] = room[p.column[at]];
+            rows[at] = room[p.column[at]];
         }
     }
     return 0;
 }
 
 /* The same of x + i y - J; room: 2 n numbers. */
-static int sparse_factor_complex(int n, int filled, const double *restrict J, double x, double y, double *restrict real,
+static int sparse_factor_complex(int n, int filled, const double *restrict J, double x, double y, double *restrict rows,
                                  double *restrict re, double *restrict im, double *restrict room)
 {
-    const sparse_pattern p = sparse_at(n, filled, real);
+    const sparse_pattern p = sparse_at(n, filled, rows);
     double *restrict const a = room, *restrict const b = room + n;
     for (int i = 0; i < n; i++) {
         const double *const row = J + (long)p.order[i] * n;
@@ -225,29 +225,29 @@ static int sparse_factor_complex(int n, int filled, const double *restrict J, do
     return 0;
 }
 
-static void sparse_solve(int n, int filled, double *real, double *restrict r, double *restrict room)
+static void sparse_solve(int n, int filled, double *rows, double *restrict r, double *restrict room)
 {
-    const sparse_pattern p = sparse_at(n, filled, real);
+    const sparse_pattern p = sparse_at(n, filled, rows);
     for (int i = 0; i < n; i++) {
         double sum = r[p.order[i]];
         for (int at = p.start[i]; at < p.middle[i]; at++) {
-            sum -= real[at] * room[p.column[at]];
+            sum -= rows[at] * room[p.column[at]];
         }
         room[i] = sum;
     }
     for (int i = n - 1; i >= 0; i--) {
         double sum = room[i];
         for (int at = p.middle[i] + 1; at < p.start[i + 1]; at++) {
-            sum -= real[at] * room[p.column[at]];
+            sum -= rows[at] * room[p.column[at]];
         }
-        r[p.order[i]] = room[i] = sum * real[p.middle[i]];
+        r[p.order[i]] = room[i] = sum * rows[p.middle[i]];
     }
 }
 
-static void sparse_solve_complex(int n, int filled, double *real, const double *restrict re, const double *restrict im,
+static void sparse_solve_complex(int n, int filled, double *rows, const double *restrict re, const double *restrict im,
                                  double *restrict r, double *restrict s, double *restrict room)
 {
-    const sparse_pattern p = sparse_at(n, filled, real);
+    const sparse_pattern p = sparse_at(n, filled, rows);
     double *restrict const a = room, *restrict const b = room + n;
     for (int i = 0; i < n; i++) {
         double x = r[p.order[i]], y = s[p.order[i]];
@@ -269,12 +269,12 @@ static void sparse_solve_complex(int n, int filled, double *real, const double *
 }
 
 /* Whether a pattern is one: numbers that came from elsewhere may be any. room: n numbers. */
-static int sparse_is_sound(int n, double filled, double *real, int *restrict room)
+static int sparse_is_sound(int n, double filled, double *rows, int *restrict room)
 {
     if (!(filled >= n && 2.0 * filled <= (double)n * n)) {
         return 0;
     }
-    const sparse_pattern p = sparse_at(n, (int)filled, real);
+    const sparse_pattern p = sparse_at(n, (int)filled, rows);
     int sound = p.start[0] == 0 && p.start[n] == (int)filled;
     memset(room, 0, (size_t)n * sizeof *room);
     for (int i = 0; sound && i < n; i++) {
