@@ -212,7 +212,14 @@ def test_lanes_are_clean_under_the_sanitizers(systems, libraries, tmp_path, cut)
     (tmp_path / "main.c").write_text(MAIN % ", ".join(map(repr, map(float, system.p))))
     sources = [str(path) for path in tmp_path.glob("*.c")]
     # -O0: the instrumented text takes the compiler a quarter of the time, and nothing wrong is optimized away
-    flags = ["-UEOMGEN_LANES", "-DEOMGEN_WITHOUT_SERIES", "-g", "-O0", "-D_ISOC11_SOURCE", "-fsanitize=address,undefined"]
+    flags = [
+        "-UEOMGEN_LANES",
+        "-DEOMGEN_WITHOUT_SERIES",
+        "-g",
+        "-O0",
+        "-D_ISOC11_SOURCE",
+        "-fsanitize=address,undefined",
+    ]
     flags += ["-fno-sanitize-recover=all"]
     command = ["gcc", *libraries.STRICT, *flags, *sources, "-o", str(tmp_path / "main"), "-lm"]
     subprocess.run(command, check=True, timeout=120)
