@@ -7,6 +7,14 @@ from typing import Any
 
 import pytest
 
+#: Examples that together have every type of joint, force, constraint and shape of all of them, every description of
+#: rotations, every function in an expression, and events, inputs and outputs (tests/emit/test_traced.py looks).
+OF_ALL_KINDS = (
+    "bicycle", "cam_follower", "compass_gait", "double_pendulum", "double_wishbone", "engine", "four_bar", "gait_leg",
+    "gear_train", "hydraulic_boom", "planetary_gear", "quadrotor_load", "rolling_disc", "satellite", "slider_crank",
+    "spatial_slider_crank", "stewart_platform", "two_link_manipulator", "wheelset",
+)  # fmt: skip
+
 
 def part_of(cases: Iterable[Any], keep: Callable[[Any], bool]) -> list[Any]:
     """The cases of a sweep as parameters; those that are not to be kept are marked thorough.

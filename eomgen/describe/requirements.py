@@ -81,6 +81,11 @@ class Requirements:
 
     def known(self, expressions: Sequence[Expr], points: Mapping[str, Array] | None = None) -> Array | None:
         """Numbers, a row each, at the declared values and at points of local names; None if these do not tell."""
+        if not points:  # most are numbers already
+            numbers = [x.value for x in expressions]
+            if None not in numbers:
+                values = np.array(numbers, dtype=float)
+                return values if np.isfinite(values).all() else None
         given = {**self.numbers, **(points or {})}
         if not symbols_of(expressions) <= given.keys():
             return None

@@ -19,6 +19,7 @@ from eomgen.runtime.allowed_parameters import require_allowed
 ROOT = Path(eg.__file__).parent
 BODY = {"mass": 1.0, "inertia": {"zz": 0.1}}
 GIVEN = " with p = "
+READ: dict[str, Any] = {}
 
 
 def scene(case: Judged, value: Any, parameter: float | None = None, declared: bool = False) -> dict[str, Any]:
@@ -49,21 +50,28 @@ def scene(case: Judged, value: Any, parameter: float | None = None, declared: bo
     return found
 
 
+def mechanism_of(tmp_path: Path, description: dict[str, Any]) -> Any:
+    """The mechanism of a file with this description, or what is wrong with it; each is read once."""
+    text = json.dumps(description)
+    if text not in READ:
+        READ.clear() if len(READ) > 20 else None
+        file = tmp_path / "scene.yaml"
+        file.write_text(text)
+        try:
+            READ[text] = eg.load(file).mechanism()
+        except ModelError as error:
+            READ[text] = list(error.problems)
+    return READ[text]
+
+
 def problems_of(tmp_path: Path, description: dict[str, Any]) -> list[Problem]:
-    file = tmp_path / "scene.yaml"
-    file.write_text(json.dumps(description))
-    try:
-        eg.load(file).mechanism()
-    except ModelError as error:
-        return list(error.problems)
-    return []
+    found = mechanism_of(tmp_path, description)
+    return found if isinstance(found, list) else []
 
 
 def late(tmp_path: Path, description: dict[str, Any], value: float) -> list[Problem]:
     """What is said of a value of p that a module of the model is given later."""
-    file = tmp_path / "scene.yaml"
-    file.write_text(json.dumps(description))
-    mechanism = eg.load(file).mechanism()
+    mechanism = mechanism_of(tmp_path, description)
     names = [p.name for p in mechanism.parameters]
     metadata = json.loads(json.dumps({"p_names": names, **keep_rules(mechanism.requirements, names)}))
     try:

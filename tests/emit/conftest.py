@@ -24,8 +24,10 @@ def systems():
 
 
 @pytest.fixture(scope="session")
-def libraries():
-    return load("library")
+def libraries(pytestconfig):
+    found = load("library")
+    found.LEVEL = "-O1" if pytestconfig.getoption("--thorough") else "-O0"
+    return found
 
 
 @pytest.fixture(scope="session")

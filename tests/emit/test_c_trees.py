@@ -197,6 +197,17 @@ def test_clean_under_the_sanitizers(systems, libraries, tmp_path, make):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.parametrize("make", ["crank", "chain", "large"])
+def test_the_optimizer_finds_nothing_to_warn_of(systems, compiled, make):
+    """What is used before it is set, or out of bounds, shows only where the compiler follows values."""
+    system, limits = {
+        "crank": (systems.slider_crank(copies=2, driven=True), systems.Limits(statements=40)),
+        "chain": (systems.chain(3), systems.Limits()),
+        "large": (systems.chain(7, BRANCHED), systems.Limits(unrolled=2, jacobian_nodes=0)),
+    }[make]
+    compiled(system, "-O1", limits=limits)
+
+
 def test_large_models_are_split_into_files_that_link(systems, compiled, monkeypatch):
     """The same results from one file and from several."""
     from eomgen.emit import c_parts, emit_c

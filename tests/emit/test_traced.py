@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from functools import cache
@@ -14,6 +15,7 @@ import models
 import numpy as np
 import pytest
 from jaxprs import evaluate
+from sweeps import OF_ALL_KINDS, part_of
 
 import eomgen as eg
 from eomgen.errors import MissingDependencyError, UsageError
@@ -95,7 +97,7 @@ def near(found: Any, expected: np.ndarray) -> None:
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9 * max(1.0, np.abs(expected).max(initial=0.0)))
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", part_of(EXAMPLES, OF_ALL_KINDS.__contains__))
 def test_casadi_equals_c(name: str) -> None:
     """Every function, and the derivatives of rhs by x, u and p."""
     functions, module = example(name).to_casadi(), in_c(name)
@@ -110,7 +112,7 @@ def test_casadi_equals_c(name: str) -> None:
         near(np.asarray(found), expected)
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", part_of(EXAMPLES, OF_ALL_KINDS.__contains__))
 def test_jax_equals_c(name: str) -> None:
     """Every function, and the derivative of rhs along a random direction of x, u and p at once."""
     functions, module = example(name).to_jax(), in_c(name)
@@ -123,6 +125,19 @@ def test_jax_equals_c(name: str) -> None:
     ways = tuple(random.normal(size=part.size) for part in (x, u, p))
     _, found = evaluate(lambda *at: list(jax.jvp(lambda *at: functions.rhs(0.0, *at), at, ways)), x, u, p)
     near(found, sum(slope @ way for slope, way in zip(slopes_of(module, x), ways, strict=True)))
+
+
+def test_the_part_of_the_examples_has_every_kind() -> None:
+    """What stands in the files: types, shapes, descriptions of rotations, functions in expressions, sections."""
+
+    def kinds(names: Any) -> set[str]:
+        text = "".join((models.EXAMPLES / f"{name}.yaml").read_text() for name in names)
+        found = re.findall(r"\b(?:type|shape|rotation):\s*(\w+)", text)
+        found += re.findall(r"\b([a-z]+[0-9]?)\(", text)
+        return {*found, *re.findall(r"^(\w+):", text, re.MULTILINE)}
+
+    assert len(kinds(EXAMPLES)) > 50
+    assert kinds(EXAMPLES) - kinds(OF_ALL_KINDS) == set()
 
 
 @pytest.mark.parametrize("name", BY_XLA)

@@ -8,6 +8,7 @@ import judges
 import models
 import numpy as np
 import pytest
+from sweeps import OF_ALL_KINDS, part_of
 
 import eomgen as eg
 from eomgen.equations import METHODS
@@ -24,7 +25,7 @@ def test_no_example_is_left_out() -> None:
     assert len(NAMES) + len(models.EXAMPLE_NAMES) >= len(list(EXAMPLES.glob("*.yaml")))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", part_of(NAMES, {*OF_ALL_KINDS, *models.DRIVEN_NAMES}.__contains__))
 def test_forms_agree(name: str) -> None:
     model = eg.load(EXAMPLES / f"{name}.yaml")
     reference = model.compile("embedding", target="numpy")
