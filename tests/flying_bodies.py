@@ -22,12 +22,12 @@ def flying(count: int, gravity: Any = (0, 0, 0)) -> tuple[eg.Model, list[Any]]:
 
 def state(mod: Any, places: Any, turns: Any) -> np.ndarray:
     """A state at rest with bodies at places, turned."""
-    start: dict[str, float] = {}
+    found = np.zeros(mod.n_x)
     for k, (place, turn) in enumerate(zip(places, turns, strict=True)):
         x, y, z, w = turn.as_quat()
-        own = [name for name in mod.q_names if name.startswith(f"j{k}_")]
-        start |= dict(zip(own, [*place, w, x, y, z], strict=True))
-    return np.asarray(mod.x0(**start))
+        own = [i for i, name in enumerate(mod.q_names) if name.startswith(f"j{k}_")]
+        found[own] = [*place, w, x, y, z]
+    return found
 
 
 def moved(mod: Any, x: np.ndarray, k: int, h: float) -> np.ndarray:
