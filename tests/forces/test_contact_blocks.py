@@ -99,9 +99,9 @@ def greatest_gap(place: np.ndarray, turn: Rotation) -> float:
     best = -np.inf
     for gap, at in sorted(starts)[-4:]:
         n = np.array(at)
-        met = n != 0
+        met, signs = n != 0, np.sign(n)
 
-        def lost(w: np.ndarray, signs: np.ndarray = np.sign(n), met: np.ndarray = met) -> float:
+        def lost(w: np.ndarray, signs: np.ndarray = signs, met: np.ndarray = met) -> float:
             n = np.zeros(3)
             n[met] = signs[met] * np.abs(w)
             return float(-gaps(n))

@@ -104,10 +104,10 @@ def test_an_ellipsoid_and_a_capsule(swapped: bool) -> None:
         flat = (NET - there) @ axis
         nearest = int(np.argmin(((NET - there - np.clip(flat, -0.2, 0.2)[:, None] * axis) ** 2).sum(axis=1)))
 
-        def square(s: np.ndarray, there: list[float] = there.tolist(), axis: list[float] = axis.tolist()) -> float:
+        def square(s: np.ndarray, there: np.ndarray = there, axis: np.ndarray = axis) -> float:
             (p, q, t), (a, b, c) = s.tolist(), AXES[0].tolist()
             u = a * math.cos(p) * math.sin(q), b * math.sin(p) * math.sin(q), c * math.cos(q)
-            return math.fsum((u[k] - there[k] - t * axis[k]) ** 2 for k in range(3))
+            return float(((u - there - t * axis) ** 2).sum())
 
         start = (*ANGLES[nearest], np.clip(flat[nearest], -0.2, 0.2))
         bounds = [(-1, 8), (-1, 4.2), (-0.2, 0.2)]
