@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 from ..elements.looks import Seen
@@ -196,6 +197,11 @@ class ContactGroups(Force):
         markers, function, operands = self._operands(view, part, still)
         return markers, pair_sum(view.graph, function, operands)
 
+    @cached_property
+    def _made(self) -> dict[str, tuple[PairFunction, list[Expr]]]:
+        """Sums over pairs, by what of them is asked for, and what they are given beside the motion of bodies."""
+        return {}
+
     def _operands(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], PairFunction, list[Expr]]:
         """The bodies as markers at their origins, the sum over pairs and what it is given."""
         graph = view.graph
@@ -209,10 +215,12 @@ class ContactGroups(Force):
             moving = (view.velocity(marker), view.angular_velocity(marker))
             operands += [*view.position(marker), *rotation]
             operands += [graph.zero if still else x for v in moving for x in v]
-        data = _SharedData(len(operands), graph)
-        function = self._function(f"{part}{self.name}", bodies, data, bool(part))
+        if part not in self._made:  # of bodies that move, at rest, for the energy: the sum is the same
+            data = _SharedData(len(operands), graph)
+            self._made[part] = self._function(f"{part}{self.name}", bodies, data, bool(part)), data.values
+        function, shared = self._made[part]
         held = [graph.zero] * function.states if still else self._held(graph)  # the energy does not depend on states
-        return markers, function, [*operands, *data.values, *held]
+        return markers, function, [*operands, *shared, *held]
 
     def _held(self, graph: Graph) -> list[Expr]:
         """The states of all pairs; the number of pieces that touch is found, so 0 stands in its place."""

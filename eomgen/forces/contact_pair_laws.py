@@ -206,7 +206,8 @@ def pair_kind(
             )
         normal_of, depth, arm, _ = contact.touch(view)
         share = contact.share(view)
-        touch = [*(contact.nearness(view)[0]), contact.nearness(view)[1], turning_radius(kinds[1], given[1], graph)]
+        facing, gap = contact.nearness(view)
+        touch = [*facing, gap, turning_radius(kinds[1], given[1], graph)]
         if share is not None:  # beside a piece of ground nothing is in it, and its neighbour is what is near
             owned = graph.apply("lt", 0.0, share)
             # what is inside has come there through the outline

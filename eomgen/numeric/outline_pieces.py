@@ -61,7 +61,7 @@ def _choose(shape: np.ndarray, place: Sequence[Any], count: int) -> tuple[np.nda
     R = shape[3:12].reshape(3, 3, *shape.shape[1:])
     reach = np.stack(np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in place), shape[0])[:3]) - shape[:3]
     x, y = ((R[:, i] * reach).sum(axis=0) for i in range(2))
-    px, py, c, s, half, bend = np.moveaxis(shape[POSE:-1].reshape(count, PIECE, *shape.shape[1:]), 1, 0)
+    px, py, c, s, half, bend = shape[POSE:-1].reshape(count, PIECE, *shape.shape[1:]).swapaxes(0, 1)
     sine = bend * half
     cosine = np.sqrt(np.maximum(0.0, 1.0 - sine * sine))
     rise = half * sine / (1.0 + cosine)

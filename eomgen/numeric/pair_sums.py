@@ -137,7 +137,7 @@ class PairSum:
                 np.sqrt(dot(change, change)),
             )
             if near.any():
-                numbers = [*np.moveaxis(a, 1, 0), *np.moveaxis(b, 1, 0), *data[list(law)][:, None]]
+                numbers = [*a.swapaxes(0, 1), *b.swapaxes(0, 1), *data[list(law)][:, None]]
                 nx, ny, nz, depth, radius = _table(touch(numbers), len(i), data)
                 normal, turning = np.stack([nx, ny, nz], axis=1), a[:, 15:18]
                 seen = speed - across(turning, reach)
@@ -223,7 +223,7 @@ class PairSum:
             if not len(i):
                 continue
             bodies = self.tables[first][i, 0], self.tables[second][j, 0]
-            numbers = [*np.moveaxis(a[i], 1, 0), *np.moveaxis(b[j], 1, 0), *data[list(law)][:, None]]
+            numbers = [*a[i].swapaxes(0, 1), *b[j].swapaxes(0, 1), *data[list(law)][:, None]]
             places = [] if held is None else [held[1][i] + held[2][j] + k for k in range(held[0])]
             begun = len(data) - self.states
             numbers += [data[begun + at] for at in places]
@@ -235,7 +235,7 @@ class PairSum:
             else:
                 assert da is not None
                 assert db is not None
-                moving = [*np.moveaxis(da[i], 1, 0), *np.moveaxis(db[j], 1, 0), *rates[list(law)][:, None]]
+                moving = [*da[i].swapaxes(0, 1), *db[j].swapaxes(0, 1), *rates[list(law)][:, None]]
                 moving += [rates[begun + at] for at in places]
                 force = _table(value(numbers), len(i), data)[0:3]
                 result = _table(slope([*numbers, *moving]), len(i), data)
@@ -379,4 +379,4 @@ def _stacked(given: Sequence[Any]) -> np.ndarray:
 def _table(result: Sequence[Any], count: int, data: np.ndarray) -> np.ndarray:
     """What a function of a pair gave as an array (RESULT, count, ...); a constant entry is one number."""
     shape = (count, *data.shape[1:])
-    return np.array([np.broadcast_to(np.asarray(x, dtype=data.dtype), shape) for x in result])
+    return np.array([np.full(shape, x, dtype=data.dtype) for x in result])

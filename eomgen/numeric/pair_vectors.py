@@ -40,4 +40,4 @@ def cross(a: Any, b: Any) -> np.ndarray:
 
 def across(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross products of vectors (n, 3, ...)."""
-    return np.moveaxis(cross(np.moveaxis(a, 1, 0), np.moveaxis(b, 1, 0)), 0, 1)
+    return cross(a.swapaxes(0, 1), b.swapaxes(0, 1)).swapaxes(0, 1)

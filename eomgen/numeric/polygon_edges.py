@@ -91,8 +91,8 @@ def _choose(first: np.ndarray, second: np.ndarray, corners: tuple[int, int]) -> 
     x, y = ((R[:, i] * reach).sum(axis=0) for i in range(2))
     (xx, xy), (yx, yy) = ([(R[:, i] * S[:, k]).sum(axis=0) for k in range(2)] for i in range(2))
     own, own_normals = _points(first, 0), _points(first, 2)
-    px, py = np.moveaxis(_points(second, 0), 1, 0)
-    nx, ny = np.moveaxis(_points(second, 2), 1, 0)
+    px, py = _points(second, 0).swapaxes(0, 1)
+    nx, ny = _points(second, 2).swapaxes(0, 1)
     others = np.stack([x + xx * px + xy * py, y + yx * px + yy * py], axis=1)
     normals = np.stack([yy * nx - yx * ny, xx * ny - xy * nx], axis=1)
     (depths_a, deepest_b), (depths_b, deepest_a) = (

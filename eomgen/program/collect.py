@@ -53,6 +53,7 @@ def collect_terms(
     recursive = equations.accelerations is not None or (c.labels and equations.constrained is not None and in_c)
     by_columns = bool(recursive) and has_long_paths(kinematics.parent)
     scale = {"length": length, "angle": kinematics.graph.one}
+    near = tuple(near_pairs(kinematics))
     terms = SystemTerms(
         graph=kinematics.graph,
         t="t",
@@ -91,8 +92,8 @@ def collect_terms(
         coordinate_slopes=c.slopes,
         finite_forces=tuple(flag for _, flag in flag_forces(kinematics)),
         meeting_times=tuple(_meeting_times(kinematics)),
-        near_pairs=tuple(near_pairs(kinematics)),
-        motion_axes=tuple(motion_axes(kinematics)) if near_pairs(kinematics) else (),
+        near_pairs=near,
+        motion_axes=tuple(motion_axes(kinematics)) if near else (),
         accelerations=equations.accelerations,
         pivots=equations.pivots,
         wrenches=find_wrenches(kinematics),

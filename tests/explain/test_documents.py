@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sweeps import part_of
 
 import eomgen as eg
 from eomgen.equations import METHODS
@@ -92,8 +93,12 @@ def _says_something(piece: Any) -> bool:
     return len(piece.png) > 0
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", KINDS)
+ALL = [(name, method) for name in KINDS for method in METHODS]
+#: Of a loop every method, of the others every other one.
+FULL = {*ALL[len(METHODS) : 2 * len(METHODS)], *ALL[: len(METHODS) : 2], *ALL[2 * len(METHODS) + 1 :: 2]}
+
+
+@pytest.mark.parametrize(("name", "method"), part_of(ALL, FULL.__contains__))
 def test_every_method_of_one_example_of_each_kind(name: str, method: str) -> None:
     document = explained(name, method)
     check(document)
@@ -118,7 +123,10 @@ def test_every_example_in_short(name: str) -> None:
 PAIRS = [(name, METHODS_BY_NAME[(k + step) % len(METHODS_BY_NAME)]) for k, name in enumerate(NAMES) for step in (0, 3)]
 
 
-@pytest.mark.parametrize(("name", "method"), PAIRS)
+SOME = set(PAIRS[::3])  #: two thirds of the examples, by each method three or more
+
+
+@pytest.mark.parametrize(("name", "method"), part_of(PAIRS, SOME.__contains__))
 def test_every_example_by_other_methods(name: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """In short, and without the pictures, which are drawn above."""
     monkeypatch.setattr(about_mechanism, "_picture", lambda module: Sentence("No picture."))

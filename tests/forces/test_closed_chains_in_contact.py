@@ -45,7 +45,7 @@ def slopes(mod: Any, x: np.ndarray) -> np.ndarray:
 def test_jacobian_of_a_closed_chain_in_contact(rolled: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(c_rolled, "ALIKE", 0)
     monkeypatch.setattr(Program, "is_rolled", lambda program, name: program.counts[name].total > rolled)
-    mod = ring(12, "by_text" if rolled else "by_loops").compile()
+    mod = ring(7, "by_text" if rolled else "by_loops").compile()
     x = mod.x0()
     x[mod.n_q :] = 0.3 * np.sin(np.arange(mod.n_x - mod.n_q))
     x = mod.project(x)
@@ -60,7 +60,7 @@ BRISTLES = {"friction_law": "lugre", "bristle_stiffness": 2e3, "bristle_damping"
 @pytest.mark.parametrize("states", [False, True], ids=["laws", "bristles"])
 def test_columns_of_contacts_are_their_derivatives(states: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Jacobians by columns that are kept, by columns that soon find no room, and by differences."""
-    model = ring(12, "with_room", **(BRISTLES if states else {}))
+    model = ring(7, "with_room", **(BRISTLES if states else {}))
     mod = model.compile()
     x = mod.x0()
     x[mod.n_q :] = 0.3 * np.sin(np.arange(mod.n_x - mod.n_q))
@@ -69,5 +69,5 @@ def test_columns_of_contacts_are_their_derivatives(states: bool, monkeypatch: py
     found, expected = mod.jacobian(0.0, x), slopes(mod, x)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
     monkeypatch.setattr(pair_statements, "SLOTS", 0 if states else 2)
-    other = ring(12, "without_room", **(BRISTLES if states else {})).compile()
+    other = ring(7, "without_room", **(BRISTLES if states else {})).compile()
     np.testing.assert_allclose(other.jacobian(0.0, x), found, rtol=0, atol=1e-12 * np.abs(found).max())

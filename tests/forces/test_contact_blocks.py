@@ -39,7 +39,7 @@ def test_faces_edges_and_corners_of_known_normal(swapped: bool) -> None:
     m.contacts("touch", *(groups[::-1] if swapped else groups), ELASTIC)
     mods = [m.compile(target=target) for target in ("numpy", "cython")]
     rng = np.random.default_rng(1)
-    for k in range(90):
+    for k in range(48):
         turns = [Rotation.random(random_state=rng.integers(1 << 30)) for _ in "ab"]
         free = rng.permutation(3)[: k % 3 + 1]
         n = np.zeros(3)
@@ -56,7 +56,7 @@ def test_faces_edges_and_corners_of_known_normal(swapped: bool) -> None:
             force, push = -mod.bias(0.0, x), 2e4 * depth**1.5
             np.testing.assert_allclose(force[6:9], push * out, atol=1e-7 * push)
             assert np.abs(force[:3] + force[6:9]).max() <= 1e-12 * push
-        if k < 6:
+        if k < 3:
             check_slopes(mods[1], x)
             one, other = (mod.jacobian(0.0, x) for mod in mods)
             assert np.abs(one - other).max() <= 1e-9 * np.abs(other).max()
@@ -67,29 +67,48 @@ def test_faces_edges_and_corners_of_known_normal(swapped: bool) -> None:
         assert all(mod.energy(apart)[1] == 0.0 for mod in mods)
 
 
-def greatest_gap(place: np.ndarray, turn: Rotation) -> float:
-    """The maximum of n r - sum |n| h - |diag(a) R^T n| over directions, searched in all strata of signs."""
-
-    def gap(n: np.ndarray) -> float:
-        n = n / np.linalg.norm(n)
-        return float(n @ place - np.abs(n) @ HALVES - np.linalg.norm(AXES * turn.inv().apply(n)))
-
-    best = -np.inf
+def strata() -> list[np.ndarray]:
+    """Directions by the signs of their parts: of faces, of edges and of corners of a cuboid."""
+    arc = np.pi / 2 * (np.arange(16) + 0.5) / 16
+    flat, up = (x.ravel() for x in np.meshgrid(arc, arc))
+    nets = {1: np.ones((1, 1)), 2: np.column_stack([np.cos(arc), np.sin(arc)])}
+    nets[3] = np.column_stack([np.cos(flat) * np.cos(up), np.sin(flat) * np.cos(up), np.sin(up)])
+    found = []
     for signs in itertools.product((-1, 0, 1), repeat=3):
         s = np.array(signs)
-        if (count := np.abs(s).sum()) == 0:
-            continue
-        if count == 1:
-            best = max(best, gap(s))
-            continue
+        if s.any():
+            net = nets[np.abs(s).sum()]
+            found.append(np.zeros((len(net), 3)))
+            found[-1][:, s != 0] = s[s != 0] * net
+    return found
 
-        def lost(w: np.ndarray, s: np.ndarray = s) -> float:
+
+STRATA = strata()
+
+
+def greatest_gap(place: np.ndarray, turn: Rotation) -> float:
+    """The maximum of n r - sum |n| h - |diag(a) R^T n| over directions, searched in strata of signs from nets there."""
+    scaled = turn.as_matrix() * AXES
+
+    def gaps(n: np.ndarray) -> np.ndarray:
+        size = np.sqrt((n * n).sum(axis=-1))
+        found: np.ndarray = (n @ place - np.abs(n) @ HALVES - np.sqrt(((n @ scaled) ** 2).sum(axis=-1))) / size
+        return found
+
+    starts = [max(zip(gaps(net), net.tolist(), strict=True)) for net in STRATA]
+    best = -np.inf
+    for gap, at in sorted(starts)[-4:]:
+        n = np.array(at)
+        met, signs = n != 0, np.sign(n)
+
+        def lost(w: np.ndarray, signs: np.ndarray = signs, met: np.ndarray = met) -> float:
             n = np.zeros(3)
-            n[s != 0] = s[s != 0] * np.abs(w)
-            return -gap(n)
+            n[met] = signs[met] * np.abs(w)
+            return float(-gaps(n))
 
-        best = max(best, *(-minimize(lost, w, method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-13}).fun
-                           for w in (np.ones(count), np.arange(1.0, count + 1))))  # fmt: skip
+        if met.sum() > 1:
+            gap = -minimize(lost, np.abs(n[met]), method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-13}).fun
+        best = max(best, float(gap))
     return best
 
 
@@ -99,7 +118,7 @@ def test_the_greatest_gap_that_a_search_finds() -> None:
     m.contacts("touch", {**BLOCK, "on": a}, {**EGG, "on": b}, ELASTIC)
     mod = m.compile()
     rng, met = np.random.default_rng(2), 0
-    while met < 40:
+    while met < 24:
         turn = Rotation.random(random_state=rng.integers(1 << 30))
         place = rng.uniform(-1, 1, 3) * (HALVES + 0.2)
         x = state(mod, [(0, 0, 0), place], [Rotation.identity(), turn])
@@ -108,7 +127,7 @@ def test_the_greatest_gap_that_a_search_finds() -> None:
             continue
         met += 1
         assert depth == pytest.approx(-greatest_gap(place, turn), abs=1e-9)
-        if met < 15:
+        if met < 10:
             check_slopes(mod, x)
 
 
@@ -120,7 +139,7 @@ def test_depth_and_force_are_continuous_around_a_corner() -> None:
     turn = Rotation.from_euler("xyz", (0.4, 0.3, 0.2))
     way = [(0.0, 0.0, 0.335), (0.235, 0.0, 0.315), (0.275, 0.155, 0.285), (0.115, 0.21, 0.22), (-0.2, 0.205, 0.1)]
     lines = itertools.pairwise(np.array(way))
-    places = np.concatenate([np.linspace(p, q, 1500, endpoint=False) for p, q in lines])
+    places = np.concatenate([np.linspace(p, q, 500, endpoint=False) for p, q in lines])
     found = []
     for place in places:
         x = state(mod, [(0, 0, 0), place], [Rotation.identity(), turn])
@@ -128,7 +147,7 @@ def test_depth_and_force_are_continuous_around_a_corner() -> None:
     depths = np.array(found)
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     met = (depths[:-1, 0] > 0) & (depths[1:, 0] > 0)
-    assert met.sum() > 2000
+    assert met.sum() > 700
     assert (np.abs(np.diff(depths[:, 0]))[met] <= 1.001 * steps[met]).all()
     push = np.linalg.norm(depths[:, 1:], axis=1)
     turned = depths[:, 1:] / np.maximum(push, 1e-300)[:, None]

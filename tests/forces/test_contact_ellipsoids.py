@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,13 @@ AXES = np.array([(0.2, 0.1, 0.08), (0.15, 0.06, 0.12)])
 PAIR = [{"shape": "ellipsoid", "semi_axes": tuple(axes)} for axes in AXES]
 ROD = {"shape": "capsule", "length": 0.4, "radius": 0.05}
 OWN = Rotation.from_euler("xyz", (0.2, 0.5, -0.3))
+
+
+#: Polar angles of points all over the first ellipsoid, and the points.
+ANGLES = np.array([(p, q) for p in np.linspace(0, 2 * np.pi, 64, endpoint=False) for q in np.linspace(0.05, 3.09, 32)])
+NET = AXES[0] * np.stack(
+    [np.cos(ANGLES[:, 0]) * np.sin(ANGLES[:, 1]), np.sin(ANGLES[:, 0]) * np.sin(ANGLES[:, 1]), np.cos(ANGLES[:, 1])], 1
+)
 
 
 def support(turn: Rotation, axes: np.ndarray, n: np.ndarray) -> np.ndarray:
@@ -91,19 +99,19 @@ def test_an_ellipsoid_and_a_capsule(swapped: bool) -> None:
         along = turns[1].apply((0, 0, 1))
         place = surface + rng.uniform(0.01, 0.045) * out + rng.uniform(-0.25, 0.25) * along
 
-        def square(
-            s: np.ndarray, frame: Any = frame, turns: Any = turns, place: Any = place, along: Any = along
-        ) -> float:
-            u = np.array([np.cos(s[0]) * np.sin(s[1]), np.sin(s[0]) * np.sin(s[1]), np.cos(s[1])])
-            point = turns[0].apply((0.03, 0.01, 0)) + frame.apply(AXES[0] * u)
-            return float(((point - place - s[2] * along) ** 2).sum())
+        # in axes of the ellipsoid; a search starts at the nearest corner of a fine net
+        there, axis = frame.inv().apply([place - turns[0].apply((0.03, 0.01, 0)), along])
+        flat = (NET - there) @ axis
+        nearest = int(np.argmin(((NET - there - np.clip(flat, -0.2, 0.2)[:, None] * axis) ** 2).sum(axis=1)))
 
-        starts = [(p, q, s) for p in (0.3, 2.0, 4.0, 5.5) for q in (0.7, 1.6, 2.5) for s in (-0.15, 0.0, 0.15)]
+        def square(s: np.ndarray, there: np.ndarray = there, axis: np.ndarray = axis) -> float:
+            (p, q, t), (a, b, c) = s.tolist(), AXES[0].tolist()
+            u = a * math.cos(p) * math.sin(q), b * math.sin(p) * math.sin(q), c * math.cos(q)
+            return float(((u - there - t * axis) ** 2).sum())
+
+        start = (*ANGLES[nearest], np.clip(flat[nearest], -0.2, 0.2))
         bounds = [(-1, 8), (-1, 4.2), (-0.2, 0.2)]
-        found = min(
-            (minimize(square, s, bounds=bounds, options={"ftol": 1e-16, "gtol": 1e-11}) for s in starts),
-            key=lambda one: one.fun,
-        )
+        found = minimize(square, start, bounds=bounds, options={"ftol": 1e-16, "gtol": 1e-11})
         body = place - turns[0].apply((0.03, 0.01, 0))
         t = np.linspace(-0.2, 0.2, 81)
         line = frame.inv().apply(body + t[:, None] * along) / AXES[0]

@@ -10,6 +10,7 @@ import contact_scenes as scenes
 import numpy as np
 import pytest
 from contact_scenes import ELASTIC, LAW, PLANAR, on
+from sweeps import part_of
 
 import eomgen as eg
 from eomgen.pipeline import build
@@ -88,8 +89,8 @@ def test_depth_and_force_against_geometry(kinds: tuple[str, str]) -> None:
         for k in range(6):
             sides[2 * k][k] += 1e-6
             sides[2 * k + 1][k] -= 1e-6
-        V = [mod.energy(side)[1] for side in sides]
-        slope = (np.array(V[::2]) - np.array(V[1::2])) / 2e-6
+        V = mod.energy(np.array(sides).T)[1]
+        slope = (V[::2] - V[1::2]) / 2e-6
         assert np.allclose(force, -slope, rtol=1e-4, atol=1e-4 * np.abs(slope).max())
         assert np.abs(force[:2] + force[3:5]).max() <= 1e-12 * np.abs(force).max()
         moment = q[0] * force[1] - q[1] * force[0] + q[3] * force[4] - q[4] * force[3] + force[2] + force[5]
@@ -231,12 +232,12 @@ def test_newtons_cradle() -> None:
     assert np.allclose(speeds, [0, 0, 0, 0, 1], atol=1e-7)
 
 
-def test_energy_never_grows_in_random_scenes() -> None:
-    for seed in range(6):
-        mod, start = random_scene(seed)
-        traj = mod.simulate((0, 0.6), initial=start, rtol=1e-9, atol=1e-11)
-        energy = np.array([sum(mod.energy(x)) for x in traj.x.T])
-        assert np.diff(energy).max() <= 1e-6 * np.abs(energy).max(), seed
+@pytest.mark.parametrize("seed", part_of(range(6), lambda seed: seed < 3))
+def test_energy_never_grows_in_random_scenes(seed: int) -> None:
+    mod, start = random_scene(seed)
+    traj = mod.simulate((0, 0.6), initial=start, rtol=1e-9, atol=1e-11)
+    energy = np.sum(mod.energy(traj.x), axis=0)
+    assert np.diff(energy).max() <= 1e-6 * np.abs(energy).max()
 
 
 def random_scene(seed: int) -> tuple[Any, dict[str, float]]:

@@ -165,13 +165,13 @@ def test_energy_by_the_parts_of_the_overlap(kind: str, radius: float) -> None:
     """On grids, whose error is of the order of their steps."""
     line = line_of(kind)
     low, high = line.min(axis=0) - 0.8 * radius, line.max(axis=0) + 0.8 * radius
-    points = np.random.default_rng(7).uniform(low, high, (50, 2))
+    points = np.random.default_rng(7).uniform(low, high, (24, 2))
     found = model(SHAPES[kind], radius).energy(states(points))[1]
     for count in (60, 120):
         grid = Grid(line, count)
         wrong = np.abs([grid.energy(p, radius) - e for p, e in zip(points, found, strict=True)])
         assert (wrong < STIFFNESS * (radius + 0.1) * grid.step).all(), points[wrong.argmax()]
-    assert (found > 0).sum() > 20
+    assert (found > 0).sum() > 10
 
 
 @pytest.mark.parametrize("kind", SHAPES)
@@ -180,7 +180,7 @@ def test_no_work_around_closed_paths(kind: str, target: str) -> None:
     """Of the circle and the turned solid, through walls, seats and the inside; the energy nowhere jumps."""
     mod = model(SHAPES[kind], 0.08, target=target, turn=0.3)
     rng, count = np.random.default_rng(11), 8000
-    for _ in range(4):
+    for _ in range(2):
         phase, wave = 2 * math.pi * np.arange(count + 1) / count, rng.uniform(-0.11, 0.11, (2, 6, 3))
         q = sum(
             wave[0, :, k, None] * np.cos((k + 1) * phase) + wave[1, :, k, None] * np.sin((k + 1) * phase)
@@ -307,6 +307,6 @@ def test_a_start_deep_inside_is_told(height: float) -> None:
     with pytest.warns(PenetrationWarning, match="deep"):
         traj = mod.simulate(1.0, initial={"j0_x": 0.001, "j0_y": height}, rtol=1e-10, atol=1e-12)
     energy = 0.5 * STIFFNESS * (0.05 + 0.1 + height) ** 2
-    total = np.array([sum(mod.energy(x)) for x in traj.x.T])
+    total = np.sum(mod.energy(traj.x), axis=0)
     np.testing.assert_allclose(total, energy, rtol=1e-6)
     assert mod.energy(traj.x[:, -1])[0] == pytest.approx(energy, rel=1e-6)

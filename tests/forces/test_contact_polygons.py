@@ -9,6 +9,7 @@ import contact_scenes as scenes
 import mujoco
 import numpy as np
 import pytest
+from sweeps import part_of
 
 import eomgen as eg
 
@@ -45,9 +46,11 @@ def tower(shapes: Any, law: Any, turn: float = 0.0, swapped: bool = False, targe
 WIDTHS = [(0.2, 0.2, 0.2), (0.2, 0.1, 0.1), (0.1, 0.2, 0.05)]
 
 
-@pytest.mark.parametrize("swapped", [False, True])
-@pytest.mark.parametrize("turn", [0.0, 0.7])
-@pytest.mark.parametrize("widths", WIDTHS, ids=str)
+STACKS = [(widths, turn, swapped) for widths in WIDTHS for turn in (0.0, 0.7) for swapped in (False, True)]
+SOME = [(WIDTHS[0], 0.0, False), (WIDTHS[1], 0.7, True), (WIDTHS[2], 0.7, False)]
+
+
+@pytest.mark.parametrize(("widths", "turn", "swapped"), part_of(STACKS, SOME.__contains__))
 def test_flush_stacks_rest(widths: tuple[float, ...], turn: float, swapped: bool) -> None:
     """Each of two places of contact carries half of what lies above: d = m g / (2 k)."""
     mod = tower([box(wide) for wide in widths], SOFT, turn, swapped)
@@ -61,8 +64,10 @@ def test_flush_stacks_rest(widths: tuple[float, ...], turn: float, swapped: bool
         assert np.abs(run[f"j{k}_x"]).max() < 1e-8
 
 
-@pytest.mark.parametrize("target", ["numpy", "cython"])
-@pytest.mark.parametrize("widths", WIDTHS, ids=str)
+HELD = [(widths, target) for widths in WIDTHS for target in ("numpy", "cython")]
+
+
+@pytest.mark.parametrize(("widths", "target"), part_of(HELD, lambda x: (x[1] == "cython") == (x[0] == WIDTHS[1])))
 def test_flush_stacks_are_held_rigidly(widths: tuple[float, ...], target: str) -> None:
     mod = tower([box(wide) for wide in widths], RIGID, 0.3, False, target)
     run = mod.simulate(0.2, method="moreau", step=1e-3)
@@ -125,7 +130,7 @@ def test_force_is_continuous_where_corners_change_places() -> None:
 
 def test_energy_is_kept_where_boxes_tumble() -> None:
     """Without loss, in frames turned against each other: thrown boxes and triangles keep their energy."""
-    for seed in range(4):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         m, bodies = scenes.planar(f"tumble{seed}", 3, (0, 0, 0))
         group = [
@@ -140,8 +145,8 @@ def test_energy_is_kept_where_boxes_tumble() -> None:
             start |= {f"j{k}_x": 0.35 * np.cos(way), f"j{k}_y": 0.35 * np.sin(way), f"j{k}_3": rng.uniform(-3, 3)}
             start |= {f"j{k}_x_dot": -np.cos(way), f"j{k}_y_dot": -np.sin(way), f"j{k}_3_dot": rng.uniform(-5, 5)}
         run = mod.simulate((0, 1), initial=start, rtol=1e-9, atol=1e-11)
-        energy = np.array([sum(mod.energy(x)) for x in run.x.T])
-        assert max(mod.energy(x)[1] for x in run.x.T) > 0.1
+        energy = np.sum(mod.energy(run.x), axis=0)
+        assert mod.energy(run.x)[1].max() > 0.1
         assert np.abs(energy / energy[0] - 1).max() < 1e-4, seed
 
 
@@ -223,7 +228,7 @@ def test_energy_is_continuous(name: str) -> None:
     mod, swapped = (touching(name, {"stiffness": 1e7, "exponent": 1.5}, order) for order in (False, True))
     rng = np.random.default_rng(11)
     starts, ends, most = [], [], []
-    for q, depth in poses(name, rng, 300):
+    for q, depth in poses(name, rng, 120):
         step = np.concatenate([np.zeros(3), rng.standard_normal(2), rng.choice([0, 10]) * rng.standard_normal(1)])
         line = q + np.linspace(-2, 2, 129)[:, None] * depth * step * rng.choice([0.1, 1.0])
         energy = mod.energy(states(line))[1]
@@ -249,7 +254,7 @@ def test_forces_are_slopes_of_the_energy_of_the_geometry(name: str) -> None:
     mod, compiled = (touching(name, {"stiffness": k, "exponent": n}, False, target) for target in ("numpy", "cython"))
     first, second = (np.array(points) for points in PAIRS[name])
     second_spots = kinks = 0
-    for q, depth in poses(name, np.random.default_rng(12), 200):
+    for q, depth in poses(name, np.random.default_rng(12), 120):
         x = np.concatenate([q, np.zeros(6)])
         found = scenes.facing(first, scenes.placed(q[3:], second))
         second_spots += found[1][0] > 0.0 and found[1][1] > 0.0
@@ -273,7 +278,7 @@ def test_forces_are_slopes_of_the_energy_of_the_geometry(name: str) -> None:
     assert kinks < 20
 
 
-@pytest.mark.parametrize("name", PAIRS)
+@pytest.mark.parametrize("name", part_of(PAIRS, lambda name: name in {"needles", "narrow", "obtuse"}))
 def test_energy_is_kept_in_deep_hits(name: str) -> None:
     """Tied by a spring, thrown at each other ten times: the corners go deep into each other."""
     m, bodies = scenes.planar(name, 2)

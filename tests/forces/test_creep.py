@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -141,20 +143,29 @@ def polach(F: float, most: float) -> float:
     return 2 * most / np.pi * (e / (1 + e**2) + np.arctan(e))
 
 
+MASS, ROLLING, STIFF, FRICTION = 400.0, 0.4, 4e6, 0.25
+
+
+@cache
+def braked(law: str, target: str) -> eg.Module:
+    """A wheel that rolls on a rail below a frame that slides."""
+    m = eg.Model("wheel", gravity=(0, 0, -G))
+    frame, wheel = m.body("frame", mass=100.0), m.body("wheel", mass=MASS, inertia=(12.0, 20.0, 12.0))
+    slide = m.joint("planar", "j", m.ground, frame)
+    m.revolute("phi", frame, wheel, axis="y")
+    m.creep("rail", m.ground.at(0, 0, -ROLLING), wheel, radius=ROLLING, longitudinal=STIFF, lateral=0.8 * STIFF,
+            creep_law=law, normal="reaction(j).z", friction=FRICTION)  # fmt: skip
+    m.output("N", slide.reaction.force[2])
+    return m.compile(target=target)
+
+
 @pytest.mark.parametrize("target", ["numpy", "cython"])
 @pytest.mark.parametrize("law", [vermeulen_johnson, polach])
 @pytest.mark.parametrize("creepage", [1e-7, 1e-4, 3e-4, 2e-3, 0.2])
 def test_a_braked_wheel_saturates(law, creepage: float, target: str) -> None:
     """By the friction of the weight that the axle carries, with both creepages at once."""
-    mass, r, f, V, mu = 400.0, 0.4, 4e6, 10.0, 0.25
-    m = eg.Model("wheel", gravity=(0, 0, -G))
-    frame, wheel = m.body("frame", mass=100.0), m.body("wheel", mass=mass, inertia=(12.0, 20.0, 12.0))
-    slide = m.joint("planar", "j", m.ground, frame)
-    m.revolute("phi", frame, wheel, axis="y")
-    m.creep("rail", m.ground.at(0, 0, -r), wheel, radius=r, longitudinal=f, lateral=0.8 * f,
-            creep_law=law.__name__, normal="reaction(j).z", friction=mu)  # fmt: skip
-    m.output("N", slide.reaction.force[2])
-    mod = m.compile(target=target)
+    r, f, V, mu = ROLLING, STIFF, 10.0, FRICTION
+    mod = braked(law.__name__, target)
     x = mod.x0(j_x_dot=V, j_y_dot=0.5 * creepage * V, phi_dot=V * (1 - creepage) / r)
     a = dict(zip(mod.v_names, mod.rhs(0.0, x)[mod.n_q :], strict=True))
     assert mod.outputs(0.0, x)[0] == pytest.approx(500.0 * G, rel=1e-12)

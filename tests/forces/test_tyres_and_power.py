@@ -65,15 +65,16 @@ def bristles(forward: float, rolling: float, sideways: float, load: float) -> tu
     c, way = C / (2.0 * HALF**2), math.copysign(1.0, rolling)
     step = 2.0 * HALF / steps
     stay = step / abs(rolling)
-    e, found = np.zeros(2), np.zeros(3)
-    drift = -stay * np.array([forward - rolling, sideways])
+    along = across = turning = e = f = 0.0
+    drift_e, drift_f = -stay * (forward - rolling), -stay * sideways
     for k in range(steps):
-        x = way * (HALF - (k + 0.5) * step)
-        e = e + (0.5 if k == 0 else 1.0) * drift
+        x, part = way * (HALF - (k + 0.5) * step), 0.5 if k == 0 else 1.0
+        e, f = e + part * drift_e, f + part * drift_f
         most = MU * 0.75 * load / HALF * (1.0 - (x / HALF) ** 2) / c
-        e = e * min(1.0, most / max(math.hypot(*e), 1e-300))
-        found += step * c * np.array([e[0], e[1], x * e[1]])
-    return found[0], found[1], found[2]
+        held = min(1.0, most / max(math.hypot(e, f), 1e-300))
+        e, f = e * held, f * held
+        along, across, turning = along + e, across + f, turning + x * f
+    return step * c * along, step * c * across, step * c * turning
 
 
 @pytest.mark.parametrize("forward", [12.0, -12.0])
@@ -100,18 +101,18 @@ def test_no_steady_slip_gains_energy(law: dict[str, Any], camber: float) -> None
         mod = corner(law, camber, rolling_radius=radius)
         rates = [mod.x_names.index(f"tyre_deflection_{k}") for k in "xy"]
         speeds = [mod.x_names.index(name) for name in SPEEDS]
-        lost = 0
+        states, loads = [], []
         for _ in range(150):
             load, forward = random.uniform(800.0, 7000.0), random.choice([-1, 1]) * random.uniform(2.0, 40.0)
             kappa, tangent = random.choice([-1, 1], 2) * 10.0 ** random.uniform(-4.0, -0.1, 2)
             grip = (1 + 1e-9) * 3.0 * MU * load / C if law is BRUSH else math.inf
-            x = at_slip(mod, forward, kappa, tangent, load, camber=camber, rolling=radius, grip=grip)
-            np.testing.assert_allclose(mod.rhs(0.0, x)[rates], 0.0, atol=1e-9)  # steady
-            forces = -mod.bias(0.0, x)[:5]
-            power = forces @ x[speeds]
-            assert power <= 1e-9 * load * abs(forward)
-            lost += power < -1e-6 * load * abs(forward)
-        assert lost > 100
+            states.append(at_slip(mod, forward, kappa, tangent, load, camber=camber, rolling=radius, grip=grip))
+            loads.append(load * abs(forward))
+        x, size = np.array(states).T.copy(), np.array(loads)
+        np.testing.assert_allclose(mod.rhs(0.0, x)[rates], 0.0, atol=1e-9)  # steady
+        power = (-mod.bias(0.0, x)[:5] * x[speeds]).sum(axis=0)
+        assert (power <= 1e-9 * size).all()
+        assert (power < -1e-6 * size).sum() > 100
 
 
 @LAWS
@@ -125,7 +126,7 @@ def test_passive_car_never_gains_energy(law: dict[str, Any]) -> None:
         m.revolute(f"spin_{name}", car.at(x, 0, R - depth, rpy=(0.03, 0, 0.01)), wheel, axis="y")
         m.tyre(name, m.ground, wheel, radius=R, stiffness=STIFFNESS, relaxation=RELAXATION, **law)
     m.coupling("gear", equation="spin_rear - 1.03*spin_front")
-    mod = m.compile(target="numpy")
+    mod = m.compile()
     for way in (1, -1):
         traj = mod.simulate((0, 1.5), {"x_dot": 10.0 * way, "spin_front_dot": 10.0 * way / R / 1.015}, method="Radau")
         turns = np.square(traj["spin_front_dot"]) + np.square(traj["spin_rear_dot"])
@@ -176,15 +177,18 @@ def test_brush_is_passive(lengths: tuple[float, float], settling: float) -> None
         force = MU * load * (1.0 - (1.0 - min(r, 1.0)) ** 3) * slip / np.hypot(*slip)
         return float(tread * MU * load * grip * whole + force @ ((np.array(lengths) - tread) * force) / (2.0 * C))
 
+    slips, states = [], []
     for _ in range(400):
         slip = random.uniform(0, 1.2 * grip) * np.array([math.cos(a := random.uniform(0, 7)), math.sin(a)])
-        x = state(
+        slips.append(slip)
+        states.append(state(
             mod, tuple(slip * lengths), z=R - load / STIFFNESS, x_dot=1e-5 * random.standard_normal(),
             y_dot=1e-4 * random.standard_normal(), spin_dot=1e-4 * random.standard_normal(),
-        )  # fmt: skip
-        change, step = mod.rhs(0.0, x)[rows] / lengths, 1e-3
+        ))  # fmt: skip
+    x = np.array(states).T.copy()
+    changes, powers, step = mod.rhs(0.0, x)[rows].T / lengths, (-mod.bias(0.0, x)[:5] * x[speeds]).sum(axis=0), 1e-3
+    for slip, change, power in zip(slips, changes, powers, strict=True):
         taken = (held(slip + step * change) - held(slip - step * change)) / (2.0 * step)
-        power = -mod.bias(0.0, x)[:5] @ x[speeds]
         assert power + taken <= 2e-3 * abs(power)
         lost += power + taken < -1e-3 * abs(power)
     assert lost > 50
@@ -201,26 +205,24 @@ def test_closed_loops_of_a_locked_wheel_gain_no_energy(lengths: tuple[float, flo
     names = list(mod.x_names)
     rows = [names.index(k) for k in ("tyre_deflection_x", "tyre_deflection_y", "j_x_dot", "j_y_dot")]
     grip, turn, number = 3.0 * MU * load / C, 2.0 * np.pi, 60  # one loop in a second
-    for part in (0.45, 1.2):
-        for way in (1.0, -1.0):
-            x, work = mod.x0(), []
-            reach = part * grip * np.array(lengths)
+    part, way = np.array([0.45, 0.45, 1.2, 1.2]), np.array([1.0, -1.0, 1.0, -1.0])
+    x, reach, work = np.tile(mod.x0()[:, None], 4), grip * np.array(lengths)[:, None] * part, []
 
-            def rates(t: float, z: np.ndarray, x: np.ndarray = x, reach: np.ndarray = reach, way: float = way) -> Any:
-                x[rows[:2]] = z[:2]
-                x[rows[2:]] = turn * reach * [-math.sin(turn * t), way * math.cos(turn * t + 0.6)]
-                found = mod.rhs(0.0, x)
-                return np.array([*found[rows[:2]], found[rows[2:]] @ x[rows[2:]]])
+    def rates(t: float, z: np.ndarray) -> np.ndarray:
+        x[rows[:2]] = z[:2]
+        x[rows[2:]] = turn * reach * np.stack([np.full(4, -math.sin(turn * t)), way * math.cos(turn * t + 0.6)])
+        found = mod.rhs(0.0, x)
+        return np.vstack([found[rows[:2]], (found[rows[2:]] * x[rows[2:]]).sum(axis=0)])
 
-            z, h = np.zeros(3), 1.0 / number
-            for k in range(4 * number):
-                a = rates(k * h, z)
-                b = rates((k + 0.5) * h, z + 0.5 * h * a)
-                c = rates((k + 0.5) * h, z + 0.5 * h * b)
-                z = z + h / 6.0 * (a + 2.0 * b + 2.0 * c + rates((k + 1) * h, z + h * c))
-                if (k + 1) % number == 0:
-                    work.append(z[2])
-            assert np.diff(work).max() < 0.0
+    z, h = np.zeros((3, 4)), 1.0 / number
+    for k in range(4 * number):
+        a = rates(k * h, z)
+        b = rates((k + 0.5) * h, z + 0.5 * h * a)
+        c = rates((k + 0.5) * h, z + 0.5 * h * b)
+        z = z + h / 6.0 * (a + 2.0 * b + 2.0 * c + rates((k + 1) * h, z + h * c))
+        if (k + 1) % number == 0:
+            work.append(z[2])
+    assert np.diff(work, axis=0).max() < 0.0
 
 
 def random_states(mod: Any, number: int = 12) -> list[np.ndarray]:

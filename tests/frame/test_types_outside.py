@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
-import zipfile
 from pathlib import Path
 
 import pytest
 
-from .test_packaging import built  # noqa: F401  (the wheel)
+ROOT = Path(__file__).parents[2]
 
 #: An expression of a user's file -> the class that a checker must see.
 SEEN = {
@@ -83,11 +83,10 @@ WRONG = {
 }
 
 
-def check(tmp_path: Path, built: Path, text: str) -> list[str]:  # noqa: F811
-    """Lines that mypy prints of a user's file, with the wheel unpacked beside it."""
+def check(tmp_path: Path, text: str) -> list[str]:
+    """Lines that mypy prints of a user's file, with what a wheel holds beside it (``test_packaging.py``)."""
     site = tmp_path / "site"
-    with zipfile.ZipFile(next(built.glob("*.whl"))) as wheel:
-        wheel.extractall(site)
+    shutil.copytree(ROOT / "eomgen", site / "eomgen", ignore=shutil.ignore_patterns("__pycache__", "built"))
     (tmp_path / "mine.py").write_text(text)
     command = [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", "--config-file=", "mine.py"]
     done = subprocess.run(
@@ -97,10 +96,10 @@ def check(tmp_path: Path, built: Path, text: str) -> list[str]:  # noqa: F811
 
 
 @pytest.mark.slow
-def test_a_checker_names_results_and_finds_slips(built: Path, tmp_path: Path) -> None:  # noqa: F811
+def test_a_checker_names_results_and_finds_slips(tmp_path: Path) -> None:
     first = BEGIN.count("\n") + len(SEEN) + len(UNIONS) + 1
     text = BEGIN + "".join(f"reveal_type({expression})\n" for expression in (*SEEN, *UNIONS))
-    lines = check(tmp_path, built, text + "".join(f"{line}\n" for line in WRONG))
+    lines = check(tmp_path, text + "".join(f"{line}\n" for line in WRONG))
     seen = [line.partition('Revealed type is "')[2] for line in lines if "Revealed type is" in line]
     names = [re.match(r"(?:builtins\.)?(?:[\w.]+\.)?(\w+)", one) for one in seen]
     assert dict(zip(SEEN, (name[1] if name else "" for name in names), strict=False)) == SEEN, lines
