@@ -11,6 +11,7 @@ import pytest
 import rotations
 from judges import Bodies, RigidBodies
 from mechanisms import Random, random_mechanism
+from sweeps import part_of
 
 import eomgen as eg
 from eomgen.api.equations import Equations
@@ -52,8 +53,14 @@ def seeds_with_balls(count: int, **options: Any) -> list[int]:
     raise AssertionError
 
 
-@pytest.mark.parametrize("method", sorted(METHODS))
-@pytest.mark.parametrize("seed", seeds_with_balls(8))
+def with_methods(seeds: list[int]) -> list[Any]:
+    """Two trees by every method, the others always by two methods each."""
+    pairs = [(seed, k, method) for k, seed in enumerate(seeds) for method in sorted(METHODS)]
+    kept = {(seed, m) for seed, k, m in pairs if k < 2 or sorted(METHODS).index(m) % 4 == k % 4}
+    return part_of([(seed, method) for seed, _, method in pairs], lambda pair: pair in kept)
+
+
+@pytest.mark.parametrize(("seed", "method"), with_methods(seeds_with_balls(8)))
 def test_tree_equals_pinocchio(seed: int, method: str) -> None:
     made = random_mechanism(seed, bodies=1 + seed % 5, forces=False, types=tuple(STEPS), rotation="euler_parameters")
     module = module_of(made, method)
@@ -92,8 +99,7 @@ def test_tree_equals_pinocchio(seed: int, method: str) -> None:
     assert np.ptp(offsets) < 1e-11 * max(1.0, np.abs(offsets).max())
 
 
-@pytest.mark.parametrize("method", sorted(METHODS))
-@pytest.mark.parametrize("seed", seeds_with_balls(8, reverse=True))
+@pytest.mark.parametrize(("seed", "method"), with_methods(seeds_with_balls(8, reverse=True)))
 def test_reversed_joints_equal_newton_and_euler_from_poses_alone(seed: int, method: str) -> None:
     made = random_mechanism(
         seed, bodies=1 + seed % 5, forces=False, reverse=True, types=tuple(STEPS), rotation="euler_parameters"
