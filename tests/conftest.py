@@ -83,7 +83,9 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     told |= {name: command for name, (_, command) in LIBRARIES.items()}
     told |= dict.fromkeys(INSTRUCTIONS, "take a processor that has them")
     if not terminalreporter.config.getoption("--thorough"):
-        terminalreporter.write_line("tests marked thorough were left out; to run them: make thorough, pytest --thorough")
+        terminalreporter.write_line(
+            "tests marked thorough were left out; to run them: make thorough, pytest --thorough"
+        )
     for name, command in told.items():
         if not is_there(name):
             terminalreporter.write_line(f"tests that need {name} were left out; to run them: {command}")
