@@ -147,7 +147,7 @@ def test_limits(arm: eg.Module, limits: Any) -> None:
 
 def test_a_spatial_arm() -> None:
     mod = spatial_arm().compile(target="numpy")
-    grid = {"q1": (0, TURN, 17), "q2": (-np.pi / 2, np.pi / 2, 11), "q3": (0, np.pi, 9)}
+    grid = {"q1": (0, TURN, 25), "q2": (-np.pi / 2, np.pi / 2, 15), "q3": (0, np.pi, 13)}
     ws = mod.workspace(grid, ["x", "y", "z"])
     q1, q2, q3 = (ws[name] for name in grid)
     out = UPPER * np.cos(q2) + LOWER * np.cos(q2 + q3)
