@@ -22,26 +22,26 @@ def largest_terms(outputs: Sequence[Expr], values: Mapping[str, float]) -> np.nd
     graph = outputs[0].graph
     value: dict[int, float] = {}
     size: dict[int, float] = {}
-    for i in reachable(graph, [y.id for y in outputs]):
-        operation, *operands = graph.nodes[i]
-        if operation in LEAVES:
-            value[i] = operands[0] if operation == "const" else values[operands[0]]
-            size[i] = abs(value[i])
-            continue
-        a = [value[k] for k in operands]
-        m = [size[k] for k in operands]
-        with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):
+        for i in reachable(graph, [y.id for y in outputs]):
+            operation, *operands = graph.nodes[i]
+            if operation in LEAVES:
+                value[i] = operands[0] if operation == "const" else values[operands[0]]
+                size[i] = abs(value[i])
+                continue
+            a = [value[k] for k in operands]
+            m = [size[k] for k in operands]
             value[i] = OPERATIONS[operation].value(*a)
-        if operation in ("add", "sub"):
-            size[i] = max(m)
-        elif operation == "mul":
-            size[i] = m[0] * m[1]
-        elif operation == "div":
-            size[i] = max(m[0], abs(value[i]) * m[1]) / abs(a[1])
-        elif operation == "sqrt":
-            size[i] = m[0] / value[i] if value[i] else 0.0
-        elif operation == "select":
-            size[i] = m[1] if a[0] else m[2]
-        else:
-            size[i] = max(abs(value[i]), *m)
+            if operation in ("add", "sub"):
+                size[i] = max(m)
+            elif operation == "mul":
+                size[i] = m[0] * m[1]
+            elif operation == "div":
+                size[i] = max(m[0], abs(value[i]) * m[1]) / abs(a[1])
+            elif operation == "sqrt":
+                size[i] = m[0] / value[i] if value[i] else 0.0
+            elif operation == "select":
+                size[i] = m[1] if a[0] else m[2]
+            else:
+                size[i] = max(abs(value[i]), *m)
     return np.array([size[y.id] for y in outputs])

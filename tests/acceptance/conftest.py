@@ -33,7 +33,9 @@ def module(equations: Callable[..., Any]) -> Callable[..., Any]:
     ) -> Any:
         key = name, method, target, independent
         if key not in made:
-            made[key] = equations(name, method, independent).compile(target=target)
+            # as users compile by one method; what another one changes in the text needs no optimizing
+            options = {"optimize": 0} if target == "cython" and method != "embedding" else {}
+            made[key] = equations(name, method, independent).compile(target=target, **options)
         return made[key]
 
     return compiled

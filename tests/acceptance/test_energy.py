@@ -7,6 +7,7 @@ laws of the force elements, never from generalized forces (CONTRACT, "Power bala
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import judges
@@ -14,7 +15,9 @@ import models
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from sweeps import part_of
 
+METHODS = ["embedding", "lagrange"]
 CONSERVATIVE = {
     "pendulum": {},
     "double_pendulum": {},
@@ -34,8 +37,7 @@ CONSERVATIVE = {
 }
 
 
-@pytest.mark.parametrize("method", ["embedding", "lagrange"])
-@pytest.mark.parametrize("name", CONSERVATIVE)
+@pytest.mark.parametrize(("name", "method"), part_of(product(CONSERVATIVE, METHODS), models.runs_always))
 def test_energy_is_kept_over_ten_seconds(module: Callable[..., Any], name: str, method: str) -> None:
     mod = module(name, method)
     run = mod.simulate((0, 10), CONSERVATIVE[name] or None, method="DOP853", rtol=1e-10, atol=1e-12)
@@ -108,8 +110,7 @@ POWERED = {
 }
 
 
-@pytest.mark.parametrize("method", ["embedding", "lagrange"])
-@pytest.mark.parametrize("name", POWERED)
+@pytest.mark.parametrize(("name", "method"), part_of(product(POWERED, METHODS), models.runs_always))
 def test_energy_changes_by_the_power_at_every_state(module: Callable[..., Any], name: str, method: str) -> None:
     power, _ = POWERED[name]
     mod = module(name, method)
@@ -125,8 +126,7 @@ def test_energy_changes_by_the_power_at_every_state(module: Callable[..., Any], 
         assert abs(moving.sum() + pushed - expected) <= 1e-10 * max(abs(expected), abs(pushed))
 
 
-@pytest.mark.parametrize("method", ["embedding", "lagrange"])
-@pytest.mark.parametrize("name", POWERED)
+@pytest.mark.parametrize(("name", "method"), part_of(product(POWERED, METHODS), models.runs_always))
 def test_work_is_the_change_of_energy_over_a_run(module: Callable[..., Any], name: str, method: str) -> None:
     """The work W' = P(x) is integrated along with the state by plain SciPy."""
     power, end = POWERED[name]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ def cycle_work(mod: Any, pistons: int) -> float:
     """What the gas of a cylinder gives in a cycle without friction or load and with sudden burning (J)."""
     sudden = {"sharp": 300.0, "delay": 0.0, "c": 0.0}
     traj = mod.simulate(0.12, parameters=sudden, t_eval=np.linspace(0.0, 0.12, 20001))
-    energy = np.array([sum(mod.bind(p=sudden).energy(x)) for x in traj.x[:, ::4].T])
+    energy = np.sum(mod.bind(p=sudden).energy(traj.x[:, ::4]), axis=0)
     theta = traj["theta"][::4]
     start, end = np.interp([theta[0], theta[0] + 4 * np.pi], theta, energy)
     return float(end - start) / pistons
@@ -71,9 +72,14 @@ ENGINES = {
 }
 
 
+@cache
+def compiled(name: str) -> Any:
+    return eg.load(EXAMPLES / f"{name}.yaml").compile(target="numpy")
+
+
 @pytest.mark.parametrize("name", ENGINES)
 def test_an_engine_runs_as_its_one_angle_does(name: str) -> None:
-    mod = eg.load(EXAMPLES / f"{name}.yaml").compile(target="numpy")
+    mod = compiled(name)
     traj = mod.simulate(0.1, rtol=1e-11, atol=1e-13)
     law = acceleration(mod, ENGINES[name])
     start = [traj["theta"][0], traj["theta_dot"][0]]
@@ -88,5 +94,5 @@ def test_an_engine_runs_as_its_one_angle_does(name: str) -> None:
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_sudden_burning_gives_the_work_of_the_otto_cycle(name: str) -> None:
-    mod = eg.load(EXAMPLES / f"{name}.yaml").compile(target="numpy")
+    mod = compiled(name)
     assert cycle_work(mod, len(ENGINES[name])) == pytest.approx(otto(mod), rel=1e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import eomgen as eg
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
+@cache
 def compiled(name: str) -> tuple[Any, dict[str, float]]:
     mod = eg.load(EXAMPLES / f"{name}.yaml").compile(target="numpy")
     return mod, dict(zip(mod.p_names, mod.p.tolist(), strict=True))

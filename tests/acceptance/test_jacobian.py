@@ -6,6 +6,7 @@ Judge: central differences (tenth order) of ``rhs`` itself at random states on t
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,6 +15,7 @@ import models
 import numpy as np
 import pytest
 from mechanisms import random_mechanism
+from sweeps import part_of
 
 from eomgen.api.equations import derive
 
@@ -41,8 +43,10 @@ def compare(mod: Any, x: np.ndarray, t: float, h: float = 1e-5) -> None:
             assert np.abs(ours - theirs).max() <= max(1e-6 * np.abs(theirs).max(), floor)
 
 
-@pytest.mark.parametrize("method", ["embedding", "lagrange"])
-@pytest.mark.parametrize("name", [*models.EXAMPLE_NAMES, *models.DRIVEN_NAMES, *LOOPS, "powered_arm", *REDUNDANT])
+NAMES = [*models.EXAMPLE_NAMES, *models.DRIVEN_NAMES, *LOOPS, "powered_arm", *REDUNDANT]
+
+
+@pytest.mark.parametrize(("name", "method"), part_of(product(NAMES, ["embedding", "lagrange"]), models.runs_always))
 def test_jacobian_of_models(module: Callable[..., Any], name: str, method: str) -> None:
     mod = module(name, method)
     for x in judges.random_states(mod, 31, 3):

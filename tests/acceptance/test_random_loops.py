@@ -7,6 +7,7 @@ M, h, power and twists are those of differences of body poses (tests/powered.py)
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import judges
@@ -45,14 +46,21 @@ POSES = {
 }
 
 
-def closed_chain(kind: str, rotation: str) -> Random:
-    """A chain of ball, universal, cylindrical joint and hinge; its last body is held to ground by a joint to be cut."""
-    types = ("spherical", "universal", "cylindrical", "revolute")
+@cache
+def chain_seed(types: tuple[str, ...], rotation: str) -> int:
+    """The first random mechanism that is a chain of one joint of each type."""
     for seed in range(1000):
         made = random_mechanism(seed, 4, reverse=True, forces=False, types=types, rotation=rotation)
         if set(made.kinds) == set(types) and made.parents == [-1, 0, 1, 2]:
-            break
-    made = powered(made)
+            return seed
+    raise AssertionError("none found")
+
+
+def closed_chain(kind: str, rotation: str) -> Random:
+    """A chain of ball, universal, cylindrical joint and hinge; its last body is held to ground by a joint to be cut."""
+    types = ("spherical", "universal", "cylindrical", "revolute")
+    seed = chain_seed(types, rotation)
+    made = powered(random_mechanism(seed, 4, reverse=True, forces=False, types=types, rotation=rotation))
     m, graph, random = made.mechanism, made.mechanism.graph, np.random.default_rng(3)
     kinematics = analyse(m)
     values = random.uniform(0.2, 0.7, len(kinematics.names))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -210,39 +211,43 @@ def perturb(text: str, start: str, end: str) -> str:
     return text[:here] + changed + text[there:]
 
 
+@pytest.fixture(scope="module")
+def compared(
+    equations: Callable[..., Any], module: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str], tuple[Targets, dict[str, float]]]:
+    """A spatial loop in one target, and which kernels differ as they are."""
+
+    @cache
+    def made(target: str) -> tuple[Targets, dict[str, float]]:
+        targets = object.__new__(Targets)
+        targets.cython = module("spatial_loop", "embedding")
+        targets.p, targets.u = targets.cython.p, targets.cython.u
+        # only the kernels compared, so that the compiler has little to do
+        targets.program = pipeline.build(equations("spatial_loop", "embedding"), target, kernels=PERTURBED)
+        return targets, perturbed_misses(targets, target, tmp_path_factory.mktemp("plain"), lambda text: text)
+
+    return made
+
+
+def perturbed_misses(targets: Targets, target: str, folder: Path, change: Callable[[str], str]) -> dict[str, float]:
+    """Kernels that differ once the text of the target has been changed."""
+    if target == "c":
+        return misses(targets, "c", c_library(targets.program, folder, targets.p, targets.u, change).fine)
+    blocks: dict[str, Any] = {"__name__": "eomgen.perturbed", "__package__": "eomgen"}
+    exec(change(emit_numpy(targets.program)["_core.py"]), blocks)  # noqa: S102 - the text of the target under test
+    constants = blocks["precompute"](targets.p)
+    return misses(targets, "c", lambda name, x, t: np.asarray(blocks[name](t, x, targets.u, constants)))
+
+
 @pytest.mark.parametrize("kernel", PERTURBED)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_one_perturbed_coefficient_is_seen(
-    equations: Callable[..., Any], module: Callable[..., Any], tmp_path: Path, target: str, kernel: str
+    compared: Callable[[str], tuple[Targets, dict[str, float]]], tmp_path: Path, target: str, kernel: str
 ) -> None:
-    targets = object.__new__(Targets)
-    targets.cython = module("spatial_loop", "embedding")
-    targets.p, targets.u = targets.cython.p, targets.cython.u
-    eqs = equations("spatial_loop", "embedding")
-    # only the kernels compared, so that the compiler has little to do
-    targets.program = pipeline.build(eqs, target, kernels=PERTURBED)
-    if target == "c":
-        start = f"static flag {kernel}_block("
-
-        def change(text: str) -> str:
-            return perturb(text, start, "\n}\n")
-
-        for changed, expected in ((None, set()), (change, {kernel})):
-            folder = tmp_path / str(changed is None)
-            folder.mkdir()
-            library = c_library(targets.program, folder, targets.p, targets.u, changed)
-            assert set(misses(targets, "c", library.fine)) == expected
-        return
-    text = emit_numpy(targets.program)["_core.py"]
-    for source, expected in ((text, set()), (perturb(text, f"def {kernel}(", "    return "), {kernel})):
-        blocks: dict[str, Any] = {"__name__": "eomgen.perturbed", "__package__": "eomgen"}
-        exec(source, blocks)  # noqa: S102 - the text of the target under test
-        constants = blocks["precompute"](targets.p)
-
-        def call(name: str, x: np.ndarray, t: float, made: Any = blocks, c: Any = constants) -> np.ndarray:
-            return np.asarray(made[name](t, x, targets.u, c))
-
-        assert set(misses(targets, "c", call)) == expected
+    targets, unchanged = compared(target)
+    assert unchanged == {}
+    start, end = (f"static flag {kernel}_block(", "\n}\n") if target == "c" else (f"def {kernel}(", "    return ")
+    assert set(perturbed_misses(targets, target, tmp_path, lambda text: perturb(text, start, end))) == {kernel}
 
 
 def test_the_largest_term_is_found() -> None:

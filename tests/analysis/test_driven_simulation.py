@@ -22,9 +22,9 @@ def mod() -> eg.Module:
 
 
 def test_solving_and_integrating_agree(mod: eg.Module) -> None:
-    t = np.linspace(0, 2, 81)
-    solved = mod.simulate(2.0, t_eval=t)
-    integrated = mod.simulate(2.0, t_eval=t, method="DOP853", rtol=1e-11, atol=1e-12)
+    t = np.linspace(0, 0.7, 29)  # a turn and more
+    solved = mod.simulate(0.7, t_eval=t)
+    integrated = mod.simulate(0.7, t_eval=t, method="DOP853", rtol=1e-11, atol=1e-12)
     assert (solved.metadata["method"], integrated.metadata["method"]) == ("kinematic", "DOP853")
     assert solved.nfev == 0
     for name in ("theta", "bend", "s", "s_dot", "s_ddot", "C", "M_x", "slider_acceleration"):

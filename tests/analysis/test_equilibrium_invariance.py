@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from sweeps import part_of
 
 import eomgen as eg
 
@@ -58,7 +59,11 @@ DESCRIPTIONS: dict[str, dict[str, Any]] = {
     "augmented": {"method": "augmented"},
     "recursive": {"method": "recursive"},
     "cython": {"target": "cython"},
+    "frames turned, another order and cut": {"turn": 0.7, "order": -1, "cut": 2},
+    "kilometres by lagrange": {"unit": 1e-3, "method": "lagrange"},
 }
+#: What a case with two or three changes has too; one by one by ``make thorough``.
+JOINED = ("kilometres", "frames turned", "order", "another cut", "lagrange")
 
 
 def angles(found: Any) -> list[float]:
@@ -73,9 +78,7 @@ def plain() -> Any:
     return loop().equilibrium(GUESS)
 
 
-@pytest.mark.parametrize(
-    "described", [pytest.param(name, marks=pytest.mark.slow if name == "cython" else ()) for name in DESCRIPTIONS]
-)
+@pytest.mark.parametrize("described", part_of(DESCRIPTIONS, lambda name: name not in JOINED))
 def test_a_loop_with_soft_and_stiff_springs(described: str, plain: Any) -> None:
     mod, first = loop(**DESCRIPTIONS[described]), plain
     other = mod.equilibrium(GUESS)

@@ -188,7 +188,9 @@ CASES: dict[str, tuple[Any, list[str], dict[str, float], float, int]] = {
 @pytest.mark.parametrize("case", CASES)
 def test_mechanisms_against_differences(case: str, tmp_path: Path) -> None:
     make, names, held, end, count = CASES[case]
-    mod, h = make(tmp_path).compile(target="numpy"), 2e-5
+    equations, h = make(tmp_path).derive(), 2e-5
+    mod = equations.compile(target="numpy")
+    quick = equations.compile(optimize=0) if mod.n_c else mod  # many runs of loops: by the functions in C
     times = np.array([0.5 * end, end])
     s = mod.sensitivities(names, end, held, t_eval=times, rtol=1e-10, atol=1e-12)
     assert len(s.events) == count
@@ -201,7 +203,7 @@ def test_mechanisms_against_differences(case: str, tmp_path: Path) -> None:
                 start[name] += shift
             else:
                 p = {name: mod.p[mod.p_names.index(name)] + shift}
-            made = mod.simulate(end, start, p, t_eval=times, rtol=1e-12, atol=1e-14)
+            made = quick.simulate(end, start, p, t_eval=times, rtol=1e-12, atol=1e-14)
             return np.vstack([made.x, *(made[y] for y in mod.y_names)]), np.concatenate(made.t_events)
 
         right, left = run(h), run(-h)
@@ -226,11 +228,11 @@ def test_what_has_no_derivative_is_refused(tmp_path: Path) -> None:
     thrown = ball(direction=0, reset=None)
     thrown.event("ceiling", "1.0 - h", restitution=1.0)
     thrown = thrown.compile(target="numpy")
-    # 0.44 s after it was thrown to 1e-9 above the ceiling, which it would reach 0.4515236 s after it was thrown
-    speed, late = float(np.sqrt(2 * G)), 0.44
+    # 0.45 s after it was thrown to 1e-9 above the ceiling, which it would reach 0.4515236 s after it was thrown
+    speed, late = float(np.sqrt(2 * G)), 0.45
     hits = {"h": 1e-9 + speed * late - G * late**2 / 2, "h_dot": speed - G * late}
-    with pytest.raises(eg.NoDerivativeError, match="ceiling at t = 0.0115.* only grazes"):
-        thrown.sensitivities(["h_dot"], 0.02, hits, max_step=1e-5)
+    with pytest.raises(eg.NoDerivativeError, match="ceiling at t = 0.0015.* only grazes"):
+        thrown.sensitivities(["h_dot"], 0.003, hits, max_step=1e-5)
     assert issubclass(eg.NoDerivativeError, eg.SimulationError)
 
     m = eg.Model("two", gravity=(0, -G, 0))

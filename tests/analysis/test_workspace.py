@@ -104,7 +104,7 @@ def arm() -> eg.Module:
 @pytest.fixture(scope="module")
 def parallel() -> Any:
     mod = five_bar().compile()
-    return mod.workspace({"left_angle": (0, TURN, 33), "right_angle": (-np.pi, np.pi, 33)}, ["x", "y"])
+    return mod.workspace({"left_angle": (0, TURN, 21), "right_angle": (-np.pi, np.pi, 21)}, ["x", "y"])
 
 
 def test_the_annulus_of_a_planar_arm(arm: eg.Module) -> None:
@@ -175,7 +175,7 @@ def spatial_shell() -> float:
 
 def test_a_five_bar_stays_on_its_branch(parallel: Any) -> None:
     exact = FiveBar(parallel["left_angle"], parallel["right_angle"])
-    assert 100 < np.count_nonzero(~exact.closes) < 400
+    assert 0.09 < (~exact.closes).mean() < 0.37
     assert (parallel.reached == exact.closes).all()
     assert set(parallel.status[~exact.closes]) == {"out of reach"}
     fine = exact.closes

@@ -96,7 +96,7 @@ def test_pictures_of_a_run(module: Any, tmp_path: Path) -> None:
     files = []
     for name in ("b.rod.end", dotless(module, "b.rod.end")):
         files.append(tmp_path / f"{name}.gif")
-        run.animate(files[-1], trace=name, plot=[name.replace("rod.end", "q")], fps=20, dpi=40)
+        run.animate(files[-1], trace=name, plot=[name.replace("rod.end", "q")], fps=2, dpi=40)
         assert run.plot(name.replace("rod.end", "q")) is not None
     assert files[0].read_bytes() == files[1].read_bytes()
 
@@ -116,7 +116,7 @@ VERBS = [  # words of the command line
     ("consistent", "--set", "a.q=0.1", "--hold", "a.q", "--weight", "b.q=3", "--target", "numpy"),
     ("impact", "--stop", "a.q", "--set", "a.q_dot=1", "--target", "numpy"),
     ("derive", "--independent", "a.q"),
-    ("view", "--range", "a.q=0:0.5:4", "--trace", "b.rod.end", "--plot", "a.q", "--out", "motion.gif"),
+    ("view", "--range", "a.q=0:0.5:4", "--trace", "b.rod.end", "--plot", "a.q", "--fps", "2", "--out", "motion.gif"),
 ]
 
 
