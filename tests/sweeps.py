@@ -16,6 +16,11 @@ OF_ALL_KINDS = (
 )  # fmt: skip
 
 
+def seeds(count: int, kept: int) -> list[Any]:
+    """Seeds of random cases, of which the first ``kept`` run always."""
+    return part_of(range(count), lambda seed: seed < kept)
+
+
 def part_of(cases: Iterable[Any], keep: Callable[[Any], bool]) -> list[Any]:
     """The cases of a sweep as parameters; those that are not to be kept are marked thorough.
 

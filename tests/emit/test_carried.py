@@ -79,7 +79,7 @@ print(len(files))
 def test_every_file_and_call_is_there_without_eomgen(tmp_path: Path) -> None:
     generate(models.build("slider_crank"), tmp_path, target="numpy")
     command = [sys.executable, "-c", LOADS, json.dumps(sorted(CALLS))]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 100
 
@@ -104,7 +104,7 @@ def test_a_package_draws_and_animates_without_eomgen(tmp_path: Path) -> None:
     import matplotlib.pyplot as plt
 
     generate(models.build("slider_crank"), tmp_path, target="numpy")
-    done = subprocess.run([sys.executable, "-c", DRAWS], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, "-c", DRAWS], cwd=tmp_path, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     place, size = done.stdout.split()
     assert float(place) == pytest.approx(0.42)
@@ -121,7 +121,7 @@ def test_a_package_lists_the_forms_that_it_has(example: str, forms: set[str], tm
     """A model turned by Euler parameters has no minimal form."""
     folder = generate(eg.load_example(example), tmp_path, target="numpy")
     listed = f"import {example} as one; print(*(name for name in one.__all__ if getattr(one, name) is not None))"
-    done = subprocess.run([sys.executable, "-c", listed], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-c", listed], cwd=tmp_path, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     every = {"minimal", "canonical", "dae"}
     assert every & set(done.stdout.split()) == forms

@@ -106,7 +106,7 @@ print(json.dumps(compare(importlib.import_module(given["name"]), given["options"
 def run_alone(folder: Path, script: str, given: Any = None) -> str:
     command = [sys.executable, "-c", script]
     text = json.dumps(given)
-    done = subprocess.run(command, cwd=folder, input=text, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(command, cwd=folder, input=text, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
 
@@ -163,7 +163,7 @@ def test_a_compiled_one_too(tmp_path: Path) -> None:
     folder = generate(bouncing(), tmp_path / "source", slim=True)
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps"]
     command += ["--no-build-isolation", "--no-index", "--target", str(tmp_path / "there"), str(folder)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     there = json.loads(run_alone(tmp_path / "there", ALONE, {"name": "bouncing", "options": options}))
     scope: dict[str, Any] = {}

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 from mechanisms import random_mechanism
 from pinocchio_trees import STEPS, pinocchio_model
+from sweeps import seeds
 
 from eomgen.equations import METHODS
 from eomgen.frames import Frame, Marker
@@ -16,7 +17,7 @@ from eomgen.kinematics import analyse
 
 @pytest.mark.parametrize("method", sorted(METHODS))
 @pytest.mark.parametrize("planar", [False, True])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(12, 6))
 def test_tree_equals_pinocchio(seed: int, planar: bool, method: str) -> None:
     made = random_mechanism(seed, bodies=1 + seed % 6, planar=planar, forces=False, types=tuple(STEPS))
     kinematics = analyse(made.mechanism)
@@ -60,7 +61,7 @@ def test_tree_equals_pinocchio(seed: int, planar: bool, method: str) -> None:
 
 
 @pytest.mark.parametrize("planar", [False, True])
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", seeds(30, 16))
 def test_articulated_bodies_equal_pinocchio(seed: int, planar: bool) -> None:
     made = random_mechanism(seed, bodies=1 + seed % 8, planar=planar, forces=False, types=tuple(STEPS))
     kinematics = analyse(made.mechanism)

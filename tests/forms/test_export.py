@@ -41,7 +41,7 @@ def test_a_package_of_each_kind_stands_alone(
 ) -> None:
     generate(models.build(name), tmp_path, method, "numpy", baumgarte=baumgarte)
     done = subprocess.run(
-        [sys.executable, "-c", ALONE.format(name=name)], cwd=tmp_path, capture_output=True, text=True, timeout=120
+        [sys.executable, "-c", ALONE.format(name=name)], cwd=tmp_path, capture_output=True, text=True, timeout=600
     )
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
