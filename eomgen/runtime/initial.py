@@ -248,7 +248,7 @@ class Initial:
             return v
         from .start_branch import StartBranch  # not in a slim package
 
-        branch = StartBranch(self, q, names)
+        branch = StartBranch(self.kernels, self.t, q, self.scaled_jacobian(q), {n: self.gradients(q, n) for n in names})
         if v.ndim == 1:
             return branch.complete(v)
         return np.array([branch.complete(column) for column in v.T]).T

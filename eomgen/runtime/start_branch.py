@@ -7,8 +7,7 @@ These equations are quadratic in v, and each branch is a solution: the tangent c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -17,9 +16,7 @@ from ..limits.constraints import COUPLED, GONE, ONE_BRANCH
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .failure import place
-
-if TYPE_CHECKING:
-    from .initial import Initial
+from .kernels import Kernels
 
 STEP = 1e-4  #: scaled motion to either side, over which rates of constraints are taken
 STARTS = 60  #: from which the branches are looked for
@@ -31,22 +28,26 @@ class StartBranch:
 
     Parameters
     ----------
-    initial : Initial
+    kernels : Kernels
+    t : float
     q : (n_q,) array
         A closed position.
-    names : sequence of str
-        Of the velocities given.
+    J : (n_c, n_v) array
+        The scaled C_q there.
+    given : mapping of str to sequence of (n_v,) arrays
+        Names of the velocities given, and their scaled gradients.
     """
 
-    def __init__(self, initial: Initial, q: Array, names: Sequence[str]) -> None:
-        self.initial, self.q, self.names = initial, q, names
-        self.scales, self.layout = initial.scales, initial.layout
-        U, sizes, V = algebra.svd(initial.scaled_jacobian(q))
+    def __init__(self, kernels: Kernels, t: float, q: Array, J: Array, given: Mapping[str, Sequence[Array]]) -> None:
+        self.kernels, self.t, self.q, self.names = kernels, t, q, list(given)
+        self.layout = kernels.layout
+        self.scales = self.layout.scales
+        U, sizes, V = algebra.svd(J)
         kept = int(np.count_nonzero(sizes > GONE * sizes[0]))
         self.lost, free = U[:, kept:], V[kept:].T
-        given = np.array([row for name in names for row in initial.gradients(q, name)])
-        if len(given):
-            _, sizes, V = algebra.svd(given @ free)
+        rows = np.array([row for gradients in given.values() for row in gradients])
+        if len(rows):
+            _, sizes, V = algebra.svd(rows @ free)
             free = free @ V[int(np.count_nonzero(sizes > GONE)) :].T
         self.free = free
 
@@ -56,7 +57,7 @@ class StartBranch:
         ends = []
         for side in (h, -h):
             x = np.concatenate([self.scales.move(self.q, side * v), v * self.scales.q])
-            ends.append(self.initial.kernels.velocity_constraints.every(x, t=self.initial.t + side) / self.scales.c)
+            ends.append(self.kernels.velocity_constraints.every(x, t=self.t + side) / self.scales.c)
         return np.asarray(self.lost.T @ (ends[0] - ends[1]) / (2.0 * h * speed**2))
 
     def complete(self, v: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,7 +37,7 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
         and type(span[0]) is type(span[1]) is float
         and isfinite(span[0] - span[1])
     ):
-        return span
+        return cast("tuple[float, float]", span)
     if isinstance(span, (tuple, list)):
         what = "span must be (start, end) in seconds: an end"
         span = [read_number(what, end) if isinstance(end, str) else end for end in span]
