@@ -8,7 +8,7 @@ These equations are quadratic in v, and each branch is a solution: the tangent c
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from ..limits.constraints import COUPLED, GONE, ONE_BRANCH
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .failure import place
-
-if TYPE_CHECKING:
-    from .initial import Initial
 
 STEP = 1e-4  #: scaled motion to either side, over which rates of constraints are taken
 STARTS = 60  #: from which the branches are looked for
@@ -31,14 +28,15 @@ class StartBranch:
 
     Parameters
     ----------
-    initial : Initial
+    initial : Any
+        The ``Initial`` that asks; its file imports this one.
     q : (n_q,) array
         A closed position.
     names : sequence of str
         Of the velocities given.
     """
 
-    def __init__(self, initial: Initial, q: Array, names: Sequence[str]) -> None:
+    def __init__(self, initial: Any, q: Array, names: Sequence[str]) -> None:
         self.initial, self.q, self.names = initial, q, names
         self.scales, self.layout = initial.scales, initial.layout
         U, sizes, V = algebra.svd(initial.scaled_jacobian(q))
