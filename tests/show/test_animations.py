@@ -144,20 +144,18 @@ def test_bad_files_and_rates_are_refused_before_any_work(run: Any, tmp_path: Pat
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_command_line_draws_and_animates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_line_draws_and_animates(tmp_path: Path) -> None:
     model, picture, film = str(EXAMPLES / "pendulum.yaml"), tmp_path / "p.png", tmp_path / "p.gif"
     done = CliRunner().invoke(eomgen, ["check", model, "--draw", str(picture)])
     assert done.exit_code == 0, done.output
     with Image.open(picture) as image:
         assert np.ptp(np.asarray(image.convert("L"))) > 100  # not blank
-    made: list[Frames] = []
-    monkeypatch.setitem(writers.FILMS, "gif", lambda frames: made.append(frames) or b"film")
     words = ["run", model, "--target", "numpy", "--end", "0.5", "--animate", str(film)]
     done = CliRunner().invoke(eomgen, words)
     assert done.exit_code == 0, done.output
     assert f"wrote {film}" in done.output
-    assert film.read_bytes() == b"film"
-    assert len(made[0].motion.over) == 76  # 0.5 s shown over 3 s at 25 in a second
+    with Image.open(film) as image:
+        assert image.n_frames == 76  # 0.5 s shown over 3 s at 25 in a second
 
 
 def test_a_page_holds_all_it_needs(run: Any, tmp_path: Path) -> None:
