@@ -73,7 +73,7 @@ GONE = 1e-6
 #: What velocities of a branch at a change point may leave of second-order equations, over V^2: they turn by GONE there.
 ONE_BRANCH = 10.0 * GONE
 #: Least part of a direction across branches that these equations see, over V^2; along a branch they see ONE_BRANCH.
-COUPLED = 100.0 * ONE_BRANCH
+COUPLED, BRANCH_STEP = 100.0 * ONE_BRANCH, 1e-4  #: and the scaled motion to either side, over which rates are taken
 #: Least square of the sine between a column of pivots and those before it, in straight-line code that may fall back to
 #: pivoting: an angle of 3e-3, beyond which accelerations keep eight digits; and where it must not, of rounding alone.
 LOST, VANISHED = 1e-5, 1e-20

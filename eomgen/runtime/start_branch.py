@@ -12,13 +12,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import AssemblyError
-from ..limits.constraints import COUPLED, GONE, ONE_BRANCH
+from ..limits.constraints import BRANCH_STEP, COUPLED, GONE, ONE_BRANCH
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .failure import place
 from .kernels import Kernels
 
-STEP = 1e-4  #: scaled motion to either side, over which rates of constraints are taken
 STARTS = 60  #: from which the branches are looked for
 ROUNDS = 40  #: of Newton's method from each
 
@@ -53,7 +52,7 @@ class StartBranch:
 
     def bends(self, v: Array, speed: float) -> Array:
         """L^T b(v) (k,) over the square of a speed, of scaled velocities v."""
-        h = STEP / speed
+        h = BRANCH_STEP / speed
         ends = []
         for side in (h, -h):
             x = np.concatenate([self.scales.move(self.q, side * v), v * self.scales.q])
