@@ -241,8 +241,8 @@ class Initial:
             The position is a change point, and no branch has the velocities given, or several have.
         """
         rank = self.layout.rank
-        if not rank or not np.any(v):
-            return v
+        if rank in (0, len(v)) or not np.any(v):
+            return v  # what drivers move entirely is refused there by what solves for it
         sizes = algebra.singular_values(self.scaled_jacobian(q))
         if sizes[rank - 1] > GONE * sizes[0]:
             return v
