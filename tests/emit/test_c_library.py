@@ -15,6 +15,7 @@ from typing import Any
 import models
 import numpy as np
 import pytest
+from sweeps import part_of
 
 from benchmarks.models import panda
 from eomgen.emit.c_bounds import stack_of
@@ -120,7 +121,7 @@ def arm() -> Any:
     return panda().compile(target="numpy")
 
 
-@pytest.fixture(scope="module", params=["double", "float"])
+@pytest.fixture(scope="module", params=part_of(["double", "float"], lambda name: name == "double"))
 def arm_library(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return generate(panda(), tmp_path_factory.mktemp(request.param), target="c", precision=request.param)
 

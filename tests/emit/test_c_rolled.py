@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 from mechanisms import random_mechanism
 from pinocchio_trees import STEPS, pinocchio_model
+from sweeps import seeds
 
 import eomgen as eg
 from eomgen import pipeline
@@ -164,7 +165,7 @@ def test_loops_equal_the_evaluator_and_lanes_have_their_bits(libraries: Any, tmp
 
 
 @pytest.mark.parametrize("planar", [False, True])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4, 2))
 def test_random_big_trees_equal_pinocchio(
     seed: int, planar: bool, libraries: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -201,8 +201,15 @@ def test_a_copied_state_goes_on_to_the_same_bits(crank: tuple[Path, Any]) -> Non
     other.freeInstance()
 
 
-@pytest.mark.parametrize("version", ["2", "3"])
-@pytest.mark.parametrize("model", [ball, lambda: models.build("slider_crank")])
+@pytest.mark.parametrize(
+    ("model", "version"),
+    [
+        (ball, "2"),
+        pytest.param(ball, "3", marks=pytest.mark.thorough),
+        pytest.param(lambda: models.build("slider_crank"), "2", marks=pytest.mark.thorough),
+        (lambda: models.build("slider_crank"), "3"),
+    ],
+)
 def test_random_calls_neither_crash_nor_leak(model: Any, version: str, tmp_path: Path) -> None:
     """150 sequences of calls in any order, with arguments missing, too short, too large and not finite."""
     equations = derive(model(), "auto")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import part_of
 
 import eomgen as eg
 from eomgen import pipeline
@@ -102,7 +103,7 @@ MODELS = {
 KERNELS = ["rhs", "jacobian", "input_jacobian", "constraint_jacobian", "project", "inverse_dynamics_hessian_product"]
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", part_of(MODELS, lambda name: name != "spatial"))
 def test_loops_found_in_closed_mechanisms_give_the_bits_of_straight_text(
     name: str, libraries: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
