@@ -23,7 +23,6 @@ LONG = (
     "half_car",
     "n_four_bar",
     "puma560",
-    "rimless_wheel",
     "shaper",
     "spatial_slider_crank",
     "stewart_platform",

@@ -13,9 +13,9 @@ which a Newton method with the derivatives of the branch at hand solves.  Contac
 each round solves for contacts that are a little softer about the impulses of the round before (the proximal point
 method, R. T. Rockafellar, SIAM J. Control Optim. 14 (1976), 877-898), which leaves the matrix regular and the solution
 as it is.  Where Newton leads nowhere, sweeps over single contacts go on (M. Jean, The non-smooth contact dynamics
-method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257).  Before all that, many contacts are solved by the edges
-of their cones (:mod:`~eomgen.numeric.contact_edges`), or in space by sweeps, and one in the plane by its four cases: it
-opens, holds, or slides to either side.  What is left over goes to :func:`solve_smoothed`.
+method, Comput. Methods Appl. Mech. Eng. 177 (1999), 235-257), and one contact in the plane by its four cases: it opens,
+holds, or slides to either side.  Before all that, many contacts are solved by the edges of their cones
+(:mod:`~eomgen.numeric.contact_edges`), or in space by sweeps.  What is left over goes to :func:`solve_smoothed`.
 
 ``templates/c/contacts`` has the same iterations in C; modules with it do them as ``core.solve_contacts``.
 """
@@ -63,11 +63,6 @@ def solve_contacts(problem: ContactProblem, start: Array, tolerance: float, most
         best, least = solve_edges(problem, best, least, tolerance)
         sweeps = WARM if not least < known else 0
         P = np.array(best)
-    if P.shape == (1, 2) and least > tolerance:
-        cases = _cases(problem)
-        sizes = [problem.size(problem.misses(case)[0]) for case in cases]
-        if min(sizes) < least:
-            best, least = cases[int(np.argmin(sizes))], min(sizes)
     for _ in range(sweeps):
         if least <= tolerance:
             break
@@ -92,6 +87,11 @@ def solve_contacts(problem: ContactProblem, start: Array, tolerance: float, most
             size = problem.size(problem.misses(P)[0])
             if size < least:
                 best, least = np.array(P), size
+    if P.shape == (1, 2) and least > tolerance:
+        cases = _cases(problem)
+        sizes = [problem.size(problem.misses(case)[0]) for case in cases]
+        if min(sizes) < least:
+            best, least = cases[int(np.argmin(sizes))], min(sizes)
     for shrinks in SHRINKS:
         if least <= tolerance or count >= most:
             break

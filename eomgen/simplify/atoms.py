@@ -15,6 +15,7 @@ Frozen = tuple[tuple[Monomial, Number], ...]  #: a Poly as a key, by rising mono
 
 ONE: Monomial = ()
 TURNS = ("sin", "cos")
+CHOICE = "select"
 SUMS = ("sum", "factor")  #: kinds of atoms that are one polynomial
 DIGITS = 12  #: of a decimal that is taken as it is written
 ROUNDED_BY = 3  #: units in the last place that a constant may have lost to the operations that made it
@@ -45,6 +46,7 @@ class Atoms:
         self.table: list[Atom] = []
         self._ids: dict[Atom, int] = {}
         self._names: list[frozenset[int]] = []
+        self._choices: list[int] = []
 
     def id(self, kind: str, what: Any) -> int:
         """The number of an atom, the same for the same atom."""
@@ -74,6 +76,14 @@ class Atoms:
             own = frozenset({k} if self.table[k].kind == "name" else ())
             self._names.append(own.union(*(self._names[part] for part in self.inside(k))))
         return self._names[atom]
+
+    def choices_in(self, atom: int) -> int:
+        """How deep choices between values stand in each other in an atom, itself included."""
+        while len(self._choices) <= atom:
+            k = len(self._choices)
+            inside = max((self._choices[part] for part in self.inside(k)), default=0)
+            self._choices.append(inside + (self.table[k].kind == CHOICE))
+        return self._choices[atom]
 
     def without_squared_signs(self, monomial: Monomial, kind: str) -> Monomial:
         """With x^2 for |x|^2; a sum in it is an atom of the kind."""

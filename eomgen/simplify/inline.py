@@ -17,10 +17,15 @@ Named = list[tuple[int, Poly]]  #: the atom of each name and what it stands for
 
 
 def is_plain(poly: Poly, atoms: Atoms) -> bool:
-    """Whether it reads as well as a name: a number, a power of one quantity, a product of two symbols."""
+    """Whether it reads as well as a name: a number, a power of one quantity, a product of two symbols.
+
+    A choice between values in which there is another is none: chains of them would double with each.
+    """
     if len(poly) != 1:
         return not poly
     (monomial,) = poly
+    if len(monomial) == 1 and atoms.choices_in(monomial[0][0]) > 1:
+        return False
     return len(monomial) < 2 or (len(monomial) == 2 and all(atoms.table[a].kind == "sym" for a, _ in monomial))
 
 

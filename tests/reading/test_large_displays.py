@@ -77,3 +77,12 @@ def test_groups_say_how_much_they_hold() -> None:
         assert operations >= sum(int(sp.count_ops(x)) for x in lines) > 0
     shown = str(eg.load(EXAMPLES / "bicycle.yaml").derive())
     assert shown.index("In groups:") < shown.index("velocity terms of the constraints") < shown.index("c_tilt = ")
+
+
+def test_choices_within_choices_are_named() -> None:
+    """Six feet that are held or free: each depends on those before, so that choices written out double with each."""
+    equations = eg.load(EXAMPLES / "rimless_wheel.yaml").derive()
+    compiled = equations.operations["inverse_dynamics"]
+    shown = [x for _, x in equations.intermediates] + list(equations.force)
+    assert sum(x.count_ops() for x in shown) < 2 * (compiled.multiplications + compiled.additions)
+    assert max(x.count_ops() for x in shown) < 100

@@ -28,7 +28,6 @@ static int iterate(contacts *s, double *P, double tolerance, int most, double *r
     const int tried = s->m >= RIGID_MANY && least > tolerance;
     const int sweeps = tried && (s->d > 2 || !solve_edges(s, P, &least, tolerance)) ? RIGID_WARM : 0;
     if (sweeps) { (void)residual_of(s, P); /* velocities */ }
-    if (s->n == 2 && s->m == 1 && least > tolerance) { try_cases(s, P, &least); }
     for (int k = 0; k < sweeps && least > tolerance; k++) {
         sweep(s, P, RIGID_SWEEPS);
         keep_better(s, P, &least);
@@ -46,6 +45,7 @@ static int iterate(contacts *s, double *P, double tolerance, int most, double *r
             keep_better(s, P, &least);
         }
     }
+    if (s->n == 2 && s->m == 1 && least > tolerance) { try_cases(s, P, &least); }
     for (size_t k = 0; k < sizeof(shrinks)/sizeof(*shrinks) && least > tolerance && count < most; k++) {
         count += follow(s, &least, tolerance, most - count, shrinks[k]);
     }
