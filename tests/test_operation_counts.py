@@ -133,7 +133,7 @@ LOOPS_FOUND = {
     "two legs with such ankles": (5591, 8160),
     "hand of three parallel fingers": (797, 1216),
     "delta robot": (8729, 20115),
-    "Stewart platform": (10092, 19494),
+    "Stewart platform": (10084, 19480),
 }
 
 
