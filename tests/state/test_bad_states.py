@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import part_of
 
 import eomgen as eg
 from eomgen.equations import METHODS
@@ -51,7 +52,12 @@ CASES += [(beside_a_loop, "embedding"), (beside_a_loop, "lagrange")]
 
 
 @pytest.fixture(
-    scope="module", params=[(t, *c) for t in TARGETS for c in CASES], ids=lambda p: f"{p[0]}-{p[1].__name__}-{p[2]}"
+    scope="module",
+    params=part_of(
+        [((t, *c),) for t in TARGETS for c in CASES],
+        lambda p: p[0] == "numpy" or p[1] is beside_a_loop or p[2] in ("augmented", "newton_euler"),
+    ),
+    ids=lambda p: f"{p[0]}-{p[1].__name__}-{p[2]}",
 )
 def module(request: pytest.FixtureRequest) -> Any:
     target, make, method = request.param

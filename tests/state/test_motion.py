@@ -7,6 +7,7 @@ import pytest
 import rotations
 from models import reference
 from scipy.spatial.transform import Rotation
+from sweeps import part_of
 
 import eomgen as eg
 from eomgen.equations import METHODS
@@ -113,8 +114,10 @@ SLOW = ("amalgamated", "hamilton")  #: noise may carry them through the singular
 
 @pytest.mark.parametrize(
     ("sequence", "method", "target"),
-    [(sequence, *way) for sequence in ("xyz", "zxz") for way in WAYS if way[0] not in SLOW]
-    + [("yzx", "auto", "cython")],
+    part_of(
+        [*((s, *way) for s in ("xyz", "zxz") for way in WAYS if way[0] not in SLOW), ("yzx", "auto", "cython")],
+        lambda case: case[0] == "yzx" or (case[0] == "xyz") == (case[2] == "numpy"),
+    ),
 )
 def test_euler_angles_stop_at_their_singularity_and_pass_by_it(sequence: str, method: str, target: str) -> None:
     """A ball spins about a fixed axis exactly through, and nearly through, the singular orientation at t = 1 s."""
