@@ -61,7 +61,7 @@ def touching(centres: np.ndarray) -> int:
     [
         (hexagonal(3), 3 * 2 + 2 * 5 + 3, "cython"),
         (hexagonal(6), 6 * 5 + 5 * 11 + 6, "numpy"),  # in rows, between rows, on the ground
-        (hexagonal(10), 10 * 9 + 9 * 19 + 10, "numpy"),
+        pytest.param(hexagonal(10), 10 * 9 + 9 * 19 + 10, "numpy", marks=pytest.mark.thorough),
         (face_centred(), None, "numpy"),
     ],
 )

@@ -110,6 +110,7 @@ def test_parameters_given_late() -> None:
         np.testing.assert_allclose(run["normal(c)"][-1], mass * G, rtol=1e-6)  # 1e-9 of 1 m/s over g h
 
 
+@pytest.mark.thorough
 def test_a_drive_loses_no_link() -> None:
     """Two seconds of benchmarks/long_drive.py, which drives for a minute."""
     sys.path.insert(0, str(Path(__file__).parents[2]))
