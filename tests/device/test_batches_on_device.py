@@ -12,6 +12,7 @@ import models
 import numpy as np
 import pytest
 from device.host_device import HostDevice, OnHost
+from sweeps import OF_ALL_KINDS, part_of
 
 import eomgen as eg
 from eomgen.cuda_functions import cuda_functions
@@ -67,7 +68,7 @@ def assert_near(found: np.ndarray, wanted: np.ndarray, name: str = "") -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", part_of(EXAMPLES, OF_ALL_KINDS.__contains__))
 def test_every_function_of_every_example(name: str, tmp_path: Path) -> None:
     equations = eg.load(models.EXAMPLES / f"{name}.yaml").derive()
     device, module = on_host(equations, tmp_path), equations.compile(target="numpy")

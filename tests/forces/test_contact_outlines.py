@@ -303,7 +303,13 @@ def test_whole_numbers_of_shapes_in_any_form(kind: Any) -> None:
     np.testing.assert_array_equal(found[1].rhs(0.0, x), found[0].rhs(0.0, x))
 
 
-@pytest.mark.parametrize("shape", [{"shape": "sprocket", **SPROCKET}, {"shape": "smooth_outline", "points": BLOB}])
+@pytest.mark.parametrize(
+    "shape",
+    [
+        pytest.param({"shape": "sprocket", **SPROCKET}, marks=pytest.mark.thorough),
+        {"shape": "smooth_outline", "points": BLOB},
+    ],
+)
 def test_an_outline_is_verified_and_written_again(shape: dict[str, Any], tmp_path: Any) -> None:
     m, (ball, wheel) = scenes.planar("written", 2)
     m.contacts("mesh", on(PLANAR["circle"], ball), on(shape, wheel), LAW)

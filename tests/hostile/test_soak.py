@@ -30,6 +30,7 @@ def test_the_judge_sees_what_grows() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_nothing_grows_over_some_models() -> None:
     """Of the numpy target, without verification: that and compiled models belong to ``python -m hostile.soak``.
 
