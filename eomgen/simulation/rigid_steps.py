@@ -287,7 +287,7 @@ class RigidSteps:
     def _note(self, found: ContactImpulses, allowed: float, rough: float) -> None:
         if rough == 1.0:
             self.residual = max(self.residual, found.residual)
-        self._misses = not found.residual <= allowed  # the last solution of a step is the one that counts
+        self._misses = self._misses or not found.residual <= allowed
         self.iterations, self.most = max(self.iterations, found.iterations), max(self.most, len(found.impulses))
 
     def _out(self, held: _Held, rows: RigidRows, P: Array, new: Array, h: float) -> Array:

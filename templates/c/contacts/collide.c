@@ -82,7 +82,7 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
         at->rounding = fmax(at->rounding, RIGID_ROUNDED*summed);
     }
     if (rough == 1.0) { told->residual = fmax(told->residual, residual); }
-    told->missed = !(residual <= rough*s->tolerance*scale + at->rounding); /* the last solution of a step counts */
+    told->missed = told->missed || !(residual <= rough*s->tolerance*scale + at->rounding);
     told->iterations = count > told->iterations ? count : told->iterations;
     along(s->n_v, n, at->X, at->P, out);
     release(s->n_v, held->L, out);
