@@ -56,8 +56,5 @@ ROUGH = 10.0
 #: end: it shrinks by h times a speed of turning in each, 0.03 to 0.003, at an impact from the size of velocities on.
 #: Forces that change with velocities take two.
 ROUNDS = 12
-#: Part of the velocities that impulses bring about, summed without signs, that is rounding: in a jam at rest these are
-#: many times what is left.
-ROUNDED = 1e-14
 #: Newton steps at most that close loops at the end of a step, by the factors of its middle: errors shrink as above.
 CLOSINGS = 8

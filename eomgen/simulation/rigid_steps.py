@@ -40,7 +40,6 @@ from ..limits.rigid_contacts import (
     REMOVED,
     RESTING,
     ROUGH,
-    ROUNDED,
     ROUNDS,
     UNSOLVED,
     YIELDING,
@@ -212,7 +211,7 @@ class RigidSteps:
     def _bears(self, meeting: _Meeting | None, excess: Array, last: bool) -> bool:
         """Whether contacts do not feel that velocities are projected by so much; if not in the last round, a miss."""
         felt = 0.0 if meeting is None else float(np.abs(meeting.rows.jacobian @ excess).max())
-        if meeting is None or felt <= self.tolerance * meeting.scale + meeting.rounding:
+        if meeting is None or felt <= self.tolerance * meeting.scale:
             return True
         if last:
             self._misses, self.residual = True, max(self.residual, felt)
@@ -260,8 +259,7 @@ class RigidSteps:
             part = 0.0 if k == GENTLER else 0.5**k
             c = undisturbed.copy()
             c[:, 0] -= arrive + part * back
-            allowed = rough * self.tolerance * scale + meeting.rounding
-            found = self._impulses(W, c, rows.friction, meeting.start, allowed)
+            found = self._impulses(W, c, rows.friction, meeting.start, rough * self.tolerance * scale)
             P = found.impulses.ravel()
             if not back.any():
                 break
@@ -272,8 +270,7 @@ class RigidSteps:
             # mechanisms that friction jams have none
             if work <= grown and found.residual <= UNSOLVED * scale:
                 break
-        meeting.rounding = ROUNDED * float((np.abs(W) @ np.abs(P)).max())
-        self._note(found, rough * self.tolerance * scale + meeting.rounding, rough)
+        self._note(found, scale, rough)
         self._rests = ~strikes
         self._last = dict(zip(meeting.keys, found.impulses, strict=True))
         meeting.start = found.impulses
@@ -284,10 +281,10 @@ class RigidSteps:
             return solve_contacts(ContactProblem(W, c, friction), start, tolerance, self.allowed)
         return ContactImpulses(*self._solve(W, c, friction, start, tolerance, self.allowed))
 
-    def _note(self, found: ContactImpulses, allowed: float, rough: float) -> None:
+    def _note(self, found: ContactImpulses, scale: float, rough: float) -> None:
         if rough == 1.0:
             self.residual = max(self.residual, found.residual)
-        self._misses = self._misses or not found.residual <= allowed
+        self._misses = self._misses or not found.residual <= rough * self.tolerance * scale
         self.iterations, self.most = max(self.iterations, found.iterations), max(self.most, len(found.impulses))
 
     def _out(self, held: _Held, rows: RigidRows, P: Array, new: Array, h: float) -> Array:
@@ -333,14 +330,12 @@ class _Meeting:
         Velocities of contacts by impulses.
     scale : float
         (m/s) What the tolerance of their impulses is relative to.
-    rounding : float
-        (m/s) What rounding of the last impulses leaves, 0 before the first.
     """
 
     def __init__(self, held: _Held, rows: RigidRows, v: Array, last: dict[Spot, Array]) -> None:
         m = len(rows.gaps)
         d = len(rows.jacobian) // m
-        self.rows, self.scale, self.rounding = rows, 0.0, 0.0
+        self.rows, self.scale = rows, 0.0
         self.before = (rows.jacobian @ v).reshape(m, d)
         self.spread = held.inverse @ rows.jacobian.T
         self.compliance = rows.jacobian @ self.spread

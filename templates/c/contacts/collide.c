@@ -6,7 +6,7 @@ typedef struct {
     double *J, *X, *W;                            /* rows by velocities; L^-T J^T without what constraints take; X^T X */
     double *before, *undisturbed, *after, *c, *P; /* velocities, what the laws start from, impulses */
     double *friction, *arrive, *back, *out;
-    double *work, scale, rounding;                /* what the tolerance is relative to; what rounding of impulses leaves */
+    double *work, scale;                          /* scale: what the tolerance of impulses is relative to */
     int *rests, *numbers;
 } meeting;
 
@@ -60,8 +60,8 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
         memcpy(at->c, at->undisturbed, (size_t)n*sizeof(double));
         for (int c = 0; c < m; c++) { at->c[c*d] -= at->arrive[c] + part*at->back[c]; }
         memcpy(at->P, at->out, (size_t)n*sizeof(double));
-        CHOSEN(solve_contacts)(m, d, at->W, at->c, at->friction, at->P, rough*s->tolerance*scale + at->rounding, s->most, at->work,
-                              at->numbers, &count, &residual);
+        CHOSEN(solve_contacts)(m, d, at->W, at->c, at->friction, at->P, rough*s->tolerance*scale, s->most, at->work, at->numbers,
+                              &count, &residual);
         if (!rebounds) {
             break;
         }
@@ -75,14 +75,8 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
             break; /* else they give energy by Newton's law (Kane and Levinson, 1985), or friction jams the mechanism */
         }
     }
-    at->rounding = 0.0;
-    for (int r = 0; r < n; r++) {
-        double summed = 0.0;
-        for (int k = 0; k < n; k++) { summed += fabs(at->W[(ptrdiff_t)r*n + k]*at->P[k]); }
-        at->rounding = fmax(at->rounding, RIGID_ROUNDED*summed);
-    }
     if (rough == 1.0) { told->residual = fmax(told->residual, residual); }
-    told->missed = told->missed || !(residual <= rough*s->tolerance*scale + at->rounding);
+    told->missed = told->missed || !(residual <= rough*s->tolerance*scale);
     told->iterations = count > told->iterations ? count : told->iterations;
     along(s->n_v, n, at->X, at->P, out);
     release(s->n_v, held->L, out);

@@ -223,7 +223,7 @@ static int bears(eomgen_rigid *s, const inertia *held, meeting *at, double t, do
     }
     across(s->n_v, at->n, at->J, d, at->undisturbed);
     felt = largest_of(at->n, at->undisturbed, 1);
-    if (felt <= s->tolerance*at->scale + at->rounding) {
+    if (felt <= s->tolerance*at->scale) {
         return 1;
     }
     if (last) { told->missed = 1, told->residual = fmax(told->residual, felt); }
@@ -288,7 +288,6 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
     for (int k = 0; k < FIXED; k++) { part[k] = next, next += sizes[k]; }
     held.n = n, held.n_c = s->n_c, held.L = part[OF_L], held.Q = part[OF_Q], held.R = part[OF_R];
     place_meeting(s, &at);
-    at.rounding = 0.0;
     told.residual = told.depth = 0.0, told.missed = told.iterations = 0;
 
     move(s, s->x, 0.5*h, v, x_m);
