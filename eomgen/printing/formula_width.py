@@ -6,6 +6,7 @@ is the width of a letter: about half the size of the font, so that 90 letters fi
 
 from __future__ import annotations
 
+import math
 import unicodedata
 
 from ..notation.notation import Notation
@@ -14,6 +15,7 @@ from . import formula_tree as tree
 from .formula_text import text
 
 PAGE = 88.0  #: letters of a line
+LABEL = 4.0  #: of them before a sum in lines: "M_11 ="
 SIGN = 2.2  #: between terms
 SPACE = 0.4  #: between factors
 FENCES = 1.7  #: parentheses
@@ -75,13 +77,19 @@ def _of_text(shown: str) -> float:
     return total
 
 
-def sums_in_lines(formula: tree.Formula, names: Notation, room: float = PAGE) -> list[tree.Formula]:
-    """A sum as sums that are about as wide as a page at most; anything else alone."""
-    if not isinstance(formula, tree.SumOf):
+def sums_in_lines(formula: tree.Formula, names: Notation, room: float = PAGE - LABEL) -> list[tree.Formula]:
+    """A sum as sums that are about as wide as a page at most; anything else alone.
+
+    A product with a sum that is wider than a line is multiplied out in as few parts as fit.
+    """
+    wide = isinstance(formula, tree.Product) and width(formula, names) > room
+    given = formula.terms if isinstance(formula, tree.SumOf) else ((False, formula),) if wide else ()
+    terms = [(subtracted, part) for subtracted, term in given for part in _in_parts(term, names, room)]
+    if len(terms) < 2:
         return [formula]
     lines: list[list[tuple[bool, tree.Formula]]] = [[]]
     used = 0.0
-    for subtracted, term in formula.terms:
+    for subtracted, term in terms:
         size = width(term, names) + SIGN
         if used and used + size > room:
             lines.append([])
@@ -89,3 +97,24 @@ def sums_in_lines(formula: tree.Formula, names: Notation, room: float = PAGE) ->
         lines[-1].append((subtracted, term))
         used += size
     return [tree.SumOf(tuple(line)) for line in lines]
+
+
+def _in_parts(term: tree.Formula, names: Notation, room: float) -> list[tree.Formula]:
+    """A product whose widest sum is cut where it is too wide: of a (b + c + d) a (b + c) and a d."""
+    sums = [x for x in term.factors if isinstance(x, tree.SumOf)] if isinstance(term, tree.Product) else []
+    if not sums or width(term, names) + SIGN <= room:
+        return [term]
+    widest = max(sums, key=lambda x: width(x, names))
+    others = width(term, names) - width(widest, names)
+    if others > room / 2:  # to cut one sum would write the others again and again
+        return [term]
+    sizes = [width(x, names) + SIGN for _, x in widest.terms]
+    each = sum(sizes) / math.ceil(sum(sizes) / (room - others))  # in parts of about the same width
+    groups: list[list[tuple[bool, tree.Formula]]] = [[]]
+    used = 0.0
+    for part, size in zip(widest.terms, sizes, strict=True):
+        if groups[-1] and used + size / 2 > each * len(groups):
+            groups.append([])
+        groups[-1].append(part)
+        used += size
+    return [tree.Product(tuple(tree.SumOf(tuple(g)) if x is widest else x for x in term.factors)) for g in groups]

@@ -65,6 +65,17 @@ class Atoms:
         parts = [what] if kind in (*TURNS, *SUMS) else what
         return {a for part in parts for monomial, _ in part for a, _ in monomial}
 
+    def all_in(self, poly: Poly) -> set[int]:
+        """The atoms that stand in a polynomial, at any depth."""
+        found: set[int] = set()
+        left = [a for monomial in poly for a, _ in monomial]
+        while left:
+            atom = left.pop()
+            if atom not in found:
+                found.add(atom)
+                left += self.inside(atom)
+        return found
+
     def names(self, poly: Poly) -> frozenset[int]:
         """The atoms of names that stand in a polynomial, at any depth."""
         return frozenset().union(*(self.names_in(a) for monomial in poly for a, _ in monomial))

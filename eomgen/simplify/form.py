@@ -106,7 +106,8 @@ class Form:
         told: set[int] = set()
 
         def tell_roots(poly: Poly) -> None:
-            for root in sorted({a for a, _ in good.powers(poly)}.intersection(raising.roots).difference(told)):
+            inside = self.expansion.atoms.all_in(poly)  # what a choice holds needs its roots told before it too
+            for root in sorted(inside.intersection(raising.roots).difference(told)):
                 told.add(root)
                 named.append((raising.roots[root][0], raising.root(root)))
 

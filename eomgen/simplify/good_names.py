@@ -128,17 +128,11 @@ class GoodNames:
 
     def _is_constant(self, poly: Poly, constant: set[int]) -> bool:
         """Whether parameters and numbers alone are in it."""
-        seen: set[int] = set()
-        stack = [a for monomial in poly for a, _ in monomial]
-        while stack:
-            a = stack.pop()
-            kind, what = self.atoms.table[a]
-            if (kind == "sym" and what not in self.parameters) or (kind == "name" and a not in constant):
-                return False
-            new = self.atoms.inside(a) - seen
-            seen |= new
-            stack += new
-        return True
+        table = ((a, *self.atoms.table[a]) for a in self.atoms.all_in(poly))
+        return not any(
+            (kind == "sym" and what not in self.parameters) or (kind == "name" and a not in constant)
+            for a, kind, what in table
+        )
 
     def _free(self, stem: str) -> str:
         return next(name for k in range(10**9) if (name := f"{stem}{k}") not in self._taken)

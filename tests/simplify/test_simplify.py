@@ -291,6 +291,28 @@ def test_long_roots_that_repeat_have_names() -> None:
         assert float(shown.subs(name, root).subs(values)) == pytest.approx(float(wanted.subs(values)), rel=1e-14)
 
 
+def test_names_of_roots_come_before_the_choices_that_hold_them() -> None:
+    graph = Graph()
+    inside = a**2 + 2 * l * (l - l * cos(A) + a * sin(A))
+    first, second = sympy.symbols("first second")
+    choices = [sympy.Piecewise((sqrt(inside), x > a), (b, True)), sympy.Piecewise((x * first, y > b), (c, True))]
+    given = [x / sqrt(inside), y / inside, y + sin(A) * second, second**2]
+    meant = [lower(graph, e) for e in choices]
+    form = simplify([lower(graph, e) for e in given], [("first", meant[0]), ("second", meant[1])], sizes=WHOLE)
+    assert form is not None
+    named, found = form.sympy(roots=True)
+    assert "r0" in [str(name) for name, _ in named]
+    values = {a: 0.7, l: 1.3, A: 0.4, x: 2.0, y: 1.1, b: 0.2, c: 0.1}
+    known = dict(values)
+    for name, expression in named:
+        assert expression.free_symbols <= set(known)
+        known[name] = float(expression.subs(known))
+    for symbol, choice in zip((first, second), choices, strict=True):
+        values[symbol] = float(choice.subs(values))
+    for shown, wanted in zip(found, given, strict=True):
+        assert float(shown.subs(known)) == pytest.approx(float(wanted.subs(values)), rel=1e-14)
+
+
 def test_terms_above_and_below_one_sum_are_not_taken_together() -> None:
     """a F + b / F share no factor; c F + a F do."""
     atoms = Atoms()
