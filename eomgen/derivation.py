@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import deepcopy
 from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
 from .equations import TreeEquations
 from .files.terminal import fold
+from .graph.copies import copied
 from .graph.core import Expr
 from .graph.count import Operations, count
 from .kinematics import Kinematics
@@ -33,7 +33,7 @@ class Derivation(Displayed):
     choice: Choice | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        vars(self)["_derived"] = deepcopy((self.kinematics, self.mobility, self.tree))
+        vars(self)["_derived"] = copied((self.kinematics, self.mobility, self.tree))
 
     def fresh(self) -> tuple[Kinematics, Mobility, TreeEquations]:
         """A copy of what was derived, in a graph of its own, as it was before anyone read or compiled anything.
@@ -41,7 +41,7 @@ class Derivation(Displayed):
         Whatever is made of expressions adds nodes to their graph, whose numbers decide on the order of sums, factors
         and statements.  What is built from such a copy depends on the model alone.
         """
-        return deepcopy(cast("tuple[Kinematics, Mobility, TreeEquations]", vars(self)["_derived"]))
+        return copied(cast("tuple[Kinematics, Mobility, TreeEquations]", vars(self)["_derived"]))
 
     @property
     def method(self) -> str:

@@ -34,12 +34,16 @@ def identity(graph: Graph) -> Mat3:
 
 def add(a: Vec3, b: Vec3) -> Vec3:
     """a + b"""
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+    graph = a[0].graph
+    x, y, z = (Expr(graph, graph.add(i.id, k.id)) for i, k in zip(a, b, strict=True))
+    return (x, y, z)
 
 
 def sub(a: Vec3, b: Vec3) -> Vec3:
     """a - b"""
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+    graph = a[0].graph
+    x, y, z = (Expr(graph, graph.sub(i.id, k.id)) for i, k in zip(a, b, strict=True))
+    return (x, y, z)
 
 
 def neg(a: Vec3) -> Vec3:
@@ -55,16 +59,25 @@ def scale(s: Expr, a: Vec3) -> Vec3:
 def dot(a: Vec3, b: Vec3) -> Expr:
     """a . b"""
     graph = a[0].graph
-    zero = total = graph.zero.id
+    mul, zero = graph.mul, graph.zero.id
+    total = zero
     for x, y in zip(a, b, strict=True):
-        if zero not in (x.id, y.id):  # most products vanish: of axes of frames, of what stands still
-            total = graph.add(total, (x * y).id)
+        i, j = x.id, y.id
+        if i != zero and j != zero:  # most products vanish: of axes of frames, of what stands still
+            total = mul(i, j) if total == zero else graph.add(total, mul(i, j))
     return Expr(graph, total)
 
 
 def cross(a: Vec3, b: Vec3) -> Vec3:
     """a x b"""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    graph = a[0].graph
+    mul, sub = graph.mul, graph.sub
+    (i, j, k), (u, v, w) = (x.id for x in a), (x.id for x in b)
+    return (
+        Expr(graph, sub(mul(j, w), mul(k, v))),
+        Expr(graph, sub(mul(k, u), mul(i, w))),
+        Expr(graph, sub(mul(i, v), mul(j, u))),
+    )
 
 
 def times(m: Mat3, a: Vec3) -> Vec3:

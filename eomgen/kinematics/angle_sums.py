@@ -8,7 +8,7 @@ import numpy as np
 
 from ..graph.core import Expr, Graph, atan2
 from ..graph.differentiate import gradient
-from ..graph.evaluate import evaluate
+from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Mat3
 from ..limits.descriptions import PLANE
@@ -28,17 +28,18 @@ def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> tuple[Expr,
     terms : list of (index into q, factor)
     """
     angle = atan2(rotation[1][0], rotation[0][0])
-    held = symbols_of([angle])
-    turning = [j for j, x in enumerate(q) if x.node[1] in held]
+    places = {x.id: j for j, x in enumerate(q)}
+    held = (graph.symbol(name).id for name in symbols_of([angle]))
+    turning = sorted(places[i] for i in held if i in places)
     slopes = gradient(angle, [q[j] for j in turning])
     tried = [rotation[2][2], *slopes]
     names = sorted(symbols_of(tried))
+    evaluate = compile_evaluator(tried, names)
     random = np.random.default_rng(7)
     found = []
     for _ in range(TRIALS):
-        values = dict(zip(names, random.uniform(0.2, 1.4, len(names)).tolist(), strict=True))
         with np.errstate(all="ignore"):
-            found.append(np.array(evaluate(tried, values), dtype=float))
+            found.append(np.array(evaluate(random.uniform(0.2, 1.4, len(names))), dtype=float))
     steps = np.round(found[0][1:])
     if any(not abs(x[0] - 1.0) < PLANE or not (np.abs(x[1:] - steps) < PLANE).all() for x in found):
         return None

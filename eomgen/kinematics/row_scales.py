@@ -48,9 +48,11 @@ def _find_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
     graph, c = kinematics.graph, kinematics.constraints
     sizes = {"length": kinematics.length_scale, "angle": graph.one}
     found = [sizes[kind] for kind in c.kinds]
+    zero = graph.zero.id
     measured: dict[int, list[Expr]] = {}  # gradients whose lengths are looked at, by row
     for i, row in enumerate(c.jacobian):
-        gradient = [x * sizes[kind] for x, kind in zip(row, kinematics.velocity_kinds, strict=True) if not x.is_zero]
+        held = ((x, kind) for x, kind in zip(row, kinematics.velocity_kinds, strict=True) if x.id != zero)
+        gradient = [x * sizes[kind] for x, kind in held]
         written = c.written[i]
         if not gradient or (not written and c.kinds[i] != "length"):
             continue

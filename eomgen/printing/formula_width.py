@@ -101,8 +101,10 @@ def sums_in_lines(formula: tree.Formula, names: Notation, room: float = PAGE - L
 
 def _in_parts(term: tree.Formula, names: Notation, room: float) -> list[tree.Formula]:
     """A product whose widest sum is cut where it is too wide: of a (b + c + d) a (b + c) and a d."""
-    sums = [x for x in term.factors if isinstance(x, tree.SumOf)] if isinstance(term, tree.Product) else []
-    if not sums or width(term, names) + SIGN <= room:
+    if not isinstance(term, tree.Product) or width(term, names) + SIGN <= room:
+        return [term]
+    sums = [x for x in term.factors if isinstance(x, tree.SumOf)]
+    if not sums:
         return [term]
     widest = max(sums, key=lambda x: width(x, names))
     others = width(term, names) - width(widest, names)

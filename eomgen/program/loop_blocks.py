@@ -59,7 +59,7 @@ def summands(x: Expr) -> list[Expr]:
 def estimate(jacobian: Sequence[Sequence[Expr]], n_dof: int) -> int:
     """About how many multiplications the linear algebra of the embedded system takes, by the pattern of C_q (m, n)."""
     touching: dict[int, set[int]] = {}
-    held = [[k for k, x in enumerate(row) if not x.is_zero] for row in jacobian]
+    held = rows_of(jacobian)
     for i, row in enumerate(held):
         for k in row:
             touching.setdefault(k, set()).add(i)

@@ -7,6 +7,7 @@ cost the same each, however many there are.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from heapq import heapify, heappop, heappush
 from typing import TypeVar
 
 from ..graph.core import Expr
@@ -19,7 +20,8 @@ FEW = 6  #: rows or terms that are not worth parts of their own
 
 def rows_of(matrix: Sequence[Sequence[Expr]]) -> list[Row]:
     """The entries of a dense matrix that are not identically zero."""
-    return [{k: x for k, x in enumerate(row) if not x.is_zero} for row in matrix]
+    zero = matrix[0][0].graph.zero.id if matrix and matrix[0] else 0
+    return [{k: x for k, x in enumerate(row) if x.id != zero} for row in matrix]
 
 
 def transpose(rows: Sequence[Mapping[int, Expr]], n: int) -> list[Row]:
@@ -75,15 +77,20 @@ def gram(rows: Sequence[Mapping[int, Expr]]) -> list[Row]:
 def minimum_degree(pattern: Sequence[Mapping[int, object]]) -> list[int]:
     """An order of elimination with little fill of a symmetric pattern; the first of equals."""
     near = [set(row) - {i} for i, row in enumerate(pattern)]
-    left = set(range(len(near)))
+    waiting = [(len(others), i) for i, others in enumerate(near)]
+    heapify(waiting)
+    gone = [False] * len(near)
     order = []
-    while left:
-        i = min(left, key=lambda k: (len(near[k]), k))
+    while waiting:
+        degree, i = heappop(waiting)
+        if gone[i] or degree != len(near[i]):  # noted again since, with another degree
+            continue
         order.append(i)
-        left.remove(i)
+        gone[i] = True
         for k in near[i]:
             near[k] |= near[i]
             near[k] -= {i, k}
+            heappush(waiting, (len(near[k]), k))
     return order
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..describe.dotted_names import Undotted
 from ..equations import TreeEquations
 from ..errors import NonFiniteError, UsageError
+from ..graph.copies import copied
 from ..graph.core import Expr, Graph
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
@@ -143,7 +143,7 @@ class WritesQuantities(ABC):
 
     def with_values(self, expressions: Sequence[Expr]) -> list[Expr]:
         """Expressions of the model with what was put in, in a graph of their own; as they are, where nothing was."""
-        found = deepcopy(list(expressions)) if self._put_in else list(expressions)
+        found = copied(list(expressions)) if self._put_in else list(expressions)
         for values in self._put_in:
             found = put_in(found, values)
         return found
