@@ -34,6 +34,7 @@ SYNONYMS = {
     # functions of expressions
     "ln": "log", "arctan": "atan", "arcsin": "asin", "arccos": "acos", "arctan2": "atan2", "radians": "deg",
     "sgn signum": "sign", "power pow": "sqrt exp", "step_function theta_function": "heaviside", "ifelse iff": "where",
+    "normal normal_force contact_force tension": "force", "penetration extension elongation": "length",
     # sections and keys of a model file
     "links parts rigid_bodies segments particles": "bodies", "hinges connections": "joints",
     "constants": "parameters", "controls signals": "inputs", "sensors observables measurements probes": "outputs",
@@ -49,7 +50,7 @@ SYNONYMS = {
     # runs and their arguments
     "t_end tend stop_time end_time duration t_final tstop time": "end t", "dt timestep time_step step_size": "step",
     "tol tolerance reltol": "rtol", "abstol": "atol", "integrator": "method solver", "tspan t_span": "span",
-    "y0": "initial", "args": "parameters", "teval times": "t_eval", "guesses": "guess",
+    "y0 x0": "initial", "args": "parameters", "teval times": "t_eval", "guesses": "guess",
     # what a Module and a Trajectory have
     "simulate integrate solve play run odeint solve_ivp forward_simulation sim": "simulate run compile",
     "mass inertia_matrix crba M generalized_mass_matrix": "mass_matrix mass",

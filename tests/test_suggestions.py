@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from models import EXAMPLES
 
 import eomgen as eg
 from eomgen.cli.command import VERBS
@@ -18,6 +19,21 @@ from eomgen.suggestions import closest, hint
 def test_a_method_of_model(word: str, meant: str) -> None:
     with pytest.raises(AttributeError, match=f"did you mean '{meant}'"):
         getattr(eg.Model("m"), word)
+
+
+@pytest.mark.parametrize(("word", "meant"), [("x0", "initial"), ("tol", "rtol"), ("teval", "t_eval")])
+def test_an_argument_of_a_run(word: str, meant: str) -> None:
+    mod = eg.load(EXAMPLES / "pendulum.yaml").compile(target="numpy")
+    with pytest.raises(eg.UsageError, match=f"did you mean .*{meant}"):
+        mod.simulate((0, 1), **{word: 1.0})
+
+
+def test_the_normal_force_of_a_contact_is_its_force() -> None:
+    m = eg.Model("m")
+    m.prismatic("s", m.ground, m.body("ball", mass=1.0), axis="y")
+    m.output("N", "normal(floor)")
+    with pytest.raises(eg.ModelError, match=r"unknown function 'normal'.*did you mean 'force'"):
+        m.check()
 
 
 def test_types_in_a_file_and_verbs() -> None:

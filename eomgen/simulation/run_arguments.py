@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isfinite
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +24,8 @@ from .tolerances import check_step
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
+PLAIN = frozenset((float, int))
+HUGE = 1e300  #: less than the largest number
 DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
 
 
@@ -31,13 +33,10 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     """Start and end (s) of what a user gives as the span of a run."""
     if span is None or (type(span) is float and isfinite(span)):
         return 0.0, declared if span is None else span
-    if (
-        type(span) is tuple
-        and len(span) == 2
-        and type(span[0]) is type(span[1]) is float
-        and isfinite(span[0] - span[1])
-    ):
-        return cast("tuple[float, float]", span)
+    if type(span) is tuple and len(span) == 2 and PLAIN.issuperset(map(type, span)):  # what most give, quickly
+        start, end = span
+        if abs(start) < HUGE and abs(end) < HUGE:
+            return float(start), float(end)
     if isinstance(span, (tuple, list)):
         what = "span must be (start, end) in seconds: an end"
         span = [read_number(what, end) if isinstance(end, str) else end for end in span]

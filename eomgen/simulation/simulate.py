@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory
 
 OPTIONS = (
-    *("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step"),
-    *("checkpoint", "checkpoint_every", "resume", "controllers"),
+    *("span", "initial", "parameters", "inputs", "method", "rtol", "atol", "t_eval", "events", "dense_output"),
+    *("max_step", "first_step", "progress", "step", "checkpoint", "checkpoint_every", "resume", "controllers"),
 )
 
 
