@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
-from covering import COVERING
-from sweeps import part_of
+from sweeps import COVERING, part_of
 
 import eomgen as eg
 from eomgen.cli import main
