@@ -19,7 +19,7 @@ from ..errors import AssemblyError
 from ..limits.constraints import GONE, INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
 from ..numeric.assembly_velocity import VelocityEquations, assemble_velocity
-from ..numeric.closure import close, closed
+from ..numeric.closure import close, closed, where_lost
 from ..numeric.constraint_system import RESTARTS
 from ..numeric.held_path import follow
 from ..numeric.projection import largest
@@ -97,9 +97,14 @@ class Initial:
             return later
         declared = self.sort(self.layout.initial).positions
         try:
-            return self.system.close(self.layout.q_reference, declared, restarts=2).q
+            return self._closed(self.layout.q_reference, declared, restarts=2)
         except AssemblyError:
             return self.system.close(self.layout.q_reference, {}).q
+
+    def _closed(self, start: Array, held: Mapping[str, float], restarts: int = RESTARTS) -> Array:
+        """The closed position near a start, also where Newton's steps halve the distance only, as at a change point."""
+        found = self.system.close(start, held, restarts)
+        return found.q if found.residual <= SETTLED else where_lost(self.system.closure(held), found.q)
 
     def later(self) -> Array | None:
         """Where drivers bring the reference position of t = 0 by this time; None without them, or if they cannot."""
@@ -133,13 +138,13 @@ class Initial:
         if not given:
             later = self.later()
             if later is None:
-                return self.system.close(layout.q_reference, declared).q
+                return self._closed(layout.q_reference, declared)
             return self.follow(later, self.compatible(later, {}, declared))
         rest = {name: value for name, value in declared.items() if name not in given}
         try:
             start = self.reference()
         except AssemblyError:
-            return self.system.close(layout.q_reference, given).q  # these parameters close somewhere else, if anywhere
+            return self._closed(layout.q_reference, given)  # these parameters close somewhere else, if anywhere
         soft = self.compatible(start, given, rest)
         blocked = None
         for held in ({**given, **soft}, given):
@@ -148,11 +153,11 @@ class Initial:
             except AssemblyError as error:
                 blocked = error
         try:
-            found = self.system.close(start, {**given, **soft}, restarts=4 if soft else RESTARTS).q
+            found = self._closed(start, {**given, **soft}, restarts=4 if soft else RESTARTS)
         except AssemblyError:
             if not soft:
                 raise
-            found = self.system.close(start, given).q
+            found = self._closed(start, given)
         # where they stand still at the reference, it is on no branch of theirs
         if not rough and len(self.compatible(start, (), given)) == len(given):
             self._tell_branch(place(tuple(given), np.array(list(given.values()))).removeprefix(", "), blocked)
@@ -246,12 +251,12 @@ class Initial:
         sizes = algebra.singular_values(self.scaled_jacobian(q))
         if sizes[rank - 1] > GONE * sizes[0]:
             return v
-        from .start_branch import StartBranch  # not in a slim package
+        from .start_branch import on_branches  # not in a slim package
 
-        branch = StartBranch(self.kernels, self.t, q, self.scaled_jacobian(q), {n: self.gradients(q, n) for n in names})
+        J, given = self.scaled_jacobian(q), {n: self.gradients(q, n) for n in names}
         if v.ndim == 1:
-            return branch.complete(v)
-        return np.array([branch.complete(column) for column in v.T]).T
+            return on_branches(self.kernels, self.t, q, J, given, v)
+        return np.array([on_branches(self.kernels, self.t, q, J, given, column) for column in v.T]).T
 
     def scaled_jacobian(self, q: Array) -> Array:
         """J (n_c, n_v): C_q, scaled."""

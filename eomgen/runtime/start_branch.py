@@ -7,14 +7,15 @@ These equations are quadratic in v, and each branch is a solution: the tangent c
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ..errors import AssemblyError
-from ..limits.constraints import BRANCH_STEP, COUPLED, GONE, ONE_BRANCH
+from ..limits.constraints import ACCEPTED, BRANCH_STEP, COUPLED, GONE, ONE_BRANCH
 from ..numeric import algebra
-from ..numeric.scales import Array
+from ..numeric.row_chains import parts
+from ..numeric.scales import Array, Indices
 from .failure import place
 from .kernels import Kernels
 
@@ -22,8 +23,30 @@ STARTS = 60  #: from which the branches are looked for
 ROUNDS = 40  #: of Newton's method from each
 
 
+def on_branches(
+    kernels: Kernels, t: float, q: Array, J: Array, given: Mapping[str, Sequence[Array]], v: Array
+) -> Array:
+    """The velocities (n,) of the only branch that has the given ones, or AssemblyError; as for StartBranch."""
+    for part in _parts(kernels, J, given):
+        v = StartBranch(kernels, t, q, J, given, part).complete(v)
+    return v
+
+
+def _parts(kernels: Kernels, J: Array, given: Mapping[str, Sequence[Array]]) -> Iterator[tuple[Indices, Indices]]:
+    """Rows and velocities of loops that are connected, by given velocities too."""
+    known = kernels.layout.scales.known
+    held = [row != 0.0 for gradients in given.values() for row in gradients]
+    pattern = np.array([*(np.ones(J.shape, dtype=bool) if known is None else known), *held])
+    for levels in parts(pattern):
+        rows = np.concatenate([level.rows for level in levels])
+        if len(rows := np.sort(rows[rows < len(J)])):
+            yield rows, np.sort(np.concatenate([level.columns for level in levels]))
+
+
 class StartBranch:
-    """The branches at one position where rank is lost.
+    """The branches at one position where rank is lost, of loops each of which is connected with the others.
+
+    Others may be as fast as they like: speeds are those of the coordinates that the lost rows know.
 
     Parameters
     ----------
@@ -35,20 +58,32 @@ class StartBranch:
         The scaled C_q there.
     given : mapping of str to sequence of (n_v,) arrays
         Names of the velocities given, and their scaled gradients.
+    part : pair of arrays of int
+        The rows of these loops, and their velocities.
     """
 
-    def __init__(self, kernels: Kernels, t: float, q: Array, J: Array, given: Mapping[str, Sequence[Array]]) -> None:
+    def __init__(
+        self,
+        kernels: Kernels,
+        t: float,
+        q: Array,
+        J: Array,
+        given: Mapping[str, Sequence[Array]],
+        part: tuple[Indices, Indices],
+    ) -> None:
         self.kernels, self.t, self.q, self.names = kernels, t, q, list(given)
         self.layout = kernels.layout
         self.scales = self.layout.scales
-        U, sizes, V = algebra.svd(J)
+        (m, n), (rows, columns) = J.shape, part
+        U, sizes, V = algebra.svd(J[np.ix_(rows, columns)])
         kept = int(np.count_nonzero(sizes > GONE * sizes[0]))
-        self.lost, free = U[:, kept:], V[kept:].T
-        rows = np.array([row for gradients in given.values() for row in gradients])
-        if len(rows):
-            _, sizes, V = algebra.svd(rows @ free)
+        self.lost, free = np.zeros((m, len(rows) - kept)), np.zeros((n, len(columns) - kept))
+        self.lost[rows], free[columns] = U[:, kept:], V[kept:].T
+        held = np.array([row for gradients in given.values() for row in gradients])
+        if len(held):
+            _, sizes, V = algebra.svd(held @ free)
             free = free @ V[int(np.count_nonzero(sizes > GONE)) :].T
-        self.free = free
+        self.free, self.columns = free, columns
 
     def bends(self, v: Array, speed: float) -> Array:
         """L^T b(v) (k,) over the square of a speed, of scaled velocities v."""
@@ -67,31 +102,48 @@ class StartBranch:
         AssemblyError
             No branch has them, or several.
         """
-        speed = self.scales.speed(v)
-        if not speed > 0.0:
+        heard = np.abs(self.lost).max(axis=1, initial=0.0) > GONE
+        speed = float(self.scales.row_speeds(v)[heard].max(initial=0.0))
+        if not speed > ACCEPTED * self.scales.speed(v):
             return v  # at rest nothing decides the branch
-        d = v / self.scales.q
+        d = np.zeros(len(v))
+        d[self.columns] = (v / self.scales.q)[self.columns]
         here = self.bends(d, speed)
-        steps = [speed * w for w in self.free.T]
-        up, down = (np.array([self.bends(d + side * w, speed) for w in steps]) for side in (1.0, -1.0))
-        slopes = 0.5 * (up - down).reshape(len(steps), len(here)).T
-        if slopes.size:
-            _, sizes, V = algebra.svd(slopes)
-            undecided = self.free @ V[: int(np.count_nonzero(sizes > COUPLED))].T
-        else:
-            undecided = np.empty((len(d), 0))
-        if not undecided.shape[1]:
-            if np.abs(here).max(initial=0.0) > ONE_BRANCH:
-                raise self._refusal(v, here, undecided, [])
+        slopes = self._slopes(d, speed)
+        undecided = self._heard(slopes)
+        if not undecided.shape[1] and np.abs(here).max(initial=0.0) <= ONE_BRANCH:
             return v
         found = self._roots(d, undecided * speed, speed, here)
+        if not found and self.free.size:  # midway between branches slopes vanish
+            random = np.random.default_rng(2)
+            others = [self._slopes(d + speed * self.free @ random.normal(size=self.free.shape[1]), speed) for _ in "12"]
+            slopes = np.vstack([slopes, *others])
+            undecided = self._heard(slopes)
+            found = self._roots(d, undecided * speed, speed, here)
+        found = [v + w * self.scales.q for w in found]
         if len(found) != 1:
-            raise self._refusal(v, slopes @ (self.free.T @ undecided), undecided, found)
+            faults = slopes[: len(here)] @ (self.free.T @ undecided) if undecided.shape[1] else here
+            raise self._refusal(v, faults, undecided, found)
         return found[0]
 
+    def _slopes(self, d: Array, speed: float) -> Array:
+        """How L^T b changes along the free directions, (k, f)."""
+        steps = [speed * w for w in self.free.T]
+        up, down = (np.array([self.bends(d + side * w, speed) for w in steps]) for side in (1.0, -1.0))
+        return np.asarray(0.5 * (up - down).reshape(len(steps), self.lost.shape[1]).T)
+
+    def _heard(self, slopes: Array) -> Array:
+        """The free directions (n, u) that slopes see."""
+        if not slopes.size:
+            return np.empty((len(self.free), 0))
+        _, sizes, V = algebra.svd(slopes)
+        return np.asarray(self.free @ V[: int(np.count_nonzero(sizes > COUPLED))].T)
+
     def _roots(self, d: Array, W: Array, speed: float, here: Array) -> list[Array]:
-        """Velocities d + W y of branches; quadratic in y, so that their coefficients are differences."""
+        """What W y leads from d to branches; quadratic in y, so that their coefficients are differences."""
         k = W.shape[1]
+        if not k:
+            return []
         unit = np.eye(k)
 
         def value(y: Array) -> Array:
@@ -114,9 +166,9 @@ class StartBranch:
             size = 1.0 + float(np.abs(y).max())
             if not np.abs(here + K @ y + (H @ y) @ y).max() <= ONE_BRANCH * size**2:
                 continue
-            v = (d + W @ y) * self.scales.q
-            if all(self.scales.speed(v - other) > COUPLED * speed * size for other in found):
-                found.append(v)
+            way = W @ y
+            if all(np.abs(way - other).max() > COUPLED * speed * size for other in found):
+                found.append(way)
         return found
 
     def _refusal(self, v: Array, faults: Array, undecided: Array, found: list[Array]) -> AssemblyError:

@@ -92,3 +92,66 @@ def test_mixtures_of_branches_are_refused_also_as_states(turn: float, target: st
 @pytest.mark.parametrize("target", TARGETS)
 def test_at_rest_every_branch_has_the_velocities(target: str) -> None:
     assert not compiled(2, target).x0(th=0.0)[compiled(2, target).n_q :].any()
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("wheel", ["alone", "geared", "ground"])
+def test_a_fast_wheel_hides_no_mixture_of_branches(wheel: str, target: str) -> None:
+    """The wheel turns 1000 times as fast: alone, geared to the crank, or as the ground of the parallelogram."""
+    mod, fast = beside_a_wheel(wheel, target), {"w_dot": 1000.0 * SPEED}
+    start = {"th": 0.0, "th_dot": SPEED, **fast}
+    for given in ({}, {"psi_dot": 0.85 * SPEED}):
+        with pytest.raises(eg.AssemblyError, match=r"change point of C\.r_x, "):
+            mod.x0({**start, **given})
+    # cranks of 0.3 m on a coupler of 1 m: 1.3 / 0.7 times as fast against each other
+    for ratio in (1.0, -1.3 / 0.7):
+        x = mod.x0({**start, "psi_dot": ratio * SPEED})
+        assert abs(x[mod.x_names.index("psi_dot")] - ratio * SPEED) <= 1e-9 * SPEED
+
+
+@cache
+def beside_a_wheel(wheel: str, target: str) -> Any:
+    m = eg.Model(f"beside_{wheel}")
+    a, b, c, w = (m.body(n, mass=1.0, com=(0.1, 0, 0), inertia={"zz": 0.1}) for n in "abcw")
+    ground = w if wheel == "ground" else m.ground
+    shaft = m.revolute("W", m.ground, w, coordinate="w")
+    crank = m.revolute("A", ground, a, coordinate="th")
+    m.revolute("D", ground.at(1, 0, 0), c, coordinate="psi")
+    m.revolute("B", a.at(ARM, 0, 0), b)
+    m.revolute("C", b.at(1, 0, 0), c.at(ARM, 0, 0))
+    if wheel == "geared":
+        m.gear("mesh", shaft, crank, radii=(1, 1000), internal=True)
+    m.guess(th=1.0, psi=1.0, B=-1.0, **({"w": 1000.0} if wheel == "geared" else {}))
+    return m.compile(target=target)
+
+
+@pytest.mark.parametrize("away", [1.0, 0.3, 1e-3])
+def test_a_declared_flat_position_is_found_as_well_as_any_other(away: float) -> None:
+    """From a guess beside it Newton's steps halve the distance, and residuals tell its square."""
+    m = flat(0.3)
+    m.guess(th=away, bend=-away, psi=away)
+    m.initial(th=0.0)
+    mod = m.compile(target="numpy")
+    assert np.abs(mod.x0()[:3]).max() <= 1e-12
+    x = mod.x0(th_dot=SPEED, psi_dot=SPEED)
+    assert np.abs(x[3:] - SPEED * np.array([1, -1, 1])).max() <= 1e-9 * SPEED
+    with pytest.raises(eg.AssemblyError, match="do not tell its branches apart: branches found have"):
+        mod.x0(th_dot=SPEED)
+
+
+def test_branches_are_found_from_midway_between_them() -> None:
+    """Least velocities with those of the coupler lie midway where cranks are short: psi_dot = 1.0 and -1.0 of it."""
+    mod = flat(0.003).compile(target="numpy")
+    with pytest.raises(eg.AssemblyError, match="branches found have") as error:
+        mod.x0(th=0.0, bend_dot=-SPEED)
+    assert "(psi_dot = -5) or (psi_dot = 5); give psi_dot too" in str(error.value)
+
+
+def flat(arm: float) -> eg.Model:
+    m = eg.Model("flat", gravity=(0, -9.81, 0))
+    a, b, c = (m.body(n, mass=1.0, com=(0.1, 0, 0), inertia={"zz": 0.1}) for n in "abc")
+    m.revolute("A", m.ground, a, coordinate="th")
+    m.revolute("B", a.at(arm, 0, 0), b, coordinate="bend")
+    m.revolute("D", m.ground.at(1, 0, 0), c, coordinate="psi")
+    m.revolute("C", b.at(1, 0, 0), c.at(arm, 0, 0))
+    return m
