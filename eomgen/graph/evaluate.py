@@ -170,7 +170,8 @@ class Evaluator:
                     append(function(data[a], data[b], data[c]))
                 for s in dead:
                     data[s] = None
-        return [data[s] if np.ndim(data[s]) else float(data[s]) for s in self._outputs]
+        found = (data[s] for s in self._outputs)  # of a sum over pairs a list
+        return [x if isinstance(x, list) or np.ndim(x) else float(x) for x in found]
 
 
 def compile_evaluator(outputs: Sequence[Expr], names: Sequence[str]) -> Evaluator:

@@ -16,6 +16,8 @@ from ..graph.core import Expr
 from ..graph.count import count
 from ..graph.rounding_bounds import is_rounding, with_bounds
 from ..graph.substitute import substitute, symbols_of
+from ..graph.traverse import LEAVES, reachable
+from ..operations import operations_with
 from .quantities import Quantities, Row, Rows
 
 LONG = 330  #: operations of M and f from which their parts are shown instead
@@ -109,10 +111,12 @@ def _rows(values: Iterator[Expr], rows: int, columns: int) -> Rows:
 def _idle(quantities: Quantities, parts: Sequence[Expr]) -> tuple[str, ...]:
     """Coordinates on which M and f do not depend, such as the heading of a vehicle on a plane, tried at random.
 
-    The parts have to be finite with 0 in the place of these coordinates.
+    Nor may what decides between pieces, such as the place of a stop far away.  The parts have to be finite with 0 in
+    the place of these coordinates.
     """
     k, mobility = quantities.kinematics, quantities.mobility
     whole = [*_flat(quantities.mass_matrix), *quantities.force]
+    whole += _deciding(whole)
     random = np.random.default_rng(11)
     width = POINTS * (1 + len(k.names))
     at: dict[str, np.ndarray] = {name: np.full(width, x) for name, x in quantities.numbers.items()}
@@ -131,6 +135,18 @@ def _idle(quantities: Quantities, parts: Sequence[Expr]) -> tuple[str, ...]:
         return ()
     at |= dict.fromkeys(idle, np.zeros(width))
     return idle if np.isfinite(with_bounds(list(parts), at)[0]).all() else ()
+
+
+def _deciding(expressions: Sequence[Expr]) -> list[Expr]:
+    """The operands of operations that may be alike in a part of their domain: comparisons, max, contact, tables."""
+    graph = expressions[0].graph
+    analytic = operations_with(lambda row: row.analytic)
+    found: dict[int, None] = {}
+    for i in reachable(graph, (x.id for x in expressions)):
+        operation, *operands = graph.nodes[i]
+        if operation not in LEAVES and operation not in analytic:
+            found |= dict.fromkeys(operands)
+    return [Expr(graph, i) for i in found if graph.nodes[i][0] not in graph.calls]
 
 
 def _motion_names(quantities: Quantities) -> Named:
