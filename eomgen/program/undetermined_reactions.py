@@ -16,10 +16,12 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute, symbols_of
+from ..graph.traverse import operands, reachable
 from ..kinematics import Kinematics
 from ..kinematics.reaction_parts import force_and_moment
 from ..kinematics.wrenches import Row6
 from ..limits.systems import UNTOUCHED
+from ..operations import CONDITION, OPERATIONS
 from .reaction_users import Users
 
 PROBES = 3  #: states at which components are looked at
@@ -106,11 +108,34 @@ def _open(kinematics: Kinematics, every: Mapping[str, Row6], idle: Sequence[Expr
 
 
 def _probed(expressions: Sequence[Expr]) -> np.ndarray:
+    expressions = _with_every_choice(expressions)
     names = sorted(symbols_of(expressions))
     values = np.random.default_rng(2).uniform(0.5, 1.5, (PROBES, len(names)))
     with np.errstate(all="ignore"):
-        evaluate = compile_evaluator(list(expressions), names)
+        evaluate = compile_evaluator(expressions, names)
         return np.array([evaluate(row.tolist()) for row in values])
+
+
+def _with_every_choice(expressions: Sequence[Expr]) -> list[Expr]:
+    """Expressions in which a choice is a combination of its values, so that what acts far from a state is seen too."""
+    graph = expressions[0].graph
+    new: dict[int, Expr] = {}
+    for i in reachable(graph, (x.id for x in expressions)):
+        operation = graph.nodes[i][0]
+        parts = [new[k] for k in operands(graph.nodes[i])]
+        row = OPERATIONS.get(operation)
+        if not parts or row is None or not row.bends:
+            new[i] = Expr(graph, graph.make(operation, *(x.id for x in parts)) if parts else i)
+            continue
+        key = graph.nodes[i][1] if row.chooses else i  # choices by one condition are made together
+        if row.kind == CONDITION or operation == "sign":
+            new[i] = graph.symbol(f"choice {i}")
+            continue
+        values = parts[1:] if row.chooses else parts
+        new[i] = graph.zero
+        for k, x in enumerate(values):
+            new[i] = new[i] + graph.symbol(f"choice {key}.{k}") * x
+    return [new[x.id] for x in expressions]
 
 
 def is_zero(expressions: Sequence[Expr]) -> bool:

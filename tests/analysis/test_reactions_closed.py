@@ -267,3 +267,26 @@ def test_reaction_histories_of_adams(case: str) -> None:
     theirs = -np.array([row["rforce"] for row in rows])
     np.testing.assert_allclose(found, own, atol=2e-6 * np.abs(own).max())
     np.testing.assert_allclose(found, theirs, atol=2 * given["check"]["rforce_err"] + 1e-6)
+
+
+@pytest.mark.parametrize("load", ["where(t > 2, 10, 0)", "10*max(s - 5, 0)", "10*(th > 3)", "10*abs(s)*(s < -1)"])
+def test_loads_across_the_plane_are_refused_also_where_they_act_later(load: str) -> None:
+    m = with_friction_in_a_loop((0, 0, load))
+    with pytest.raises(eg.ModelError, match="the load of joint 'P' is undetermined"):
+        m.compile(target="numpy")
+    assert with_friction_in_a_loop((load, load, 0)).compile(target="numpy").n_dof == 1
+
+
+def with_friction_in_a_loop(load: tuple[object, ...]) -> eg.Model:
+    """A slider-crank in a plane, with friction by the force that its slide carries, and a force on the slider."""
+    m = eg.Model("rubbing", gravity=(0, -9.81, 0))
+    crank, rod, block = (m.body(n, mass=1.0, com=(0.1, 0, 0), inertia=(0.1, 0.2, 0.3)) for n in ("a", "b", "c"))
+    m.revolute("A", m.ground, crank, coordinate="th")
+    m.revolute("B", crank.at(0.4, 0, 0), rod)
+    m.prismatic("P", m.ground, block, axis="x", coordinate="s")
+    m.revolute("C", rod.at(0.9, 0, 0), block)
+    m.friction("rub", "P", coefficient=0.2, smoothing=1e-2)
+    m.force("push", block, value=load)
+    m.guess(B=-0.5, s=1.2)
+    m.initial(th=0.4, th_dot=1.0)
+    return m
