@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.constraints import ACCEPTED, BRANCH_STEP, COUPLED, EXACT, PASSED, SETTLED, TIKHONOV
+from ..limits.constraints import ACCEPTED, EXACT, SETTLED, TIKHONOV
 from ..limits.motions import NULL
 from . import algebra
 from .projection import largest, within
@@ -121,40 +121,6 @@ def _step(K: Array, f: Array, damping: float | None, top: float) -> Array:
     G = K @ K.T
     G.flat[:: len(G) + 1] += (damping + TIKHONOV) * top
     return np.asarray(-K.T @ algebra.solve(G, f))
-
-
-def where_lost(system: ClosureSystem, q: Array) -> Array:
-    """The position where rank is lost beside a closed q, which by itself tells it to the root of its residual only.
-
-    With L and R of the directions lost, L^T J R = 0 is linear in the distance from there.
-    """
-    moves = np.flatnonzero(system.free)
-    if not len(moves):
-        return q
-    least, best = largest(system.evaluate(q)[0]), q
-    for _ in range(2):
-        J = system.evaluate(best)[1][:, moves]
-        U, sizes, V = algebra.svd(J)
-        kept = int(np.count_nonzero(sizes > PASSED * sizes[0]))
-        L, R = U[:, kept:], np.zeros((len(system.free), len(moves) - kept))
-        R[moves] = V[kept:].T
-        if not (L.size and R.size):
-            break
-
-        def left(y: Array, q: Array = best, L: Array = L, R: Array = R) -> Array:
-            return (L.T @ system.evaluate(system.scales.move(q, R @ y))[1] @ R).ravel()
-
-        steps = BRANCH_STEP * np.eye(R.shape[1])
-        slopes = np.array([left(y) - left(-y) for y in steps]).T / (2.0 * BRANCH_STEP)
-        P, heard, Q = algebra.svd(slopes)
-        k = int(np.count_nonzero(heard > COUPLED))
-        y = -Q[:k].T @ ((P[:, :k].T @ left(np.zeros(len(steps)))) / heard[:k])
-        trial = system.scales.move(best, R @ y)
-        size = largest(system.evaluate(trial)[0])
-        if not (size <= least and largest(y) <= PASSED):
-            break
-        least, best = size, trial
-    return best
 
 
 def remoteness(e: Array, steepness: Array) -> float:

@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError
+from ..errors import AssemblyError, UnavailableError
 from ..limits.constraints import GONE, INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
 from ..numeric.assembly_velocity import VelocityEquations, assemble_velocity
-from ..numeric.closure import close, closed, where_lost
+from ..numeric.closure import close, closed
 from ..numeric.constraint_system import RESTARTS
 from ..numeric.held_path import follow
 from ..numeric.projection import largest
@@ -104,7 +104,12 @@ class Initial:
     def _closed(self, start: Array, held: Mapping[str, float], restarts: int = RESTARTS) -> Array:
         """The closed position near a start, also where Newton's steps halve the distance only, as at a change point."""
         found = self.system.close(start, held, restarts)
-        return found.q if found.residual <= SETTLED else where_lost(self.system.closure(held), found.q)
+        if found.residual > SETTLED:
+            with suppress(UnavailableError):
+                from .start_branch import where_lost  # not in a slim package
+
+                return where_lost(self.system.closure(held), found.q)
+        return found.q
 
     def later(self) -> Array | None:
         """Where drivers bring the reference position of t = 0 by this time; None without them, or if they cannot."""

@@ -12,8 +12,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from ..errors import AssemblyError
-from ..limits.constraints import ACCEPTED, BRANCH_STEP, COUPLED, GONE, ONE_BRANCH
+from ..limits.constraints import ACCEPTED, BRANCH_STEP, COUPLED, GONE, ONE_BRANCH, PASSED
 from ..numeric import algebra
+from ..numeric.closure import ClosureSystem
+from ..numeric.projection import largest
 from ..numeric.row_chains import parts
 from ..numeric.scales import Array, Indices
 from .failure import place
@@ -21,6 +23,40 @@ from .kernels import Kernels
 
 STARTS = 60  #: from which the branches are looked for
 ROUNDS = 40  #: of Newton's method from each
+
+
+def where_lost(system: ClosureSystem, q: Array) -> Array:
+    """The position where rank is lost beside a closed q, which by itself tells it to the root of its residual only.
+
+    With L and R of the directions lost, L^T J R = 0 is linear in the distance from there.
+    """
+    moves = np.flatnonzero(system.free)
+    if not len(moves):
+        return q
+    least, best = largest(system.evaluate(q)[0]), q
+    for _ in range(2):
+        J = system.evaluate(best)[1][:, moves]
+        U, sizes, V = algebra.svd(J)
+        kept = int(np.count_nonzero(sizes > PASSED * sizes[0]))
+        L, R = U[:, kept:], np.zeros((len(system.free), len(moves) - kept))
+        R[moves] = V[kept:].T
+        if not (L.size and R.size):
+            break
+
+        def left(y: Array, q: Array = best, L: Array = L, R: Array = R) -> Array:
+            return (L.T @ system.evaluate(system.scales.move(q, R @ y))[1] @ R).ravel()
+
+        steps = BRANCH_STEP * np.eye(R.shape[1])
+        slopes = np.array([left(y) - left(-y) for y in steps]).T / (2.0 * BRANCH_STEP)
+        P, heard, Q = algebra.svd(slopes)
+        k = int(np.count_nonzero(heard > COUPLED))
+        y = -Q[:k].T @ ((P[:, :k].T @ left(np.zeros(len(steps)))) / heard[:k])
+        trial = system.scales.move(best, R @ y)
+        size = largest(system.evaluate(trial)[0])
+        if not (size <= least and largest(y) <= PASSED):
+            break
+        least, best = size, trial
+    return best
 
 
 def on_branches(
