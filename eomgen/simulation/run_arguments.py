@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,7 +34,7 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     if span is None or (type(span) is float and isfinite(span)):
         return 0.0, declared if span is None else span
     if type(span) is tuple and len(span) == 2 and PLAIN.issuperset(map(type, span)):  # what most give, quickly
-        start, end = span
+        start, end = cast("tuple[float, float]", span)
         if abs(start) < HUGE and abs(end) < HUGE:
             return float(start), float(end)
     if isinstance(span, (tuple, list)):
