@@ -129,9 +129,9 @@ def test_operations_on_equal_terms(robot: Robot) -> None:
 
 #: Operations of a call with one Newton step, and of such a call by the code for states next to change points.
 LOOPS_FOUND = {
-    "ankle with two rods": (2795, 4082),
-    "two legs with such ankles": (5591, 8160),
-    "hand of three parallel fingers": (797, 1216),
+    "ankle with two rods": (2795, 4089),
+    "two legs with such ankles": (5591, 8173),
+    "hand of three parallel fingers": (797, 1228),
     "delta robot": (8729, 20115),
     "Stewart platform": (10084, 19480),
 }

@@ -264,6 +264,20 @@ class LoopBlocks(ABC):
             held = held + graph.apply("and", separate, graph.apply("lt", limits[group], square))
         return graph.apply("lt", self.terms.n_v - self.terms.n_dof - 0.5, held)
 
+    def usual_square(self, rows: Sequence[int]) -> Expr:
+        """The square of a usual entry of some scaled rows and of those that their lengths are compared with.
+
+        Columns far shorter are what rounding leaves of them where rank is lost.
+        """
+        groups = {self.groups[i] for i in rows}
+        known = (dot(row, row) for row in self.J)
+        found = [
+            x * (1.0 / len(row))
+            for row, x, group in zip(self.J, known, self.groups, strict=True)
+            if x is not None and group in groups
+        ]
+        return largest([*found, *([1.0 / (self.unit * self.unit)] if UNIT in groups else [])])
+
     def shortest(self, squares: Sequence[Expr]) -> dict[int, Expr]:
         """Squares of the lengths at which rows of each group are short."""
         graph, members = self.terms.graph, dict[int, list[Expr]]()

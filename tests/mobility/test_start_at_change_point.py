@@ -155,3 +155,50 @@ def flat(arm: float) -> eg.Model:
     m.revolute("D", m.ground.at(1, 0, 0), c, coordinate="psi")
     m.revolute("C", b.at(1, 0, 0), c.at(arm, 0, 0))
     return m
+
+
+@cache
+def slider_crank(target: str) -> Any:
+    """Crank and rod of 1 m each: at 90 degrees the rod lies on the crank, and may turn with it or mirror it."""
+    m = eg.Model("equal_arms", gravity=(0, -9.81, 0))
+    crank = m.body("crank", mass=1.0, com=(0.5, 0, 0), inertia={"zz": 0.1})
+    rod = m.body("rod", mass=2.0, com=(0.5, 0, 0), inertia={"zz": 0.2})
+    slider = m.body("slider", mass=0.5)
+    m.revolute("A", m.ground, crank, coordinate="th")
+    m.revolute("B", crank.at(1, 0, 0), rod, coordinate="b")
+    m.revolute("C", rod.at(1, 0, 0), slider)
+    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    m.guess(th=0.5, b=-1.0, s=1.8)
+    return m.compile(target=target)
+
+
+def mirrored(th: float, w: float) -> float:
+    """The crank's acceleration where the rod's angle is -th: T = M(th) w^2 / 2, V = 1.5 g sin th."""
+    inertia = 0.1 + 0.25 + 0.2 + 2 * (2.25 * np.sin(th) ** 2 + 0.25 * np.cos(th) ** 2) + 2.0 * np.sin(th) ** 2
+    slope = (8.0 + 4.0) * np.sin(th) * np.cos(th)
+    return float((-9.81 * 1.5 * np.cos(th) - 0.5 * slope * w * w) / inertia)
+
+
+def together(th: float, w: float) -> float:
+    """The same where the rod turns with the crank and the slider rests: a pendulum."""
+    return float(-9.81 * 1.5 * np.cos(th) / (0.1 + 0.25 + 0.2 + 0.5))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize(("s_dot", "law"), [(-4.0, mirrored), (0.0, together)])
+def test_a_slider_crank_of_equal_arms_runs_on_both_branches(s_dot: float, law: Any, target: str) -> None:
+    start = {"th": np.pi / 2, "th_dot": 2.0, "s_dot": s_dot}
+    run = slider_crank(target).simulate((0, 0.9), initial=start, rtol=1e-10, atol=1e-12)
+    found = solve_ivp(
+        lambda t, y: [y[1], law(*y)], (0, 0.9), [np.pi / 2, 2.0], "DOP853", rtol=1e-12, atol=1e-13
+    )  # fmt: skip
+    assert abs(run["th"][-1] - found.y[0, -1]) < 1e-8
+    assert abs(run["th_dot"][-1] - found.y[1, -1]) < 1e-7
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("off", [1e-15, 1e-12, 1e-9])
+def test_what_rounding_leaves_of_rows_tells_no_accelerations(off: float, target: str) -> None:
+    """Off both branches by so much no row is open by more than its square: nothing but rounding tells it."""
+    x = [np.pi / 2, -np.pi + off, off, 2.0, -4.0, -4.0]
+    assert np.abs(slider_crank(target).rhs(0.0, x)[3:]).max() < 1e-6
