@@ -269,14 +269,18 @@ class LoopBlocks(ABC):
 
         Columns far shorter are what rounding leaves of them where rank is lost.
         """
-        groups = {self.groups[i] for i in rows}
-        known = (dot(row, row) for row in self.J)
-        found = [
-            x * (1.0 / len(row))
-            for row, x, group in zip(self.J, known, self.groups, strict=True)
-            if x is not None and group in groups
-        ]
+        groups = dict.fromkeys(self.groups[i] for i in rows)
+        found = [x for group in groups for x in self._mean_squares[group]]
         return largest([*found, *([1.0 / (self.unit * self.unit)] if UNIT in groups else [])])
+
+    @cached_property
+    def _mean_squares(self) -> dict[int, list[Expr]]:
+        """Of the rows of each group, the mean squares of their entries."""
+        found: dict[int, list[Expr]] = {group: [] for group in self.groups}
+        for row, group in zip(self.J, self.groups, strict=True):
+            if (x := dot(row, row)) is not None:
+                found[group].append(x * (1.0 / len(row)))
+        return found
 
     def shortest(self, squares: Sequence[Expr]) -> dict[int, Expr]:
         """Squares of the lengths at which rows of each group are short."""
