@@ -151,9 +151,8 @@ class StartBranch:
             return v
         found = self._roots(d, undecided * speed, speed, here)
         if not found and self.free.size:  # midway between branches slopes vanish
-            random = np.random.default_rng(2)
-            others = [self._slopes(d + speed * self.free @ random.normal(size=self.free.shape[1]), speed) for _ in "12"]
-            slopes = np.vstack([slopes, *others])
+            ways = np.random.default_rng(2).normal(size=(2, self.free.shape[1]))
+            slopes = np.vstack([slopes, *(self._slopes(d + speed * self.free @ way, speed) for way in ways)])
             undecided = self._heard(slopes)
             found = self._roots(d, undecided * speed, speed, here)
         found = [v + w * self.scales.q for w in found]
