@@ -141,8 +141,7 @@ class Initial:
         if not layout.n_h and not any(name in self.system.cut.names for name in (*declared, *given)):
             return self.system.with_values(self.system.with_values(layout.q_reference, declared), given)
         if not given:
-            later = self.later()
-            if later is None:
+            if (later := self.later()) is None:
                 return self._closed(layout.q_reference, declared)
             return self.follow(later, self.compatible(later, {}, declared))
         rest = {name: value for name, value in declared.items() if name not in given}
@@ -253,15 +252,12 @@ class Initial:
         rank = self.layout.rank
         if rank in (0, len(v)) or not np.any(v):
             return v  # what drivers move entirely is refused there by what solves for it
-        sizes = algebra.singular_values(self.scaled_jacobian(q))
+        sizes = algebra.singular_values(J := self.scaled_jacobian(q))
         if sizes[rank - 1] > GONE * sizes[0]:
             return v
         from .start_branch import on_branches  # not in a slim package
 
-        J, given = self.scaled_jacobian(q), {n: self.gradients(q, n) for n in names}
-        if v.ndim == 1:
-            return on_branches(self.kernels, self.t, q, J, given, v)
-        return np.array([on_branches(self.kernels, self.t, q, J, given, column) for column in v.T]).T
+        return on_branches(self.kernels, self.t, q, J, {n: self.gradients(q, n) for n in names}, v)
 
     def scaled_jacobian(self, q: Array) -> Array:
         """J (n_c, n_v): C_q, scaled."""
@@ -289,8 +285,11 @@ class Initial:
                 moves = np.linalg.norm(basis, axis=0)
                 ordered = dict.fromkeys([*layout.independent, *np.argsort(-moves, kind="stable")])
                 others = [layout.v[i] for i in ordered if moves[i] > 0.1]
-                instead = " or ".join(others[:2])
-                remedy = f"give {instead} instead, or another position" if others else "no velocity is possible here"
+                remedy = (
+                    f"give {' or '.join(others[:2])} instead, or another position"
+                    if others
+                    else "no velocity is possible here"
+                )
                 raise AssemblyError(
                     f"{name} = {value:.6g} cannot be reached: the constraints allow no such velocity here, as "
                     f"at a dead centre or across a blade{place(layout.q, q)}; {remedy}"

@@ -62,7 +62,9 @@ def where_lost(system: ClosureSystem, q: Array) -> Array:
 def on_branches(
     kernels: Kernels, t: float, q: Array, J: Array, given: Mapping[str, Sequence[Array]], v: Array
 ) -> Array:
-    """The velocities (n,) of the only branch that has the given ones, or AssemblyError; as for StartBranch."""
+    """The velocities (n,) or (n, m) of the only branch that has the given ones, or AssemblyError; see StartBranch."""
+    if v.ndim > 1:
+        return np.array([on_branches(kernels, t, q, J, given, column) for column in v.T]).T
     for part in _parts(kernels, J, given):
         v = StartBranch(kernels, t, q, J, given, part).complete(v)
     return v

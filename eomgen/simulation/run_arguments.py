@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isfinite
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,15 +33,12 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     """Start and end (s) of what a user gives as the span of a run."""
     if span is None or (type(span) is float and isfinite(span)):
         return 0.0, declared if span is None else span
-    if type(span) is tuple and len(span) == 2 and PLAIN.issuperset(map(type, span)):  # what most give, quickly
-        start, end = cast("tuple[float, float]", span)
-        if abs(start) < HUGE and abs(end) < HUGE:
-            return float(start), float(end)
     if isinstance(span, (tuple, list)):
         what = "span must be (start, end) in seconds: an end"
-        span = [read_number(what, end) if isinstance(end, str) else end for end in span]
-        if len(span) == 2 and all(type(end) is float and isfinite(end) for end in span):
-            return float(span[0]), float(span[1])
+        ends: Any = [read_number(what, end) if isinstance(end, str) else end for end in span]
+        if len(ends) == 2 and PLAIN.issuperset(map(type, ends)) and abs(ends[0]) < HUGE > abs(ends[1]):
+            return float(ends[0]), float(ends[1])
+        span = ends
     pair = as_real(span)
     if isinstance(span, str) or (pair is not None and not pair.ndim):
         return 0.0, read_number("the end of the span", span)
