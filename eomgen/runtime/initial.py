@@ -82,8 +82,6 @@ class Initial:
         """C_t (n_c,)."""
         return self.kernels.velocity_constraints.every(np.concatenate([q, np.zeros(self.layout.n_v)]), t=self.t)
 
-    # positions
-
     def follow(self, start: Array, held: Mapping[str, float]) -> Array:
         """From a closed position steadily to held values; raises AssemblyError when blocked."""
         q = follow(self.system, start, held)
@@ -285,11 +283,8 @@ class Initial:
                 moves = np.linalg.norm(basis, axis=0)
                 ordered = dict.fromkeys([*layout.independent, *np.argsort(-moves, kind="stable")])
                 others = [layout.v[i] for i in ordered if moves[i] > 0.1]
-                remedy = (
-                    f"give {' or '.join(others[:2])} instead, or another position"
-                    if others
-                    else "no velocity is possible here"
-                )
+                instead = " or ".join(others[:2])
+                remedy = f"give {instead} instead, or another position" if others else "no velocity is possible here"
                 raise AssemblyError(
                     f"{name} = {value:.6g} cannot be reached: the constraints allow no such velocity here, as "
                     f"at a dead centre or across a blade{place(layout.q, q)}; {remedy}"
@@ -327,8 +322,7 @@ class Initial:
 
         Nonholonomic constraints count for rates only, where `positions` is False.
         """
-        layout = self.layout
-        scales = self.place if positions else self.scales
+        layout, scales = self.layout, self.place if positions else self.scales
         C_q = self.system.position(q)[1][: self.layout.n_h] if positions else self._C_q(q, t=self.t)
         rows = [*scales.jacobian(C_q), *(row for name in given for row in self.gradients(q, name))]
         basis: Array = np.empty((0, len(scales.q)))
