@@ -11,7 +11,7 @@ from ..limits.constraints import KEPT, LEFT
 from ..limits.crossings import NEAR_SQUARE
 from ..numeric.triangular import diagonal_blocks
 from .factor import outward
-from .loop_blocks import NOTHING, LoopBlocks, apart, total_magnitude
+from .loop_blocks import NOTHING, LoopBlocks, apart, largest, total_magnitude
 from .sparse import dot, times, transpose
 
 
@@ -72,8 +72,8 @@ class BodyLoops(LoopBlocks):
         graph, separate, angles = self.terms.graph, self.separate_rows(), self._angles_of_columns()
         if angles is None:
             return separate
-        columns = self.all_of([graph.apply("lt", size * NEAR_SQUARE, part) for size, part in angles])
-        return graph.apply("or", columns, separate)
+        columns = [graph.apply("lt", size * NEAR_SQUARE, part) for size, part in angles]
+        return graph.apply("or", self.all_of([*columns, self.long_rows()]), separate)
 
     def _angles_of_columns(self) -> list[tuple[Expr, Expr]] | None:
         """Squares of dependent columns and of what they have apart, where they are found one or two at a time."""
@@ -84,14 +84,16 @@ class BodyLoops(LoopBlocks):
             return None
         angles: list[tuple[Expr, Expr]] = []
         for rows, columns in blocks:
-            usual = self.usual_square(rows)
             if len(rows) == 1:
-                size, pivot = dot(self.J[rows[0]], self.J[rows[0]]), left[rows[0]][columns[0]]
-                part = pivot * pivot
+                row, pivot = self.J[rows[0]], left[rows[0]][columns[0]]
+                square = dot(row, row)
+                angles += [(square, pivot * pivot)] if square is not None else []
             else:
                 size, part, _ = apart(*(left[m].get(c, self.terms.graph.zero) for m in rows for c in columns))
-                usual = usual * usual
-            # columns that are short beside the usual entry have no angle but that of their rounding
-            size = usual * NEAR_SQUARE if size is None else self.terms.graph.apply("max", size, usual * NEAR_SQUARE)
-            angles.append((size, part))
+                squares = [dot(self.J[m], self.J[m]) for m in rows]
+                usual = largest(
+                    [x * (1.0 / len(self.J[m])) for m, x in zip(rows, squares, strict=True) if x is not None]
+                )
+                # columns that are short beside the usual entry have no angle but that of their rounding
+                angles.append((self.terms.graph.apply("max", size, usual * usual * NEAR_SQUARE), part))
         return angles

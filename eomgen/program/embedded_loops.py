@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..limits.constraints import LOST, ROUNDED, TIKHONOV, VANISHED
+from ..limits.constraints import ROUNDED, TIKHONOV
 from ..limits.crossings import NEAR_SQUARE
 from ..limits.inertia import STILL
 from ..numeric.triangular import DiagonalBlock, diagonal_blocks
@@ -52,7 +52,6 @@ class EmbeddedLoops(LoopBlocks):
 
     def __init__(self, terms: SystemTerms, term: float = TIKHONOV, solutions: int = 2) -> None:
         super().__init__(terms, term, solutions)
-        self.lost = VANISHED if self.gentle else LOST
         #: squares of a column of the dependent coordinates, and of its part across those before it
         self._angles: dict[tuple[Expr, Expr], None] = {}
 
@@ -76,11 +75,12 @@ class EmbeddedLoops(LoopBlocks):
 
     def _far(self) -> Expr:
         """By the columns of the dependent coordinates, which a dead centre of the independent ones makes nearly
-        parallel too, or by the rows of all.
+        parallel too, where no row vanishes; or by the rows of all.
         """
         graph = self.terms.graph
-        far = self.all_of([graph.apply("lt", size * NEAR_SQUARE, part) for size, part in self._angles])
-        if self.gentle and far != graph.one and not self.redundant:
+        columns = [graph.apply("lt", size * NEAR_SQUARE, part) for size, part in self._angles]
+        far = self.all_of([*columns, self.long_rows()])
+        if self.gentle and columns and not self.redundant:
             far = graph.apply("or", far, self.separate_rows())
         return far
 
@@ -102,10 +102,9 @@ class EmbeddedLoops(LoopBlocks):
         first: list[Expr] = []
         found: list[list[Expr]] = [[] for _ in terms.preferred]
         if dependent and (blocks is None or any(len(b.rows) > 2 for b in blocks)):
-            first, *found = self._least_squares(left, right, dependent, conditions)
+            first, *found = self._least_squares(left, right, conditions)
         elif blocks is not None:  # else rows that hold nothing: parameters alone decide whether they are closed
-            conditions += self._judged(left, blocks, dependent)
-            first, *found = (self._substitute(left, blocks, r) for r in right)
+            first, *found = (self._substitute(left, blocks, r, [] if j else conditions) for j, r in enumerate(right))
         x = [graph.zero] * terms.n_v
         for i, value in zip(dependent, first, strict=True):
             x[i] = value
@@ -120,29 +119,9 @@ class EmbeddedLoops(LoopBlocks):
         conditions += [graph.apply("lt", largest(values), most) for most, values in sizes.items()]
         return B, x
 
-    def _judged(self, rows: list[Row], blocks: list[DiagonalBlock], dependent: Sequence[int]) -> list[Expr]:
-        """Whether the columns of blocks of one or two are apart, and not what rounding leaves where rank is lost."""
-        graph = self.terms.graph
-        conditions: list[Expr] = []
-        for block in blocks:
-            scale = self.terms.graph.one
-            for k in block.columns:
-                scale = scale * self.s[dependent[k]]
-            usual = self.usual_square(block.rows)
-            if len(block.rows) == 2:
-                sizes, across, _ = apart(*(rows[m].get(k, graph.zero) for m in block.rows for k in block.columns))
-                sizes, usual = sizes * (scale * scale), usual * usual
-            else:
-                (i,), (k,) = block.rows, block.columns
-                across = rows[i][k] * rows[i][k]
-                sizes = sum((x * x for x in self.J[i].values()), graph.zero)
-            across = across * (scale * scale)
-            sizes = graph.apply("max", sizes, usual * NEAR_SQUARE)
-            conditions.append(graph.apply("lt", sizes * self.lost, across))
-            self._angles[sizes, across] = None
-        return conditions
-
-    def _substitute(self, rows: list[Row], blocks: list[DiagonalBlock], right: Sequence[Expr]) -> list[Expr]:
+    def _substitute(
+        self, rows: list[Row], blocks: list[DiagonalBlock], right: Sequence[Expr], conditions: list[Expr]
+    ) -> list[Expr]:
         """Solve block after block, each of one or two rows."""
         graph = self.terms.graph
         x: list[Expr] = [graph.zero] * len(rows)
@@ -159,26 +138,26 @@ class EmbeddedLoops(LoopBlocks):
                 continue
             (i, j), (k, l) = block.rows, block.columns
             p, q, r, t = (rows[m].get(c, graph.zero) for m in (i, j) for c in (k, l))
-            inverse = 1.0 / apart(p, q, r, t)[2]
+            sizes, across, determinant = apart(p, q, r, t)
+            conditions.append(graph.apply("lt", sizes * self.lost, across))
+            self._angles[sizes, across] = None
+            inverse = 1.0 / determinant
             x[k] = (t * b[0] - q * b[1]) * inverse
             x[l] = (p * b[1] - r * b[0]) * inverse
         return x
 
     def _least_squares(
-        self, rows: list[Row], right: Sequence[Sequence[Expr]], dependent: Sequence[int], conditions: list[Expr]
+        self, rows: list[Row], right: Sequence[Sequence[Expr]], conditions: list[Expr]
     ) -> list[list[Expr]]:
         """Solve by normal equations, refined once: redundant rows need no choice, and nothing is pivoted."""
         graph = self.terms.graph
         columns = transpose(rows, self.terms.n_v - self.terms.n_dof)
         E = gram(columns)
         factor = factorize(E)
-        short = self.usual_square(range(len(rows))) * NEAR_SQUARE
         for i, pivot in enumerate(factor.pivots):
             if not (pivot - E[i][i]).is_zero:
-                scale = self.s[dependent[i]]
-                size = graph.apply("max", E[i][i], short / (scale * scale))
-                conditions.append(graph.apply("lt", size * max(self.lost, ROUNDED), pivot))
-                self._angles[size, pivot] = None
+                conditions.append(graph.apply("lt", E[i][i] * max(self.lost, ROUNDED), pivot))
+                self._angles[E[i][i], pivot] = None
         found = []
         for b in right:
             x = factor.solve(times(columns, b))

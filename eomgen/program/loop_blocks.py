@@ -14,7 +14,7 @@ from functools import cached_property
 
 from ..graph.core import Expr
 from ..kinematics.row_groups import ALL, UNIT
-from ..limits.constraints import GENTLE, LEFT, TIKHONOV, UNMOVED
+from ..limits.constraints import GENTLE, LEFT, LOST, TIKHONOV, UNMOVED, VANISHED
 from ..limits.crossings import NEAR_SQUARE, SMALL
 from ..limits.rounding import ROW
 from .sparse import Row, SparseFactor, dot, factorize, fill, gram, in_parts, rows_of, times, transpose
@@ -104,6 +104,7 @@ class LoopBlocks(ABC):
         self.J = [{k: x * self.s[k] for k, x in row.items()} for row in self.rows]
         self.h = len(terms.constraints)
         self.gentle = terms.n_v > LARGE
+        self.lost = VANISHED if self.gentle else LOST
         #: whether there are more rows than their rank
         self.redundant = len(self.J) > terms.n_v - terms.n_dof
 
@@ -232,6 +233,7 @@ class LoopBlocks(ABC):
         conditions: list[Expr] = []
         moved = self._moved(conditions)
         a, checks = self._accelerate(dict(zip(v, moved, strict=True)), conditions)
+        conditions.append(self.long_rows(self.lost))
         return [*moved, *a, self.all_of(conditions), self._far()], checks
 
     @abstractmethod
@@ -254,45 +256,52 @@ class LoopBlocks(ABC):
         """Per row the group with which its length is compared."""
         return self.terms.row_groups or (ALL,) * len(self.J)
 
-    def separate_rows(self) -> Expr:
-        """Whether as many rows as the rank are neither short beside their group nor near to those before them."""
-        graph, pivots = self.terms.graph, self._solver[0].pivots
-        squares = [graph.zero if (x := dot(row, row)) is None else x for row in self.J]
-        held, limits = graph.zero, self.shortest(squares)
-        for pivot, square, group in zip(pivots, squares, self.groups, strict=True):
-            separate = graph.apply("lt", square * NEAR_SQUARE, pivot)
-            held = held + graph.apply("and", separate, graph.apply("lt", limits[group], square))
-        return graph.apply("lt", self.terms.n_v - self.terms.n_dof - 0.5, held)
-
-    def usual_square(self, rows: Sequence[int]) -> Expr:
-        """The square of a usual entry of some scaled rows and of those that their lengths are compared with.
-
-        Columns far shorter are what rounding leaves of them where rank is lost.
-        """
-        groups = dict.fromkeys(self.groups[i] for i in rows)
-        found = [x for group in groups for x in self._mean_squares[group]]
-        return largest([*found, *([1.0 / (self.unit * self.unit)] if UNIT in groups else [])])
+    @cached_property
+    def row_squares(self) -> list[Expr]:
+        """The squares of the lengths of the scaled rows."""
+        zero = self.terms.graph.zero
+        return [zero if (x := dot(row, row)) is None else x for row in self.J]
 
     @cached_property
-    def _mean_squares(self) -> dict[int, list[Expr]]:
-        """Of the rows of each group, the mean squares of their entries."""
-        found: dict[int, list[Expr]] = {group: [] for group in self.groups}
-        for row, group in zip(self.J, self.groups, strict=True):
-            if (x := dot(row, row)) is not None:
-                found[group].append(x * (1.0 / len(row)))
-        return found
-
-    def shortest(self, squares: Sequence[Expr]) -> dict[int, Expr]:
+    def short_squares(self) -> dict[int, Expr]:
         """Squares of the lengths at which rows of each group are short."""
         graph, members = self.terms.graph, dict[int, list[Expr]]()
-        for square, group in zip(squares, self.groups, strict=True):
+        for square, group in zip(self.row_squares, self.groups, strict=True):
             members.setdefault(group, []).append(square)
         unit = graph.constant(1.0) / (self.unit * self.unit)
         found = {}
         for group, own in members.items():
             if group == ALL:
-                size = largest(squares)
+                size = largest(self.row_squares)
             else:
                 size = unit if group == UNIT else graph.apply("max", largest(own), unit * (SMALL * SMALL))
             found[group] = size * NEAR_SQUARE
         return found
+
+    def long_rows(self, part: float = 1.0) -> Expr:
+        """Whether as many rows as their rank are not short beside their group, or shorter by a part of that square.
+
+        A row may vanish where rank is lost; what is left of it then is rounding, and all ratios of its entries with it.
+        """
+        graph = self.terms.graph
+        limits = {group: square * part for group, square in self.short_squares.items()}
+        long = [graph.apply("lt", limits[k], x) for k, x in zip(self.groups, self.row_squares, strict=True)]
+        return self._as_many_as_the_rank(long)
+
+    def separate_rows(self) -> Expr:
+        """Whether as many rows as the rank are neither short beside their group nor near to those before them."""
+        graph, pivots, limits = self.terms.graph, self._solver[0].pivots, self.short_squares
+        separate = []
+        for pivot, square, group in zip(pivots, self.row_squares, self.groups, strict=True):
+            apart = graph.apply("lt", square * NEAR_SQUARE, pivot)
+            separate.append(graph.apply("and", apart, graph.apply("lt", limits[group], square)))
+        return self._as_many_as_the_rank(separate)
+
+    def _as_many_as_the_rank(self, rows: Sequence[Expr]) -> Expr:
+        """Whether a condition holds for as many rows as their rank."""
+        if not self.redundant:
+            return self.all_of(rows)
+        graph, held = self.terms.graph, self.terms.graph.zero
+        for row in rows:
+            held = held + row
+        return graph.apply("lt", self.terms.n_v - self.terms.n_dof - 0.5, held)

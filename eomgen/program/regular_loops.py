@@ -146,15 +146,6 @@ class RegularLoops:
         columns = self.loops.all_of(self._across(NEAR_SQUARE))
         return [self.terms.graph.apply("or", columns, self.loops.separate_rows())]
 
-    def _long(self) -> Expr:
-        """Whether as many rows as their rank are not short beside their group."""
-        graph, zero = self.terms.graph, self.terms.graph.zero
-        squares = [zero if (x := dot(row, row)) is None else x for row in self.loops.J]
-        limits, held = self.loops.shortest(squares), zero
-        for square, group in zip(squares, self.loops.groups, strict=True):
-            held = held + graph.apply("lt", limits[group], square)
-        return graph.apply("lt", len(self.dependent) - 0.5, held)
-
     # -- blocks ---------------------------------------------------------------------------------------------------
     def closing(self) -> list[Expr]:
         """As of LoopBlocks; the length is endless where another form is to take the step."""
@@ -191,7 +182,7 @@ class RegularLoops:
         gamma = [x * i for x, i in zip(here[terms.n_v :], self.loops.inverse, strict=True)]
         given, _ = self._particular([-x for x in gamma])
         a, checks = embedded_accelerations(terms, self.loops.s, self._motions, given, here[: terms.n_v])
-        conditions = [*self._follows(), *self._far(), self._long()]
+        conditions = [*self._follows(), *self._far(), self.loops.long_rows()]
         if self.loops.redundant:  # whose rates may contradict each other
             conditions += [self.loops.held(self.moved, self._rate), self.loops.held(a, gamma)]
         return [*self.moved, *a, self.loops.all_of(conditions), terms.graph.one], checks
