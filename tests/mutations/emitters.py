@@ -84,7 +84,7 @@ FAULTS = (
     ),
     Fault(
         "bodies-columns", "eomgen/program/body_loops.py",
-        'return graph.apply("or", columns, separate)',
+        'return graph.apply("or", self.all_of([*columns, self.long_rows()]), separate)',
         "return graph.one",
         "loops by articulated bodies: that a change point is near is not told",
         ("tests/mobility/test_change_point_accelerations.py::test_in_every_method[recursive-cython]",),
