@@ -61,7 +61,7 @@ def woodpecker() -> Any:
             {"normal_law": "rigid", "friction": MU, "restitution": E_BEAK if k == 0 else 0.0},
         )
     m.independent(*coordinates)
-    return m.compile(target="numpy")
+    return m.compile()
 
 
 def by_hand(end: float, h: float) -> Any:
