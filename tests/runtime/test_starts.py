@@ -21,7 +21,8 @@ def module(request: pytest.FixtureRequest) -> Any:
     return eg.load(EXAMPLES / f"{request.param}.yaml").compile()
 
 
-def test_a_start_takes_few_calls(module: Any) -> None:
+def test_a_start_takes_few_calls(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "IPython", raising=False)  # of other tests: it would be asked for a notebook
     module.simulate(SHORT)
     count = 0
 
