@@ -50,20 +50,33 @@ def with_bounds(
     graph = common_graph(outputs)
     if graph is None:
         return np.empty(0), np.empty(0)
+    return _bounds_at(graph, outputs, _values_of_nodes(graph, outputs, values), values, independent)
+
+
+def _values_of_nodes(graph: Graph, outputs: Sequence[Expr], values: Mapping[str, Value]) -> dict[int, Value]:
+    """The value of every node that the outputs are made of, by id, ascending."""
     order, nodes = reachable(graph, (y.id for y in outputs)), graph.nodes
     names = [nodes[i][1] for i in order if nodes[i][0] == "sym" and nodes[i][1] in values]  # of many, few are used
-    found = dict(zip(order, Evaluator([Expr(graph, i) for i in order], names)([values[n] for n in names]), strict=True))
+    evaluate = Evaluator([Expr(graph, i) for i in order], names)
+    return dict(zip(order, evaluate([values[n] for n in names]), strict=True))
+
+
+def _bounds_at(
+    graph: Graph, outputs: Sequence[Expr], found: Mapping[int, Value], values: Mapping[str, Value], independent: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """What :func:`with_bounds` gives, from the values of all nodes."""
+    nodes = graph.nodes
     bounds: dict[int, Value] = {}
     with np.errstate(all="ignore"):
-        for i in order:
+        for i, y in found.items():
             operation, *operands = nodes[i]
             if operation == "sym":
                 bounds[i] = 0.0
                 continue
             if operation == "const":
-                bounds[i] = abs(found[i])
+                bounds[i] = abs(y)
                 continue
-            y, row = found[i], OPERATIONS.get(operation)
+            row = OPERATIONS.get(operation)
             if isinstance(y, list):  # of a sum over pairs, whose entries are nodes of their own
                 bounds[i] = 0.0
                 continue
@@ -80,8 +93,7 @@ def with_bounds(
                 except (ValueError, ArithmeticError):
                     bound = math.inf
             bounds[i] = bound**0.5 if independent else bound
-    width = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
-    shape = (len(outputs), *width)
+    shape = (len(outputs), *np.broadcast_shapes(*(np.shape(x) for x in values.values())))
     result = np.empty(shape), np.empty(shape)
     for k, y in enumerate(outputs):
         result[0][k], result[1][k] = found[y.id], bounds[y.id]
@@ -90,8 +102,13 @@ def with_bounds(
 
 def with_likely_bounds(outputs: Sequence[Expr], values: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
     """The same, bounds at most CHANCE times those of independent roundings, which long chains of rotations need."""
-    found, bounds = with_bounds(outputs, values)
-    return found, np.minimum(bounds, CHANCE * with_bounds(outputs, values, independent=True)[1])
+    graph = common_graph(outputs)
+    if graph is None:
+        return np.empty(0), np.empty(0)
+    nodes = _values_of_nodes(graph, outputs, values)
+    found, bounds = _bounds_at(graph, outputs, nodes, values, independent=False)
+    likely = _bounds_at(graph, outputs, nodes, values, independent=True)[1]
+    return found, np.minimum(bounds, CHANCE * likely)
 
 
 def vanishing(outputs: Sequence[Expr]) -> list[bool]:
@@ -126,35 +143,36 @@ def _is_flat(x: Expr, values: Mapping[str, float]) -> bool:
     """Whether the slope by each symbol is rounding, also of the terms' own slopes, which folded constants hide."""
     names = sorted(symbols_of([x]))
     slopes, bounds = with_likely_bounds(gradient(x, [x.graph.symbol(name) for name in names]), values)
-    terms = np.minimum(_slopes_of_terms(x, names, values), CHANCE * _slopes_of_terms(x, names, values, power=2))
-    return bool(is_rounding(slopes, np.maximum(bounds, terms)).all())
+    strict, likely = _slopes_of_terms(x, names, values)
+    return bool(is_rounding(slopes, np.maximum(bounds, np.minimum(strict, CHANCE * likely))).all())
 
 
-def _slopes_of_terms(x: Expr, names: Sequence[str], values: Mapping[str, float], power: int = 1) -> np.ndarray:
+def _slopes_of_terms(x: Expr, names: Sequence[str], values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
     """Of each symbol, the sum of the magnitudes of the slopes of all terms by it: (n,), from the result backwards.
 
-    Of their squares, and the root of that, with ``power`` 2.
+    And the root of the sum of their squares.
     """
     graph = x.graph
-    order, nodes = reachable(graph, [x.id]), graph.nodes
-    known = [nodes[i][1] for i in order if nodes[i][0] == "sym"]
-    evaluate = Evaluator([Expr(graph, i) for i in order], known)
-    found = dict(zip(order, evaluate([values[n] for n in known]), strict=True))
-    weights = dict.fromkeys(order, 0.0)
-    weights[x.id] = 1.0
+    found, nodes = _values_of_nodes(graph, [x], values), graph.nodes
+    weights, squares = dict.fromkeys(found, 0.0), dict.fromkeys(found, 0.0)
+    weights[x.id] = squares[x.id] = 1.0
     with np.errstate(all="ignore"):
-        for i in reversed(order):
+        for i in reversed(found):
             operation, *operands = nodes[i]
-            weight, y, row = weights[i], found[i], OPERATIONS.get(operation)
+            weight, square, y, row = weights[i], squares[i], found[i], OPERATIONS.get(operation)
             if not weight or isinstance(y, list) or row is None or not row.rates:
                 continue
             try:
                 at = [found[k] for k in operands]
                 for rate, k in zip(row.rates, operands, strict=True):
-                    weights[k] += weight if rate is unit else float(rate(y, *at)) ** power * weight
+                    slope = 1.0 if rate is unit else float(rate(y, *at))
+                    weights[k] += slope * weight
+                    squares[k] += slope**2 * square
             except (ValueError, ArithmeticError):
-                weights.update((k, math.inf) for k in operands)
-    return np.array([weights.get(graph.symbol(name).id, 0.0) ** (1.0 / power) for name in names])
+                for k in operands:
+                    weights[k] = squares[k] = math.inf
+    ids = [graph.symbol(name).id for name in names]
+    return np.array([weights.get(i, 0.0) for i in ids]), np.array([squares.get(i, 0.0) ** 0.5 for i in ids])
 
 
 def is_rounding(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:

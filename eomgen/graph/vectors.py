@@ -34,16 +34,28 @@ def identity(graph: Graph) -> Mat3:
 
 def add(a: Vec3, b: Vec3) -> Vec3:
     """a + b"""
-    graph = a[0].graph
-    x, y, z = (Expr(graph, graph.add(i.id, k.id)) for i, k in zip(a, b, strict=True))
-    return (x, y, z)
+    (x, y, z), (u, v, w) = a, b
+    return (_sum(x, u), _sum(y, v), _sum(z, w))
+
+
+def _sum(x: Expr, y: Expr) -> Expr:
+    """x + y, one of which is zero more often than not: of planar motion, of axes of frames, of what stands still."""
+    graph = x.graph
+    zero = graph.zero.id
+    if y.id == zero:
+        return x
+    return y if x.id == zero else Expr(graph, graph.add(x.id, y.id))
 
 
 def sub(a: Vec3, b: Vec3) -> Vec3:
     """a - b"""
-    graph = a[0].graph
-    x, y, z = (Expr(graph, graph.sub(i.id, k.id)) for i, k in zip(a, b, strict=True))
-    return (x, y, z)
+    (x, y, z), (u, v, w) = a, b
+    return (_difference(x, u), _difference(y, v), _difference(z, w))
+
+
+def _difference(x: Expr, y: Expr) -> Expr:
+    graph = x.graph
+    return x if y.id == graph.zero.id else Expr(graph, graph.sub(x.id, y.id))
 
 
 def neg(a: Vec3) -> Vec3:
@@ -53,31 +65,46 @@ def neg(a: Vec3) -> Vec3:
 
 def scale(s: Expr, a: Vec3) -> Vec3:
     """s a"""
-    return (s * a[0], s * a[1], s * a[2])
+    graph = s.graph
+    none, mul = graph.zero.id, graph.mul
+    x, y, z = (c if c.id == none else Expr(graph, mul(s.id, c.id)) for c in a)
+    return (x, y, z)
 
 
 def dot(a: Vec3, b: Vec3) -> Expr:
     """a . b"""
-    graph = a[0].graph
-    mul, zero = graph.mul, graph.zero.id
-    total = zero
-    for x, y in zip(a, b, strict=True):
-        i, j = x.id, y.id
-        if i != zero and j != zero:  # most products vanish: of axes of frames, of what stands still
-            total = mul(i, j) if total == zero else graph.add(total, mul(i, j))
-    return Expr(graph, total)
+    (x, y, z), (u, v, w) = a, b
+    graph = x.graph
+    zero = graph.zero
+    none, total = zero.id, zero.id
+    i, j = x.id, u.id
+    if i != none and j != none:  # as in sums, most are zero
+        total = graph.mul(i, j)
+    i, j = y.id, v.id
+    if i != none and j != none:
+        total = graph.mul(i, j) if total == none else graph.add(total, graph.mul(i, j))
+    i, j = z.id, w.id
+    if i != none and j != none:
+        total = graph.mul(i, j) if total == none else graph.add(total, graph.mul(i, j))
+    return zero if total == none else Expr(graph, total)
 
 
 def cross(a: Vec3, b: Vec3) -> Vec3:
     """a x b"""
-    graph = a[0].graph
-    mul, sub = graph.mul, graph.sub
-    (i, j, k), (u, v, w) = (x.id for x in a), (x.id for x in b)
-    return (
-        Expr(graph, sub(mul(j, w), mul(k, v))),
-        Expr(graph, sub(mul(k, u), mul(i, w))),
-        Expr(graph, sub(mul(i, v), mul(j, u))),
-    )
+    (x, y, z), (u, v, w) = a, b
+    return (_determinant(y, z, v, w), _determinant(z, x, w, u), _determinant(x, y, u, v))
+
+
+def _determinant(x: Expr, y: Expr, u: Expr, v: Expr) -> Expr:
+    """x v - y u"""
+    graph = x.graph
+    zero = graph.zero
+    none = zero.id
+    i, j, k, n = x.id, v.id, y.id, u.id
+    if i == none or j == none:
+        return zero if k == none or n == none else Expr(graph, graph.neg(graph.mul(k, n)))
+    product = graph.mul(i, j)
+    return Expr(graph, product if k == none or n == none else graph.sub(product, graph.mul(k, n)))
 
 
 def times(m: Mat3, a: Vec3) -> Vec3:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
+from functools import cached_property, partial
 
 from ..equations import METHODS, TreeEquations
 from ..graph.count import count
@@ -29,11 +30,16 @@ class Choice:
     method : str
     operations : mapping of str to int
         Multiplications, additions and divisions of the right-hand side by each method compared; of ``embedding`` only
-        those of the factorisation where they alone are more than all of ``recursive``.
+        those of the factorisation where they alone are more than all of ``recursive``.  Counted when they are read:
+        where only one method is left nothing depends on them.
     """
 
     method: str
-    operations: Mapping[str, int]
+    counted: Callable[[], Mapping[str, int]]
+
+    @cached_property
+    def operations(self) -> Mapping[str, int]:
+        return self.counted()
 
     def __str__(self) -> str:
         counts = ", ".join(f"{method} {n}" for method, n in self.operations.items())
@@ -71,10 +77,12 @@ def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tupl
     bodies = BodyLoops(collect_terms(kinematics, mobility, recursive))
     if bodies.motion is None or not _is_sound(kinematics, mobility, bodies):
         return embedding or METHODS["embedding"](kinematics), None
+    if "embedding" not in operations:
+        return recursive, Choice("recursive", lambda: {"recursive": _count(bodies)})
     operations["recursive"] = _count(bodies)
-    if embedding is not None and operations.get("embedding", operations["recursive"] + 1) <= operations["recursive"]:
-        return embedding, Choice("embedding", operations)
-    return recursive, Choice("recursive", operations)
+    assert embedding is not None
+    chosen = embedding if operations["embedding"] <= operations["recursive"] else recursive
+    return chosen, Choice(chosen.method, partial(dict, operations))
 
 
 def _with_shorter(recursive: TreeEquations, embedding: TreeEquations) -> TreeEquations:
@@ -118,7 +126,7 @@ def _choose_of_tree(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
     factoring = factoring_operations(kinematics.parent)
     large = not is_unrolled(kinematics.parent, Limits().unrolled)
     if factoring >= operations["recursive"] and has_long_paths(kinematics.parent):
-        return recursive, Choice("recursive", {"embedding": factoring, **operations})
+        return recursive, Choice("recursive", partial(dict, embedding=factoring, **operations))
     embedding = METHODS["embedding"](kinematics)
     if large:
         lower = [x for i, row in enumerate(embedding.mass_matrix) for x in row[: i + 1]]
@@ -130,4 +138,4 @@ def _choose_of_tree(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
         total = count(turned.accelerations(solution) if turned else solution).total
     operations = {"embedding": total, **operations}
     chosen = _with_shorter(recursive, embedding) if operations["recursive"] < total else embedding
-    return chosen, Choice(chosen.method, operations)
+    return chosen, Choice(chosen.method, partial(dict, operations))
