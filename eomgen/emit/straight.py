@@ -64,6 +64,7 @@ def cut(
     statements: int,
     lists: Sequence[Expr] = (),
     find: FindPairs | None = None,
+    guards: Sequence[Expr] = (),
 ) -> Pieces:
     """Order the statements behind outputs and checks and cut them into pieces.
 
@@ -77,14 +78,17 @@ def cut(
         What is made too, for its own sake.
     find : callable, optional
         Statements, results and checks -> pairs that stay together and cross in places side by side.
+    guards : sequence of Expr
+        Checks that come before all that they do not need.
     """
     nodes = graph.nodes
     places: dict[int, list[int]] = {}
     for k, y in enumerate(outputs):
         places.setdefault(y.id, []).append(k)
-    wanted = [*outputs, *checks, *lists]
-    sequence = _pair(graph, [i for i in order(wanted) if i not in skipped])
-    check_ids = {y.id for y in checks}
+    wanted = [*outputs, *checks, *guards, *lists]
+    begun = order(guards)
+    sequence = _pair(graph, [i for i in (*begun, *(k for k in order(wanted) if k not in set(begun))) if i not in skipped])
+    check_ids = {y.id for y in (*checks, *guards)}
     pairs = None if find is None else find(sequence, {*places, *check_ids})
     second: Mapping[int, int] = {}
     if pairs is not None:

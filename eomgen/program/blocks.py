@@ -185,9 +185,11 @@ class BlockMaker:
         loads = {"loads": self.held.loads} if self.held is not None else {}
         return {**port_symbols(self.terms, self.sizes.n_h), **loads}
 
-    def _internal(self, name: str, ports: str, outputs: Sequence[Expr], checks: Sequence[Expr] = ()) -> Block:
+    def _internal(
+        self, name: str, ports: str, outputs: Sequence[Expr], checks: Sequence[Expr] = (), guards: Sequence[Expr] = ()
+    ) -> Block:
         inputs = tuple(map(self.port, ports.split()))
-        return Block(name, inputs, tuple(outputs), (len(outputs),), tuple(checks), public=False)
+        return Block(name, inputs, tuple(outputs), (len(outputs),), tuple(checks), tuple(guards), public=False)
 
     def public(self, name: str) -> Block | None:
         """The public kernel of this name if it is straight-line code for this system, else None."""
@@ -330,7 +332,7 @@ class BlockMaker:
                 form = self._loops if name in USUAL else self._regular
                 assert form is not None
                 if name.endswith("closing"):  # a Newton step
-                    return self._internal(name, "q", form.closing())
+                    return self._internal(name, "q", form.closing(), guards=form.guards)
                 outputs, checks = form.dynamics()  # v, a, whether these are sound
                 return self._internal(name, "q v", outputs, [*self._turned, *checks])
             case "loop_slopes" | "slopes_by_position" | "slopes_by_velocity":

@@ -140,10 +140,16 @@ class LoopBlocks(ABC):
         graph = self.terms.graph
         e = [x * i for x, i in zip(self.terms.constraints, self.inverse, strict=False)]
         if self.gentle:
-            closed = self._closed()
-            e = [graph.apply("select", closed, graph.zero, x) for x in e]
+            e = [graph.apply("select", self._closed, graph.zero, x) for x in e]
         return e
 
+    @property
+    def guards(self) -> list[Expr]:
+        """What is 0 where no step is to be made, as all residuals count as zero."""
+        graph = self.terms.graph
+        return [graph.apply("select", self._closed, graph.zero, graph.one)] if self.gentle and self.h else []
+
+    @cached_property
     def _closed(self) -> Expr:
         """Whether no row is farther off than its own sum is rounded: its step would be noise, large near lost rank."""
         graph = self.terms.graph

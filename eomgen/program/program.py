@@ -73,6 +73,8 @@ class Block:
     ----------
     checks : tuple of Expr
         Where one is <= 0 the function reports a singular mass matrix (status 2); NaN shows in the result.
+    guards : tuple of Expr
+        Looked at before all else: where one is <= 0 nothing need be found, and C for one state ends there (status 2).
     public : bool
         Whether users call it; else only drivers do.
     """
@@ -82,6 +84,7 @@ class Block:
     outputs: tuple[Expr, ...]
     shape: tuple[int, ...]
     checks: tuple[Expr, ...] = ()
+    guards: tuple[Expr, ...] = ()
     public: bool = True
 
     @property

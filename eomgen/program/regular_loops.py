@@ -146,6 +146,11 @@ class RegularLoops:
         columns = self.loops.all_of(self._across(NEAR_SQUARE))
         return [self.terms.graph.apply("or", columns, self.loops.separate_rows())]
 
+    @property
+    def guards(self) -> list[Expr]:
+        """As of LoopBlocks."""
+        return self.loops.guards
+
     # -- blocks ---------------------------------------------------------------------------------------------------
     def closing(self) -> list[Expr]:
         """As of LoopBlocks; the length is endless where another form is to take the step."""

@@ -3,7 +3,10 @@
 static int step_directly(double t, const double *restrict q, const double *restrict u, const double *restrict c,
                          double *restrict found, double *restrict w)
 {
-    (void)regular_closing_block(t, q, u, c, found, w);
+    if (regular_closing_block(t, q, u, c, found, w) != 0) {
+        memset(found, 0, (3 + N) * sizeof *found); /* only rounding is left of the constraints */
+        return 1;
+    }
     if (found[2] <= CONSTRAINTS_NEARBY) {
         return 1;
     }
