@@ -185,7 +185,9 @@ def print_block(
     for run in runs:
         outputs[run.first : run.first + run.length] = [graph.zero] * run.length
     lists = [Expr(graph, made) for made in dict.fromkeys(run.made for run in runs)]
-    pieces = cut(graph, outputs, block.checks, program.parameter_only, program.limits.statements, lists, find, block.guards)
+    pieces = cut(
+        graph, outputs, block.checks, program.parameter_only, program.limits.statements, lists, find, block.guards
+    )
     texts = references(program, block.inputs)
     return print_pieces(program, f"{block.name}_block", pieces, texts, runs, places_again(program, block), printing)
 

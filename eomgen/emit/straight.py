@@ -87,7 +87,9 @@ def cut(
         places.setdefault(y.id, []).append(k)
     wanted = [*outputs, *checks, *guards, *lists]
     begun = order(guards)
-    sequence = _pair(graph, [i for i in (*begun, *(k for k in order(wanted) if k not in set(begun))) if i not in skipped])
+    sequence = _pair(
+        graph, [i for i in (*begun, *(k for k in order(wanted) if k not in set(begun))) if i not in skipped]
+    )
     check_ids = {y.id for y in (*checks, *guards)}
     pairs = None if find is None else find(sequence, {*places, *check_ids})
     second: Mapping[int, int] = {}

@@ -12,6 +12,7 @@ from ..limits.inertia import STILL
 from ..numeric.triangular import DiagonalBlock, diagonal_blocks
 from .factor import exceeding
 from .loop_blocks import LoopBlocks, apart, largest
+from .motions import Motions
 from .sparse import Row, dot, factorize, gram, rows_of, times, transpose
 from .terms import SystemTerms
 
@@ -19,18 +20,14 @@ SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast 
 
 
 def embedded_accelerations(
-    terms: SystemTerms, scales: Sequence[Expr], B: Sequence[Row], a: Sequence[Expr], bias: Sequence[Expr]
+    terms: SystemTerms, scales: Sequence[Expr], B: Motions, a: Sequence[Expr], bias: Sequence[Expr]
 ) -> tuple[list[Expr], list[Expr]]:
     """Accelerations a + B y with B^T (M (a + B y) + bias) = 0, and checks of the inertia B^T M B."""
     graph, f = terms.graph, range(terms.n_dof)
     M = rows_of(terms.mass_matrix)
     force = [x + y for x, y in zip(bias, times(M, a), strict=True)]
-    columns = transpose(B, terms.n_dof)
-    MB = [{k: x for k, b in enumerate(columns) if (x := dot(row, b)) is not None} for row in M]
-    across = transpose(MB, terms.n_dof)
-    embedded = {(i, k): dot(columns[i], across[k]) for i in f for k in f if k <= i}
-    entries = {key: graph.zero if x is None else x for key, x in embedded.items()}
-    factor = factorize([{k: entries[max(i, k), min(i, k)] for k in f} for i in f])
+    columns, embedded = B.columns, B.gram(M)
+    factor = factorize([{k: embedded.get((max(i, k), min(i, k)), graph.zero) for k in f} for i in f])
     y = factor.solve([-x for x in times(columns, force)])
     diagonal = {i: row.get(i, graph.zero) for i, row in enumerate(M)}
     squares = [dot({i: x * x for i, x in column.items()}, diagonal) for column in columns]
@@ -38,11 +35,11 @@ def embedded_accelerations(
     sizes = [graph.zero if x is None else x * k for x, k in zip(squares, units, strict=True)]
     checks = exceeding([d * k for d, k in zip(factor.pivots, units, strict=True)], sizes)
     if terms.n_dof == 1:  # there is no other motion whose inertia tells what nothing is
-        moving = {k: scales[k] / scales[terms.preferred[0]] for k, row in enumerate(B) if row}
+        moving = {k: scales[k] / scales[terms.preferred[0]] for k, row in enumerate(B.rows) if row}
         reach = dot({k: ratio * ratio for k, ratio in moving.items()}, diagonal)
         if reach is not None:
             checks.append(graph.apply("lt", reach * STILL, factor.pivots[0]))
-    return [x + d for x, d in zip(a, times(B, y), strict=True)], checks
+    return [x + d for x, d in zip(a, times(B.rows, y), strict=True)], checks
 
 
 class EmbeddedLoops(LoopBlocks):
@@ -70,7 +67,7 @@ class EmbeddedLoops(LoopBlocks):
             B, _ = self._partition(None, conditions)
         else:
             B, a = self._partition([-x for x in gamma], conditions)
-        a, checks = embedded_accelerations(terms, self.s, B, a, here[: terms.n_v])
+        a, checks = embedded_accelerations(terms, self.s, Motions(B, terms.n_dof), a, here[: terms.n_v])
         return a, checks
 
     def _far(self) -> Expr:

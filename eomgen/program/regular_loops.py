@@ -19,8 +19,9 @@ from ..limits.constraints import LOST
 from ..limits.crossings import NEAR_SQUARE
 from .embedded_loops import SPREAD, embedded_accelerations
 from .loop_blocks import LoopBlocks, largest, total_magnitude
+from .motions import Leg, Motions
 from .orthogonal import OrthogonalFactor, connected, fronts, work
-from .sparse import Row, SparseFactor, dot, factorize, times, transpose
+from .sparse import Row, SparseFactor, factorize, times
 
 ENDLESS = 1e300  #: the length of a step that is not known here
 ROW = 64  #: connected columns from which on rows tell what is near, as columns of 160 four-bars no longer can
@@ -75,28 +76,39 @@ class RegularLoops:
         return x, left
 
     @cached_property
-    def _motions(self) -> list[Row]:
+    def _motions(self) -> Motions:
         """B (n rows of f)."""
         zero = self.terms.graph.zero
         columns = [self._particular([-row.get(k, zero) for row in self.loops.rows])[0] for k in self.terms.preferred]
         for k, column in zip(self.terms.preferred, columns, strict=True):
             column[k] = self.terms.graph.one
-        return [{j: x[i] for j, x in enumerate(columns) if not x[i].is_zero} for i in range(self.terms.n_v)]
+        rows = [{j: x[i] for j, x in enumerate(columns) if not x[i].is_zero} for i in range(self.terms.n_v)]
+        return Motions(rows, self.terms.n_dof, self._legs())
 
-    @cached_property
-    def _columns(self) -> list[Row]:
-        return transpose(self._motions, self.terms.n_dof)
+    def _legs(self) -> list[Leg]:
+        """The parts that fewer rows hold than freedoms drive."""
+        graph, m, place = self.terms.graph, len(self._left), {k: j for j, k in enumerate(self.terms.preferred)}
+        found = []
+        for part in self._factor.parts:
+            held = [i for i, row in enumerate(self._left) if not part.isdisjoint(row)]
+            drive = [{place[k]: -x for k, x in self.loops.rows[i].items() if k in place} for i in held]
+            if len(held) >= len(set().union(*drive)):
+                continue
+            unit = [self._factor.solve([graph.one if j == i else graph.zero for j in range(m)])[0] for i in held]
+            inverse = [{j: x[k] for j, x in enumerate(unit) if not x[k].is_zero} for k in sorted(part)]
+            found.append(Leg(tuple(self.dependent[k] for k in sorted(part)), inverse, drive))
+        return found
 
     @cached_property
     def _weighted(self) -> list[Row]:
-        return [{i: x * self.weights[i] for i, x in column.items()} for column in self._columns]
+        return [{i: x * self.weights[i] for i, x in column.items()} for column in self._motions.columns]
 
     @cached_property
     def _products(self) -> list[Row]:
         """B^T W B."""
         f = range(self.terms.n_dof)
-        lower = {(i, j): dot(self._columns[i], self._weighted[j]) for i in f for j in f if j <= i}
-        return [{j: x for j in f if (x := lower[max(i, j), min(i, j)]) is not None} for i in f]
+        lower = self._motions.gram([{k: x} for k, x in enumerate(self.weights)])
+        return [{j: lower[key] for j in f if (key := (max(i, j), min(i, j))) in lower} for i in f]
 
     @cached_property
     def _nearest(self) -> SparseFactor:
@@ -159,7 +171,7 @@ class RegularLoops:
         size = total_magnitude(e) * (loops.unit / float(loops.h))
         d, rest = self._particular(e)
         left = total_magnitude(rest) * loops.unit if rest else graph.zero
-        dz = [x - y for x, y in zip(d, times(self._motions, self._along(d)), strict=True)]
+        dz = [x - y for x, y in zip(d, times(self._motions.rows, self._along(d)), strict=True)]
         length = total_magnitude([x * (1.0 / s) for x, s in zip(dz, loops.s, strict=True)])
         length = graph.apply("select", self.loops.all_of(self._follows()), length, graph.constant(ENDLESS))
         return [size, left, length, *(-x for x in dz)]
@@ -175,9 +187,9 @@ class RegularLoops:
         v = [terms.graph.symbol(name) for name in terms.v]
         given, _ = self._particular([-x for x in self._rate])
         y = [v[k] for k in terms.preferred]
-        missed = [a - b - c for a, b, c in zip(v, given, times(self._motions, y), strict=True)]
+        missed = [a - b - c for a, b, c in zip(v, given, times(self._motions.rows, y), strict=True)]
         y = [a + b for a, b in zip(y, self._along(missed), strict=True)]
-        return [a + b for a, b in zip(given, times(self._motions, y), strict=True)]
+        return [a + b for a, b in zip(given, times(self._motions.rows, y), strict=True)]
 
     def dynamics(self) -> tuple[list[Expr], list[Expr]]:
         """As of LoopBlocks; where it is sound, no change point is near."""

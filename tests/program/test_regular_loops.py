@@ -14,6 +14,7 @@ import eomgen as eg
 from benchmarks.large_loops import four_bars as four_bars_in_a_row
 from benchmarks.loop_robots import ROBOTS
 from eomgen import pipeline
+from eomgen.graph.count import count
 from eomgen.graph.evaluate import compile_evaluator
 from eomgen.limits.constraints import NEARBY
 from eomgen.limits.crossings import NEAR
@@ -133,6 +134,44 @@ def test_steps_come_to_the_same_place(name: str) -> None:
             np.testing.assert_allclose(places[0], places[1], rtol=0, atol=1e-12)
             assert np.abs(beside.module.constraints(places[0][: beside.n_q])).max() < 1e-13
     assert found >= 3
+
+
+@pytest.mark.parametrize("name", ["delta robot", "Stewart platform", "redundant rows"])
+def test_a_closed_position_makes_no_step(name: str) -> None:
+    """A guard ends the step where only rounding is left of the constraints, which takes a part of its operations."""
+    beside, rng = Beside(MODELS[name]()), np.random.default_rng(7)
+    for part in ("regular_closing", "closing"):
+        block = beside.blocks[part]
+        (guard,) = block.guards
+        guarded = compile_evaluator([guard], (*beside.names, *beside.values, "t"))
+        assert count([guard]).total < 0.3 * count(list(block.outputs)).total
+        for far in (0.0, 1e-12, 1e-9, 1e-3):
+            x = beside.state(rng, 0.02)
+            x[: beside.n_q] += far * rng.uniform(-1, 1, beside.n_q)
+            is_open = guarded([*x, *beside.values.values(), 0.0])[0]
+            assert is_open == (far > 0.0)
+            if not is_open:
+                assert not beside.evaluate(part, x)[[0, 1, *range(3, 3 + beside.n)]].any()
+        x[0] = np.nan
+        assert guarded([*x, *beside.values.values(), 0.0])[0] == 1.0, "what is not a number is not closed"
+
+
+@pytest.mark.parametrize("name", ["delta robot", "Stewart platform"])
+def test_compiled_calls_at_closed_positions_are_those_beside_them(name: str) -> None:
+    """Alone and side by side, to the bit; a state that is not a number stays one."""
+    module = MODELS[name]().compile(lanes=4, kernels=KERNELS)
+    rng, states = np.random.default_rng(8), []
+    for far in (0.0, 0.0, 1e-13, 0.0, 1e-9, 0.0, 1e-6, 0.0):
+        x = module.x0()
+        x[: module.n_q] += 0.02 * rng.uniform(-1, 1, module.n_q)
+        x[module.n_q :] = rng.uniform(-1, 1, module.n_v)
+        x = module.project(x)
+        found = module.rhs(0.0, x)
+        x[: module.n_q] += far * rng.uniform(-1, 1, module.n_q)
+        states.append(x)
+        np.testing.assert_allclose(module.rhs(0.0, x), found, rtol=0, atol=1e3 * (far + 1e-14) * np.abs(found).max())
+    together = module.rhs(0.0, np.array(states).T)
+    assert (together == np.array([module.rhs(0.0, x) for x in states]).T).all()
 
 
 def test_next_to_change_points_the_usual_form_decides() -> None:
