@@ -133,7 +133,7 @@ LOOPS_FOUND = {
     "two legs with such ankles": (5580, 8153),
     "hand of three parallel fingers": (792, 1214),
     "delta robot": (8712, 20104),
-    "Stewart platform": (10067, 19469),
+    "Stewart platform": (9725, 19469),
 }
 
 

@@ -13,10 +13,11 @@ from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Mat3
 from ..limits.descriptions import PLANE
 
+Turns = tuple[Expr, list[tuple[int, float]]]  #: an angle, and the coordinates in it with their factors
 TRIALS = 3  #: random points at which an identity is tried
 
 
-def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> tuple[Expr, list[tuple[int, float]]] | None:
+def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> Turns | None:
     """The angle about z of a rotation that is about z at every q, else None.
 
     Whether it is, is tried at random values of all symbols: an identity that holds there holds everywhere.

@@ -8,7 +8,7 @@ cut joint, times the wrench by which the equation acts there.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 from ..describe.mechanism import JointSpec
 from ..graph import vectors as vec
@@ -18,12 +18,11 @@ from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .angle_sums import sum_of_turns
+from .angle_sums import Turns
 from .kinematics import Kinematics
 
 #: Rows by twists are taken where they and the constraints are shorter than this times those of derivatives.
 SHORTER = 0.9
-Turns: TypeAlias = tuple[Expr, list[tuple[int, float]]]
 COMMON = ("r_x", "r_y", "r_z")  #: rows along axes that both chains share (see close_loop)
 
 
@@ -74,13 +73,11 @@ def pose_equations(kinematics: Kinematics, spec: JointSpec) -> PoseEquations:
 
 
 def turns_about_z(kinematics: Kinematics, spec: JointSpec) -> Turns | None:
-    """What :func:`.angle_sums.sum_of_turns` finds of a cut joint with one angle, looked for once."""
-    kept: dict[str, Turns | None] = vars(kinematics).setdefault("_turns_about_z", {})
-    if spec.name not in kept:
-        alone = sum(coordinate.kind == "angle" for coordinate in spec.joint.coordinates) == 1
-        rotation = kinematics.poses.relative(spec.predecessor, spec.successor).rotation
-        kept[spec.name] = sum_of_turns(kinematics.graph, rotation, kinematics.q) if alone else None
-    return kept[spec.name]
+    """What :meth:`.tree.Poses.turns` finds of a cut joint with one angle."""
+    if sum(coordinate.kind == "angle" for coordinate in spec.joint.coordinates) != 1:
+        return None
+    rotation = kinematics.poses.relative(spec.predecessor, spec.successor).rotation
+    return kinematics.poses.turns(rotation, kinematics.q)
 
 
 def pose_symbols(graph: Graph, of: str) -> tuple[Mat3, Vec3]:

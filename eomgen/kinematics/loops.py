@@ -17,7 +17,6 @@ from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Vec3
 from ..limits.rounding import ROUNDED
 from ..records import dataclass
-from .angle_sums import sum_of_turns
 from .state import MotionSymbols
 from .tree import Poses
 
@@ -88,7 +87,7 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
     gap = vec.sub(inner.position, outer.position)
     position = vec.transpose_times(outer.rotation, gap)
     angles = [k for k, coordinate in enumerate(spec.joint.coordinates) if coordinate.kind == "angle"]
-    turns = sum_of_turns(graph, rotation, q) if len(angles) == 1 else None
+    turns = poses.turns(rotation, q) if len(angles) == 1 else None
     if turns is not None:
         rows = spec.joint.closure_in_turns(graph, rotation, position, turns[0])
     else:

@@ -26,7 +26,6 @@ from ..graph.differentiate import jvp
 from ..graph.spatial import Twist
 from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Mat3, Vec3
-from .angle_sums import sum_of_turns
 from .exerted import part_exerted
 from .momentum import Momentum
 from .reaction_parts import part_of_reaction
@@ -130,7 +129,7 @@ class MarkerMotion:
         It is where the relative rotation is about that axis at every configuration.
         """
         rotation = self.poses.relative(start, end).rotation
-        found = sum_of_turns(self.graph, rotation, self.state.q)
+        found = self.poses.turns(rotation, self.state.q)
         if found is not None:
             angle, terms = found
             rate = self.graph.zero

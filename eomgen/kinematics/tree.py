@@ -6,6 +6,8 @@ in link axes at the link's origin (Featherstone, RBDA, ch. 2, with body coordina
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..describe.mechanism import Mechanism
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
@@ -14,6 +16,7 @@ from ..graph.rounding_bounds import settled_rotation
 from ..graph.spatial import Twist, Wrench
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
+from .angle_sums import Turns, sum_of_turns
 from .axis_turns import AxisTurns, turn_frame
 from .link_inertia import SpatialInertia, body_inertia, place_point, settled_matrix
 from .topology import Topology
@@ -157,6 +160,7 @@ class Poses:
         self.link_of = {link.body: k for k, link in enumerate(links)} | {GROUND: GROUND}
         self._pass = self.graph.begin_pass()
         self._known: dict[tuple[int, int, tuple[Mat3, Vec3] | None], Frame] = {}
+        self._turns: dict[tuple[int, ...], Turns | None] = {}
 
     def marker_in_link(self, marker: Marker) -> Frame:
         """Constant placement of a marker in its link frame (in ground for a ground marker)."""
@@ -215,6 +219,13 @@ class Poses:
         outer, inner = self.pair(start, end)
         back = vec.transpose(outer.rotation)
         return Frame(vec.product(back, inner.rotation), vec.times(back, vec.sub(inner.position, outer.position)))
+
+    def turns(self, rotation: Mat3, q: Sequence[Expr]) -> Turns | None:
+        """What :func:`.angle_sums.sum_of_turns` finds of a rotation, looked for once."""
+        key = tuple(x.id for row in rotation for x in row)
+        if key not in self._turns:
+            self._turns[key] = sum_of_turns(self.graph, rotation, q)
+        return self._turns[key]
 
     def pair(self, start: Marker, end: Marker) -> tuple[Frame, Frame]:
         """Placements of two markers in the frame of :meth:`between`."""
