@@ -11,8 +11,8 @@ from ..limits.crossings import NEAR_SQUARE
 from ..limits.inertia import STILL
 from ..numeric.triangular import DiagonalBlock, diagonal_blocks
 from .factor import exceeding
+from .leg_motions import Motions
 from .loop_blocks import LoopBlocks, apart, largest
-from .motions import Motions
 from .sparse import Row, dot, factorize, gram, rows_of, times, transpose
 from .terms import SystemTerms
 

@@ -18,8 +18,8 @@ from ..graph.substitute import substitute
 from ..limits.constraints import LOST
 from ..limits.crossings import NEAR_SQUARE
 from .embedded_loops import SPREAD, embedded_accelerations
+from .leg_motions import Leg, Motions
 from .loop_blocks import LoopBlocks, largest, total_magnitude
-from .motions import Leg, Motions
 from .orthogonal import OrthogonalFactor, connected, fronts, work
 from .sparse import Row, SparseFactor, factorize, times
 

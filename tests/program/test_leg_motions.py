@@ -9,7 +9,7 @@ from eomgen.graph import Graph
 from eomgen.graph.core import Expr
 from eomgen.graph.count import count
 from eomgen.graph.evaluate import evaluate
-from eomgen.program.motions import Leg, Motions, _product
+from eomgen.program.leg_motions import Leg, Motions, _product
 from eomgen.program.sparse import dot, transpose
 
 LEGS, ROWS, FREEDOMS = 4, 3, 6
