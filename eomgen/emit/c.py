@@ -150,7 +150,7 @@ def _context(program: Program, printed: list[Printed], work: int) -> dict[str, A
     moving = range(sizes.n_v - program.n_states)
     known = program.metadata.get("row_velocities") or [moving] * sizes.n_c
     drivers = [read_template(f"c/drivers/{file}.c") for file in driver_files(program)]
-    roots = [y for b in program.blocks for y in (*b.outputs, *b.checks)]
+    roots = [y for b in program.blocks for y in b.roots]
     return {
         "name": program.name,
         "prefix": program.name.upper(),

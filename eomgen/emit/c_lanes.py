@@ -77,7 +77,7 @@ def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
     if not blocks:
         return {}
     name = program.name
-    roots = [y for b in blocks.values() for y in (*b.outputs, *b.checks)]
+    roots = [y for b in blocks.values() for y in b.roots]
     parts = [space_file(program), f"{straight_file(program)}_in_lanes", "rhs_in_lanes"]
     drivers = [read_template(f"c/drivers/{file}.c") for file in parts if loops_in_lanes(program)]
     inside = {

@@ -121,7 +121,7 @@ def build_program(
     made = {*(d.name for d in drivers), *(b.name for b in blocks.values() if b.public)}
     kernel_shapes = {k.name: list(k.shape(sizes)) for k in KERNELS if k.name in made}
 
-    roots = [y for block in blocks.values() for y in (*block.outputs, *block.checks)]
+    roots = [y for block in blocks.values() for y in block.roots]
     hoisted, parameter_only = hoist(terms.graph, roots, terms.p)
     counts = {b.name: count_apart((*b.outputs, *b.checks), parameter_only) for b in blocks.values()}
     counts["precompute"] = count_apart(hoisted, frozenset())

@@ -40,7 +40,7 @@ def fingerprint(program: Program) -> str | None:
 def _spell_graph(program: Program, known: Known) -> list[Any]:
     """The nodes that can be reached, and what calls among them mean."""
     graph: Graph = program.graph
-    expressions = [y for block in program.blocks for y in (*block.outputs, *block.checks)] + list(program.hoisted)
+    expressions = [y for block in program.blocks for y in block.roots] + list(program.hoisted)
     if program.system is not None:
         system = program.system
         expressions += [*system.entries, *system.right, *system.sizes, *system.accelerations]

@@ -93,6 +93,11 @@ class Block:
         return tuple(s for port in self.ports for s in port.symbols)
 
     @property
+    def roots(self) -> tuple[Expr, ...]:
+        """All that is evaluated."""
+        return (*self.outputs, *self.checks, *self.guards)
+
+    @property
     def n_in(self) -> int:
         """Length of x."""
         return sum(len(port.symbols) for port in self.ports)
