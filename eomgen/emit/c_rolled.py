@@ -24,22 +24,15 @@ ALIKE = 2
 
 def print_rolled(program: Program, block: Block) -> Printed | None:
     """The C functions of a block whose alike segments are loops; None if too few of its segments are alike."""
-    texts, again = references(program, block.inputs), places_again(program, block)
-    common = program.parameter_only, texts, again, program.is_searched(block.name)
-    name = f"{block.name}_guard"
-    # guards are a function of their own: in one with the rest, what is alike would not stay side by side
-    guard = _print(program, name, (), block.guards, *common) if block.guards else None
-    opening = [] if guard is None else [f"EOMGEN_REJECT({name}_block({', '.join(ARGUMENTS)}))"]
-    printed = _print(program, block.name, block.outputs, block.checks, *common, opening)
-    if printed is None or guard is None:
-        return printed
-    return printed._replace(text=f"{guard.text}\n{printed.text}", work=max(guard.work, printed.work))
+    texts = references(program, block.inputs)
+    again = places_again(program, block)
+    return _print(program, block.name, block.outputs, block.checks, program.parameter_only, texts, again)
 
 
 def print_rolled_precompute(program: Program) -> Printed | None:
     """The same of ``precompute_block``."""
     texts = {program.graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)}
-    return _print(program, "precompute", program.hoisted, (), frozenset(), texts, {}, program.is_searched("precompute"))
+    return _print(program, "precompute", program.hoisted, (), frozenset(), texts, {})
 
 
 def _print(
@@ -50,13 +43,11 @@ def _print(
     skipped: frozenset[int],
     texts: dict[int, str],
     again: dict[str, str],
-    searched: bool,
-    opening: Sequence[str] = (),
 ) -> Printed | None:
     graph, name = program.graph, f"{block}_block"
     given = {i: _place(text) for i, text in texts.items()}
     longest = max(1, program.limits.statements // 2)
-    found = find_segments(graph, outputs, checks, skipped, given, longest, searched)
+    found = find_segments(graph, outputs, checks, skipped, given, longest, program.is_searched(block))
     if ALIKE * found.written > found.carried_out:
         return None
     found.lists.again = again
@@ -74,7 +65,7 @@ def _print(
     main += [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in bare]
     angles, first = _print_angles(found, name)
     runs, calls = _print_runs(found.runs, name, len(found.kinds))
-    text = function_text(f"static flag {name}", set(ARGUMENTS), [*opening, *main, *first, *calls])
+    text = function_text(f"static flag {name}", set(ARGUMENTS), [*main, *first, *calls])
     return Printed("\n".join([*printed, angles + runs + text]), (), found.work)
 
 

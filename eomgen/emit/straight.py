@@ -86,10 +86,8 @@ def cut(
     for k, y in enumerate(outputs):
         places.setdefault(y.id, []).append(k)
     wanted = [*outputs, *checks, *guards, *lists]
-    begun = order(guards)
-    sequence = _pair(
-        graph, [i for i in (*begun, *(k for k in order(wanted) if k not in set(begun))) if i not in skipped]
-    )
+    every = dict.fromkeys((*order(guards), *order(wanted)))
+    sequence = _pair(graph, [i for i in every if i not in skipped])
     check_ids = {y.id for y in (*checks, *guards)}
     pairs = None if find is None else find(sequence, {*places, *check_ids})
     second: Mapping[int, int] = {}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from copy import copy
-from functools import cached_property, partial
+from functools import cached_property
 
 from ..equations import METHODS, TreeEquations
 from ..graph.count import count
@@ -35,15 +35,37 @@ class Choice:
     """
 
     method: str
-    counted: Callable[[], Mapping[str, int]]
-
-    @cached_property
-    def operations(self) -> Mapping[str, int]:
-        return self.counted()
+    operations: Mapping[str, int]
 
     def __str__(self) -> str:
         counts = ", ".join(f"{method} {n}" for method, n in self.operations.items())
         return f"{self.method} chosen; operations of the right-hand side: {counts}"
+
+
+class CountedLater(Mapping[str, int]):
+    """Operations that are counted when they are first read; copies and pickles hold plain numbers."""
+
+    def __init__(self, counted: Callable[[], dict[str, int]]) -> None:
+        self._counted = counted
+
+    @cached_property
+    def _found(self) -> dict[str, int]:
+        return self._counted()
+
+    def __getitem__(self, method: str) -> int:
+        return self._found[method]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def __repr__(self) -> str:
+        return repr(self._found)
+
+    def __reduce__(self) -> tuple[type[dict[str, int]], tuple[dict[str, int]]]:
+        return dict, (self._found,)
 
 
 def choose(kinematics: Kinematics, mobility: Mobility) -> tuple[TreeEquations, Choice | None]:
@@ -78,11 +100,11 @@ def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tupl
     if bodies.motion is None or not _is_sound(kinematics, mobility, bodies):
         return embedding or METHODS["embedding"](kinematics), None
     if "embedding" not in operations:
-        return recursive, Choice("recursive", lambda: {"recursive": _count(bodies)})
+        return recursive, Choice("recursive", CountedLater(lambda: {"recursive": _count(bodies)}))
     operations["recursive"] = _count(bodies)
     assert embedding is not None
     chosen = embedding if operations["embedding"] <= operations["recursive"] else recursive
-    return chosen, Choice(chosen.method, partial(dict, operations))
+    return chosen, Choice(chosen.method, operations)
 
 
 def _with_shorter(recursive: TreeEquations, embedding: TreeEquations) -> TreeEquations:
@@ -126,7 +148,7 @@ def _choose_of_tree(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
     factoring = factoring_operations(kinematics.parent)
     large = not is_unrolled(kinematics.parent, Limits().unrolled)
     if factoring >= operations["recursive"] and has_long_paths(kinematics.parent):
-        return recursive, Choice("recursive", partial(dict, embedding=factoring, **operations))
+        return recursive, Choice("recursive", {"embedding": factoring, **operations})
     embedding = METHODS["embedding"](kinematics)
     if large:
         lower = [x for i, row in enumerate(embedding.mass_matrix) for x in row[: i + 1]]
@@ -138,4 +160,4 @@ def _choose_of_tree(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
         total = count(turned.accelerations(solution) if turned else solution).total
     operations = {"embedding": total, **operations}
     chosen = _with_shorter(recursive, embedding) if operations["recursive"] < total else embedding
-    return chosen, Choice(chosen.method, partial(dict, operations))
+    return chosen, Choice(chosen.method, operations)

@@ -154,7 +154,7 @@ class LoopBlocks(ABC):
         """Whether no row is farther off than its own sum is rounded: its step would be noise, large near lost rank."""
         graph = self.terms.graph
         beyond = [graph.apply("abs", row) - ROW * total_magnitude(summands(row)) for row in self.terms.constraints]
-        return graph.apply("lt", largest(beyond), graph.zero)
+        return graph.apply("le", largest(beyond), graph.zero)
 
     # -- velocity and acceleration --------------------------------------------------------------------------------
     @cached_property

@@ -15,7 +15,6 @@ from pinocchio_trees import STEPS, pinocchio_model
 from sweeps import seeds
 
 import eomgen as eg
-from benchmarks.large_loops import closed_chain
 from eomgen import pipeline
 from eomgen.emit import c_rolled, emit_c
 from eomgen.equations import METHODS
@@ -219,30 +218,3 @@ def test_few_alike_segments_stay_straight_line() -> None:
     program = pipeline.build(numbers_chain(3).derive("recursive"), "c", ["rhs"])
     assert not program.is_rolled("rhs")
     assert c_rolled.print_rolled(program, program.blocks[0]) is None
-
-
-@pytest.mark.parametrize("rolled", [0, NEVER])
-def test_a_step_onto_closed_loops_ends_at_its_guard(
-    rolled: int, libraries: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In loops the guard is a function of its own; states on the loops and beside them have the graph's numbers."""
-    monkeypatch.setattr(c_rolled, "ALIKE", 0)
-    equations = closed_chain(20, True, True).derive("recursive")
-    program = limited(pipeline.build(equations, "c", ["rhs", "project"]), rolled)
-    sources = emit_c(program, "double", lanes=False)
-    text = sources[f"{program.name}.c"]
-    step = text[text.index("static flag closing_block(") :].partition("\n}\n")[0]
-    assert ("EOMGEN_REJECT(closing_guard_block(" in step) == (rolled == 0)
-    library = libraries.Library(libraries.compile_library(sources, tmp_path, "-O0"), [], [])
-    module = equations.compile("numpy")
-    x = module.x0()
-    x[module.n_q :] = np.random.default_rng(6).uniform(-1.0, 1.0, module.n_v)
-    x = module.project(x)
-    for far in (0.0, 1e-9, 1e-6):
-        beside = x + far * np.r_[np.random.default_rng(7).uniform(-1.0, 1.0, module.n_q), np.zeros(module.n_v)]
-        expected = module.rhs(0.0, beside)
-        found = library.fine("rhs", beside, 0.0)
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
-    x[0] = np.nan
-    status, out = library("rhs", x, 0.0)
-    assert status or np.isnan(out).any()

@@ -1,12 +1,14 @@
 """What build_program decides: blocks and drivers, ports, hoisting, counts, refusals."""
 
 import json
+import pickle
 import subprocess
 import sys
 from dataclasses import FrozenInstanceError, replace
 
 import pytest
 
+from benchmarks.large_loops import closed_chain
 from eomgen.errors import UsageError
 from eomgen.graph.count import count
 from eomgen.graph.substitute import symbols_of
@@ -168,3 +170,13 @@ def test_importing_the_stage_loads_neither_sympy_nor_templates():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_what_auto_chose_is_counted_when_read_and_goes_through_pickle() -> None:
+    equations = closed_chain(40, True, True).derive()
+    again = pickle.loads(pickle.dumps(equations))
+    assert equations.choice is not None
+    assert again.choice == equations.choice == closed_chain(40, True, True).derive().choice
+    assert str(again.choice) == str(equations.choice)
+    assert set(again.choice.operations) == {"recursive"}
+    assert again.choice.operations["recursive"] > 40 * 100

@@ -15,7 +15,7 @@ from benchmarks.large_loops import four_bars as four_bars_in_a_row
 from benchmarks.loop_robots import ROBOTS
 from eomgen import pipeline
 from eomgen.graph.count import count
-from eomgen.graph.evaluate import compile_evaluator
+from eomgen.graph.evaluate import compile_evaluator, evaluate
 from eomgen.limits.constraints import NEARBY
 from eomgen.limits.crossings import NEAR
 from eomgen.program import straight_loops
@@ -158,20 +158,44 @@ def test_a_closed_position_makes_no_step(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["delta robot", "Stewart platform"])
 def test_compiled_calls_at_closed_positions_are_those_beside_them(name: str) -> None:
-    """Alone and side by side, to the bit; a state that is not a number stays one."""
-    module = MODELS[name]().compile(lanes=4, kernels=KERNELS)
+    """Alone and side by side, to the bit, signs of zeros included; beside NumPy's, which pivots."""
+    equations = MODELS[name]().derive()
+    module, numbers = equations.compile(lanes=4, kernels=KERNELS), equations.compile(target="numpy", kernels=KERNELS)
     rng, states = np.random.default_rng(8), []
     for far in (0.0, 0.0, 1e-13, 0.0, 1e-9, 0.0, 1e-6, 0.0):
         x = module.x0()
         x[: module.n_q] += 0.02 * rng.uniform(-1, 1, module.n_q)
         x[module.n_q :] = rng.uniform(-1, 1, module.n_v)
         x = module.project(x)
-        found = module.rhs(0.0, x)
         x[: module.n_q] += far * rng.uniform(-1, 1, module.n_q)
         states.append(x)
-        np.testing.assert_allclose(module.rhs(0.0, x), found, rtol=0, atol=1e3 * (far + 1e-14) * np.abs(found).max())
-    together = module.rhs(0.0, np.array(states).T)
-    assert (together == np.array([module.rhs(0.0, x) for x in states]).T).all()
+        expected = numbers.rhs(0.0, x)
+        np.testing.assert_allclose(module.rhs(0.0, x), expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+    together, alone = module.rhs(0.0, np.array(states).T), np.array([module.rhs(0.0, x) for x in states]).T
+    assert (together == alone).all()
+    assert (np.signbit(together) == np.signbit(alone)).all()
+
+
+def test_rows_that_vanish_at_a_parameter_count_as_closed() -> None:
+    """Their terms are 0 too, so that nothing is rounded."""
+    model = four_bars_in_a_row(5)
+    m = eg.Model("bars", gravity=(0, -9.81, 0))
+    m.parameter("h", 0.0)
+    rod: dict[str, Any] = {"mass": 1.0, "inertia": (0.01, 0.08, 0.08)}
+    cranks = [m.body(f"crank{k}", com=(0, 0.5, 0), **rod) for k in range(6)]
+    for k, crank in enumerate(cranks):
+        m.revolute(f"A{k}", m.ground.at(k, 0, 0), crank)
+        m.guess(**{f"A{k}": 0.3})
+    for k in range(5):
+        coupler = m.body(f"coupler{k}", com=(0.5, 0, 0), **rod)
+        m.revolute(f"B{k}", cranks[k].at(0, 1, 0), coupler)
+        m.guess(**{f"B{k}": -0.3})
+        m.revolute(f"C{k}", coupler.at(1, 0, "h"), cranks[k + 1].at(0, 1, 0))
+    for one in (model, m):
+        block = {b.name: b for b in pipeline.build(one.derive(), "c", ["rhs"]).blocks}["closing"]
+        at = {f"{name}{k}": angle for name, angle in (("A", 0.3), ("B", -0.3)) for k in range(6)}
+        assert evaluate(list(block.guards), at | {"h": 0.0, "t": 0.0}) == [0.0]
+        assert evaluate(list(block.guards), at | {"h": 1e-9, "t": 0.0, "A2": 0.4}) == [1.0]
 
 
 def test_next_to_change_points_the_usual_form_decides() -> None:

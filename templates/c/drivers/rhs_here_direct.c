@@ -35,6 +35,9 @@ static int close_directly(double t, double *restrict q, const double *restrict u
             move(q, found + 3);
             continue;
         }
+        for (int k = 0; length == 0.0 && k < N; k++) {
+            found[3 + k] = -0.0; /* adding -0 changes nothing, not even the sign of a zero */
+        }
         step += !(found[0] > CONSTRAINTS_GENTLE); /* before, close_position makes the same steps, as many as it takes */
         move(q, found + 3);
         if (arrives(length, left)) {

@@ -18,7 +18,7 @@ static flag rhs_driver(real t, const real *restrict x, const real *restrict u, c
         left |= open & ~(found[2] <= 0.25); /* or not a number */
         open &= ~left;
         for (int k = 0; k < N; k++) {
-            step[k] = choose(open, found[3 + k], same(-0.0)); /* adding -0 changes nothing */
+            step[k] = choose(open & (found[2] != 0.0), found[3 + k], same(-0.0)); /* adding -0 changes nothing */
         }
         move(y, step);
         open &= ~((found[2] <= CONSTRAINTS_SHORT) & (found[1] <= CONSTRAINTS_EXACT));
