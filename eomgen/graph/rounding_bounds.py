@@ -167,7 +167,7 @@ def _slopes_of_terms(x: Expr, names: Sequence[str], values: Mapping[str, float])
                 for rate, k in zip(row.rates, operands, strict=True):
                     slope = 1.0 if rate is unit else float(rate(y, *at))
                     weights[k] += slope * weight
-                    squares[k] += slope**2 * square
+                    squares[k] += slope * slope * square  # infinite where ** would raise
             except (ValueError, ArithmeticError):
                 for k in operands:
                     weights[k] = squares[k] = math.inf
