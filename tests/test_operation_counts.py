@@ -132,7 +132,7 @@ LOOPS_FOUND = {
     "ankle with two rods": (2790, 4079),
     "two legs with such ankles": (5580, 8153),
     "hand of three parallel fingers": (792, 1214),
-    "delta robot": (8712, 20104),
+    "delta robot": (8534, 20104),
     "Stewart platform": (9725, 19469),
 }
 

@@ -12,7 +12,8 @@ from ..program import Block, Program
 from .c_layout import places_again
 from .c_text import ARGUMENTS, SIGNATURE, BlockPrinter, Printed, direct_results, function_text
 from .repeats import FEW
-from .rolled import Place, SegmentKind, Segments, find_segments
+from .rolled import SegmentKind, Segments, find_segments
+from .segment_reader import Place
 from .straight import Pieces, PrintedFunction, conditions, references
 
 CALLED = 24  #: runs in one function; more go through a table of runs

@@ -18,7 +18,7 @@ FEW = 3  #: segments of fewer members are not worth a loop
 WORTH = 60
 
 
-def find_repeats(letters: Sequence[Hashable], longest: int) -> list[tuple[int, int, int]]:
+def find_repeats(letters: Sequence[Hashable], longest: int, worth: int = WORTH) -> list[tuple[int, int, int]]:
     """Start, period and count of stretches that repeat themselves, in order, none overlapping another.
 
     Parameters
@@ -27,12 +27,14 @@ def find_repeats(letters: Sequence[Hashable], longest: int) -> list[tuple[int, i
         What each statement is like, equal for those that may be alike.
     longest : int
         The longest period.
+    worth : int
+        How many statements a repeat spares at least.
     """
     numbers: dict[Hashable, int] = {}
     text = np.array([numbers.setdefault(x, len(numbers)) for x in letters], dtype=np.int32)
     waiting = []
     for period in range(1, min(longest, len(text) // FEW) + 1):
-        waiting += [_offer(start, period, end) for start, end in _stretches(text, period)]
+        waiting += [_offer(start, period, end) for start, end in _stretches(text, period, worth)]
     heapify(waiting)
     taken = np.zeros(len(text), dtype=bool)
     found = []
@@ -45,7 +47,7 @@ def find_repeats(letters: Sequence[Hashable], longest: int) -> list[tuple[int, i
             taken[start : start + count * period] = True
             continue
         for first, last in free:
-            if _saved(first, period, last) >= WORTH:
+            if _saved(first, period, last) >= worth:
                 heappush(waiting, _offer(first, period, last))
     return sorted(found)
 
@@ -60,13 +62,13 @@ def _offer(start: int, period: int, end: int) -> tuple[int, int, int, int]:
     return -_saved(start, period, end), period, start, end
 
 
-def _stretches(text: np.ndarray, period: int) -> list[tuple[int, int]]:
+def _stretches(text: np.ndarray, period: int, worth: int) -> list[tuple[int, int]]:
     """Start and end of all that repeat themselves after a period and are worth a loop."""
     unlike = np.flatnonzero(text[period:] != text[:-period])
     edges = np.concatenate(([-1], unlike, [len(text) - period]))
     starts, ends = edges[:-1] + 1, edges[1:] + period
     count = (ends - starts) // period
-    good = (count >= FEW) & ((count - 1) * period >= WORTH)
+    good = (count >= FEW) & ((count - 1) * period >= worth)
     return list(zip(starts[good].tolist(), ends[good].tolist(), strict=True))
 
 

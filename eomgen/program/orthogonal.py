@@ -26,26 +26,39 @@ class Front(NamedTuple):
 
 
 def fronts(pattern: Sequence[Iterable[int]], n: int) -> list[Front] | None:
-    """The order in which columns are taken out, those of the fewest rows first; None if these cannot be independent."""
+    """The order in which columns are taken out, those of the fewest rows first; None if these cannot be independent.
+
+    Of these, those that leave the fewest rows: a row of loops is taken from its ends, one loop after the other.
+    """
     held = dict(enumerate(map(set, pattern)))
     touching: list[set[int]] = [set() for _ in range(n)]
     for i, row in held.items():
         for k in row:
             touching[k].add(i)
     found, waiting, new = [], set(range(n)), len(held)
+
+    known: dict[int, tuple[set[int], set[int]]] = {}  #: column -> columns of the same rows, and the others of these
+
+    def taken(k: int) -> tuple[set[int], set[int]]:
+        if k not in known:
+            near = set().union(*(held[i] for i in touching[k]))
+            columns = {j for j in near if touching[j] <= touching[k]}
+            known[k] = columns, near - columns
+        return known[k]
+
     while waiting:
-        first = min(waiting, key=lambda k: (len(touching[k]), k))
-        rows = touching[first]
-        near = set().union(*(held[i] for i in rows))
-        columns = {k for k in near if touching[k] <= rows}
+        least = min(len(touching[k]) for k in waiting)
+        first = min((k for k in waiting if len(touching[k]) == least), key=lambda k: (-len(taken(k)[0]), k))
+        rows, (columns, others) = touching[first], taken(first)
         if len(columns) > len(rows) or not columns:
             return None
-        others = near - columns
         left = tuple(range(new, new + len(rows) - len(columns)))
         new += len(left)
         found.append(Front(tuple(sorted(rows)), tuple(sorted(columns)), tuple(sorted(others)), left))
         for k in others:
             touching[k] = (touching[k] - rows) | set(left)
+        for j in others.union(*(held[i] for k in others for i in touching[k] if i in held)):
+            known.pop(j, None)
         for i in rows:
             del held[i]
         held |= {i: set(others) for i in left}
@@ -93,6 +106,8 @@ class OrthogonalFactor:
         What every column has across those before it.
     parts : list of set
         Columns that rows connect.
+    longest : int
+        Most columns of which one is compared with combinations of rows that the others have left.
     """
 
     def __init__(self, rows: Sequence[Row], n: int, order: Sequence[Front]) -> None:
@@ -102,6 +117,7 @@ class OrthogonalFactor:
         held = dict(enumerate(rows))
         self.squares = [x for column in transpose(rows, n) if (x := dot(column, column)) is not None]
         self.parts = connected(rows)
+        self.longest = _longest(order)
         for front in order:
             own = [held.pop(i) for i in front.rows]
             graph = next(x.graph for row in own for x in row.values())
@@ -132,6 +148,17 @@ class OrthogonalFactor:
                 x[k] = total
         used = {i for front, *_ in self._taken for i in front.rows}
         return x, [y for i, y in b.items() if i not in used and not y.is_zero]
+
+
+def _longest(order: Sequence[Front]) -> int:
+    """Most columns of a front and of those whose left rows it takes, and so on."""
+    made: dict[int, int] = {}
+    columns: list[int] = []
+    for k, front in enumerate(order):
+        before = {made[i] for i in front.rows if i in made}
+        columns.append(len(front.columns) + sum(columns[j] for j in before))
+        made |= dict.fromkeys(front.left, k)
+    return max(columns, default=0)
 
 
 def connected(rows: Sequence[Row]) -> list[set[int]]:

@@ -50,11 +50,11 @@ class Limits:
     states: int = 60
     #: Functions of more operations are searched for what repeats itself without a mark of the graph (constraint rows,
     #: their factor, derivatives).  Short loops keep more in memory, so the two blocks of the right-hand side of loops
-    #: are searched only above the second number.  Measured (closed chains, rows of four-bars), microseconds of loops
-    #: and of text without: 21 and 18 at 38,000 operations, 50 and 39 at 75,000, 84 and 87 at 179,000; text without
-    #: takes 3 to 4 times as long to compile.
+    #: are searched only above the second number.  Measured (rows of 160 and 320 four-bars), microseconds of loops and
+    #: of text without: 22 and 17 at 25,000 operations, 41 and 50 at 49,000, where the text without leaves the
+    #: second-level cache and takes twice as long to compile.
     repeated: int = 32_000
-    repeated_dynamics: int = 100_000
+    repeated_dynamics: int = 40_000
 
 
 @dataclass(frozen=True)

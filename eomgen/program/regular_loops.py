@@ -24,7 +24,7 @@ from .orthogonal import OrthogonalFactor, connected, fronts, work
 from .sparse import Row, SparseFactor, factorize, times
 
 ENDLESS = 1e300  #: the length of a step that is not known here
-ROW = 64  #: connected columns from which on rows tell what is near, as columns of 160 four-bars no longer can
+ROW = 64  #: columns beside one from which on rows tell what is near, as columns of 160 four-bars no longer can
 
 
 class RegularLoops:
@@ -120,10 +120,10 @@ class RegularLoops:
 
     @cached_property
     def _in_a_row(self) -> bool:
-        """Whether so many columns are connected that what one has across all others is small away from change points,
-        too: the last crank of n four-bars in a row has 0.4 / n.
+        """Whether a column is compared with so many others that what it has across them is small away from change
+        points, too: 0.4 / n of the last crank of n four-bars in a row, where every loop leaves a row to the next.
         """
-        return max(map(len, self._factor.parts), default=0) > ROW
+        return self._factor.longest > ROW
 
     def _follows(self) -> list[Expr]:
         """Whether the dependent velocities follow well from the independent ones: not by columns that are nearly
