@@ -197,7 +197,7 @@ def measured(quick: bool) -> Report:
             limits.append(Limit(f"{what},", us["other"] / us["plain"], bound))
     side = Table("side by side", ("what", "first us", "second us", "ratio"), pairs)
     notes = (
-        "Every parameter is a number. Calls at closed positions, which need no step onto the loops; with one: 1e-9 off.",
+        "Every parameter is a number. Calls where loops are closed make no step onto them; with a step: 1e-9 off.",
         "Derivation and compilation take CPU seconds of this process and the compilers, from a cache with the layer;",
         "derivation of four-bars the least of three, their calls medians of 25 turns of all, the least beside.",
         "Before articulated bodies carried the multipliers, the planar chain of 100 took 2,359 us, the humanoid with a",
