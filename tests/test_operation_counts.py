@@ -14,6 +14,7 @@ import pytest
 
 import eomgen as eg
 from benchmarks.growth import operations
+from benchmarks.large_loops import closed_chain, four_bars
 from benchmarks.loop_robots import ROBOTS as LOOP_ROBOTS
 from benchmarks.models import ARMS, chain, humanoid, numeric_arm, panda, spatial_chain, symbolic_arm
 from benchmarks.operation_counts import base_inertias, of_eomgen
@@ -142,6 +143,16 @@ def test_right_hand_sides_of_robots_with_loops(name: str, tmp_path: Path) -> Non
     (tmp_path / "robot.xml").write_text(LOOP_ROBOTS[name]().text())
     counts = pipeline.build(eg.load(tmp_path / "robot.xml").derive(), "c", ["rhs"]).counts
     assert (taken(counts), sum(counts[name].total for name in USUAL)) == LOOPS_FOUND[name]
+
+
+@pytest.mark.parametrize("name", ["closed chain of 20", "closed chain of 100", "20 four-bars"])
+def test_jacobians_of_loops_take_what_the_page_says(name: str) -> None:
+    n = int(next(word for word in name.split() if word.isdigit()))
+    model = four_bars(n) if "bars" in name else closed_chain(n, True, False)
+    counts = pipeline.build(model.derive(), "c", ["jacobian"]).counts
+    row = [f"{counts[block].total:,}" for block in ("loop_slopes", "slopes_by_position", "slopes_by_velocity")]
+    page = (EXAMPLES.parent / "docs" / "operations.md").read_text(encoding="utf-8")
+    assert f"| {name} | {' | '.join(row)} |" in page
 
 
 @pytest.mark.parametrize("robot", ROBOTS[:3], ids=lambda robot: robot.name)
