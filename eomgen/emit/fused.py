@@ -107,6 +107,9 @@ class _Runs:
             if found is not None:
                 yield self.place[found[0]], found[1]
 
+    def _kind(self, segment: Segment) -> object:
+        return self.reader.read(segment)[0]
+
     def _join(self, run: list[Segment]) -> bool:
         """Make one loop of a run and of that from which its middle member reads last, if that is possible.
 
@@ -139,9 +142,10 @@ class _Runs:
         if not first <= middle < end:
             return False
         joined = [(*other.groups[m + ahead], *run.groups[m]) for m in range(first, end)]
-        kinds = [self.reader.read(one)[0] for one in joined]
-        usual = kinds[middle - first]
-        alike = [k for k, kind in enumerate(kinds) if kind == usual]
+        usual = self._kind(joined[middle - first])
+        if any(self._kind(one) != usual for one in joined[max(0, middle - first - 1) : middle - first + 2]):
+            return False  # without a look at all
+        alike = [k for k, one in enumerate(joined) if self._kind(one) == usual]
         first, end, joined = first + alike[0], first + alike[-1] + 1, joined[alike[0] : alike[-1] + 1]
         most = max(len(run.groups), len(other.groups))
         if len(alike) < max(FEW, most - ENDS) or len(alike) < len(joined):
