@@ -103,3 +103,41 @@ def test_the_work_of_a_leg_does_not_grow_with_the_number_of_legs() -> None:
 def test_parts_that_no_row_connects_are_apart() -> None:
     rows = [dict.fromkeys(row) for row in ([0, 1], [2], [1, 3], [4, 5], [5, 6], [])]
     assert sorted(map(sorted, connected(rows))) == [[0, 1, 3], [2], [4, 5, 6]]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("missing", [0, 1, 12, 13, 24])
+def test_a_row_of_loops_is_taken_from_its_ends(missing: int) -> None:
+    """Loop k holds columns 2 k to 2 k + 2 by two rows; one column is independent and left out."""
+    pattern = [{c - (c > missing) for c in (2 * k, 2 * k + 1, 2 * k + 2) if c != missing} for k in range(12)]
+    order = fronts([row for row in pattern for _ in range(2)], 24)
+    assert order is not None
+    assert all(len(front.rows) == len(front.columns) for front in order)
+    _, rows, n = built([sorted(row) for row in pattern for _ in range(2)])
+    assert OrthogonalFactor(rows, n, order).longest == 2
+
+
+def test_columns_behind_the_rows_that_a_front_takes_are_counted() -> None:
+    """Both legs leave a row to the platform: its two columns are compared with those of the legs."""
+    _, rows, n = built(PATTERNS["two legs on a platform"])
+    order = fronts(rows, n)
+    assert order is not None
+    assert [(len(front.columns), len(front.left)) for front in order] == [(2, 1), (2, 1), (2, 0)]
+    assert OrthogonalFactor(rows, n, order).longest == 6
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_fronts_of_random_patterns(seed: int) -> None:
+    """Each takes all rows that hold its columns, and no column is forgotten or taken twice."""
+    random = np.random.default_rng(seed)
+    n = int(random.integers(2, 25))
+    pattern = [{k, *random.integers(0, n, random.integers(0, 4)).tolist()} for k in [*range(n), *range(0, n, 5)]]
+    order = fronts(pattern, n)
+    assert order is not None
+    held = dict(enumerate(map(set, pattern)))
+    for front in order:
+        assert set(front.rows) == {i for i, row in held.items() if not row.isdisjoint(front.columns)}
+        near = set().union(*(held.pop(i) for i in front.rows))
+        assert near == {*front.columns, *front.others}
+        assert len(front.left) == len(front.rows) - len(front.columns)
+        held |= {i: set(front.others) for i in front.left}
+    assert sorted(k for front in order for k in front.columns) == list(range(n))

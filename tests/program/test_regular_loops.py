@@ -18,7 +18,7 @@ from eomgen.graph.count import count
 from eomgen.graph.evaluate import compile_evaluator, evaluate
 from eomgen.limits.constraints import NEARBY
 from eomgen.limits.crossings import NEAR
-from eomgen.program import straight_loops
+from eomgen.program import regular_loops, straight_loops
 from eomgen.program.block_groups import REGULAR, USUAL
 from tests.kinematics.test_row_groups import closed_chain
 from tests.mobility.test_n_four_bar import n_four_bar
@@ -313,8 +313,13 @@ def test_pivots_of_rounding_alone_do_not_count_as_sound() -> None:
     np.testing.assert_allclose(module.rhs(0.0, x), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-def test_many_loops_in_a_row_are_told_by_their_rows() -> None:
-    beside = Beside(four_bars_in_a_row(40))  # the last column has 0.02 of its square across the others
+@pytest.mark.parametrize(("number", "row"), [(40, regular_loops.ROW), (10, 0)], ids=["columns", "rows"])
+def test_many_loops_in_a_row_are_sound_away_from_change_points(
+    number: int, row: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Told by the columns of every loop, or by rows where columns would be compared with more others than ROW."""
+    monkeypatch.setattr(regular_loops, "ROW", row)
+    beside = Beside(four_bars_in_a_row(number))
     n = beside.n
 
     def state(angle: float) -> np.ndarray:
