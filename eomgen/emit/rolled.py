@@ -131,7 +131,7 @@ def find_segments(
     left = [i for i in statements if i not in early]
     results = {i: tuple(at) for i, at in places.items()}
     reader = SegmentReader(graph, known, results, checked, alone)
-    groups = _grouped(graph, _apart(parts(graph, left), alone), items, alone)
+    groups = _grouped(graph, _apart(parts(graph, left), alone), items - kept, alone)
     common = _common(reader, [tuple(chain.from_iterable(group)) for group in groups])
     segments: list[tuple[int, ...]] = []
     for group, alike in zip(groups, common, strict=True):
@@ -141,7 +141,7 @@ def find_segments(
         segments = _repeated(reader, segments, _kept(reader, segments), 2 * longest)
         segments = _merged(segments, _kept(reader, segments))
     segments = _shortened(segments, _kept(reader, segments), longest)
-    segments = fuse(reader, segments, longest, {i: nodes[i][1] for i in items})
+    segments = fuse(reader, segments, longest, {i: nodes[i][1] for i in items - kept})
     read = [reader.read(segment) for segment in segments]
     return _laid_out(segments, read, tuple(angles), known, results, checked, lists)
 

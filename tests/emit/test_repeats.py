@@ -136,3 +136,29 @@ def test_loops_found_in_closed_mechanisms_give_the_bits_of_straight_text(
             assert np.isfinite(three).all()
             np.testing.assert_array_equal(one, three, err_msg=kernel)
             np.testing.assert_array_equal(two, three, err_msg=kernel)
+
+
+def test_what_another_loop_reads_inside_a_chain_is_stored(libraries: Any, tmp_path: Path) -> None:
+    """Links hand values to the next in a variable; another chain that hangs on one of them reads them from memory."""
+    m = eg.Model("branched", gravity=(0, -9.81, 0))
+    links: list[Any] = []
+    for name, n, mass, com in (("a", 30, 1.0, (0.05, 0, 0)), ("b", 30, 0.5, (0.05, 0.01, 0))):
+        last: Any = links[10].at(0.1, 0, 0) if links else m.ground
+        for k in range(n):
+            link = m.body(f"{name}{k}", mass=mass, com=com, inertia=(1e-3, 1.2e-3, 1.5e-3))
+            m.revolute(f"j{name}{k}", last, link)
+            links.append(link)
+            last = link.at(0.1, 2 * com[1], 0)
+    program = pipeline.build(m.derive(), "c", ["rhs", "jacobian"])
+    found = []
+    for label, change in (("loops", {"rolled": 0, "repeated": 0, "repeated_dynamics": 0}), ("text", {"rolled": NEVER})):
+        limits = replace(program.limits, rolled_of_long=NEVER, **change)
+        folder = tmp_path / label
+        folder.mkdir()
+        sources = emit_c(replace(program, limits=limits), "double", lanes=False)
+        assert (HEAD in sources["branched.c"]) == (label == "loops")
+        found.append(libraries.Library(libraries.compile_library(sources, folder, "-O0"), [], []))
+    x = np.random.default_rng(0).uniform(-1.0, 1.0, 120)
+    for kernel in ("rhs", "jacobian"):
+        loops, text = (library.fine(kernel, x, 0.3) for library in found)
+        np.testing.assert_allclose(loops, text, rtol=0, atol=1e-12 * np.abs(text).max(), err_msg=kernel)
