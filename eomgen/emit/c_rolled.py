@@ -150,7 +150,7 @@ def _find_carried(found: Segments) -> list[FromBefore]:
             follows = 0 <= e < stride and all(at == kind.start + m * stride + e for m, at in enumerate(places[1:]))
             if follows and e not in first and n > FEW:
                 reads[column[0]], first[e] = e, places[0]
-                read.add(places[0])  # of another kind
+                read.add(places[0])  # which may lie inside a chain of another kind
             else:
                 read.update(places)
         if len(reads) > CARRIED:

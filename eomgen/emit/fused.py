@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
-from types import MappingProxyType
 
 from .repeats import FEW, find_repeats
 from .segment_reader import SegmentReader
@@ -18,18 +17,15 @@ from .segment_reader import SegmentReader
 Segment = tuple[int, ...]
 
 PERIOD = 16  #: kinds that alternate at most
-NONE: Mapping[int, int] = MappingProxyType({})
 CALLS = 8  #: of functions that have to be spared
 SEVERAL = 4  #: members of one loop that belong with one of another at most
 ENDS = 2  #: members at the ends of two loops that may stay outside of the common one
 
 
-def fuse(
-    reader: SegmentReader, segments: Sequence[Segment], longest: int, entries: Mapping[int, int] = NONE
-) -> list[Segment]:
+def fuse(reader: SegmentReader, segments: Sequence[Segment], longest: int, entries: Mapping[int, int]) -> list[Segment]:
     """Segments of at most so many statements in an order in which they can be evaluated.
 
-    ``entries`` are read where the lists are there in which they stand.
+    ``entries`` maps what is no statement, but an entry of a list, to the list that has to be there first.
     """
     return _Runs(reader, longest, entries).fused(_alternating(reader, segments, longest))
 
@@ -144,7 +140,7 @@ class _Runs:
         joined = [(*other.groups[m + ahead], *run.groups[m]) for m in range(first, end)]
         usual = self._kind(joined[middle - first])
         if any(self._kind(one) != usual for one in joined[max(0, middle - first - 1) : middle - first + 2]):
-            return False  # without a look at all
+            return False  # told by three of them, without reading all
         alike = [k for k, one in enumerate(joined) if self._kind(one) == usual]
         first, end, joined = first + alike[0], first + alike[-1] + 1, joined[alike[0] : alike[-1] + 1]
         most = max(len(run.groups), len(other.groups))

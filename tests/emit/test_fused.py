@@ -13,7 +13,7 @@ from emit.test_repeats import four_bars
 
 from eomgen import pipeline
 from eomgen.emit import emit_c
-from eomgen.emit.fused import ENDS, NONE, fuse
+from eomgen.emit.fused import ENDS, fuse
 from eomgen.emit.segment_reader import Place, SegmentReader
 from eomgen.graph.core import Expr, Graph
 
@@ -33,10 +33,10 @@ class Scene:
         self.segments.append(tuple(y.id for y in made))
         return made[-1]
 
-    def fused(self, longest: int = LONG, entries: Mapping[int, int] = NONE) -> list[tuple[int, ...]]:
+    def fused(self, longest: int = LONG, entries: Mapping[int, int] | None = None) -> list[tuple[int, ...]]:
         known: dict[int, Place] = {y.id: ("x", k) for k, y in enumerate(self.x)}
         reader = SegmentReader(self.graph, known, {}, frozenset(), frozenset())
-        found = fuse(reader, self.segments, longest, entries)
+        found = fuse(reader, self.segments, longest, entries or {})
         for segments in (self.segments, found):
             done = set(known)
             for i in chain.from_iterable(segments):
