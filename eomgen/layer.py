@@ -72,9 +72,9 @@ def read_layer() -> dict[str, str]:
     return {name: definitions(text) + text if name.endswith((".c", ".h")) else text for name, text in texts.items()}
 
 
-def read_steppers(parts: Sequence[str]) -> str:
-    """The text of some parts of the steppers, and of a run of an ensemble by them."""
-    text = "\n".join((*(_read(f"c/steppers/{part}.c") for part in parts), _read("c/ensembles/one_run.c")))
+def read_sources(parts: Sequence[str]) -> str:
+    """The text of some parts of the layer's C source, as ``steppers/loop``, with the limits that it names."""
+    text = "\n".join(_read(f"c/{part}.c") for part in parts)
     return definitions(text) + text
 
 

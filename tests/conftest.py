@@ -24,9 +24,16 @@ PROGRAMS = {
     "qemu": (("qemu-arm",), "qemu-user"),
 }
 #: The same for libraries of Python: name -> its module, and how it is installed.
-LIBRARIES = {"NVRTC": ("cuda.bindings.nvrtc", "pip install '.[cuda]'")}
+LIBRARIES = {
+    "NVRTC": ("cuda.bindings.nvrtc", "pip install '.[cuda]'"),
+    "CuPy": ("cupy", "pip install cupy-cuda13x"),
+    "PyTorch": ("torch", "pip install torch"),
+    "Numba": ("numba.cuda", "pip install numba-cuda"),
+}
 #: The same for instructions of the processor: name -> what Linux calls them.
 INSTRUCTIONS = {"AVX2": "avx2", "AVX-512": "avx512dq"}
+#: The same for a GPU of NVIDIA: name -> where Linux has it.
+DEVICES = {"a GPU": "/dev/nvidiactl"}
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -55,7 +62,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def is_there(program: str) -> bool:
-    """Whether one of PROGRAMS is on the path, one of LIBRARIES is installed, or the processor has INSTRUCTIONS."""
+    """Whether it is on the path, installed, in the processor or in the computer; by the table that names it."""
+    if program in DEVICES:
+        return Path(DEVICES[program]).exists()
     if program in INSTRUCTIONS:
         info = Path("/proc/cpuinfo")
         return info.exists() and INSTRUCTIONS[program] in info.read_text().split()
@@ -82,6 +91,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     told = {name: f"apt install {package}" for name, (_, package) in PROGRAMS.items()}
     told |= {name: command for name, (_, command) in LIBRARIES.items()}
     told |= dict.fromkeys(INSTRUCTIONS, "take a processor that has them")
+    told |= dict.fromkeys(DEVICES, "take a computer with one of NVIDIA and pip install '.[cuda]'")
     if not terminalreporter.config.getoption("--thorough"):
         terminalreporter.write_line("tests marked thorough were left out; to run them: make thorough")
     for name, command in told.items():

@@ -53,7 +53,7 @@ def compile_with_log(
     program = _done(nvrtc, nvrtc.nvrtcCreateProgram(text.encode(), b"model.cu", 0, [], []))
     try:
         (status,) = nvrtc.nvrtcCompileProgram(program, len(flags), [flag.encode() for flag in flags])
-        log = b" " * _done(nvrtc, nvrtc.nvrtcGetProgramLogSize(program))
+        log = _room(_done(nvrtc, nvrtc.nvrtcGetProgramLogSize(program)))
         _done(nvrtc, nvrtc.nvrtcGetProgramLog(program, log))
         said = log.decode(errors="replace").strip("\0 \n")
         if int(status) != 0:
@@ -63,9 +63,10 @@ def compile_with_log(
             if architecture.startswith("sm_")
             else (nvrtc.nvrtcGetPTXSize, nvrtc.nvrtcGetPTX)
         )
-        code = b" " * _done(nvrtc, sizes(program))
+        length = _done(nvrtc, sizes(program))
+        code = _room(length)
         _done(nvrtc, gets(program, code))
-        return code, said
+        return code[:length], said
     finally:
         nvrtc.nvrtcDestroyProgram(program)
 
@@ -94,6 +95,11 @@ def load_nvrtc() -> Any:
     except (ImportError, RuntimeError) as error:  # without the library it raises RuntimeError, or one derived from it
         raise MissingDependencyError(f"NVRTC is not installed; {INSTALL}") from error
     return nvrtc
+
+
+def _room(length: int) -> bytes:
+    """Bytes that NVRTC writes into.  Python has each single byte only once, for everybody: so never one alone."""
+    return bytes(length + 1)
 
 
 def _done(nvrtc: Any, answer: Any) -> Any:

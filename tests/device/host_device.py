@@ -23,6 +23,7 @@ void choose_state(long long j) { host_state = j; }
 #define EOMGEN_OWN host_state
 """
 FLAGS = ("-std=c11", "-O0", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-fPIC", "-shared", "-x", "c")
+OF_RUNS = ("EOMGEN_WANT_RUNS", "EOMGEN_WANT_DOP853", "EOMGEN_WANT_RK4")
 WANTED = re.compile(r"EOMGEN_WANT_\w+")
 
 
@@ -48,6 +49,10 @@ class HostDevice:
         copy = np.array(array, order="C")
         return DeviceArray(self, copy.ctypes.data, copy.shape, copy.dtype, copy)
 
+    def foreign(self, array: np.ndarray) -> OnHost:
+        """An array as another library would hold it on the device."""
+        return OnHost(array)
+
     def get(self, array: DeviceArray) -> np.ndarray:
         length = max(array.nbytes, 1)
         memory = (ctypes.c_char * length).from_address(array.pointer)
@@ -62,16 +67,18 @@ class HostDevice:
 
     def kernel(self, text: str, name: str, wanted: Sequence[str]) -> Callable[..., None]:
         assert set(wanted) <= set(WANTED.findall(text)), wanted
-        if text not in self.libraries:  # with all kernels at once
+        every = {macro for macro in WANTED.findall(text) if macro not in OF_RUNS}
+        macros = tuple(sorted(set(wanted) if "EOMGEN_WANT_RUNS" in wanted else every))  # all batches at once
+        if (text, macros) not in self.libraries:
             path = self.folder / f"{len(self.libraries)}.so"
             source = path.with_suffix(".cu")
             source.write_text(HEAD + text, encoding="utf-8")
-            macros = [f"-D{macro}" for macro in set(WANTED.findall(text))]
-            command = [*find_compiler().command, *FLAGS, *macros, str(source), "-o", str(path), "-lm"]
+            defined = [f"-D{macro}" for macro in macros]
+            command = [*find_compiler().command, *FLAGS, *defined, str(source), "-o", str(path), "-lm"]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             assert done.returncode == 0, done.stderr
-            self.libraries[text] = ctypes.CDLL(str(path))
-        library = self.libraries[text]
+            self.libraries[text, macros] = ctypes.CDLL(str(path))
+        library = self.libraries[text, macros]
 
         def launch(count: int, *arguments: Any) -> None:
             values = [_as_c(a) for a in (np.int64(count), *arguments)]

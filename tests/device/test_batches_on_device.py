@@ -5,13 +5,11 @@ The text is the one that NVRTC gets; only the words that a GPU has and a host la
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import models
 import numpy as np
 import pytest
-from device.host_device import HostDevice, OnHost
 from sweeps import OF_ALL_KINDS, part_of
 
 import eomgen as eg
@@ -26,10 +24,6 @@ COLUMNS = 3
 EARLY = 1e-4  #: a time (s) that driven mechanisms reach from their start
 
 
-def on_host(equations: Any, folder: Path) -> DeviceModule:
-    return cuda_functions(equations, HostDevice(folder))
-
-
 def states_of(module: Any, count: int = COLUMNS, seed: int = 3, t: float = 0.0) -> np.ndarray:
     """States near the start, a little off the constraints too."""
     random = np.random.default_rng(seed)
@@ -38,14 +32,14 @@ def states_of(module: Any, count: int = COLUMNS, seed: int = 3, t: float = 0.0) 
     return np.array(columns).T + 1e-7 * random.normal(size=(x.size, count))
 
 
-def arguments_of(device: DeviceModule, name: str, x: np.ndarray) -> list[np.ndarray]:
-    q, v = x[: device.n_q], x[device.n_q :]
+def arguments_of(model: DeviceModule, name: str, x: np.ndarray) -> list[np.ndarray]:
+    q, v = x[: model.n_q], x[model.n_q :]
     every = {"x": x, "q": q, "v": v, "a": np.sin(3.0 * v)}
-    return [every[port] for port, _ in device.facts["kernels"][name][0]]
+    return [every[port] for port, _ in model.facts["kernels"][name][0]]
 
 
-def named(device: DeviceModule, name: str, given: list[np.ndarray]) -> dict[str, np.ndarray]:
-    return dict(zip((port for port, _ in device.facts["kernels"][name][0]), given, strict=True))
+def named(model: DeviceModule, name: str, given: list[np.ndarray]) -> dict[str, np.ndarray]:
+    return dict(zip((port for port, _ in model.facts["kernels"][name][0]), given, strict=True))
 
 
 def expected(module: Any, name: str, given: list[np.ndarray], t: float, k: int) -> np.ndarray:
@@ -69,60 +63,60 @@ def assert_near(found: np.ndarray, wanted: np.ndarray, name: str = "") -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", part_of(EXAMPLES, OF_ALL_KINDS.__contains__))
-def test_every_function_of_every_example(name: str, tmp_path: Path) -> None:
+def test_every_function_of_every_example(name: str, device: Any) -> None:
     equations = eg.load(models.EXAMPLES / f"{name}.yaml").derive()
-    device, module = on_host(equations, tmp_path), equations.compile(target="numpy")
+    model, module = cuda_functions(equations, device), equations.compile(target="numpy")
     x = states_of(module, t=EARLY)
-    assert {"rhs", "jacobian", "mass_matrix", "inverse_dynamics", "energy", "poses"} <= set(device.facts["kernels"])
-    for kernel, (_, shape) in device.facts["kernels"].items():
-        given = arguments_of(device, kernel, x)
-        found, status = getattr(device, kernel)(**named(device, kernel, given), t=EARLY, status=True)
+    assert {"rhs", "jacobian", "mass_matrix", "inverse_dynamics", "energy", "poses"} <= set(model.facts["kernels"])
+    for kernel, (_, shape) in model.facts["kernels"].items():
+        given = arguments_of(model, kernel, x)
+        found, status = getattr(model, kernel)(**named(model, kernel, given), t=EARLY, status=True)
         assert found.shape == (*shape, COLUMNS)
         for k in range(COLUMNS):
             assert_near(found[..., k], expected(module, kernel, given, EARLY, k), kernel)
         assert (status == 0).all() or kernel == "events", kernel
 
 
-def test_parameters_inputs_and_times_of_each_state(tmp_path: Path) -> None:
+def test_parameters_inputs_and_times_of_each_state(device: Any) -> None:
     equations = eg.load(models.EXAMPLES / "slider_crank.yaml").derive()
-    device, module = on_host(equations, tmp_path), equations.compile(target="numpy")
+    model, module = cuda_functions(equations, device), equations.compile(target="numpy")
     x = states_of(module)
-    p = np.repeat(device.p[:, None], COLUMNS, axis=1) * np.array([1.0, 1.001, 0.999])
+    p = np.repeat(model.p[:, None], COLUMNS, axis=1) * np.array([1.0, 1.001, 0.999])
     u, t = np.array([[0.1, -2.0, 5.0]]), np.array([0.0, 0.5, 1.0])
-    found = device.rhs(t, x, p, u)
+    found = model.rhs(t, x, p, u)
     for k in range(COLUMNS):
         assert_near(found[:, k], module.rhs(t[k], x[:, k], p=p[:, k], u=u[:, k]))
-    one = device.rhs(0.5, x[:, 1], p[:, 1], u[:, 1])
+    one = model.rhs(0.5, x[:, 1], p[:, 1], u[:, 1])
     assert one.shape == (6,)
     np.testing.assert_array_equal(one, found[:, 1])
     assert np.ptp(found[3]) > 1.0  # the inputs are felt
 
 
-def test_arrays_of_the_device_are_not_copied(tmp_path: Path) -> None:
+def test_arrays_of_the_device_are_not_copied(device: Any) -> None:
     equations = eg.load(models.EXAMPLES / "double_pendulum.yaml").derive()
-    device = on_host(equations, tmp_path)
+    model = cuda_functions(equations, device)
     x = np.random.default_rng(0).normal(size=(4, 100))
-    wanted = device.rhs(0.0, x)
-    before = device.device.copies
-    found = device.rhs(0.0, OnHost(x))
-    assert device.device.copies == before + 2  # t and u
+    wanted = model.rhs(0.0, x)
+    before = device.copies
+    found = model.rhs(0.0, device.foreign(x))
+    assert device.copies == before + 2  # t and u
     assert isinstance(found, DeviceArray)
     assert found.shape == (4, 100)
     np.testing.assert_array_equal(found.numpy(), wanted)
     told = found.__cuda_array_interface__
     assert (told["shape"], told["typestr"], told["version"]) == ((4, 100), "<f8", 3)
-    again = device.rhs(0.0, found)  # what comes out goes in
-    np.testing.assert_array_equal(again.numpy(), device.rhs(0.0, wanted))
+    again = model.rhs(0.0, found)  # what comes out goes in
+    np.testing.assert_array_equal(again.numpy(), model.rhs(0.0, wanted))
 
 
-def test_a_state_that_fails_leaves_the_others_alone(tmp_path: Path) -> None:
+def test_a_state_that_fails_leaves_the_others_alone(device: Any) -> None:
     equations = eg.load(models.EXAMPLES / "slider_crank.yaml").derive()
-    device, module = on_host(equations, tmp_path), equations.compile(target="numpy")
+    model, module = cuda_functions(equations, device), equations.compile(target="numpy")
     x = states_of(module)
-    good = device.rhs(0.0, x)
+    good = model.rhs(0.0, x)
     x[2, 1] = 5.0  # cannot be closed
     x[0, 2] = np.nan
-    found, status = device.rhs(0.0, x, status=True)
+    found, status = model.rhs(0.0, x, status=True)
     np.testing.assert_array_equal(found[:, 0], good[:, 0])
     assert np.isnan(found[:, 1:]).any(axis=0).all()
     assert status[0] == 0
@@ -131,41 +125,41 @@ def test_a_state_that_fails_leaves_the_others_alone(tmp_path: Path) -> None:
         module.rhs(0.0, x[:, 1])
 
 
-def test_no_states_give_no_results(tmp_path: Path) -> None:
-    device = on_host(eg.load(models.EXAMPLES / "double_pendulum.yaml").derive(), tmp_path)
-    assert device.mass_matrix(np.empty((2, 0))).shape == (2, 2, 0)
+def test_no_states_give_no_results(device: Any) -> None:
+    model = cuda_functions(eg.load(models.EXAMPLES / "double_pendulum.yaml").derive(), device)
+    assert model.mass_matrix(np.empty((2, 0))).shape == (2, 2, 0)
 
 
-def test_wrong_calls_are_refused_by_name(tmp_path: Path) -> None:
-    device = on_host(eg.load(models.EXAMPLES / "double_pendulum.yaml").derive(), tmp_path)
+def test_wrong_calls_are_refused_by_name(device: Any) -> None:
+    model = cuda_functions(eg.load(models.EXAMPLES / "double_pendulum.yaml").derive(), device)
     x = np.zeros((4, 3))
     with pytest.raises(UsageError, match=r"x must have shape \(4,\) or \(4, k\), not \(3, 4\)"):
-        device.rhs(0.0, x.T)
+        model.rhs(0.0, x.T)
     with pytest.raises(UsageError, match=r"p must have shape \(5,\) or \(5, 3\), not \(5, 2\)"):
-        device.rhs(0.0, x, np.ones((5, 2)))
+        model.rhs(0.0, x, np.ones((5, 2)))
     with pytest.raises(UsageError, match="t must be a number"):
-        device.rhs([0.0, 1.0], x)
+        model.rhs([0.0, 1.0], x)
     with pytest.raises(UsageError, match="rhs needs x"):
-        device.rhs(0.0)
+        model.rhs(0.0)
     with pytest.raises(UsageError, match="mass_matrix takes q, p, u, t and status"):
-        device.mass_matrix(x[:2], x=x)
+        model.mass_matrix(x[:2], x=x)
     with pytest.raises(UsageError, match="same number of columns"):
-        device.inverse_dynamics(x[:2, 0], x[:2], x[:2])
+        model.inverse_dynamics(x[:2, 0], x[:2], x[:2])
     with pytest.raises(UsageError, match=r"a must have shape \(2,\) or \(2, 3\), not \(2, 2\)"):
-        device.inverse_dynamics(x[:2], x[:2], np.zeros((2, 2)))
+        model.inverse_dynamics(x[:2], x[:2], np.zeros((2, 2)))
     with pytest.raises(UsageError, match="x is one state"):
-        device.rhs(0.0, x[:, 0], np.ones((5, 2)))
+        model.rhs(0.0, x[:, 0], np.ones((5, 2)))
     with pytest.raises(UsageError, match="array of numbers"):
-        device.rhs(0.0, "state")
+        model.rhs(0.0, "state")
 
 
-def test_a_pendulum_of_any_length_falls_as_the_textbook_says(tmp_path: Path) -> None:
+def test_a_pendulum_of_any_length_falls_as_the_textbook_says(device: Any) -> None:
     m = eg.Model("swing", gravity=(0, "-g", 0))
     m.parameter("g", 9.81)
     m.parameter("l", 1.0)
     m.revolute("A", m.ground, m.body("bob", mass=1.0, com=(0, "-l", 0)), coordinate="theta")
-    device = on_host(m.derive(), tmp_path)
+    model = cuda_functions(m.derive(), device)
     lengths, angles = np.array([0.1, 0.5, 2.0]), np.array([0.1, -1.0, 3.0])
     given = {"g": np.full(3, 9.81), "l": lengths}
-    found = device.rhs(0.0, [angles, np.zeros(3)], [given[name] for name in device.p_names])
+    found = model.rhs(0.0, [angles, np.zeros(3)], [given[name] for name in model.p_names])
     np.testing.assert_allclose(found, [np.zeros(3), -9.81 / lengths * np.sin(angles)], rtol=1e-14)

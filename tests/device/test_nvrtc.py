@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from graphlib import CycleError, TopologicalSorter
 
 import models
 import pytest
@@ -17,6 +18,7 @@ from eomgen.errors import MissingDependencyError, ToolchainError
 
 EXAMPLES = sorted(path.stem for path in models.EXAMPLES.glob("*.yaml"))
 BY_POINTER = re.compile(r"^\s*call[.\w]*\s+(\([^)]*\),\s*)?%", re.MULTILINE)
+CALL = re.compile(r"^\s*call[.\w]*\s+(?:\([^)]*\),\s*)?(\w+)", re.MULTILINE)
 QUICK = "--Ofast-compile=max"
 
 
@@ -41,14 +43,39 @@ def test_every_example_compiles_to_ptx(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.needs("NVRTC")
 @pytest.mark.parametrize("method", ["DOP853", "RK4"])
-def test_runs_call_nothing_by_a_pointer(method: str) -> None:
-    """So that the stack is known beforehand; the table of a method is seen through."""
+def test_the_stack_of_runs_is_known_beforehand(method: str) -> None:
+    """Nothing is called by a pointer, and nothing calls itself: else GPUs give 1 kB, and a run writes beyond it."""
     text = emit_device_text(pipeline.build(bouncing(True).derive(), "cuda"))
     assert BY_POINTER.search("call (retval0), %rd1, (param0), proto;")
     code = compile_device_text(text, "compute_90", ["EOMGEN_WANT_RUNS", f"EOMGEN_WANT_{method}"])
     ptx = code.decode(errors="replace")
-    assert f"ball_{method.lower()}_runs" in ptx
+    calls = called_by_each(ptx)
+    assert f"ball_{method.lower()}_runs" in calls
+    assert any("eomgen_step" in name for name in calls)
     assert not BY_POINTER.search(ptx)
+    tuple(TopologicalSorter(calls).static_order())  # CycleError
+
+
+def called_by_each(ptx: str) -> dict[str, set[str]]:
+    """Function -> the functions that it calls, by their names in PTX."""
+    parts = re.split(r"^(?:\.\w+ )*\.(?:entry|func)\s+(?:\([^)]*\)\s*)?(\w+)\s*\(", ptx, flags=re.MULTILINE)
+    return {
+        name: {call for call in CALL.findall(body)}
+        for name, body in zip(parts[1::2], parts[2::2], strict=True)
+        if "{" in body
+    }
+
+
+@pytest.mark.needs("NVRTC")
+def test_a_function_that_calls_itself_is_seen() -> None:
+    text = (
+        "__noinline__ double g(double x, int n); __noinline__ double f(double x, int n) { return n ? g(x, n) + x : x; }"
+        "__noinline__ double g(double x, int n) { return n & 1 ? f(x * x, n - 1) - x : f(x, n - 2) * f(-x, n - 3); }"
+        'extern "C" __global__ void h(double *x) { *x = f(*x, (int)*x); }'
+    )
+    calls = called_by_each(compile_device_text(text, "compute_90").decode(errors="replace"))
+    with pytest.raises(CycleError):
+        tuple(TopologicalSorter(calls).static_order())
 
 
 @pytest.mark.slow
@@ -77,6 +104,14 @@ def test_a_gpu_newer_than_nvrtc_gets_ptx() -> None:
     newer = best_architecture((99, 0))
     assert newer.startswith("compute_")
     assert compile_device_text('extern "C" __global__ void f(double *x) { *x = 1.0; }', newer)
+
+
+@pytest.mark.needs("NVRTC")
+def test_an_empty_log_spoils_no_byte_of_python() -> None:
+    """Python has each byte once: NVRTC wrote the end of an empty text into everybody's b" "."""
+    assert compile_with_log('extern "C" __global__ void f(double *x) { *x = 1.0; }', "compute_90")[1] == ""
+    assert bytes([32]) * 1 == "\N{SPACE}".encode("ascii")
+    assert ord(b"a b"[1:2]) == 32
 
 
 @pytest.mark.needs("NVRTC")

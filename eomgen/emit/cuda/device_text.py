@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from ...errors import UsageError
-from ...layer import read_layer, read_steppers
+from ...layer import read_layer, read_sources
 from ...program import Block, KernelDriver, Program
 from ...simulation.events import GO_ON, RESET, crowd_of
 from ...targets import DEVICE_KERNELS
@@ -27,10 +27,13 @@ from ..straight import cut
 
 #: Methods of ensembles: rows of n numbers that each needs in K and F.
 METHODS = {"dop853": 15 + 7, "rk4": 4 + 3}
-#: What is compiled of the steppers, in order; rk4_step is in the text of the model.
-STEPPERS = ("control", "signals", "plain", "rk4", "loop")
-EVENTS = ("event_values", "event_zero", "crossings")
+#: Where the steppers have them; rk4_step is in the text of the model.
+SOURCES = {"dop853": "steppers/plain", "rk4": "steppers/rk4"}
+#: What else is compiled of the steppers, in order.
+STEPPERS = ("steppers/control", "steppers/signals", "steppers/loop")
+EVENTS = ("steppers/event_values", "steppers/event_zero", "steppers/crossings")
 _FUNCTION = re.compile(r"^static (int|flag|void|double) ", re.MULTILINE)
+_OF_STEPPERS = re.compile(r"^(int|void|double) (?=eomgen_\w+\([^;]*$)", re.MULTILINE)
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|<[^>]+>)[^\n]*\n', re.MULTILINE)
 
 
@@ -57,13 +60,19 @@ def emit_device_text(program: Program) -> str:
     unrolled = replace(program, limits=replace(program.limits, rolled=sys.maxsize))  # threads have little memory
     sources = dict(emit_c(unrolled, lanes=False, separate=False))
     parts = (*STEPPERS, *(EVENTS if program.metadata.get("events") else ()))
-    texts = {**sources, **read_layer(), "steppers": read_steppers(parts)}
+    texts = {**sources, **read_layer(), "steppers": read_sources((*parts, "ensembles/one_run"))}
+    texts |= {name: read_sources([part]) for name, part in SOURCES.items()}
+    texts["eomgen_methods.h"] = read_sources(["steppers/dop853"])
     there: set[str] = set()
     model = _flattened([name for name in sources if name.endswith(".c")], texts, there)
+    header = _flattened(["eomgen_real.h", "eomgen_steppers.h"], texts, there)
+    methods = {name: _flattened([name], texts, there) for name in SOURCES}
     steppers = _flattened(["steppers"], texts, there)
+    if program.metadata.get("events"):  # all in one takes NVRTC a minute
+        steppers = _OF_STEPPERS.sub(r"EOMGEN_APART \1 ", steppers)
     if program.drivers:  # which call each other in many places; a tree's rhs is inlined, so that it runs in registers
         model = _FUNCTION.sub(r"static EOMGEN_APART \1 ", model)
-    return render("cuda/model.cu.j2", _context(program) | {"model": model, "steppers": steppers})
+    return render("cuda/model.cu.j2", _context(program) | {"model": model, "header": header, "own": methods, "steppers": steppers})
 
 
 def describe_device(program: Program) -> dict[str, Any]:

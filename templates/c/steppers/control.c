@@ -90,9 +90,11 @@ void eomgen_start(const eomgen_method *method, eomgen_run *run)
     if (!(run->h_abs > 0.0) && !method->expands) {
         run->h_abs = first_step(method, run);
     }
+#ifndef EOMGEN_ALONE /* which has no such methods */
     if (method->begin != NULL) {
         method->begin(run);
     }
+#endif
 }
 
 /* The least step that SciPy takes. */
@@ -131,9 +133,11 @@ double eomgen_longest(eomgen_run *run)
 
 int eomgen_step(const eomgen_method *method, eomgen_run *run)
 {
+#ifndef EOMGEN_ALONE
     if (method->step != NULL) {
         return method->step(run);
     }
+#endif
     const int n = run->n;
     const double longest = method->fixed ? run->max_step : eomgen_longest(run);
     double h_abs = run->h_abs > longest ? longest : run->h_abs;
@@ -162,8 +166,8 @@ int eomgen_step(const eomgen_method *method, eomgen_run *run)
         }
         const double h = t_new - run->t;
         h_abs = fabs(h);
-        method->attempt(run, h);
-        const double error = n > 0 ? method->error(run, h) : 0.0;
+        EOMGEN_METHOD(method, attempt)(run, h);
+        const double error = n > 0 ? EOMGEN_METHOD(method, error)(run, h) : 0.0;
         if (error < 1.0 && !run->stopped) {
             double factor = error == 0.0 ? 10.0 : fmin(10.0, 0.9 * eomgen_stretch(error, method->error_order));
             factor = rejected && factor > 1.0 ? 1.0 : factor;
@@ -183,9 +187,10 @@ int eomgen_step(const eomgen_method *method, eomgen_run *run)
 
 void eomgen_between(const eomgen_method *method, eomgen_run *run, double t, double *y)
 {
+    (void)method; /* on a device it is known */
     if (!run->interpolates) {
-        method->prepare(run);
+        EOMGEN_METHOD(method, prepare)(run);
         run->interpolates = 1;
     }
-    method->interpolate(run, t, y);
+    EOMGEN_METHOD(method, interpolate)(run, t, y);
 }

@@ -9,6 +9,8 @@
 #define EOMGEN_EVENTS(events) (events)->values
 #define EOMGEN_RESETS(events) (events)->resets
 #define EOMGEN_PROJECT(events) (events)->project
+#define EOMGEN_HAS_EVENTS(events) ((events)->values != NULL)
+#define EOMGEN_PROJECTS(events) ((events)->project != NULL)
 #endif
 
 /* What happens at an event besides that it is noted. */

@@ -121,6 +121,10 @@ void eomgen_failed(eomgen_run *run, int status, double t, const double *y, doubl
 #ifndef EOMGEN_RHS
 #define EOMGEN_RHS(run) (run)->rhs
 #endif
+#ifndef EOMGEN_METHOD
+#define EOMGEN_METHOD(method, function) (method)->function
+#define EOMGEN_TABLED(function) function
+#endif
 
 /* x' at (t, y) into k; NaN where the right-hand side fails, which is remembered. */
 static inline void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k)

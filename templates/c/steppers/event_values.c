@@ -8,7 +8,7 @@
 
 static int event_values(eomgen_run *run, eomgen_events *ev, double t, const double *y, double *g)
 {
-    if (ev->values == NULL && ev->tape == NULL && ev->outside == NULL) {
+    if (!EOMGEN_HAS_EVENTS(ev) && ev->tape == NULL && ev->outside == NULL) {
         return 0;
     }
     if (run->signals != NULL) {
@@ -17,7 +17,7 @@ static int event_values(eomgen_run *run, eomgen_events *ev, double t, const doub
     for (int i = 0; i < ev->n_model; i++) {
         g[i] = (double)NAN; /* if nothing is written */
     }
-    const int status = ev->values != NULL ? EOMGEN_EVENTS(ev)(t, y, run->u, run->c, g, run->w) : 0;
+    const int status = EOMGEN_HAS_EVENTS(ev) ? EOMGEN_EVENTS(ev)(t, y, run->u, run->c, g, run->w) : 0;
     if (status != 0 && status != EOMGEN_NON_FINITE) {
         for (int i = 0; i < ev->n_model; i++) {
             g[i] = (double)NAN;

@@ -1,5 +1,6 @@
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 #include "eomgen_loop.h"
 
@@ -18,28 +19,27 @@ static void domain_edge(const eomgen_method *method, eomgen_run *run, eomgen_eve
     }
 }
 
-static double zero_between(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, const double *bracket);
-
-/* The zero in a bracket within which, at a time, the value is no number: on either side of that gap; NaN if on none. */
-static double zero_beside(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, const double *bracket, double gap)
+/* From a bracket within which, at a time, the value is no number, to one on either side of that gap; 0 if none is there. */
+static int leave_gap(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, double *bracket, double gap)
 {
     double first[4] = {bracket[0], bracket[0], bracket[2], bracket[2]};
     domain_edge(method, run, ev, i, &first[1], &first[3], gap);
     if (first[3] == 0.0 || (first[3] > 0.0) != (first[2] > 0.0)) {
-        return zero_between(method, run, ev, i, first);
+        memcpy(bracket, first, sizeof first);
+        return 1;
     }
     double last[4] = {bracket[1], bracket[1], bracket[3], bracket[3]};
     domain_edge(method, run, ev, i, &last[0], &last[2], gap);
-    if (last[2] == 0.0 || (last[2] > 0.0) != (last[3] > 0.0)) {
-        return zero_between(method, run, ev, i, last);
-    }
-    return (double)NAN;
+    memcpy(bracket, last, sizeof last);
+    return last[2] == 0.0 || (last[2] > 0.0) != (last[3] > 0.0);
 }
 
 /* The zero between a and b, where the values fa and fb differ in sign: R. P. Brent, Algorithms for Minimization without
    Derivatives, 1973, chapter 4; to four roundings, like SciPy's. Where the value jumps,
-   the far side of the jump: a run that goes on from the near one would meet it again. */
-static double zero_between(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, const double *bracket)
+   the far side of the jump: a run that goes on from the near one would meet it again. NaN, and when, where the value is
+   no number. */
+static double zero_of_numbers(
+    const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, const double *bracket, double *gap)
 {
     double a = bracket[0], b = bracket[1], fa = bracket[2], fb = bracket[3], c = a, fc = fa, d = b - a, e = d;
     for (int k = 0; k < 100 && fb != 0.0; k++) {
@@ -73,9 +73,22 @@ static double zero_between(const eomgen_method *method, eomgen_run *run, eomgen_
         b += fabs(d) > tolerance ? d : m > 0.0 ? tolerance : -tolerance;
         fb = value_at(method, run, ev, i, b);
         if (isnan(fb)) {
-            return zero_beside(method, run, ev, i, bracket, b);
+            *gap = b;
+            return fb;
         }
     }
     const int jumps = fb * bracket[2] > 0.0 && fb * fc < 0.0 && fabs(fb) > RUNS_TOUCHING * ev->size[i];
     return jumps ? c : b;
+}
+
+/* The zero in a bracket; NaN if it lies where the value is no number. No recursion: a device has to know its stack. */
+static double zero_between(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, const double *bracket)
+{
+    double own[4] = {bracket[0], bracket[1], bracket[2], bracket[3]}, gap = 0.0;
+    for (;;) {
+        const double zero = zero_of_numbers(method, run, ev, i, own, &gap);
+        if (!isnan(zero) || !leave_gap(method, run, ev, i, own, gap)) {
+            return zero;
+        }
+    }
 }

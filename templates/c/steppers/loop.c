@@ -96,7 +96,7 @@ static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_jou
             }
         }
     }
-    if (ev->project != NULL) {
+    if (EOMGEN_PROJECTS(ev)) {
         memcpy(ev->y, run->y, (size_t)run->n * sizeof(double));
         if (EOMGEN_PROJECT(ev)(run->t, ev->y, run->u, run->c, run->y, run->w) != 0) {
             return EOMGEN_RESET_FAILED;

@@ -24,6 +24,6 @@ static inline void measure(const eomgen_run *run, double *scale)
 }
 
 #define METHOD(name_, title, K, F, order) \
-    const eomgen_method eomgen_##name_ = {title, K, F, order, name_##_attempt, name_##_error, name_##_prepare, \
-        name_##_interpolate, 0, 0, 0, NULL, NULL};
+    const eomgen_method eomgen_##name_ = {title, K, F, order, EOMGEN_TABLED(name_##_attempt), \
+        EOMGEN_TABLED(name_##_error), EOMGEN_TABLED(name_##_prepare), EOMGEN_TABLED(name_##_interpolate), 0, 0, 0, NULL, NULL};
 #include "eomgen_methods.h"

@@ -57,7 +57,8 @@ static void rk4_interpolate(const eomgen_run *run, double t, double *y)
     }
 }
 
-const eomgen_method eomgen_rk4 = {"RK4", 4, 3, 4, rk4_attempt, rk4_error, rk4_prepare, rk4_interpolate, 1, 0, 0, NULL, NULL};
+const eomgen_method eomgen_rk4 = {"RK4", 4, 3, 4, EOMGEN_TABLED(rk4_attempt), EOMGEN_TABLED(rk4_error),
+    EOMGEN_TABLED(rk4_prepare), EOMGEN_TABLED(rk4_interpolate), 1, 0, 0, NULL, NULL};
 
 int eomgen_march(eomgen_function rhs, int n, double t, double h, const double *x, const double *u, const double *c,
     double *out, double *w, double *k)
