@@ -36,7 +36,10 @@ class DeviceFunctions:
         self.n_u, self.n_p, self.n_dof = len(self.u_names), len(self.p_names), int(metadata["n_dof"])
         self.p, self.u = (np.array(metadata[f"{kind}_values"], dtype=float) for kind in ("p", "u"))
         self.x0 = np.array(facts["x0"], dtype=float)
+        for declared in (self.p, self.u, self.x0):
+            declared.flags.writeable = False  # they are on the device once and for all
         self._constants: DeviceArray | None = None
+        self._there: dict[str, tuple[bytes, DeviceArray]] = {}
         self._kernels: dict[str, Callable[..., None]] = {}
         self._calls: dict[str, BatchCall] = {}
         for name, (ports, shape) in facts["kernels"].items():
@@ -74,6 +77,14 @@ class DeviceFunctions:
             raise UsageError(f"{label} must have shape {wanted}, not {shape}")
         on_device = found if isinstance(found, DeviceArray) else self.device.put(found)
         return on_device, shape[1] if len(shape) == 2 else None
+
+    def kept(self, label: str, given: Array) -> DeviceArray:
+        """Numbers on the device; those of the last call where they are the same."""
+        told, found = self._there.get(label, (None, None))
+        if found is None or told != given.tobytes():
+            found = self.device.put(given)
+            self._there[label] = (given.tobytes(), found)
+        return found
 
     def constants(self, p: Any, count: int) -> tuple[DeviceArray, bool]:
         """What kernels take in place of parameters, and whether each state has its own."""
@@ -117,7 +128,8 @@ class BatchCall:
         if any((1 if each is None else each) != count for _, each in found):
             raise UsageError(f"{' and '.join(port for port, _ in self.ports)} must have the same number of columns")
         t, each_t = self._times(values["t"], count)
-        u, each_u = module.columns("u", module.u if values["u"] is None else values["u"], module.n_u, count)
+        given_u = module.kept("u", module.u) if values["u"] is None else values["u"]
+        u, each_u = module.columns("u", given_u, module.n_u, count)
         c, each_c = module.constants(values["p"], count)
         if not batch and (each_t or each_u is not None or each_c):
             raise UsageError(f"{self.ports[0][0]} is one state, so t, p and u must be too")
@@ -149,7 +161,8 @@ class BatchCall:
     def _times(self, given: Any, count: int) -> tuple[DeviceArray, bool]:
         there = self.module.device.view(given)
         if there is None:
-            there = self.module.device.put(np.asarray(given, dtype=float))
+            array = np.asarray(given, dtype=float)
+            there = self.module.kept("t", array) if array.ndim == 0 else self.module.device.put(array)
         if there.shape not in ((), (1,), (count,)):
             raise UsageError(f"t must be a number or of shape ({count},), not {there.shape}")
         return there, there.shape == (count,) and count > 1

@@ -59,11 +59,7 @@ def test_the_stack_of_runs_is_known_beforehand(method: str) -> None:
 def called_by_each(ptx: str) -> dict[str, set[str]]:
     """Function -> the functions that it calls, by their names in PTX."""
     parts = re.split(r"^(?:\.\w+ )*\.(?:entry|func)\s+(?:\([^)]*\)\s*)?(\w+)\s*\(", ptx, flags=re.MULTILINE)
-    return {
-        name: {call for call in CALL.findall(body)}
-        for name, body in zip(parts[1::2], parts[2::2], strict=True)
-        if "{" in body
-    }
+    return {name: set(CALL.findall(body)) for name, body in zip(parts[1::2], parts[2::2], strict=True) if "{" in body}
 
 
 @pytest.mark.needs("NVRTC")

@@ -72,7 +72,9 @@ def emit_device_text(program: Program) -> str:
         steppers = _OF_STEPPERS.sub(r"EOMGEN_APART \1 ", steppers)
     if program.drivers:  # which call each other in many places; a tree's rhs is inlined, so that it runs in registers
         model = _FUNCTION.sub(r"static EOMGEN_APART \1 ", model)
-    return render("cuda/model.cu.j2", _context(program) | {"model": model, "header": header, "own": methods, "steppers": steppers})
+    return render(
+        "cuda/model.cu.j2", _context(program) | {"model": model, "header": header, "own": methods, "steppers": steppers}
+    )
 
 
 def describe_device(program: Program) -> dict[str, Any]:
