@@ -1,27 +1,12 @@
 /* Nanoseconds of one call of a right-hand side that stands in another file, so that the compiler sees none of it here.
-   The state moves a little with every result, so that no call can begin before the one before has ended. Upper halves of
-   vector registers that other code of the process has left in use are emptied first: else every change between a text's
-   SSE instructions and the VEX instructions of libm's sine takes an Intel processor 70 cycles. */
+   The state moves a little with every result, so that no call can begin before the one before has ended. */
 #include <time.h>
-#if defined(__x86_64__)
-#include <immintrin.h>
-
-__attribute__((target("avx"))) static void empty_upper_halves(void)
-{
-    _mm256_zeroupper();
-}
-#endif
 
 void call(const double *x, const double *u, double *out);
 
 double measure(long calls, int n_q, int n_v, double *x, const double *u, double *out)
 {
     struct timespec start, end;
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx")) {
-        empty_upper_halves();
-    }
-#endif
     clock_gettime(CLOCK_MONOTONIC, &start);
     for (long k = 0; k < calls; k++) {
         call(x, u, out);
