@@ -161,7 +161,7 @@ def _plan(
     """Flags of every C file, and under "" those of the linker."""
     files = [file for file in sources if file.endswith(".c")]
     size = sum(len(sources[file]) for file in files)
-    flags = {file: compile_flags(options, compiler, size, hidden=extension) for file in files}
+    flags = {file: compile_flags(options, compiler, size, hidden=extension, portable=not extension) for file in files}
     flags = {file: [*words, f"-DEOMGEN_LANES={lanes}"] for file, words in flags.items()}
     return {**flags, "": link_flags(options, compiler, extension=extension)}
 

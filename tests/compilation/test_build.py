@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import platform
 import shutil
+import subprocess
 import sys
 import sysconfig
 import time
@@ -77,15 +79,28 @@ def test_everything_that_matters_changes_the_key(
     assert compile_c_library(sources, "pendulum").key == keys[3]
 
 
-def test_flags_are_those_measured_to_be_best() -> None:
+def test_flags_are_those_measured_to_be_best(monkeypatch: pytest.MonkeyPatch) -> None:
     gcc, clang = (CompilerInfo(kind, (kind,), kind, "") for kind in ("gcc", "clang"))
     for compiler, size, level in ((gcc, 1, 1), (gcc, 10**7, 1), (clang, 1, 2), (clang, 10**7, 1)):
         flags = compile_flags(Options(), compiler, size, hidden=True)
         assert f"-O{level}" in flags
         assert "-ffp-contract=off" in flags
         assert "-ffast-math" not in flags
+        assert "-mavx" not in compile_flags(Options(), compiler, size, hidden=True, portable=True)
+        for width, wanted in ((2, False), (4, True), (8, True)):
+            monkeypatch.setattr(options_module, "lane_width", lambda width=width: width)
+            assert ("-mavx" in compile_flags(Options(), compiler, size, hidden=True)) is wanted
+            assert "-mavx" not in compile_flags(Options(native=True), compiler, size, hidden=True)
     native = compile_flags(Options(native=True), gcc, 1, hidden=True)
     assert {"-march=native", "-ffp-contract=fast"} <= set(native)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="instructions of x86-64")
+def test_a_library_for_others_has_no_instructions_of_this_processor_alone(sources: dict[str, str]) -> None:
+    library = compile_c_library(sources, "pendulum").path
+    text = subprocess.run(["objdump", "-d", str(library)], capture_output=True, text=True, check=True).stdout
+    assert "mulsd" in text
+    assert "vmulsd" not in text
 
 
 @pytest.mark.parametrize("options", [Options(optimize=0), Options(native=True, warnings=True)])
