@@ -66,17 +66,18 @@ class Trajectory:
         t: Array,
         x: Array,
         columns: Source,
-        header: dict[str, Any],
+        header: dict[str, Any] | Callable[[], dict[str, Any]],
         t_events: Sequence[Array] = (),
         x_events: Sequence[Array] = (),
         sample: Callable[[Array], Trajectory] | None = None,
         described: Callable[[], dict[str, Any]] = dict,
     ) -> None:
         self.t, self.x, self.names = t, x, columns.names
-        self._columns, self._header, self._described = columns, header, described
-        self.units: dict[str, str] = header.get("units", {})
+        self._columns, self._told, self._described = columns, header, described
         self._times, self._states, self._sample = t_events, x_events, sample
 
+    _header = cached_property[dict[str, Any]](lambda self: self._told() if callable(self._told) else self._told)
+    units = cached_property[dict[str, str]](lambda self: self._header.get("units", {}))
     t_events = cached_property[Named](lambda self: Named.of(self._times, self._header))
     x_events = cached_property[Named](lambda self: Named.of(self._states, self._header))
     nfev = cached_property[int](lambda self: int(self._header.get("nfev", 0)))

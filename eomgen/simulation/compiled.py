@@ -165,7 +165,7 @@ def integrate_compiled(
     return (
         Solution(
             times,
-            np.ascontiguousarray(states.T),
+            states,
             t_events,
             x_events,
             journey.dense() if dense else None,

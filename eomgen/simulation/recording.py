@@ -17,6 +17,7 @@ from .integrate import Solution
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+    from ..runtime.layout import Layout
 
 PLAIN = frozenset((float,))  #: types of options that nobody changes afterwards
 
@@ -38,22 +39,11 @@ def record(
     """
     residuals, x = project(module, solution.t, solution.x, forcing)
     described: Callable[[], dict[str, Any]] = partial(_described, module, forcing, options)
+    told = solution.ends, solution.status, solution.message, solution.counts  # not the states before projection
+    header: Any = partial(_header, module.layout, method, options, event_names, residuals, told)
     varies = bool(forcing.values)
     if varies or not PLAIN.issuperset(map(type, options.values())):  # the user may change them
-        described = described().copy
-    rtol, atol = options.get("rtol"), options.get("atol")
-    header: dict[str, Any] = {
-        "method": method,
-        "rtol": rtol if type(rtol) is float else _plain(rtol),
-        "atol": atol if type(atol) is float else _plain(atol),
-        "span": list(solution.ends),
-        "status": solution.status,
-        "message": solution.message,
-        **solution.counts,
-        "residuals": residuals,
-        "event_names": list(event_names),
-        "units": units_of_layout(module.layout),
-    }
+        described, header = described().copy, header()
     steps: Callable[[], tuple[Array, Array, Array]] | None = None
     if solution.steps is not None:
         walked = solution.steps
@@ -70,10 +60,29 @@ def record(
 
         def sample(t: Array) -> Trajectory:
             found, states = project(module, t, dense(t), forcing)
-            head = described() | header | {"residuals": found}
+            head = described() | (header() if callable(header) else header) | {"residuals": found}
             return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states)), head)
 
     return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample, described)
+
+
+def _header(
+    layout: Layout, method: str, options: dict[str, Any], names: Sequence[str], residuals: Any, told: tuple[Any, ...]
+) -> dict[str, Any]:
+    """What a trajectory tells of its run."""
+    ends, status, message, counts = told
+    return {
+        "method": method,
+        "rtol": _plain(options.get("rtol")),
+        "atol": _plain(options.get("atol")),
+        "span": list(ends),
+        "status": status,
+        "message": message,
+        **counts,
+        "residuals": residuals,
+        "event_names": list(names),
+        "units": units_of_layout(layout),
+    }
 
 
 def _described(module: BoundModel, forcing: Forcing, options: dict[str, Any]) -> dict[str, Any]:

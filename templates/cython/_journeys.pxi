@@ -297,7 +297,7 @@ cdef class Journey(Stepper):
         return [i for i in range(self.events.n) if self.events.direction[i] <= 1 and isnan(self.events.size[i])]
 
     def results(self):
-        """Times (k,), states (k, n_x), and rows (event, t, state) of events, in order."""
+        """Times (k,), states (n_x, k), and rows (event, t, state) of events, in order; None without events."""
         cdef eomgen_journey *j = &self.journey
         if j.n_eval >= 0:
             pair = [[self.times[:j.stored]], [self.states[:j.stored]]]
@@ -305,9 +305,11 @@ cdef class Journey(Stepper):
         else:
             self.take()
             pair = self.stored
-        notes = np.concatenate(self.stored[3]) if self.stored[3] else np.empty((0, 2 + self.run.n))
+        notes = None
+        if j.events != NULL:
+            notes = np.concatenate(self.stored[3]) if self.stored[3] else np.empty((0, 2 + self.run.n))
         times, states = [parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in pair[:2]]
-        return times, states, notes
+        return times, cnp.PyArray_GETCONTIGUOUS(cnp.PyArray_Transpose(states, NULL)), notes
 
     def trail(self):
         """Rows (t, state) of every step, after results(); none if too many, None if they were not to be kept."""
