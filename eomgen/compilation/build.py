@@ -17,7 +17,7 @@ from .cache import Cache, CacheEntry, cache_directory, compute_key
 from .commands import Running, allowed, raise_failure
 from .compiler import CompilerInfo, describe_native, find_compiler
 from .cython_layer import HEADERS, build_layer, describe_interpreter, describe_layer
-from .options import Options, compile_flags, link_flags, machine_flags
+from .options import Options, compile_flags, link_flags, machine_flags, needed_features
 from .processor import choose_lanes, late_files
 from .products import require_library, require_object, stamp, write_stamp
 from .shared_objects import is_shared, shared_objects
@@ -187,7 +187,10 @@ def _build(
             (folder / file).write_text(text, encoding="utf-8", newline="\n")
         files = {file: Path("sources", file) for file in flags if file}
         compile_and_link(directory, key, name, files, flags, product, compiler, options.jobs, objects, progress)
-        recipe = {"compiler": [*compiler.command, compiler.version], "flags": dict(flags), "options": asdict(options)}
+        recipe = {
+            "compiler": [*compiler.command, compiler.version], "flags": dict(flags), "options": asdict(options),
+            "needs": needed_features(flags),
+        }  # fmt: skip
         return cache.publish(directory, key, kind, name, product, recipe)
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ..errors import UsageError
 from ..numeric.counts import as_count, read_count
 from ..texts import shown
 from .compiler import CompilerInfo
-from .processor import lane_width
+from .processor import NEEDS, lane_width
 
 #: gcc: -O1. Measured with gcc 12 on one call of a right-hand side, beside -O2, which vectorises straight-line code
 #: to its harm: Panda, UR5, Talos, ANYmal take 0.97, 0.96, 0.96, 0.91 of the time, linkages with loops 0.97 to 1, and
@@ -34,7 +34,8 @@ class Options:
         build.
     native : bool
         Use every instruction of this processor, and contract a*b + c into one of them; results may differ in the last
-        digits. Changes the build.
+        digits. Changes the build. Without it modules have -mavx where this processor has AVX2: no result changes, and
+        other processors get a build of their own.
     warnings : bool
         Treat the compiler's warnings as errors. Changes the build.
     extra : sequence of str
@@ -115,6 +116,11 @@ def machine_flags(options: Options, compiler: CompilerInfo) -> list[str]:
         # zig compiles for this very processor, and checks for undefined behaviour, unless told otherwise.
         return ["-mcpu=native" if options.native else "-mcpu=baseline", "-fno-sanitize=undefined"]
     return ["-march=native"] if options.native else []
+
+
+def needed_features(flags: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+    """Features of the processor, by NumPy's names, without which code compiled with such flags cannot run."""
+    return NEEDS[WITH_AVX] if any("-mavx" in words for words in flags.values()) else ()
 
 
 def layer_flags(compiler: CompilerInfo) -> list[str]:

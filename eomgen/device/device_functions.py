@@ -37,7 +37,7 @@ class DeviceFunctions:
         self.p, self.u = (np.array(metadata[f"{kind}_values"], dtype=float) for kind in ("p", "u"))
         self.x0 = np.array(facts["x0"], dtype=float)
         for declared in (self.p, self.u, self.x0):
-            declared.flags.writeable = False  # they are on the device once and for all
+            declared.flags.writeable = False  # the device may hold them already
         self._constants: DeviceArray | None = None
         self._there: dict[str, tuple[bytes, DeviceArray]] = {}
         self._kernels: dict[str, Callable[..., None]] = {}

@@ -79,8 +79,8 @@ def describe(module: BoundModel) -> Handle:
         core.take_lanes()  # here, once, so that workers find them beside the module
     getattr(core, "ensemble", None)  # likewise
     recipe = _recipe(Path(file))
-    native = bool(recipe) and json.loads(recipe)["options"].get("native", False)
-    needs = tuple(sorted(processor_features())) if native else ()
+    facts = json.loads(recipe) if recipe else {"options": {}, "needs": ()}
+    needs = tuple(sorted(processor_features())) if facts["options"].get("native", False) else tuple(facts["needs"])
     return Handle(type(module), core.__name__, file, digest(file), recipe, module.p, module.u, needs)
 
 
@@ -115,7 +115,8 @@ def _recipe(file: Path) -> str:
     sources = {n.removeprefix(folder): text.decode() for n, text in sorted(files.items()) if n.startswith(folder)}
     if not sources:
         return ""
-    return json.dumps({"name": facts["name"], "sources": sources, "options": facts["recipe"].get("options", {})})
+    how = {key: facts["recipe"].get(key, none) for key, none in (("options", {}), ("needs", []))}
+    return json.dumps({"name": facts["name"], "sources": sources, **how})
 
 
 @lru_cache(maxsize=8)

@@ -152,7 +152,7 @@ def integrate_compiled(
         status = journey.jump(after) or journey.travel()
     if checkpoint is not None and journey.raised is None and status in (ENDED, TERMINAL):
         checkpoint.save(journey.frozen(status))
-    times, states, notes = journey.results()
+    times, states, notes = journey.outcome()
     if events is not None and journey.raised is None:
         warn_of_unknown([events.names[i] for i in journey.unknown()])
     if status == ZENO and events is not None:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
 MANY = 16  #: sets of arguments that are kept for a module
-NOTHING = (None, None, None)
 SIMPLE = frozenset((str, float, type(None)))  #: types of the arguments by which a run is found again
 
 
@@ -36,7 +35,7 @@ class Settled(NamedTuple):
 def settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | None:
     """What holds for a run in compiled code without inputs; None where the arguments must be read one by one."""
     key = (method, rtol, atol)
-    if key != NOTHING and not SIMPLE.issuperset(map(type, key)):
+    if not (method is None and rtol is None and atol is None or SIMPLE.issuperset(map(type, key))):
         return None
     known = module._settled
     if key in known:

@@ -296,7 +296,7 @@ cdef class Journey(Stepper):
         """The events watched that were NaN at the start and after every step."""
         return [i for i in range(self.events.n) if self.events.direction[i] <= 1 and isnan(self.events.size[i])]
 
-    def results(self):
+    def outcome(self):
         """Times (k,), states (n_x, k), and rows (event, t, state) of events, in order; None without events."""
         cdef eomgen_journey *j = &self.journey
         if j.n_eval >= 0:
@@ -312,11 +312,11 @@ cdef class Journey(Stepper):
         return times, cnp.PyArray_GETCONTIGUOUS(cnp.PyArray_Transpose(states, NULL)), notes
 
     def trail(self):
-        """Rows (t, state) of every step, after results(); none if too many, None if they were not to be kept."""
+        """Rows (t, state) of every step, after outcome(); none if too many, None if they were not to be kept."""
         return np.concatenate(self.stored[4]) if self.stored[4] else None
 
     def dense(self):
-        """The solution between steps, after results(); None if there is none."""
+        """The solution between steps, after outcome(); None if there is none."""
         if not self.stored[2]:
             return None
         cdef Dense dense = Dense.__new__(Dense)

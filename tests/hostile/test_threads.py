@@ -129,7 +129,7 @@ def test_one_solution_read_by_all(crank: Any) -> None:
     settings = {"rtol": 1e-8, "atol": np.full(n, 1e-10), "max_step": np.inf}
     journey = core.journey("DOP853", context, *SPAN[:1], x0, SPAN[1], plan=plan, **settings)
     assert journey.travel() == 1
-    journey.results()
+    journey.outcome()
     dense = journey.dense()
     stepper = core.stepper("DOP853", context, SPAN[0], x0, SPAN[1], **settings)
     assert stepper.step()

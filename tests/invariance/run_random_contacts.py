@@ -135,7 +135,7 @@ def approaching(scene: Scene, mod: eg.Module, random: np.random.Generator) -> np
     x = random_state(scene, mod, random)
     if "soil" in scene.family[1]:
         for k in range(1, n):
-            x[3 * k : 3 * k + 2] = 0.7 * k - 0.8, 0.35
+            x[3 * k : 3 * k + 2] = 0.7 * k - 0.8, x[1] + 0.35
         x[2] = 0.0
         x[3 * n :] = 0.0
         x[3 * n :: 3][1:n] = random.standard_normal(n - 1)
