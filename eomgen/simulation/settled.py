@@ -35,7 +35,7 @@ class Settled(NamedTuple):
 def settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | None:
     """What holds for a run in compiled code without inputs; None where the arguments must be read one by one."""
     key = (method, rtol, atol)
-    if not (method is None and rtol is None and atol is None or SIMPLE.issuperset(map(type, key))):
+    if not ((method is None and rtol is None and atol is None) or SIMPLE.issuperset(map(type, key))):
         return None
     known = module._settled
     if key in known:
