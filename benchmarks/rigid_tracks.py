@@ -22,6 +22,9 @@ from .excavator_mujoco import Scene
 
 TITLE = "the tracked excavator with rigid contact, beside MuJoCo"
 STEP = 1e-3  #: (s)
+#: MuJoCo's where speeds are compared (s): its mean speed after the turn is -1.10, -0.86 and -1.01 m/s at 1, 0.5 and
+#: 0.25 ms, as its contacts are the stiffer the smaller its steps are.
+FINE = 0.25e-3
 #: Speeds of the sprocket (rad/s) over times (s): of a start, and turned round within 0.3 s.
 DRIVE = ([0.0, 1.0], [0.0, 3.0])
 REVERSAL = ([0.0, 1.0, 2.0, 2.3], [0.0, 3.0, 3.0, -3.0])
@@ -38,16 +41,16 @@ def by_moreau(module: Any, seconds: float, speeds: tuple[list[float], list[float
 
 
 def by_mujoco(
-    model: Any, module: Any, seconds: float, speeds: tuple[list[float], list[float]]
+    model: Any, module: Any, seconds: float, speeds: tuple[list[float], list[float]], step: float = STEP
 ) -> tuple[float, list[float], list[float], int, float]:
     """CPU seconds, ways and speeds of the chassis at all steps, most contacts, deepest penetration at the end."""
-    world = mujoco.MjModel.from_xml_string(Scene(model, module, STEP).text())
+    world = mujoco.MjModel.from_xml_string(Scene(model, module, step).text())
     data = mujoco.MjData(world)
     x, rate = int(world.joint("x").qposadr[0]), int(world.joint("x").dofadr[0])
     mujoco.mj_forward(world, data)
     most, ways, rates = 0, list[float](), list[float]()
     start = process_time()
-    for _ in range(round(seconds / STEP)):
+    for _ in range(round(seconds / step)):
         data.ctrl[0] = np.interp(data.time, *speeds)
         mujoco.mj_step(world, data)
         most = max(most, data.ncon)
@@ -77,8 +80,8 @@ def theirs(model: Any, module: Any, seconds: float) -> list[Any]:
 def turned_round(model: Any, module: Any) -> list[list[Any]]:
     """Least, greatest and mean speed of the chassis by both in parts of a drive that is turned round."""
     seconds = 4.0
-    run, (_, _, theirs, _, _) = by_moreau(module, seconds, REVERSAL), by_mujoco(model, module, seconds, REVERSAL)
-    t, rows = np.arange(1, round(seconds / STEP) + 1) * STEP, list[list[Any]]()
+    run, (_, _, theirs, _, _) = by_moreau(module, seconds, REVERSAL), by_mujoco(model, module, seconds, REVERSAL, FINE)
+    t, rows = np.arange(1, round(seconds / FINE) + 1) * FINE, list[list[Any]]()
     own, other = np.interp(t, run.t, run["x_dot"]), np.array(theirs)
     for begin, end in ((1.0, 2.0), (2.0, 2.3), (2.3, 2.6), (2.6, 3.0), (3.0, 4.0)):
         part = (t > begin) & (t <= end)
@@ -104,6 +107,7 @@ def run(quick: bool) -> Report:
         "moreau with contact_tolerance=1e-3 and contact_iterations=1: edges of cones one by one, then a Newton step.",
         "MuJoCo: implicitfast, elliptic cones, Newton, time constants of 2 ms; the upper structure is rigid there.",
         "Penetration: the deepest of the run by moreau, its start among it; that at the end in MuJoCo.",
+        f"Turned round: MuJoCo's steps are of {1e3 * FINE:g} ms, since its speeds change with them by up to 0.25 m/s.",
     )
     tables = [Table("drive on flat ground", head, rows)]
     if not quick:

@@ -17,7 +17,6 @@ from .integrate import Solution
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.layout import Layout
 
 PLAIN = frozenset((float,))  #: types of options that nobody changes afterwards
 
@@ -39,8 +38,8 @@ def record(
     """
     residuals, x = project(module, solution.t, solution.x, forcing)
     described: Callable[[], dict[str, Any]] = partial(_described, module, forcing, options)
-    told = solution.ends, solution.status, solution.message, solution.counts  # not the states before projection
-    header: Any = partial(_header, module.layout, method, options, event_names, residuals, told)
+    found = solution[5:9]  # status, message, counts and ends: not the states before projection, which take much memory
+    header: Any = partial(_header, module.layout, method, options, event_names, residuals, *found)
     varies = bool(forcing.values)
     if varies or not PLAIN.issuperset(map(type, options.values())):  # the user may change them
         described, header = described().copy, header()
@@ -67,22 +66,14 @@ def record(
 
 
 def _header(
-    layout: Layout, method: str, options: dict[str, Any], names: Sequence[str], residuals: Any, told: tuple[Any, ...]
-) -> dict[str, Any]:
+    layout: Any, title: str, options: Any, names: Any, residuals: Any, status: int, message: str, counts: Any, ends: Any
+) -> dict[str, Any]:  # fmt: skip
     """What a trajectory tells of its run."""
-    ends, status, message, counts = told
     return {
-        "method": method,
-        "rtol": _plain(options.get("rtol")),
-        "atol": _plain(options.get("atol")),
-        "span": list(ends),
-        "status": status,
-        "message": message,
-        **counts,
-        "residuals": residuals,
-        "event_names": list(names),
+        "method": title, "rtol": _plain(options.get("rtol")), "atol": _plain(options.get("atol")), "span": list(ends),
+        "status": status, "message": message, **counts, "residuals": residuals, "event_names": list(names),
         "units": units_of_layout(layout),
-    }
+    }  # fmt: skip
 
 
 def _described(module: BoundModel, forcing: Forcing, options: dict[str, Any]) -> dict[str, Any]:
