@@ -178,5 +178,6 @@ def run(quick: bool) -> Report:
     limits = tuple(
         Limit(f"{name}: results of the GPU beside the module", error, ALIKE) for name, error in errors.items()
     )
+    notes.append(f"the processors: all cores, or one where that is quicker, tried up to {SMALL:,} states")
     notes.append(f"GPU: {gpu.device.name}; medians; each batch is launched {LAUNCHES} times in a row, from Python")
     return Report(tuple(tables), limits, tuple(notes), {"errors": errors})

@@ -19,7 +19,7 @@ GCC_LEVEL = 1
 #: Other compilers: -O2, and -O1 for models whose files are longer than this (bytes) together.
 LARGE_SOURCE = 800_000
 #: Lanes of processors whose instructions write a third register: -mavx, to the same bits. gcc 12 copies registers less,
-#: so Talos and ANYmal take 0.82 and 0.8 of the time, Panda and UR5 0.98 (medians on a Xeon of 2023).
+#: so Talos and ANYmal take about 0.8 of the time (0.72 to 0.88 in four measurements on a Xeon), small arms 0.98.
 WITH_AVX = 4
 
 

@@ -73,7 +73,8 @@ class Trajectory:
         described: Callable[[], dict[str, Any]] = dict,
     ) -> None:
         self.t, self.x, self.names = t, x, columns.names
-        self._columns, self._told, self._described = columns, header, described
+        self.columns = columns  #: where the columns come from: the module's calls, or the arrays of a file
+        self._told, self._described = header, described
         self._times, self._states, self._sample = t_events, x_events, sample
 
     _header = cached_property[dict[str, Any]](lambda self: self._told() if callable(self._told) else self._told)
@@ -94,11 +95,6 @@ class Trajectory:
     def name(self) -> str:
         """Name of the model."""
         return str(self.metadata["name"])
-
-    @property
-    def columns(self) -> Source:
-        """The source of the columns: the module's calls, or the arrays of a file."""
-        return self._columns
 
     @property
     def has_dense_output(self) -> bool:
@@ -137,7 +133,7 @@ class Trajectory:
             name = plain_name(name, self.metadata.get("instances", {}))  # leg1.hip, of an instance of a component
         if name not in self.names:
             raise unknown("column", name, ("t", *self.names))
-        return self._columns[name]
+        return self.columns[name]
 
     def __contains__(self, name: object) -> bool:
         return name == "t" or name in self.names
@@ -222,7 +218,7 @@ class Trajectory:
     @property
     def has_energies(self) -> bool:
         """Whether the energy of the model is known; given equations of motion can lack it."""
-        return self._columns.has_energies
+        return self.columns.has_energies
 
     @property
     def energies(self) -> Array:
@@ -233,7 +229,7 @@ class Trajectory:
         UsageError
             The equations of motion were given without kinetic energy.
         """
-        return self._columns.energies
+        return self.columns.energies
 
     @property
     def change_points(self) -> list[ChangePoint]:
@@ -246,7 +242,7 @@ class Trajectory:
         UsageError
             The trajectory was read from a file, without the model.
         """
-        columns: Any = self._columns
+        columns: Any = self.columns
         if not hasattr(type(columns), "change_points"):
             raise UsageError("change points need the model: use the trajectory of simulate, not one read from a file")
         found: list[ChangePoint] = columns.change_points

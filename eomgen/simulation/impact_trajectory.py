@@ -70,7 +70,7 @@ class ImpactRun(Trajectory):
         found = []
         for a, b in pairwise(ends):
             header = self.metadata | {"span": [float(self.t[a]), float(self.t[b - 1])], "event_names": []}
-            found.append(Trajectory(self.t[a:b], self.x[:, a:b], TrajectoryPart(self._columns, a, b), header))
+            found.append(Trajectory(self.t[a:b], self.x[:, a:b], TrajectoryPart(self.columns, a, b), header))
         return found
 
 

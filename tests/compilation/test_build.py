@@ -13,9 +13,11 @@ import time
 from pathlib import Path
 from typing import Any
 
+import models
 import numpy as np
 import pytest
 
+import eomgen as eg
 from eomgen.compilation import (
     Cache,
     Options,
@@ -101,6 +103,18 @@ def test_a_library_for_others_has_no_instructions_of_this_processor_alone(source
     text = subprocess.run(["objdump", "-d", str(library)], capture_output=True, text=True, check=True).stdout
     assert "mulsd" in text
     assert "vmulsd" not in text
+
+
+@pytest.mark.needs("AVX2")
+@pytest.mark.parametrize("name", ["slider_crank", "satellite"])
+def test_a_third_register_changes_no_bit(name: str) -> None:
+    model = eg.load(models.EXAMPLES / f"{name}.yaml")
+    one, other = model.compile(), model.compile(extra=("-mno-avx",))
+    x = one.project(one.x0() + 0.01 * np.random.default_rng(0).normal(size=one.n_x))
+    found = [(m.rhs(0.0, x), m.jacobian(0.0, x), m.simulate(0.3, x).x) for m in (one, other)]
+    assert one.core.__file__ != other.core.__file__
+    for own, without in zip(*found, strict=True):
+        np.testing.assert_array_equal(own, without)
 
 
 @pytest.mark.parametrize("options", [Options(optimize=0), Options(native=True, warnings=True)])

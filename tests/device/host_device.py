@@ -13,6 +13,7 @@ import numpy as np
 
 from eomgen.compilation import find_compiler
 from eomgen.device.arrays_on_device import DeviceArray
+from eomgen.emit.cuda.device_text import METHODS
 
 #: What a GPU has and a host lacks: which thread this is.
 HEAD = """
@@ -23,7 +24,7 @@ void choose_state(long long j) { host_state = j; }
 #define EOMGEN_OWN host_state
 """
 FLAGS = ("-std=c11", "-O0", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-fPIC", "-shared", "-x", "c")
-OF_RUNS = ("EOMGEN_WANT_RUNS", "EOMGEN_WANT_DOP853", "EOMGEN_WANT_RK4")
+OF_RUNS = {f"EOMGEN_WANT_{name.upper()}" for name in ("runs", *METHODS)}
 WANTED = re.compile(r"EOMGEN_WANT_\w+")
 
 
