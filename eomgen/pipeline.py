@@ -249,6 +249,7 @@ def _assemble_start(equations: Derivation) -> list[str]:
     return []
 
 
+@_alone()
 @np.errstate(all="ignore")
 def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
     """The functions to generate for a target."""
@@ -330,7 +331,7 @@ def _load(
 
         if options:
             raise UsageError(f"target 'numpy' has no options, and these are given: {', '.join(options)}")
-        with _timed(seconds, "emit"):
+        with _alone(), _timed(seconds, "emit"):
             sources = emit_numpy(program)
         with _timed(seconds, "load"):
             return cast("Core", load_numpy(sources, equations.name, twins(program)))
@@ -344,7 +345,7 @@ def _load(
     if unknown:
         raise UsageError(f"no option {', '.join(unknown)}; there are: {', '.join(allowed)}")
     chosen = Options(**options)
-    with _timed(seconds, "emit"):
+    with _alone(), _timed(seconds, "emit"):
         shortcut = Shortcut(fingerprint(program), chosen)
         artifact = shortcut.find()
         if artifact is None:
@@ -360,5 +361,5 @@ def _load(
             except ToolchainError as error:
                 raise blame_source(error, equations.kinematics.graph.functions.values()) or error from None
             shortcut.keep(artifact)
-    with _timed(seconds, "load"):
+    with _alone(), _timed(seconds, "load"):
         return cast("Core", load_core(artifact))

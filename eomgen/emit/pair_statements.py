@@ -97,7 +97,7 @@ class PairLists:
         self._rates: dict[str, int] = {}
         end = start
         work = 0
-        for i in statements:
+        for i in statements if graph.calls else ():
             call = self.call(i)
             if call is None or call.part == "item":
                 continue

@@ -124,7 +124,7 @@ def find_segments(
     slot = {a: k for k, a in enumerate(angles)}
     known.update((i, ("w", slot[nodes[i][1]] + (len(angles) if nodes[i][0] == "cos" else 0))) for i in turning)
     lists = PairLists(graph, statements, 2 * len(angles))
-    items = {i for i in statements if lists.call(i) is not None and not lists.is_list(i)}
+    items = {i for i in statements if graph.calls and lists.call(i) is not None and not lists.is_list(i)}
     known.update((i, ("w", lists.place(i))) for i in items)
     alone = {*lists.every, *(items & kept)}
     early = {*turning, *(items - kept)}

@@ -107,6 +107,12 @@ class BoundModel(Assembled, Momenta):
         return {}
 
     @cached_property
+    def _running_start(self) -> Array:
+        """The state of the declared initial values at t = 0, from which the right-hand side can be evaluated."""
+        self.rhs(0.0, self._declared_start)
+        return self._declared_start
+
+    @cached_property
     def _parameters(self) -> Mapping[str, float]:
         """The parameters bound, by name; they never change."""
         return MappingProxyType(dict(zip(self.p_names, self.p.tolist(), strict=True)))

@@ -62,13 +62,14 @@ class Run:
 
     def begin(self, start: float, end: float, x: Array, longest: float, kept: int) -> None:
         """Take what the check of steps that lead nowhere begins with."""
-        self._first = (start, end, x, self.module.n_q, longest, partial(_troubled, self.module), kept)
+        self._first = (start, end, x, self.module.n_q, longest), kept
 
     @cached_property
     def stall_check(self) -> StallCheck | None:
         """What ends the run where its steps lead nowhere, made when first looked at; a slim package has none."""
         check = find_stall_check()
-        return None if check is None else check(*self._first)
+        first, kept = self._first
+        return None if check is None else check(*first, partial(_troubled, self.module), kept)
 
     def look(self, t: float, x: Array, steps: int = 1) -> None:
         """Take note of further steps."""

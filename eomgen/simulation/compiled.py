@@ -136,9 +136,8 @@ def integrate_compiled(
         "stall_check": look,
         "keep": None if checkpoint is None else (checkpoint.every, checkpoint.save),
     }  # fmt: skip
-    rtol, atol = require_one(options["rtol"]), options["atol"]
-    limits = options.get("max_step", inf), options.get("first_step", 0.0)
-    journey = core.journey(method, module.kernels.context, start, x0, end, rtol, atol, *limits, forcing.encode(), plan)
+    steps = require_one(options["rtol"]), options["atol"], options.get("max_step", inf), options.get("first_step", 0.0)
+    journey = core.journey(method, module.kernels.context, start, x0, end, *steps, forcing.encode(), plan)
     status = 0
     if checkpoint is not None and checkpoint.kept is not None:
         try:
@@ -174,6 +173,7 @@ def integrate_compiled(
             {"nfev": journey.evaluations, "njev": journey.differentiations, "nlu": journey.factorizations},
             (start, journey.t),
             None if (trail := journey.trail()) is None else (trail[:, 0], np.ascontiguousarray(trail[:, 1:].T)),
+            journey.finite,
         ),
         journey.failure,
         journey.raised,

@@ -41,6 +41,7 @@ class Solution(NamedTuple):
     counts: dict[str, int]
     ends: tuple[float, float]  #: first and last time reached
     steps: tuple[Array, Array] | None = None  #: (k,), (n_x, k) of every step, where others are stored; k = 0: too many
+    finite: bool = False  #: whether the states are known to be finite
 
 
 class Interrupted(KeyboardInterrupt):

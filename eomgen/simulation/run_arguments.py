@@ -33,13 +33,14 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     """Start and end (s) of what a user gives as the span of a run."""
     if span is None or (type(span) is float and isfinite(span)):
         return 0.0, declared if span is None else span
-    if isinstance(span, (tuple, list)):
+    ends: Any = span
+    if isinstance(ends, (tuple, list)) and len(ends) == 2:
+        start, end = ends
+        if type(start) in PLAIN and type(end) in PLAIN and abs(start) < HUGE > abs(end):
+            return float(start), float(end)
         what = "span must be (start, end) in seconds: an end"
-        ends: Any = [read_number(what, end) if isinstance(end, str) else end for end in span]
-        if len(ends) == 2 and PLAIN.issuperset(map(type, ends)) and abs(ends[0]) < HUGE > abs(ends[1]):
-            return float(ends[0]), float(ends[1])
-        span = ends
-    pair = as_real(span)
+        ends = [read_number(what, end) if isinstance(end, str) else end for end in ends]
+    pair = as_real(ends)
     if isinstance(span, str) or (pair is not None and not pair.ndim):
         return 0.0, read_number("the end of the span", span)
     if pair is None or pair.shape != (2,) or not np.isfinite(pair).all():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from math import inf, isfinite
+from math import inf
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -205,15 +205,12 @@ def simulate(
     if varies:
         forcing.enter(*nodes[:2])
     if shared and initial is None and not start:
-        x0 = bound._declared_start.copy()
+        x0 = bound._running_start.copy()
     else:
         x0 = find_state(bound, initial, start, forcing)
-    if varies:
-        u0 = forcing(start, x0)
+        u0 = forcing(start, x0) if varies else None
         forcing.require_finite()
         bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
-    else:
-        bound.rhs(start, x0)
     run = Run(bound, forcing)
     if "contact_shapes" in bound.metadata:
         from .meetings import begin
@@ -288,8 +285,7 @@ def simulate(
 
 
 def _check(run: Run, solution: Solution, start: float, end: float, method: str) -> None:
-    x = solution.x.ravel()
-    if not isfinite(x.dot(x)) and not np.isfinite(solution.x).all():  # a finite sum of squares says it at once
+    if not solution.finite and not np.isfinite(solution.x).all():
         finite = np.isfinite(solution.x).all(axis=0)
         first = int(np.flatnonzero(~finite)[0])
         raise run.ended(float(solution.t[first]), end, method, "the state is not finite.") from run.cause()

@@ -118,6 +118,8 @@ cdef class Journey(Stepper):
     ----------
     raised : exception or None
         What a signal, the watch or an event function raised; the run has stopped there.
+    finite : bool
+        Whether all states of the outcome are.
     """
 
     cdef eomgen_journey journey
@@ -130,6 +132,7 @@ cdef class Journey(Stepper):
     cdef double called_at
     cdef long stride, most
     cdef readonly object raised
+    cdef readonly bint finite
 
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
@@ -309,7 +312,13 @@ cdef class Journey(Stepper):
         if j.events != NULL:
             notes = np.concatenate(self.stored[3]) if self.stored[3] else np.empty((0, 2 + self.run.n))
         times, states = [parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in pair[:2]]
-        return times, cnp.PyArray_GETCONTIGUOUS(cnp.PyArray_Transpose(states, NULL)), notes
+        cdef cnp.ndarray x = cnp.PyArray_GETCONTIGUOUS(cnp.PyArray_Transpose(states, NULL))
+        cdef double total = 0.0
+        cdef cnp.npy_intp i
+        for i in range(cnp.PyArray_SIZE(x)):
+            total += 0.0 * (<double *>cnp.PyArray_DATA(x))[i]  # NaN from the first that is not finite
+        self.finite = total == 0.0
+        return times, x, notes
 
     def trail(self):
         """Rows (t, state) of every step, after outcome(); none if too many, None if they were not to be kept."""

@@ -158,10 +158,11 @@ cdef class Kernel:
         batch.time = Piece(<char *>&now, 1, 0, 0)
         if not isinstance(t, (float, int)):
             t = doubles(t, "t", self.error, self.name, SCALAR)
-        if isinstance(t, np.ndarray) and t.ndim > 0:
-            if t.ndim > 1 or len(t) != columns:
+        if cnp.PyArray_Check(t) and cnp.PyArray_NDIM(<cnp.ndarray>t) > 0:
+            if cnp.PyArray_NDIM(<cnp.ndarray>t) > 1 or cnp.PyArray_DIM(<cnp.ndarray>t, 0) != columns:
                 raise self.error(f"t of {self.name} must be a number or have shape (k,), not {t.shape}")
-            held.append(self.read(t[None], 1, "t", &batch.time, &columns))
+            held.append(t)
+            batch.time = Piece(cnp.PyArray_BYTES(<cnp.ndarray>t), 1, 0, cnp.PyArray_STRIDE(<cnp.ndarray>t, 0))
         else:
             now = moment(t, "t", self.error, self.name)
         batch.inputs = Piece(<char *>self.u, MODEL.n_u, sizeof(double), 0)

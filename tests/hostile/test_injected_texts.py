@@ -31,8 +31,10 @@ def test_every_text_field_is_among_those_that_are_filled() -> None:
 
 
 # -- C ----------------------------------------------------------------------------------------------------------------
-#: The characters of the metadata, numbers alone.
-METADATA = re.compile(r"metadata_text\[\] = \{([0-9,\s]*)\};")
+#: The literals of the metadata: harmless characters, and all others as escapes of three digits.
+METADATA = re.compile(
+    r'metadata_text\[\d+\]\[\d+\] = \{\n((?: +"(?:[A-Za-z0-9 _.,:;(){}\[\]+=<>^-]|\\[0-7]{3})*",?\n)*)\};'
+)
 
 
 def code_of(text: str) -> str:
@@ -59,7 +61,8 @@ def test_c_holds_the_text_as_comment_and_data_only(key: str) -> None:
             assert not re.search(r"<(?!stdio\.h>|U\+)[a-zA-Z/!?]", text)
     data = METADATA.search(files_of(key, "c")[f"{name}.c"])
     assert data is not None
-    assert_held(json.loads(bytes(map(int, data[1].replace("\n", "").strip(" ,").split(",")[:-1]))), NASTY[key])
+    literals = "".join(re.findall(r'"(.*)"', data[1]))
+    assert_held(json.loads(re.sub(r"\\(\d{3})", lambda found: chr(int(found[1], 8)), literals)), NASTY[key])
 
 
 def test_a_compiler_takes_every_header_without_a_warning(tmp_path: Any) -> None:
