@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import platform
-from contextlib import suppress
-from functools import cache, lru_cache
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,7 +13,7 @@ from ..errors import MissingDependencyError, ToolchainError, UsageError
 from ..files.build_folder import MANIFEST, read_entry
 from ..numeric.scales import Array
 from ..runtime.late import eager
-from ..runtime.pickling import restore
+from ..runtime.pickling import processor_features, restore
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -82,21 +80,6 @@ def describe(module: BoundModel) -> Handle:
     facts = json.loads(recipe) if recipe else {"options": {}, "needs": ()}
     needs = tuple(sorted(processor_features())) if facts["options"].get("native", False) else tuple(facts["needs"])
     return Handle(type(module), core.__name__, file, digest(file), recipe, module.p, module.u, needs)
-
-
-@cache
-def processor_features() -> frozenset[str]:
-    """What this processor can do: its kind, NumPy's names of features, and on Linux those of the kernel."""
-    found = {platform.machine()}
-    with suppress(ImportError, AttributeError):
-        features = import_module("numpy._core._multiarray_umath").__cpu_features__
-        found |= {name for name, there in features.items() if there}
-    with suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
-            if line.startswith(("flags", "Features")):
-                found |= set(line.partition(":")[2].split())
-                break
-    return frozenset(found)
 
 
 def digest(file: str) -> str:

@@ -6,9 +6,11 @@ and the kind of processor), not for keeping: generate a package for that.
 
 from __future__ import annotations
 
+import platform
 import sys
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import cache, partial
 from importlib import import_module, machinery, util
 from pathlib import Path
 from types import ModuleType
@@ -80,7 +82,7 @@ def _find_core(name: str, file: str) -> ModuleType:
     path = Path(file)
     try:
         if (path.parent / MANIFEST).exists():
-            read_entry(path.parent)
+            _require_features(read_entry(path.parent)[0], file)
         require_trusted(path)
         if not path.name.endswith(tuple(machinery.EXTENSION_SUFFIXES)):
             return load_source(name, file, read_trusted(path))
@@ -98,6 +100,31 @@ def _find_core(name: str, file: str) -> ModuleType:
     vars(core)["__getattr__"] = partial(_find_class, core, path)
     sys.modules[name] = core
     return core
+
+
+def _require_features(manifest: Mapping[str, Any], file: str) -> None:
+    """Refuse code with instructions that this processor does not know, which would end the process without a word."""
+    lacking = set(manifest.get("recipe", {}).get("needs", ())) - processor_features()
+    if lacking:
+        raise ToolchainError(
+            f"the compiled code of the pickled module needs a processor with {', '.join(sorted(lacking))}, which "
+            f"this one lacks: {file}; compile the model again here"
+        )
+
+
+@cache
+def processor_features() -> frozenset[str]:
+    """What this processor can do: its kind, NumPy's names of features, and on Linux those of the kernel."""
+    found = {platform.machine()}
+    with suppress(ImportError, AttributeError):
+        features = import_module("numpy._core._multiarray_umath").__cpu_features__
+        found |= {name for name, there in features.items() if there}
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith(("flags", "Features")):
+                found |= set(line.partition(":")[2].split())
+                break
+    return frozenset(found)
 
 
 def _find_lanes(file: Path) -> int:

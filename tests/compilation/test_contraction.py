@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen.ensembles.handle import processor_features
 from eomgen.runtime.late import eager
+from eomgen.runtime.pickling import processor_features
 
 #: Whether this processor has fused operations; without them nothing may differ.
 FUSES = bool({"FMA3", "ASIMD"} & processor_features())

@@ -13,6 +13,8 @@ import pytest
 
 import eomgen as eg
 from eomgen.api.module import Module
+from eomgen.compilation.options import WITH_AVX
+from eomgen.compilation.processor import lane_width
 from eomgen.errors import ToolchainError
 from eomgen.runtime import pickling
 from eomgen.runtime.late import eager
@@ -62,6 +64,16 @@ def test_rarer_kernels_go_along_once_they_are_made() -> None:
 def test_a_module_whose_code_has_gone_says_so(tmp_path: Path) -> None:
     with pytest.raises(ToolchainError, match=r"gone: .*_core\.py; compile the model again"):
         pickling.restore(Module, "eomgen._gone", str(tmp_path / "_core.py"), np.zeros(1), np.zeros(1))
+
+
+@pytest.mark.skipif(lane_width() < WITH_AVX, reason="all processors of the kind know what it is compiled to")
+def test_code_that_this_processor_does_not_know_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = eg.load(EXAMPLES / "pendulum.yaml").compile()
+    given = pickle.dumps(module)
+    monkeypatch.delitem(sys.modules, eager(module.core).__name__)
+    monkeypatch.setattr(pickling, "processor_features", frozenset)
+    with pytest.raises(ToolchainError, match="needs a processor with AVX2, FMA3.*compile the model again here"):
+        pickle.loads(given)
 
 
 def test_a_module_made_by_hand_says_why_it_cannot(pendulum) -> None:
