@@ -5,7 +5,6 @@ Each stage is a package whose functions take frozen values and return frozen val
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,9 +12,9 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from . import __version__
+from .alone import alone
 from .derivation import Derivation
 from .describe.dotted_names import Undotted
 from .equations import GIVEN, METHODS, take_given
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
     from .program.program import Program
     from .runtime.protocols import Core
 
-LINEAR_ALGEBRA = ThreadpoolController()  #: found once: that looks through the libraries of the process
 Derived = TypeVar("Derived", bound=Derivation)
 #: Functions that the assembly of a state calls, and those for values of outputs.
 OF_STARTS = (
@@ -52,22 +50,6 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     start = perf_counter()
     yield
     seconds[stage] = perf_counter() - start
-
-
-@contextmanager
-def _alone() -> Iterator[None]:
-    """Pause the garbage collector, which would walk the many small objects of a graph again and again, and keep linear
-    algebra to one thread: matrices are small, and on a busy machine threads that wait for each other take 20 times as
-    long (singular values of 320 x 320: 6 ms in one thread, 110 ms in two).
-    """
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        with LINEAR_ALGEBRA.limit(limits=1, user_api="blas"):
-            yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 def choose_method(mechanism: Mechanism, method: str) -> str:
@@ -132,17 +114,17 @@ def derive_as(
     from .program.choice import choose
 
     seconds: dict[str, float] = {}
-    with _alone(), _timed(seconds, "describe"):
+    with alone(), _timed(seconds, "describe"):
         mechanism = model.mechanism()
     chosen = choose_method(mechanism, method)
-    with _alone(), _timed(seconds, "kinematics"):
+    with alone(), _timed(seconds, "kinematics"):
         plain = Undotted(mechanism.instances).coordinate  # leg.hip of an instance is leg_hip
         wanted = tuple(plain(name) if isinstance(name, str) else name for name in independent or ())
         kinematics = analyse(mechanism, wanted)
         mobility = _mobility(kinematics, wanted)
     if baumgarte is not None:
         kinematics = _stabilised(kinematics, chosen, baumgarte)
-    with _alone(), _timed(seconds, "equations"):
+    with alone(), _timed(seconds, "equations"):
         if mechanism.reaction_quantities or mechanism.switched or any(force.by_reaction for force in mechanism.forces):
             kinematics = _with_reactions(kinematics, mobility)
         choice: Choice | None = None
@@ -152,7 +134,7 @@ def derive_as(
             tree = METHODS[chosen](kinematics)
         else:
             tree, choice = choose(kinematics, mobility)
-    with _alone():
+    with alone():
         return kind(kinematics, mobility, tree, seconds, choice)
 
 
@@ -249,7 +231,7 @@ def _assemble_start(equations: Derivation) -> list[str]:
     return []
 
 
-@_alone()
+@alone()
 @np.errstate(all="ignore")
 def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
     """The functions to generate for a target."""
@@ -331,7 +313,7 @@ def _load(
 
         if options:
             raise UsageError(f"target 'numpy' has no options, and these are given: {', '.join(options)}")
-        with _alone(), _timed(seconds, "emit"):
+        with alone(), _timed(seconds, "emit"):
             sources = emit_numpy(program)
         with _timed(seconds, "load"):
             return cast("Core", load_numpy(sources, equations.name, twins(program)))
@@ -345,7 +327,7 @@ def _load(
     if unknown:
         raise UsageError(f"no option {', '.join(unknown)}; there are: {', '.join(allowed)}")
     chosen = Options(**options)
-    with _alone(), _timed(seconds, "emit"):
+    with alone(), _timed(seconds, "emit"):
         shortcut = Shortcut(fingerprint(program), chosen)
         artifact = shortcut.find()
         if artifact is None:
@@ -361,5 +343,5 @@ def _load(
             except ToolchainError as error:
                 raise blame_source(error, equations.kinematics.graph.functions.values()) or error from None
             shortcut.keep(artifact)
-    with _alone(), _timed(seconds, "load"):
+    with alone(), _timed(seconds, "load"):
         return cast("Core", load_core(artifact))

@@ -34,8 +34,8 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     if span is None or (type(span) is float and isfinite(span)):
         return 0.0, declared if span is None else span
     ends: Any = span
-    if isinstance(ends, (tuple, list)) and len(ends) == 2:
-        start, end = ends
+    if isinstance(ends, (tuple, list)):
+        start, end = ends if len(ends) == 2 else (HUGE, HUGE)
         if type(start) in PLAIN and type(end) in PLAIN and abs(start) < HUGE > abs(end):
             return float(start), float(end)
         what = "span must be (start, end) in seconds: an end"

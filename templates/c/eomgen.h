@@ -6,7 +6,7 @@
 extern "C" {
 #endif
 
-#define EOMGEN_ABI 3
+#define EOMGEN_ABI 4
 
 /* Status of every function: 0 is success, positive codes are recoverable (a smaller step may succeed), negative ones are
    not. */
@@ -68,7 +68,7 @@ typedef struct {
     int n_kernels;
     const eomgen_kernel *kernels;
     int (*precompute)(const double *p, double *c);
-    const char *metadata; /* JSON: names, units, values */
+    const char *const *metadata; /* JSON: names, units, values; one text in pieces, then NULL */
     const eomgen_lanes *const *lanes; /* what was compiled, widest first, then NULL */
     int closed_at;        /* where in w a call of rhs leaves its state brought onto the constraints, 0 where it does not */
     const eomgen_series *series; /* NULL: not here */

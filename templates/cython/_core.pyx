@@ -49,13 +49,14 @@ cdef extern from "eomgen.h" nogil:
         void (*contracted)() noexcept
         void (*expand)() noexcept
     ctypedef const eomgen_lanes *eomgen_lanes_pointer
+    ctypedef const char *text_pointer "const char *"
     ctypedef struct eomgen_model:
         int abi
         const char *name
         int n_p, n_u, n_const, n_work, n_kernels
         const eomgen_kernel *kernels
         int (*precompute)(const double *, double *) noexcept nogil
-        const char *metadata
+        const text_pointer *metadata
         const eomgen_lanes_pointer *lanes
         int closed_at
         const eomgen_series *series
@@ -81,10 +82,14 @@ cdef enum:
     MANY = 4096  # columns after which lanes that must be compiled first are worth it
 
 cdef const eomgen_model *MODEL = eomgen_model_table()
-if MODEL.abi != 3:
-    raise ImportError(f"the model's C table has layout {MODEL.abi} and this layer reads layout 3: generate both again")
+if MODEL.abi != 4:
+    raise ImportError(f"the model's C table has layout {MODEL.abi} and this layer reads layout 4: generate both again")
 
-metadata = MODEL.metadata.decode()
+metadata = ""
+cdef int _piece = 0
+while MODEL.metadata[_piece] != NULL:
+    metadata += MODEL.metadata[_piece].decode()
+    _piece += 1
 table = <uintptr_t>MODEL  # for classes that are compiled apart
 compiler = EOMGEN_COMPILER.decode()  # of this layer, and of the model that is linked with it
 names = tuple([MODEL.kernels[i].name.decode() for i in range(MODEL.n_kernels)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import subprocess
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +45,7 @@ class Table(ctypes.Structure):
         ("n_kernels", ctypes.c_int),
         ("kernels", ctypes.POINTER(Entry)),
         ("precompute", PRECOMPUTE),
-        ("metadata", ctypes.c_char_p),
+        ("metadata", ctypes.POINTER(ctypes.c_char_p)),
         ("lanes", ctypes.POINTER(ctypes.POINTER(Lanes))),
     )
 
@@ -74,7 +75,7 @@ class Library:
         self._library.eomgen_model_table.restype = ctypes.POINTER(Table)
         self.table = self._library.eomgen_model_table().contents
         self.entries = {e.name.decode(): e for e in (self.table.kernels[k] for k in range(self.table.n_kernels))}
-        self.metadata = json.loads(self.table.metadata.decode())
+        self.metadata = json.loads(b"".join(takewhile(bool, self.table.metadata)))
         self.u = np.array([*u, 0.0])
         self.c = np.full(self.table.n_const + 1, np.nan)
         self.w = np.full(self.table.n_work + 1, np.nan)

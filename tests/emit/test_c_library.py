@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from sweeps import part_of
 
+import eomgen as eg
 from benchmarks.models import panda
 from eomgen.emit.c_bounds import stack_of
 from eomgen.emit.single_precision import single_limit
@@ -171,6 +172,20 @@ int outer(double t)
 """
     inner = 256 + 8 * (1 + 2 + 4 + 14 + 2)
     assert stack_of([text]) == {"inner": inner, "outer": inner + 256 + 8 * 2}
+
+
+def test_what_a_model_says_of_itself_is_not_taken_for_code(tmp_path: Path) -> None:
+    """Its text stands in the C as well, where lengths of arrays are read."""
+    text = (models.EXAMPLES / "slider_crank.yaml").read_text(encoding="utf-8")
+    doc = 'doc: "Here M = m_c r^2, N = 2, WIDTH = rpm; static int f(int n) { real a[9000]; }"'
+    bounds = []
+    for name, given in (("plain", text), ("told", re.sub("^doc: .*", doc, text, flags=re.M))):
+        (tmp_path / f"{name}.yaml").write_text(given, encoding="utf-8")
+        model = eg.load(tmp_path / f"{name}.yaml")
+        folder = generate(model, tmp_path / name, target="c")
+        bounds.append(stack_of((folder / file).read_text() for file in c_files(folder)))
+    assert len(bounds[0]) > 50
+    assert bounds[0] == bounds[1]
 
 
 def test_nothing_is_written_but_what_is_given(arm_library: Path) -> None:

@@ -32,9 +32,7 @@ def test_every_text_field_is_among_those_that_are_filled() -> None:
 
 # -- C ----------------------------------------------------------------------------------------------------------------
 #: The literals of the metadata: harmless characters, and all others as escapes of three digits.
-METADATA = re.compile(
-    r'metadata_text\[\d+\]\[\d+\] = \{\n((?: +"(?:[A-Za-z0-9 _.,:;(){}\[\]+=<>^-]|\\[0-7]{3})*",?\n)*)\};'
-)
+METADATA = re.compile(r'metadata_texts\[\] = \{\n((?: +"(?:[A-Za-z0-9 _.,:-]|\\[0-7]{3})*",?\n)*) +NULL\n\};')
 
 
 def code_of(text: str) -> str:

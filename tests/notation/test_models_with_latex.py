@@ -113,7 +113,7 @@ def test_generated_c_code_is_the_same(tmp_path: Path) -> None:
     ]
     assert codes[0].keys() == codes[1].keys()
     assert len("".join(codes[0].values())) > 20_000
-    told = re.compile(r"metadata_text\[.*?\n\};", re.DOTALL)  # what the module says of itself
+    told = re.compile(r"metadata_texts\[.*?\n\};", re.DOTALL)  # what the module says of itself
     assert codes[0] != codes[1]
     with_latex, without = ({name: told.sub("", text) for name, text in code.items()} for code in codes)
     assert with_latex == without
