@@ -96,13 +96,14 @@ static const eomgen_kernel kernels[] = {
     {"failing", pendulum_failing, 2, 2}, {"empty", pendulum_empty, 0, 0},
 };
 
-static const char metadata[] =
-    "{\"abi\": 1, \"name\": \"pendulum\", \"n_q\": 1, \"n_v\": 1, \"p_values\": [2.0, 0.5, 9.81], \"u_values\": [0.0],"
+static const char *const metadata[] = {
+    "{\"abi\": 1, \"name\": \"pendulum\", \"n_q\": 1, \"n_v\": 1, \"p_values\": [2.0, 0.5, 9.81], \"u_values\": [0.0],",
     " \"p_names\": [\"m\", \"l\", \"g\"], \"u_names\": [\"tau\"],"
-    " \"operations\": {\"rhs\": {\"multiplications\": 1}, \"rhs_long\": {\"multiplications\": 1000000}}}";
+    " \"operations\": {\"rhs\": {\"multiplications\": 1}, \"rhs_long\": {\"multiplications\": 1000000}}}", NULL,
+};
 
 static const eomgen_model model = {
-    3, "pendulum", 3, 1, 5, PENDULUM_N_WORK, (int)(sizeof kernels / sizeof kernels[0]), kernels, pendulum_precompute, metadata,
+    4, "pendulum", 3, 1, 5, PENDULUM_N_WORK, (int)(sizeof kernels / sizeof kernels[0]), kernels, pendulum_precompute, metadata,
     NULL, 0, NULL,
 };
 
