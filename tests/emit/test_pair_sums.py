@@ -37,7 +37,7 @@ def test_text_does_not_grow_with_the_pairs(tmp_path: Path) -> None:
         found = {}
         for file in sorted(folder.rglob("*.c")):
             text = re.sub(r"(?s)(static )?const \w+ \w+\[\d+\](\[\d+\])? = \{.*?\n\};", "", file.read_text())
-            text = re.sub(r"(\d+,\s*){25,}", "", text)  # the description of the model, as bytes
+            text = re.sub(r"(?s)metadata_texts\[\] = \{.*?\n\};", "", text)  # the description of the model
             found[file.name] = re.sub(r"\d+", "0", text)
         texts.append(found)
     assert texts[0].keys() == texts[1].keys()
