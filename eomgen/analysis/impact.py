@@ -1,8 +1,8 @@
 """Analysis: a state at an impact, or at which coordinates are locked -> the state after it, impulses, energy lost.
 
-M (v+ - v-) + C_q^T i = sum n g, C_q v+ = C_q v-, with the normals n = d(gap)/dt by v; the law that gives the impulses g
-is in :mod:`.impact_law`, that of gaps with friction in :mod:`.impact_friction`.  Locked coordinates keep rate 0 (their
-impulses may pull).
+M (v+ - v-) + C_q^T i = sum n g, C_q v+ = C_q v-, with the normals n = d(gap)/dt by v; C_q has rows of what is closed of
+constraints that close and open, too.  The law that gives the impulses g is in :mod:`.impact_law`, that of gaps with
+friction in :mod:`.impact_friction`.  Locked coordinates keep rate 0 (their impulses may pull).
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.room import read_flag, read_number, read_numbers
 from ..runtime.signal_rates import drift, moving_inputs
+from .closed_rows import with_closed_rows
 from .constrained import ProjectedStates, conditioned_motions, prepare, solve_multipliers
 from .impact_friction import Sliding, strike
 from .impact_gaps import Gaps, allowance, by_velocity, check_gaps
@@ -293,9 +294,9 @@ def _apply(
     states: ProjectedStates, rows: Array, rates: Array, e: Array, names: Sequence[str], sliding: Sliding
 ) -> Impact:
     layout, v = states.module.layout, states.v[:, 0]
-    C_q = states.jacobian()
+    C_q, scales = with_closed_rows(states.module, float(states.t[0]), states.x[:, 0], states.jacobian()[0])
     M = states.evaluate(states.module.kernels.mass_matrix, states.q)[..., 0]
-    B, condition = conditioned_motions(C_q[0], layout.scales)
+    B, condition = conditioned_motions(C_q, scales)
     count = len(names)
     rows = np.vstack([rows.reshape(-1, layout.n_v), sliding.rows])
     rates = np.concatenate([read_numbers("rates", rates), sliding.rates])
@@ -319,7 +320,7 @@ def _apply(
     else:
         impulses, change = np.zeros(len(rates)), np.zeros_like(v)
     after = np.concatenate([states.q[:, 0], v + change])
-    held = solve_multipliers(C_q, (M @ change - rows.T @ impulses)[:, None], layout.scales)[:, 0]
+    held = solve_multipliers(C_q[None], (M @ change - rows.T @ impulses)[:, None], scales)[: layout.n_c, 0]
     lost = 0.0 - float(change @ M @ (v + 0.5 * change))
     before = np.ascontiguousarray(states.x[:, 0])
     final = rates + rows @ change

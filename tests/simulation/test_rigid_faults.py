@@ -51,6 +51,13 @@ def test_no_contacts() -> None:
         m.compile(target="numpy").simulate(1.0, method="moreau", step=1e-3)
 
 
+def test_an_event_that_ends_a_run() -> None:
+    m = pile(["circle", "box"])
+    m.event("late", "t-0.05", terminal=True)
+    with pytest.raises(UsageError, match="method moreau watches no events, and late ends the run"):
+        m.compile(target="numpy").simulate(0.1, method="moreau", step=1e-3)
+
+
 def test_deep_start(ball: Any) -> None:
     with pytest.raises(UsageError, match=r"starts with shapes inside each other; contacts 'c': .* 0.05 m deep"):
         ball.simulate(0.2, {"j_y": 0.05}, method="moreau", step=1e-3)
