@@ -26,10 +26,10 @@ def alone() -> Iterator[None]:
     global _inside
     with _lock:
         if not _inside:
+            _before.enter_context(LINEAR_ALGEBRA.limit(limits=1, user_api="blas"))
             if gc.isenabled():
                 gc.disable()
                 _before.callback(gc.enable)
-            _before.enter_context(LINEAR_ALGEBRA.limit(limits=1, user_api="blas"))
         _inside += 1
     try:
         yield

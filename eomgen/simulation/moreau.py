@@ -164,8 +164,7 @@ def _require_no_others(module: BoundModel, events: Any) -> None:
     if module.layout.reaction_laws:
         names = ", ".join(module.layout.reaction_laws)
         raise UsageError(f"method moreau has no friction by reactions of joints (here {names}); use another method")
-    watched = Events(module.layout, None)
-    if watched.resets:
+    if Events(module.layout, None).resets:
         raise UsageError(f"{module.name} has events that reset its state, which method moreau does not watch")
     if ends := [event["name"] for event in module.metadata.get("events", []) if event["terminal"]]:
         raise UsageError(f"method moreau watches no events, and {', '.join(ends)} ends the run; leave it out here")
