@@ -54,7 +54,7 @@ CALLS = ("simulate",)
 
 
 def carry_slim(
-    package: Mapping[str, str], signals: bool, states: bool, clocks: bool, contact_shapes: bool
+    package: Mapping[str, str], signals: bool, start_terms: bool, states: bool, clocks: bool, contact_shapes: bool
 ) -> dict[str, str]:
     """Files of eomgen for a slim package, by name: what is reached of each, and refusals in place of others.
 
@@ -64,6 +64,8 @@ def carry_slim(
         Generated files, from which all begins.
     signals : bool
         Whether the model declares inputs over time, whose expressions runs in Python have to play.
+    start_terms : bool
+        Whether its initial values follow from parameters.
     states : bool
         Whether the model has first-order states.
     clocks : bool
@@ -71,7 +73,8 @@ def carry_slim(
     contact_shapes : bool
         Whether groups of shapes are in contact.
     """
-    left_out = LEFT_OUT if signals else LEFT_OUT | {"runtime/tapes": "inputs that a model declares"}
+    left_out = LEFT_OUT if signals or start_terms else LEFT_OUT | {"runtime/tapes": "inputs that a model declares"}
+    left_out = left_out if start_terms else left_out | {"runtime/late_start": "initial values that follow from others"}
     left_out = left_out if states else left_out | {"runtime/mechanical": "first-order states"}
     left_out = left_out if contact_shapes else left_out | {"simulation/meetings": "contacts between groups of shapes"}
     left_out = left_out if clocks else left_out | dict.fromkeys(OF_CLOCKS, "sampled states")

@@ -17,6 +17,7 @@ from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.assembled import initial_of
 from ..runtime.given_start import last_state
+from ..runtime.late_start import late_values
 from ..runtime.near_names import check_names, without_dots
 from ..runtime.room import read_numbers, require_room
 from ..simulation.clocks import at_next_samples, require_agreement
@@ -183,7 +184,7 @@ def _assemble_all(
     if cases.states is None and (not varying or _is_free(module, cases, free)):
         scalars = {name: float(x) for name, x in cases.values.items() if not np.ndim(x)}
         x = np.repeat(module.x0(scalars, t=t, **_shared(cases))[:, None], cases.count, axis=1)
-        for name, value in cases.values.items():
+        for name, value in (late_values(module.layout, cases.p) | cases.values).items():
             if np.ndim(value):
                 x[module.x_names.index(name)] = value
         return x, failed, words
@@ -244,7 +245,8 @@ def _assemble_one(module: BoundModel, cases: Cases, k: int, t: float) -> Array:
 
 def _is_free(module: BoundModel, cases: Cases, free: bool) -> bool:
     """Whether named initial values are entries of the state, whatever the others are."""
-    return free and not module.layout.loops and all(name in module.x_names for name in cases.values)
+    layout = module.layout
+    return free and not (layout.loops or layout.initial_outputs) and all(n in layout.x for n in cases.values)
 
 
 def _shared(cases: Cases) -> dict[str, Any]:

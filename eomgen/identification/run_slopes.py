@@ -19,6 +19,7 @@ from ..limits.identification import QUADRATURE
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.input_kinds import Expressed, Tabulated
+from ..runtime.late_start import start_slopes
 from ..runtime.signals import Forcing
 from ..simulation.simulate import simulate
 
@@ -55,7 +56,7 @@ def run_slopes(
     dict of str to (n_t, names) array, or None
     """
     layout, initial = module.layout, arguments["initial"]
-    if layout.n_c or layout.quaternion_slots or layout.n_events or layout.given_rates:
+    if layout.n_c or layout.quaternion_slots or layout.n_events or layout.given_rates or layout.initial_outputs:
         return None
     if not (isinstance(initial, Mapping) and initial.keys() <= set(layout.x)):
         return None
@@ -79,7 +80,7 @@ def run_slopes(
     missed = run.x[:, ends[:-1]] + h * (rate @ WEIGHTS) - run.x[:, ends[1:]]
     if not np.abs(missed).max() <= QUADRATURE * np.abs(run.x).max():
         return None
-    S = _linear(h, *_slopes(bound, names, t, x, u), _start(layout.x, names))
+    S = _linear(h, *_slopes(bound, names, t, x, u), _start(bound, names, initial))
     wanted = np.searchsorted(grid, measured)
     found = {name: S[wanted, k] for k, name in enumerate(layout.x)}
     if not set(columns) <= found.keys():
@@ -105,9 +106,15 @@ def _inputs(forcing: Forcing, module: BoundModel, t: Array) -> Array:
     return forcing.sample(t, np.zeros((module.n_x, len(t))))
 
 
-def _start(states: tuple[str, ...], names: Sequence[str]) -> Array:
-    """S (n_x, k) of the initial state: one for a state that is to be found."""
-    return np.array([[float(name == state) for name in names] for state in states])
+def _start(module: BoundModel, names: Sequence[str], given: Mapping[str, float]) -> Array:
+    """S (n_x, k) of the initial state: one for a state that is to be found; declared values follow from parameters."""
+    S = np.array([[float(name == state) for name in names] for state in module.x_names])
+    for state, by_p in start_slopes(module.layout, module.kernels.context.p).items():
+        if state not in given:
+            S[module.x_names.index(state)] += [
+                by_p[module.p_names.index(name)] if name in module.p_names else 0.0 for name in names
+            ]
+    return S
 
 
 def _slopes(module: BoundModel, names: Sequence[str], t: Array, x: Array, u: Array) -> tuple[Array, Array]:

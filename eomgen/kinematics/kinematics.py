@@ -89,7 +89,8 @@ class Kinematics:
     forces: tuple[ForceTerms, ...]
     length_scale: Expr
     coupled: tuple[str, ...] = ()  #: labels of the equations of constraint elements
-    plastic: Mapping[str, tuple[tuple[str, Expr], ...]] = field(default_factory=dict)  #: event -> velocities after it
+    #: by event, while constraints are closed
+    velocities_after: Mapping[str, tuple[tuple[str, Expr], ...]] = field(default_factory=dict)
     held_rows: tuple[tuple[str, str, str], ...] = ()  #: label, state, kind of constraints that close and open
     held_errors: tuple[Expr, ...] = ()  #: of each, its error and the rate of it, while it is closed
     reaction_laws: tuple[str, ...] = ()  #: force elements whose laws speak of reactions, which are solved for

@@ -14,7 +14,6 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
-from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute, symbols_of
 from ..graph.tape import record_tape
 from ..kinematics import Kinematics
@@ -35,6 +34,7 @@ from .given_multipliers import multiplier_values
 from .kept_rules import keep_rules
 from .rolling_discs import describe_discs
 from .soundness import flag_forces, not_finite_where
+from .start_terms import describe_start
 from .state_terms import with_states
 from .terms import SystemTerms
 
@@ -267,9 +267,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "independent_rows": list(rows),
         "redundant_rows": [i for i in range(len(c.labels)) if i not in rows],
         "q_reference": list(mobility.q_reference),
-        "initial": _numbers(kinematics, "initial"),
-        **({"initial_outputs": _numbers(kinematics, "initial_outputs")} if m.initial_outputs else {}),
-        "guess": _numbers(kinematics, "guess"),
+        **describe_start(kinematics),
         "length_scale": mobility.length_scale,
         **({} if m.limits_told else {"limits_told": False}),
         "limits": {
@@ -377,14 +375,3 @@ def _euler_angles(kinematics: Kinematics) -> list[list[Any]]:
             vanishing = "sin" if sequence[0] == sequence[2] else "cos"
             found.append([spec.name, kinematics.names.index(spec.coordinates[-2]), vanishing])
     return found
-
-
-def _numbers(kinematics: Kinematics, which: str) -> dict[str, float]:
-    """Initial values or guesses at the declared parameter values."""
-    given = getattr(kinematics.mechanism, which)
-    values = {p.name: p.value for p in kinematics.mechanism.parameters if p.value is not None}
-    values |= {u.name: u.value for u in kinematics.mechanism.inputs}
-    if not given:
-        return {}
-    numbers = compile_evaluator(list(given.values()), tuple(values))(list(values.values()))
-    return {name: float(x) for name, x in zip(given, numbers, strict=True)}

@@ -52,7 +52,7 @@ def resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:
     places = {name: k for k, name in enumerate(names)}
     found: list[tuple[int, int, Expr]] = []
     for i, event in enumerate(kinematics.mechanism.events):
-        for name, value in (*event.reset, *kinematics.plastic.get(event.name, ())):
+        for name, value in (dict(event.reset) | dict(kinematics.velocities_after.get(event.name, ()))).items():
             if name not in places:
                 raise UsageError(
                     f"events.{event.name}.reset: {name!r} belongs to a joint that is cut and follows from the others; "

@@ -28,9 +28,10 @@ from ..kinematics.resolved_loads import AnyLoad, entries_of, with_entries
 from ..kinematics.switched import SwitchedRow, switched_rows
 from ..kinematics.wrenches import JointWrenches
 from .factor import factorize, solve
-from .held_constraints import LinearValues, hold, plastic_impacts
+from .held_constraints import LinearValues, hold
 from .law_pieces import pieces_of
 from .reaction_users import Users, refuse_joints, refuse_redundant, require_inertia_of_tree, too_many_pieces
+from .reset_velocities import AfterEvents
 from .solve_laws import laws_in, solve_laws
 from .undetermined_reactions import refuse_undetermined
 
@@ -61,7 +62,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     linear = _replaced(kinematics, dict(zip(laws, forces, strict=True)))
     linear = replace(linear, forces=(*linear.forces, *held))
     symbols = [graph.symbol(name) for name in names]
-    values, known, plastic = list[Expr](), dict[Expr, Expr](), dict[str, tuple[tuple[str, Expr], ...]]()
+    values, known, after = list[Expr](), dict[Expr, Expr](), dict[str, tuple[tuple[str, Expr], ...]]()
     if not (names or laws or rows):  # what is asked for is 0 in every state: the moment about a hinge
         pass
     elif laws or rows or kinematics.constraints.labels or _before_accelerations(mechanism):
@@ -73,7 +74,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
         a, columns = _motion(linear, mobility, unknown, users)
         found = _linear_parts([*kinematics.a, *multipliers], measured, unknown, a, columns)
         inner = [row[len(laws) :] for row in found.gain[len(reactions) :]]
-        plastic = plastic_impacts(kinematics, rows, inner, columns[len(laws) :])
+        after = AfterEvents(kinematics, rows, inner, columns[len(laws) :]).velocities() if rows else {}
         still, gain = hold(found, rows, len(laws))
         gain = _asked_at_states(kinematics, gain) if laws else gain
         symbols += [row.multiplier for row in rows]
@@ -84,7 +85,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     motion.carried = dict(zip(names, values, strict=False))
     whole = replace(kinematics, forces=(*kinematics.forces, *held))
     solved = _replaced(whole, known | dict(zip(symbols, values, strict=True)))
-    solved = replace(solved, motion=motion, reaction_laws=tuple(speaking), plastic=plastic)
+    solved = replace(solved, motion=motion, reaction_laws=tuple(speaking), velocities_after=after)
     known_rows = tuple((row.label, row.state, row.kind) for row in rows)
     return replace(solved, held_rows=known_rows, held_errors=tuple(e for row in rows for e in row.errors))
 

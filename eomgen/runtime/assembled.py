@@ -195,7 +195,7 @@ class Assembled:
 
 def initial_of(kernels: Kernels, t: float, names: Iterable[str]) -> Initial:
     """The assembly of a model to values of these names; outputs and places of markers may be among them."""
-    names = [*map(str, names), *kernels.layout.metadata.get("initial_outputs", ())]
+    names = [*map(str, names), *kernels.layout.initial_outputs]
     if not any("(" in name or name in kernels.layout.y for name in map(kernels.layout.plain, names)):
         return Initial(kernels, t)
     from .wanted_outputs import WantedInitial

@@ -24,12 +24,7 @@ def constraint_system(kernels: Kernels) -> ConstraintSystem:
     def cut(q: Array, t: float) -> tuple[Array, Array]:
         return np.asarray(y(q, zero, zero, t=t), dtype=float)[0], y_q(q, t=t)
 
-    return ConstraintSystem(
-        lambda q, t: (C(q, t=t), C_q(q, t=t)),
-        layout.place_scales,
-        layout.q,
-        layout.coordinate_kinds,
-        layout.constraint_labels,
-        CutJoints(layout.loops, layout.loop_kinds, layout.loop_scales, cut),
-        (lambda q, t: alignment(q, t=t)) if layout.n_alignments else None,
-    )
+    joints = CutJoints(layout.loops, layout.loop_kinds, layout.loop_scales, cut)
+    aligned = (lambda q, t: alignment(q, t=t)) if layout.n_alignments else None
+    named = layout.place_scales, layout.q, layout.coordinate_kinds, layout.constraint_labels
+    return ConstraintSystem(lambda q, t: (C(q, t=t), C_q(q, t=t)), *named, joints, aligned)

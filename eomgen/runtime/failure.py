@@ -87,10 +87,8 @@ class Fail:
         blame = ""
         if not np.isfinite(x).all() and names:
             bad = [n for n, value in zip(names, x, strict=True) if not np.isfinite(value)]
-            blame, remedy = (
-                f": {', '.join(bad)} already {'is' if len(bad) == 1 else 'are'} not",
-                "check the state given",
-            )
+            blame = f": {', '.join(bad)} already {'is' if len(bad) == 1 else 'are'} not"
+            remedy = "check the state given"
         elif names and (trouble := no_rotation(self.layout, x)):
             what, remedy = trouble
             status = 1
@@ -100,6 +98,9 @@ class Fail:
             blame, remedy = f": {trouble[0]}", trouble[1]
         elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE_ROOT]):
             blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
+        elif name == "resets" and (switched := self.layout.metadata.get("switched")):
+            blame = f": new values are no numbers, or contradict what is closed ({', '.join(switched)}) or holds always"
+            remedy = "give new values that obey it, or open it first (releases)"
         elif status == 4 and not len(self.layout.independent):
             what = "the constraints are singular here, and the mechanism has no degree of freedom"
             remedy = "start a little away from this position, or change the dimensions"

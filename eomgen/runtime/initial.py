@@ -110,8 +110,20 @@ class Initial:
         return found.q
 
     def later(self) -> Array | None:
-        """Where drivers bring the reference position of t = 0 by this time; None without them, or if they cannot."""
+        """Where drivers by this time, or later parameters, bring the reference position; None without, or if blocked.
+
+        Initial values that follow from parameters are followed from those at the declared ones; where these do not
+        close the loops of now, from the closed position nearest to them.
+        """
         if not self.t or largest(self.scales.residual(self.system.position(self.layout.q_reference)[0])) <= SETTLED:
+            if "start_terms" in self.layout.metadata:
+                from .late_start import first_values  # in a slim package only where it is needed
+
+                layout = self.layout
+                before, now = self.sort(first_values(layout)).positions, self.sort(layout.initial).positions
+                for held in (before, {}) if before != now else ():
+                    with suppress(AssemblyError):
+                        return self.follow(self.system.close(layout.q_reference, held).q, now)
             return None
         first = Initial(self.kernels).reference()
         try:

@@ -54,6 +54,10 @@ class Kernels:
         if p is not None and "scales" in core.names:
             scales = core.state("scales", self.context, layout.shape("scales"), self._unscaled, False, UsageError)
             self.layout = layout = layout.sized(scales(np.empty(0)))
+        if p is not None and "start_terms" in layout.metadata:
+            from .late_start import started
+
+            self.layout = layout = started(layout, self.context.p)
         self.fail = Fail(layout, self._culprit, self._poses if "poses" in core.names else None)
         self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
         self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)

@@ -121,8 +121,8 @@ class Layout:
         self.loop_angles = np.array([kind == "angle" for kind in self.loop_kinds], dtype=bool)
         self.loop_lengths = np.array([kind == "length" for kind in self.loop_kinds], dtype=bool)
         self.loop_scales = np.where(self.loop_lengths, self.length, 1.0)
-        self.initial: dict[str, float] = {k: float(v) for k, v in data.get("initial", {}).items() if v is not None}
-        self.guess: dict[str, float] = {k: float(v) for k, v in data.get("guess", {}).items() if v is not None}
+        starts = ("initial", "initial_outputs", "guess")
+        self.initial, self.initial_outputs, self.guess = (dict[str, float](data.get(key, {})) for key in starts)
         self.limits: dict[str, dict[str, float]] = data.get("limits", {})
         reference = data.get("q_reference")
         neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()

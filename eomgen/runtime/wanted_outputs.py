@@ -60,7 +60,7 @@ class WantedInitial(Initial):
     def __init__(self, kernels: Kernels, t: float, names: Iterable[str]) -> None:
         super().__init__(kernels, t)
         self.layout = copy(kernels.layout)
-        self.layout.initial = declared_values(kernels.layout)
+        self.layout.initial = {**kernels.layout.initial, **kernels.layout.initial_outputs}
         wanted = dict.fromkeys([*names, *self.layout.initial])
         found = [one for one in (find_wanted(kernels, name, t) for name in wanted) if one is not None]
         self.wanted_rates = {one.name: one for one in found if isinstance(one, WantedRate)}
@@ -86,11 +86,6 @@ class WantedInitial(Initial):
             return super().gradients(q, name)
         row, _, scale = self.rate_equation(q, name)
         return [row * self.scales.q / scale]
-
-
-def declared_values(layout: Layout) -> dict[str, float]:
-    """All declared initial values, outputs included."""
-    return {**layout.initial, **layout.metadata.get("initial_outputs", {})}
 
 
 def find_wanted(kernels: Kernels, name: str, t: float) -> WantedPosition | WantedRate | None:

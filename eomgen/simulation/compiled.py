@@ -154,6 +154,8 @@ def integrate_compiled(
     times, states, notes = journey.outcome()
     if events is not None and journey.raised is None:
         warn_of_unknown([events.names[i] for i in journey.unknown()])
+    if status == RESET_FAILED and events is not None:
+        events.reset(module, forcing, journey.t, journey.state(), journey.fired())  # fails too, and tells why
     if status == ZENO and events is not None:
         raise events.crowded(journey.t, journey.resets)
     t_events, x_events = [], []
@@ -161,20 +163,10 @@ def integrate_compiled(
         which = notes[:, 0]
         t_events = [notes[which == i, 1] for i in range(len(events))]
         x_events = [np.ascontiguousarray(notes[which == i, 2:].T) for i in range(len(events))]
-    return (
-        Solution(
-            times,
-            states,
-            t_events,
-            x_events,
-            journey.dense() if dense else None,
-            STATUS.get(status, -1),
-            MESSAGES.get(status, TOO_SMALL),
-            {"nfev": journey.evaluations, "njev": journey.differentiations, "nlu": journey.factorizations},
-            (start, journey.t),
-            None if (trail := journey.trail()) is None else (trail[:, 0], np.ascontiguousarray(trail[:, 1:].T)),
-            journey.finite,
-        ),
-        journey.failure,
-        journey.raised,
-    )
+    counts = {"nfev": journey.evaluations, "njev": journey.differentiations, "nlu": journey.factorizations}
+    trail = None if (trail := journey.trail()) is None else (trail[:, 0], np.ascontiguousarray(trail[:, 1:].T))
+    solution = Solution(
+        times, states, t_events, x_events, journey.dense() if dense else None, STATUS.get(status, -1),
+        MESSAGES.get(status, TOO_SMALL), counts, (start, journey.t), trail, journey.finite,
+    )  # fmt: skip
+    return solution, journey.failure, journey.raised

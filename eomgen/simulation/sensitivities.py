@@ -19,6 +19,7 @@ from ..numeric.scales import Array, Indices
 from ..runtime.change_points import singular_values
 from ..runtime.failure import place
 from ..runtime.given_start import Span, Start
+from ..runtime.late_start import start_slopes
 from ..runtime.near_names import check_names, read_names, unknown
 from ..runtime.refusals import refuse_rigid, require_projection, require_velocities
 from ..runtime.room import read_number, require_steps
@@ -76,7 +77,8 @@ def sensitivities(
     hold : sequence of str, optional
         Coordinates and rates that keep their initial values when something else changes; the constraints give the
         rest, by the smallest change where they leave a choice.  By default those given in ``initial``, then the
-        declared ones, then the independent ones, while they leave each other room.
+        declared ones, then the independent ones, while they leave each other room; declared ones that are
+        expressions of parameters follow these, unless they are named here.
     method : str or OdeSolver subclass, optional
         Of SciPy.
     rtol, atol, t_eval, events : optional
@@ -123,7 +125,9 @@ def sensitivities(
         with told_by_the_caller():
             alone = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **settings)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
-    S0 = start_sensitivity(here, start, x0, held, columns, _inputs(run, start, x0))
+    follows = start_slopes(layout, bound.kernels.context.p) if initial is None or given is not None else {}
+    follows = {} if hold is not None else {name: by_p for name, by_p in follows.items() if name not in (given or ())}
+    S0 = start_sensitivity(here, start, x0, held, columns, _inputs(run, start, x0), follows)
     solver = limited(Run(bound, forcing), choose_solver(method), stop >= start)
     width = layout.n_x * (1 + len(columns.names))
     if np.ndim(settings["atol"]):  # of each state, and of its derivatives alike

@@ -7,6 +7,7 @@ implicit differentiation of C(q, p) = 0 and C_q v + C_t = 0.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -83,7 +84,7 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
     layout = module.layout
     initial = Initial(module.kernels, t)
     q, found = x[: layout.n_q], []
-    starts = [*(given or ()), *layout.metadata.get("initial_outputs", ())]
+    starts = [*(given or ()), *layout.initial_outputs]
     if outputs := [name for name in starts if (name in layout.y and name not in layout.x) or place_of_marker(name)]:
         raise UsageError(
             f"derivatives need a start with held coordinates and rates, not {', '.join(outputs)}; give the "
@@ -119,8 +120,11 @@ def start_sensitivity(
     held: Sequence[str],
     columns: Differentiated,
     inputs: SlopesNow | None = None,
+    slopes: Mapping[str, Array] = MappingProxyType({}),
 ) -> Array:
     """dx0 (n_x, k) of an assembled state, with the derivatives of the inputs there.
+
+    ``slopes`` are those (n_p,) of held values that follow from parameters, by name.
 
     Raises
     ------
@@ -134,6 +138,8 @@ def start_sensitivity(
     other = columns.spread(E[:, n_x + layout.n_u :], E[:, n_x : n_x + layout.n_u])
     initial = Initial(module.kernels, t)
     wanted = {name: np.zeros(count) for name in held}
+    for name in slopes.keys() & wanted.keys():
+        (wanted[name],) = columns.spread(slopes[name][None], np.zeros((1, layout.n_u)))
     for column, name in columns.initial:
         if len(initial.gradients(x[:n_q], name)) != 1:
             raise UsageError(f"{name} cannot change alone; use the angular velocity, or rotation: euler_angles")

@@ -263,6 +263,8 @@ def simulate(
             f"interrupted at t = {solution.ends[1]:.6g} s of {end:.6g} s",
             lambda: record(bound, forcing, solution, title, settings, watched.names),
         ) from interrupt.__cause__
+    except EvaluationError as error:  # of a reset
+        raise SimulationError(f"{title} stopped: {error}") from error
     except Crawling as crawl:
         raise run.gave_up(crawl, end, title, settings) from None
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:

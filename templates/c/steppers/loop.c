@@ -88,10 +88,12 @@ static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_jou
             return EOMGEN_RESET_FAILED;
         }
         for (int k = 0; k < ev->n_resets; k++) {
+            if (ev->reset_of[k] == i && !isfinite(ev->values_reset[k])) { /* those of others need not be numbers here */
+                return EOMGEN_RESET_FAILED;
+            }
+        }
+        for (int k = 0; k < ev->n_resets; k++) {
             if (ev->reset_of[k] == i) {
-                if (!isfinite(ev->values_reset[k])) { /* those of other events need not be numbers here */
-                    return EOMGEN_RESET_FAILED;
-                }
                 run->y[ev->reset_x[k]] = ev->values_reset[k];
             }
         }

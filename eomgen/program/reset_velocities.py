@@ -1,0 +1,138 @@
+"""Stage program, events while constraints are closed -> velocities after them, which these constraints allow.
+
+As a constraint closes, v+ = v- - M^-1 C^T (C M^-1 C^T)^-1 (C v- + C_t) of it and of all that are closed, with M^-1 the
+inverse on the motions that the constraints of the mechanism leave: a plastic impact (F. Pfeiffer, C. Glocker, Multibody
+Dynamics with Unilateral Contacts (1996), ch. 8, without friction).  New values that an event gives while constraints
+are closed are no impact: they are brought onto these by the shortest change, as onto those of the mechanism.  Where
+that leaves a closed equation unfulfilled, because another contradicts it, the new velocities are no numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ..describe.mechanism import Event
+from ..forces.branches import where
+from ..graph.core import Expr
+from ..graph.substitute import substitute
+from ..kinematics import Kinematics
+from ..kinematics.eliminate import Matrix, total
+from ..kinematics.switched import SwitchedRow
+from ..limits.constraints import MEASURED
+from .held_constraints import closed, solve_switched, switched_matrix
+
+MOST = 40  #: equations of a mechanism onto which velocities are brought together with closed ones; more are judged only
+
+
+class Equation(NamedTuple):
+    """One equation after an event: 1 where it has to hold, C' and its slopes by v, C and its size."""
+
+    on: Expr
+    jacobian: Sequence[Expr]
+    rate: Expr
+    change: Expr  #: of C by the event; equations of velocities have none
+    size: Expr
+
+
+@dataclass(frozen=True)
+class AfterEvents:
+    """The velocities after events.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+    rows : sequence of SwitchedRow
+    inner : matrix
+        C M^-1 C^T of the rows with its sign changed.
+    columns : matrix
+        By row, the accelerations that a unit of its multiplier makes.
+    """
+
+    kinematics: Kinematics
+    rows: Sequence[SwitchedRow]
+    inner: Matrix
+    columns: Matrix
+
+    def velocities(self) -> dict[str, tuple[tuple[str, Expr], ...]]:
+        """New velocities by event, of those that close constraints or give coordinates or velocities new values."""
+        k = self.kinematics
+        moving = {*k.names, *k.velocity_names}
+        switched = [s.state for s in k.mechanism.switched]
+        found = dict[str, tuple[tuple[str, Expr], ...]]()
+        for event in k.mechanism.events:
+            given = dict(event.reset)
+            closes = any(given.get(state) == k.graph.one for state in switched)
+            if closes or not moving.isdisjoint(given):
+                found[event.name] = tuple(zip(k.velocity_names, self._after(event, closes), strict=True))
+        return found
+
+    def _after(self, event: Event, closes: bool) -> list[Expr]:
+        k, given = self.kinematics, dict(event.reset)
+        new = {k.graph.symbol(name): value for name, value in given.items()}
+        v = substitute(list(k.v), new)
+        own = [self._closed(row, given, new) for row in self.rows]
+        anyone = own[0].on
+        for one in own[1:]:
+            anyone = where(one.on, 1.0, anyone)
+        moving = not {*k.names, *k.velocity_names}.isdisjoint(given)
+        lasting = self._lasting(anyone, new) if moving else []
+        if closes:
+            acting, columns = own, substituted(self.columns, new)
+            inner = substituted(self.inner, new)
+        else:
+            acting = [*(lasting if len(lasting) <= MOST else ()), *own]
+            columns = [self._shortest(one) for one in acting]
+            inner = [[total([j * c for j, c in zip(one.jacobian, column, strict=True)]) for column in columns]
+                     for one in acting]  # fmt: skip
+        A = switched_matrix(inner, [one.on for one in acting])
+        (impulses,) = solve_switched(A, [[-(one.on * one.rate) for one in acting]])
+        after = []
+        for j, before in enumerate(v):
+            after.append(total([before, *(c[j] * i for c, i in zip(columns, impulses, strict=True))]))
+        fits = k.graph.one
+        for one in (*lasting, *own):
+            fits = fits * self._fulfilled(one, v, after)
+        return [x / fits for x in after]
+
+    def _closed(self, row: SwitchedRow, given: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> Equation:
+        """Equations that may be no numbers while they are open: those of what closes now."""
+        on = given.get(row.state, closed(row))
+        rate, error, *J = substitute([row.rate, row.errors[0], *row.jacobian], new)
+        before = substitute([row.errors[0]], {s: x for s, x in new.items() if s.node[1] == row.state})[0]
+        return Equation(on, J, rate, error - before, self._size(row.kind))
+
+    def _lasting(self, on: Expr, new: Mapping[Expr, Expr]) -> list[Equation]:
+        """The equations of the mechanism, which have to hold beside those that are closed."""
+        c, found = self.kinematics.constraints, []
+        for i, (J, rate, kind) in enumerate(zip(c.jacobian, c.velocity, c.kinds, strict=True)):
+            value = c.values[i] if i < len(c.values) else self.kinematics.graph.zero
+            now, speed, *slopes = substitute([value, rate, *J], new)
+            found.append(Equation(on, slopes, speed, now - value, self._size(kind)))
+        return found
+
+    def _shortest(self, one: Equation) -> list[Expr]:
+        """Of an equation, the change of velocities in its direction, lengths in the length of the mechanism."""
+        sizes = (self._size(kind) for kind in self.kinematics.velocity_kinds)
+        return [-(j * size * size) for j, size in zip(one.jacobian, sizes, strict=True)]
+
+    def _size(self, kind: str) -> Expr:
+        return self.kinematics.length_scale if kind == "length" else self.kinematics.graph.one
+
+    def _fulfilled(self, one: Equation, before: Sequence[Expr], after: Sequence[Expr]) -> Expr:
+        """1 where an equation holds after the event, or need not hold, else 0."""
+        graph, parts, sizes = self.kinematics.graph, [one.rate], [one.size]
+        for j, v, w in zip(one.jacobian, before, after, strict=True):
+            if not j.is_zero:
+                parts.append(j * (w - v))
+                sizes.append(graph.apply("abs", j) * (graph.apply("abs", v) + graph.apply("abs", w)))
+        holds = graph.apply("le", graph.apply("abs", total(parts)), MEASURED * total(sizes))
+        if not one.change.is_zero:
+            holds = holds * graph.apply("le", graph.apply("abs", one.change), MEASURED * one.size)
+        return where(one.on, holds, 1.0)
+
+
+def substituted(matrix: Matrix, new: Mapping[Expr, Expr]) -> Matrix:
+    """A matrix with new values of symbols."""
+    return [substitute(list(row), new) for row in matrix]

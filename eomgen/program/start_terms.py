@@ -1,0 +1,50 @@
+"""Stage program, start: initial values and guesses -> their numbers, and how they follow from later parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..graph.core import Expr
+from ..graph.differentiate import gradient
+from ..graph.evaluate import compile_evaluator
+from ..graph.substitute import symbols_of
+from ..graph.tape import record_tape
+from ..kinematics import Kinematics
+
+
+def describe_start(kinematics: Kinematics) -> dict[str, Any]:
+    """Initial values and guesses as model.json holds them.
+
+    Their numbers are those at the declared parameters.  ``start_terms`` are the tapes of those that follow from
+    parameters, by section with their names; ``start_slopes`` the derivatives of initial values that do not vanish, with
+    the name and the place of the parameter of each.
+    """
+    m = kinematics.mechanism
+    given = {"initial": m.initial, "initial_outputs": m.initial_outputs, "guess": m.guess}
+    values = {p.name: p.value for p in m.parameters}
+    found: dict[str, Any] = {
+        key: _numbers(terms, values) for key, terms in given.items() if terms or key != "initial_outputs"
+    }
+    places = {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)}
+    late = {key: {n: x for n, x in terms.items() if symbols_of([x])} for key, terms in given.items()}
+    if not any(late.values()):
+        return found
+    known = [kinematics.graph.symbol(name) for name in places]
+    slopes = [
+        (name, k, slope)
+        for name, x in late["initial"].items()
+        for k, slope in enumerate(gradient(x, known))
+        if not slope.is_zero
+    ]
+    terms = {
+        key: [list(of), list(record_tape(list(of.values()), places.__getitem__))] for key, of in late.items() if of
+    }
+    tape = record_tape([slope for *_, slope in slopes], places.__getitem__)
+    return found | {"start_terms": terms, "start_slopes": [[[name, k] for name, k, _ in slopes], list(tape)]}
+
+
+def _numbers(given: Mapping[str, Expr], values: Mapping[str, float | None]) -> dict[str, float]:
+    """Initial values or guesses at the declared parameters, each of which has a value in a model that is generated."""
+    numbers = compile_evaluator(list(given.values()), tuple(values))(list(values.values())) if given else []
+    return {name: float(x) for name, x in zip(given, numbers, strict=True)}

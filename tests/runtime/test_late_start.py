@@ -1,0 +1,160 @@
+"""Initial values that are expressions of parameters: parameters given late start runs where the same model would whose
+parameters are declared so, and the slopes of the start are those of the expressions."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen.generation import generate
+
+TARGETS = ("cython", "numpy")
+
+
+def thrown(h: float = 2.0, w: float = 0.5) -> eg.Model:
+    """A ball that starts at h/2 + w with the speed h w, and a state that begins at w squared."""
+    m = eg.Model("thrown", gravity=(0.0, -10.0, 0.0))
+    ball = m.body("ball", mass=1.0)
+    m.prismatic("J", m.ground, ball, axis="y", coordinate="y")
+    m.parameter("h", h)
+    m.parameter("w", w)
+    m.state("a", "-a", initial="w**2")
+    m.initial(y="h/2 + w", y_dot="h*w")
+    return m
+
+
+def crank(start: float = 0.4, speed: float = 2.0) -> eg.Model:
+    """A slider-crank whose start is declared by parameters: crank angle and slider speed."""
+    m = eg.Model("crank", gravity=(0.0, -9.81, 0.0))
+    m.parameter("start", start)
+    m.parameter("speed", speed)
+    m.parameter("r", 0.2)
+    arm = m.body("arm", mass=1.0, inertia={"zz": 0.01}, com=("r/2", 0, 0))
+    rod = m.body("rod", mass=1.0, inertia={"zz": 0.02}, com=(0.25, 0, 0))
+    block = m.body("block", mass=1.0)
+    m.revolute("A", m.ground, arm, axis="z", coordinate="theta")
+    m.revolute("B", arm.at("r", 0, 0), rod, axis="z", coordinate="phi")
+    m.prismatic("C", m.ground, block, axis="x", coordinate="s")
+    m.revolute("D", rod.at(0.5, 0, 0), block, axis="z", coordinate="psi")
+    m.guess(phi=-0.2, s=0.65)
+    m.initial(theta="start", theta_dot="speed")
+    m.independent = ["theta"]
+    return m
+
+
+@pytest.fixture(scope="module", params=TARGETS)
+def ball(request: pytest.FixtureRequest) -> Any:
+    return thrown().compile(target=request.param)
+
+
+@pytest.fixture(scope="module")
+def mechanism() -> Any:
+    return crank().compile(target="cython")
+
+
+def start(h: float, w: float) -> list[float]:
+    return [h / 2 + w, h * w, w * w]
+
+
+def test_bound_parameters_start_where_their_expressions_say(ball: Any) -> None:
+    p = {"h": 3.0, "w": 0.25}
+    assert ball.x0() == pytest.approx(start(2.0, 0.5), rel=1e-15)
+    assert ball.bind(p).x0() == pytest.approx(start(3.0, 0.25), rel=1e-15)
+    assert ball.bind(p).bind({"h": 2.0, "w": 0.5}).x0() == pytest.approx(start(2.0, 0.5), rel=1e-15)
+    assert ball.x0(p=[3.0, 0.25]) == pytest.approx(start(3.0, 0.25), rel=1e-15)
+    assert ball.x0({"y": 7.0}, p=[3.0, 0.25]) == pytest.approx([7.0, 0.75, 0.0625], rel=1e-15)
+
+
+def test_a_run_begins_there_and_follows_the_parabola(ball: Any) -> None:
+    run = ball.simulate(0.5, parameters={"h": 3.0, "w": 0.25})
+    assert run["y"][-1] == pytest.approx(1.75 + 0.75 * 0.5 - 5.0 * 0.25, abs=1e-8)
+    assert run["a"][-1] == pytest.approx(0.0625 * np.exp(-0.5), rel=1e-7)
+
+
+@pytest.mark.parametrize("initial", [None, {"y_dot": 1.0}, {"a": [0.1, 0.2, 0.3]}])
+def test_each_of_many_runs_begins_at_its_own(ball: Any, initial: Any) -> None:
+    h = [1.0, 2.0, 3.0]
+    found = ball.simulate_many(0.5, initial, {"h": h})
+    for k, one in enumerate(h):
+        given = {name: np.broadcast_to(x, 3)[k] for name, x in (initial or {}).items()}
+        alone = thrown(one).compile(target="numpy").simulate(0.5, given)
+        assert found.x[:, k] == pytest.approx(alone.x[:, -1], abs=1e-8)
+
+
+def test_slopes_by_parameters_are_those_of_the_closed_form(ball: Any) -> None:
+    t, h, w = 0.5, 2.0, 0.5
+    found = ball.sensitivities(["h", "w"], t, t_eval=[0.0, t])
+    assert found.dx[:, :, 0] == pytest.approx(np.array([[0.5, 1.0], [w, h], [0.0, 2.0 * w]]), abs=1e-14)
+    assert found["y", "h"][-1] == pytest.approx(0.5 + w * t, abs=1e-8)
+    assert found["a", "w"][-1] == pytest.approx(2.0 * w * np.exp(-t), abs=1e-7)
+
+
+def test_values_that_are_given_or_held_do_not_follow(ball: Any) -> None:
+    given = ball.sensitivities(["h"], 0.1, {"y": 1.0}).dx[:, 0, 0]
+    assert given == pytest.approx([0.0, 0.5, 0.0], abs=1e-14)
+    assert not ball.sensitivities(["h"], 0.1, [1.0, 2.0, 3.0]).dx[:, 0, 0].any()
+    assert not ball.sensitivities(["h"], 0.1, hold=["y", "y_dot", "a"]).dx[:, 0, 0].any()
+
+
+def test_a_fit_finds_the_parameter_by_which_runs_start(ball: Any) -> None:
+    t = np.linspace(0.0, 0.5, 11)
+    data = {"t": t, "y": 1.6 + 0.5 + 1.6 * t - 5.0 * t**2}  # h = 3.2, w = 0.5
+    for initial in (None, {"a": 1.0}):
+        assert ball.fit(data, {"h": 2.0}, initial=initial).parameters["h"] == pytest.approx(3.2, rel=1e-6)
+
+
+@pytest.mark.parametrize("angle", [-2.5, -0.4, 0.9, 2.0, 3.0])
+def test_a_closed_loop_starts_as_if_declared_so(mechanism: Any, angle: float) -> None:
+    late = mechanism.bind({"start": angle, "speed": -1.0, "r": 0.15})
+    x = late.x0()
+    s = 0.15 * np.cos(angle) + np.sqrt(0.25 - (0.15 * np.sin(angle)) ** 2)
+    assert x[late.x_names.index("theta")] == pytest.approx(angle, abs=1e-12)
+    assert float(late.poses(x[: late.n_q])[list(late.body_names).index("block")][0, 3]) == pytest.approx(s, abs=1e-12)
+    assert late.minimal.x0() == pytest.approx([angle, -1.0], abs=1e-12)
+
+
+def test_slopes_of_the_start_of_a_closed_loop(mechanism: Any) -> None:
+    names, h = ["start", "speed", "r"], 1e-6
+    p = dict(zip(mechanism.p_names, mechanism.p, strict=True))
+    found = mechanism.sensitivities(names, 0.2)
+    for k, name in enumerate(names):
+        for at in (0, -1):
+            ends = [mechanism.simulate(0.2, parameters={name: p[name] + side}, rtol=1e-11, atol=1e-13).x[:, at]
+                    for side in (h, -h)]  # fmt: skip
+            assert found.dx[:, k, at] == pytest.approx((ends[0] - ends[1]) / (2.0 * h), abs=2e-7)
+
+
+def test_an_output_that_is_declared_holds_for_each_run() -> None:
+    m = eg.Model("arm", gravity=(0.0, -9.81, 0.0))
+    m.parameter("l", 1.0)
+    m.parameter("reach", 0.5)
+    arm = m.body("arm", mass=1.0, inertia={"zz": 0.1}, com=("l", 0, 0))
+    m.revolute("A", m.ground, arm, axis="z", coordinate="theta")
+    m.output("tip", "l*sin(theta)")
+    m.initial(tip="reach/2")
+    module = m.compile(target="numpy")
+    for parameters in ({"l": [1.0, 2.0]}, {"reach": [0.5, 1.0]}):
+        found = [module.bind({n: x[k] for n, x in parameters.items()}).x0()[0] for k in range(2)]
+        ends = module.simulate_many(1e-9, parameters=parameters).x[0]
+        assert ends == pytest.approx(found, abs=1e-12)
+    assert module.bind({"l": 2.0}).x0()[0] == pytest.approx(np.arcsin(0.125), abs=1e-12)
+    assert module.bind({"reach": 1.0}).x0()[0] == pytest.approx(np.arcsin(0.5), abs=1e-12)
+
+
+@pytest.mark.parametrize("slim", [False, True])
+def test_an_exported_package_follows_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, slim: bool) -> None:
+    folder = generate(thrown(), tmp_path / "thrown", target="numpy", slim=slim)
+    monkeypatch.syspath_prepend(folder.parent)
+    package = importlib.import_module("thrown")
+    try:
+        assert package.bind(p={"h": 3.0, "w": 0.25}).x0() == pytest.approx(start(3.0, 0.25), rel=1e-15)
+        assert package.simulate(0.1, parameters={"h": 3.0}).x[:, 0] == pytest.approx(start(3.0, 0.5), rel=1e-15)
+    finally:
+        for name in [name for name in sys.modules if name.partition(".")[0] == "thrown"]:
+            del sys.modules[name]
