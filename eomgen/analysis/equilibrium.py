@@ -13,7 +13,7 @@ from ..numeric.scales import Array
 from ..runtime.assembled import initial_of
 from ..runtime.initial import Initial
 from ..runtime.near_names import read_names, unknown
-from ..runtime.refusals import refuse_rigid, refuse_sampled, require_velocities
+from ..runtime.refusals import refuse_closed, refuse_rigid, refuse_sampled, require_velocities
 from ..runtime.room import read_number, read_numbers
 from .balance_search import find_balance
 from .balanced import Equilibrium, describe, read_coordinates
@@ -67,6 +67,8 @@ def equilibrium(
         The loops do not close with the held values.
     UsageError
         A name is unknown, or there are too few unknowns.
+    UnavailableError
+        A constraint that closes and opens is closed there, or states are sampled, or contacts rigid.
     """
     require_velocities(module.layout)
     refuse_rigid(module.layout, "equilibrium")
@@ -77,6 +79,8 @@ def equilibrium(
     by_name = isinstance(hold, Mapping)
     wanted: dict[str, float | None] = dict(hold) if by_name else dict.fromkeys(read_names("hold", hold))  # type: ignore[arg-type]
     given = {name: read_number(f"hold: {name}", value) for name, value in wanted.items() if value is not None}
+    states = _states(module, guess)
+    refuse_closed(module.layout, states, "equilibrium")
     initial = Initial(module.kernels, time)
     if initial.sort(given).rates:
         raise UsageError(f"hold takes coordinates, not rates or states: {', '.join(initial.sort(given).rates)}")
@@ -87,7 +91,7 @@ def equilibrium(
             raise unknown("coordinate", name, here)
         given.setdefault(name, here[name])
     given = initial.sort(given).positions
-    search = Search(module, time, given, unknowns, _states(module, guess))
+    search = Search(module, time, given, unknowns, states)
     rows = len(search.gradients(module, q))
     if unknowns and len(unknowns) < rows:
         raise UsageError(

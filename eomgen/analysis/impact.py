@@ -30,6 +30,7 @@ from .impact_gaps import Gaps, allowance, by_velocity, check_gaps
 from .impact_law import collide
 from .impact_sliding import Rough, check_friction, find_sliding
 from .tables import as_text
+from .true_distances import require_distances
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -313,6 +314,7 @@ def _apply(
         free = np.where(fixed[: len(rates)], 0.0, rates)
         free[count:] = rates[count:]  # a body may slide as a driver or a belt moves it
         if sliding.names:
+            require_distances(states.module, float(states.t[0]), states.q[:, 0], rows[:count], names, sliding)
             impulses, z = strike(H, free, e, rest, sliding.coefficients, sliding.owner, names)
         else:
             impulses, z = collide(H, free, e, rest, names)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from ..runtime.refusals import refuse_rigid, refuse_sampled
+from ..runtime.refusals import refuse_closed, refuse_rigid, refuse_sampled
 from ..runtime.room import read_number, read_numbers
 from .eigenvalue_rounding import own_accelerations
 from .linear_given import find_given_tangent, refuse_inputs
@@ -104,6 +104,7 @@ def linearize(
         return Linearization(
             layout, time, state, module.u, (moved[chosen], U[chosen], C, D), names, rates[chosen], None, tangent
         )
+    refuse_closed(layout, state[layout.n_x - len(layout.states) :], "linearize in minimal form")
     tangent = find_tangent(module, time, state, J, independent)
     n_q, n_z = layout.n_q, len(tangent.positions)
     moved = J @ tangent.T

@@ -28,7 +28,7 @@ from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
 from .drawn import describe_picture
-from .event_terms import describe_events, resets
+from .event_terms import describe_events, find_translations, resets
 from .factor import has_long_paths
 from .given_multipliers import multiplier_values
 from .kept_rules import keep_rules
@@ -280,6 +280,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "baumgarte": None if c.stabilised is None else list(c.stabilised),
         "dry_friction": {j.coordinates[0]: j.dry_friction for j in m.joints if j.dry_friction},
         **describe_events(kinematics),
+        **({"translations": found} if (found := find_translations(kinematics)) else {}),
         **_signals(kinematics, equations),
         **({"input_rates": rates} if (rates := _input_rates(kinematics)) else {}),
         **({"constraint_inputs": used} if (used := _constraint_inputs(kinematics)) else {}),

@@ -5,7 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from ..errors import UsageError
+from ..frames import GROUND
 from ..graph.core import Expr
+from ..joints.many_degrees import Cylindrical, Planar, Translational
+from ..joints.one_degree import Prismatic
+from ..joints.turning import Free
 from ..kinematics import Kinematics
 
 
@@ -44,6 +48,25 @@ def _clocks(kinematics: Kinematics) -> list[dict[str, Any]]:
         }
         for c in kinematics.mechanism.clocks
     ]
+
+
+def find_translations(kinematics: Kinematics) -> list[list[Any]]:
+    """Joints of the tree that move bodies without turning them.
+
+    Of each its name, the place here of the next of them towards the ground, or -1, the body, and the velocities.
+    """
+    found: list[list[Any]] = []
+    outer = {GROUND: -1}  #: by body, the outermost of them so far
+    kinds = dict(zip(kinematics.velocity_labels, kinematics.velocity_kinds, strict=True))
+    for branch in kinematics.topology.branches:
+        spec = kinematics.mechanism.joints[branch.joint]
+        slides = isinstance(spec.joint, (Prismatic, Cylindrical, Planar, Translational, Free))
+        outer[branch.body] = outer[branch.parent]
+        if slides:
+            places = [i for i, name in enumerate(kinds) if name in spec.coordinates and kinds[name] == "length"]
+            outer[branch.body] = len(found)
+            found.append([spec.name, outer[branch.parent], branch.body, places])
+    return found
 
 
 def resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:

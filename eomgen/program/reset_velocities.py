@@ -26,7 +26,7 @@ from .held_constraints import closed, solve_switched, switched_matrix
 MOST = 40  #: equations of a mechanism onto which velocities are brought together with closed ones; more are judged only
 
 
-class Equation(NamedTuple):
+class RowAfter(NamedTuple):
     """One equation after an event: 1 where it has to hold, C' and its slopes by v, C and its size."""
 
     on: Expr
@@ -96,23 +96,23 @@ class AfterEvents:
             fits = fits * self._fulfilled(one, v, after)
         return [x / fits for x in after]
 
-    def _closed(self, row: SwitchedRow, given: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> Equation:
+    def _closed(self, row: SwitchedRow, given: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> RowAfter:
         """Equations that may be no numbers while they are open: those of what closes now."""
         on = given.get(row.state, closed(row))
         rate, error, *J = substitute([row.rate, row.errors[0], *row.jacobian], new)
         before = substitute([row.errors[0]], {s: x for s, x in new.items() if s.node[1] == row.state})[0]
-        return Equation(on, J, rate, error - before, self._size(row.kind))
+        return RowAfter(on, J, rate, error - before, self._size(row.kind))
 
-    def _lasting(self, on: Expr, new: Mapping[Expr, Expr]) -> list[Equation]:
+    def _lasting(self, on: Expr, new: Mapping[Expr, Expr]) -> list[RowAfter]:
         """The equations of the mechanism, which have to hold beside those that are closed."""
         c, found = self.kinematics.constraints, []
         for i, (J, rate, kind) in enumerate(zip(c.jacobian, c.velocity, c.kinds, strict=True)):
             value = c.values[i] if i < len(c.values) else self.kinematics.graph.zero
             now, speed, *slopes = substitute([value, rate, *J], new)
-            found.append(Equation(on, slopes, speed, now - value, self._size(kind)))
+            found.append(RowAfter(on, slopes, speed, now - value, self._size(kind)))
         return found
 
-    def _shortest(self, one: Equation) -> list[Expr]:
+    def _shortest(self, one: RowAfter) -> list[Expr]:
         """Of an equation, the change of velocities in its direction, lengths in the length of the mechanism."""
         sizes = (self._size(kind) for kind in self.kinematics.velocity_kinds)
         return [-(j * size * size) for j, size in zip(one.jacobian, sizes, strict=True)]
@@ -120,7 +120,7 @@ class AfterEvents:
     def _size(self, kind: str) -> Expr:
         return self.kinematics.length_scale if kind == "length" else self.kinematics.graph.one
 
-    def _fulfilled(self, one: Equation, before: Sequence[Expr], after: Sequence[Expr]) -> Expr:
+    def _fulfilled(self, one: RowAfter, before: Sequence[Expr], after: Sequence[Expr]) -> Expr:
         """1 where an equation holds after the event, or need not hold, else 0."""
         graph, parts, sizes = self.kinematics.graph, [one.rate], [one.size]
         for j, v, w in zip(one.jacobian, before, after, strict=True):

@@ -73,6 +73,24 @@ def refuse_sampled(layout: Layout, what: str) -> None:
         )
 
 
+def refuse_closed(layout: Layout, states: Array, what: str) -> None:
+    """Refuse first-order states (n_s,) with which constraints that close and open are closed.
+
+    Raises
+    ------
+    UnavailableError
+    """
+    given = dict(zip(layout.states, states, strict=True))
+    names = [name for name in layout.metadata.get("switched", ()) if given[f"{name}_closed"] > 0.5]
+    if names:
+        first = f"{names[0]}_closed"
+        raise UnavailableError(
+            f"{what} is not available while constraints that close and open are closed, and {', '.join(names)} of "
+            f"{layout.name!r} {'are' if names[1:] else 'is'}: what holds for a time restricts no degree of freedom; "
+            f"give {{{first!r}: 0}} to let it go, or a model where it holds always (without closes and opens)"
+        )
+
+
 def refuse_rigid(layout: Layout, what: str) -> None:
     """Refuse a model with contacts that exert impulses alone, which its equations in continuous time do not have.
 

@@ -10,7 +10,8 @@ with M, J and C of the middle where nothing else is said, and the laws of :mod:`
 between impulses P and velocities J v+.  The normal velocity is to be at least -e times the one before where shapes
 touch, and -g/h where they are a gap g apart and come to rest on each other (D. E. Stewart, J. C. Trinkle, An implicit
 time-stepping scheme for rigid body dynamics with inelastic collisions and Coulomb friction, Int. J. Numer. Methods Eng.
-39 (1996), 2673-2691).  What is left of penetrations and of open loops is removed from the positions alone (V. Acary,
+39 (1996), 2673-2691).  Where shapes land, which is an impact without rebound, it is 0 at once, so that friction acts on
+all of the impact, and the rest of their gap is closed in the positions.  What is left of penetrations and of open loops is removed from the positions alone (V. Acary,
 Projected event-capturing time-stepping schemes, Comput. Methods Appl. Mech. Eng. 256 (2013), 224-250).
 
 Constraints hold for the velocities at the end of a step and push in the middle, as in SHAKE and its form by velocities
@@ -251,9 +252,11 @@ class RigidSteps:
         rows, before, W = meeting.rows, meeting.before, meeting.compliance
         undisturbed = (rows.jacobian @ free).reshape(before.shape)
         fast = before[:, 0] < -RESTING * np.abs(undisturbed[:, 0] - before[:, 0])
-        strikes = fast & (rows.restitution > 0.0) & (rows.gaps + h * undisturbed[:, 0] < 0.0)
-        arrive = np.where(rows.gaps > 0.0, -rows.gaps / h, 0.0)
-        back = np.where(strikes, -rows.restitution * before[:, 0] - arrive, 0.0)
+        strikes = fast & (rows.gaps + h * undisturbed[:, 0] < 0.0)
+        bounces = strikes & (rows.restitution > 0.0)
+        self._rests, self._lands = ~bounces, strikes & ~bounces
+        arrive = np.where((rows.gaps > 0.0) & ~self._lands, -rows.gaps / h, 0.0)
+        back = np.where(bounces, -rows.restitution * before[:, 0] - arrive, 0.0)
         scale = meeting.scale = max(float(np.abs(before).max()), float(np.abs(undisturbed).max()))
         for k in range(GENTLER + 1):
             part = 0.0 if k == GENTLER else 0.5**k
@@ -271,7 +274,6 @@ class RigidSteps:
             if work <= grown and found.residual <= UNSOLVED * scale:
                 break
         self._note(found, scale, rough)
-        self._rests = ~strikes
         self._last = dict(zip(meeting.keys, found.impulses, strict=True))
         meeting.start = found.impulses
         return free + meeting.spread @ P, found.impulses
@@ -288,14 +290,25 @@ class RigidSteps:
         self.iterations, self.most = max(self.iterations, found.iterations), max(self.most, len(found.impulses))
 
     def _out(self, held: _Held, rows: RigidRows, P: Array, new: Array, h: float) -> Array:
-        """A displacement (n_v,) that removes a part of the penetration of contacts that last, with load or without."""
+        """A displacement (n_v,) that removes a part of the penetration of contacts that last, with load or without.
+
+        Where shapes land, the rest of their gaps is closed too, and what is pressed together stays so.
+        """
         d = len(rows.jacobian) // len(rows.gaps)
         normal = rows.jacobian[::d]
-        removed = -REMOVED * rows.gaps
-        lasts = (rows.gaps < 0.0) & self._rests & ((P[:, 0] > 0.0) | (h * (normal @ new) < removed))
-        if not lasts.any():
-            return np.zeros(len(new))
-        J, wanted = normal[lasts], removed[lasts]
+        rate, loaded = normal @ new, P[:, 0] > 0.0
+        removed, left = -REMOVED * rows.gaps, np.maximum(rows.gaps + 0.5 * h * rate, 0.0)
+        out = np.zeros(len(new))
+        lasts = (rows.gaps < 0.0) & self._rests & (loaded | (h * rate < removed))
+        if lasts.any():
+            out += self._displaced(held, normal[lasts], removed[lasts])
+        pressed = self._rests & loaded
+        if (self._lands & pressed & (left > 0.0)).any():
+            out -= self._displaced(held, normal[pressed], left[pressed])
+        return out
+
+    def _displaced(self, held: _Held, J: Array, wanted: Array) -> Array:
+        """A displacement (n_v,) by pushes along normals J (m, n_v) of at least as much as wanted (m,) along each."""
         spread = held.inverse @ J.T
         W = J @ spread
         W += YIELDING * np.diag(np.diag(W))

@@ -1,5 +1,7 @@
 /* Impulses of the contacts that act in one step. */
 
+enum { BOUNCES, RESTS, LANDS }; /* lands: an impact without rebound */
+
 typedef struct {
     int m, n; /* contacts, their rows */
     double *records;                              /* in the order of the contacts */
@@ -7,7 +9,8 @@ typedef struct {
     double *before, *undisturbed, *after, *c, *P; /* velocities, what the laws start from, impulses */
     double *friction, *arrive, *back, *out;
     double *work, scale;                          /* scale: what the tolerance of impulses is relative to */
-    int *rests, *numbers;
+    double *part;                                 /* of W */
+    int *rests, *numbers, *which;                 /* whether they bounce, rest or land */
 } meeting;
 
 /* Impulses of the same pairs in the last step, places of one pair numbered. */
@@ -47,10 +50,10 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
     for (int c = 0; c < m; c++) {
         const double gap = -at->records[RECORD_OF*c + 5], e = at->records[RECORD_OF*c + 13];
         const double before = at->before[c*d], undisturbed = at->undisturbed[c*d];
-        const int strikes = before < -RIGID_RESTING*fabs(undisturbed - before) && e > 0.0 && gap + h*undisturbed < 0.0;
-        at->arrive[c] = gap > 0.0 ? -gap/h : 0.0;
-        at->back[c] = strikes ? -e*before - at->arrive[c] : 0.0;
-        at->rests[c] = !strikes;
+        const int strikes = before < -RIGID_RESTING*fabs(undisturbed - before) && gap + h*undisturbed < 0.0;
+        at->rests[c] = !strikes ? RESTS : e > 0.0 ? BOUNCES : LANDS;
+        at->arrive[c] = gap > 0.0 && at->rests[c] != LANDS ? -gap/h : 0.0;
+        at->back[c] = at->rests[c] == BOUNCES ? -e*before - at->arrive[c] : 0.0;
         rebounds = rebounds || at->back[c] != 0.0;
     }
     memcpy(at->out, at->P, (size_t)n*sizeof(double)); /* what the solution starts from */
@@ -83,38 +86,56 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
     for (int i = 0; i < s->n_v; i++) { out[i] += free[i]; }
 }
 
-/* A displacement that removes a part of the penetration of contacts that last; whether there is one. */
-static int push_out(const eomgen_rigid *s, const inertia *held, meeting *at, const double *next, double h, double *out,
-                    eomgen_rigid *told)
+/* Adds a displacement by pushes along the normals of some contacts, by `sign` times at least at->c along each. */
+static void displace(const eomgen_rigid *s, const inertia *held, meeting *at, const int *which, int count, double sign,
+                     double *move, double *out, eomgen_rigid *told)
 {
-    const int m = at->m, d = s->d, n = at->n;
-    double *const W = at->W, *const wanted = at->c, *const P = at->after;
-    double largest = 0.0, residual = 0.0;
-    int *const lasts = at->rests;
-    int count = 0, iterations = 0;
-    across(s->n_v, n, at->J, next, at->undisturbed);
-    for (int c = 0; c < m; c++) {
-        const double gap = -at->records[RECORD_OF*c + 5], removed = -RIGID_REMOVED*gap;
-        if (gap < 0.0 && at->rests[c] && (at->P[c*d] > 0.0 || h*at->undisturbed[c*d] < removed)) {
-            wanted[count] = -removed, P[count] = 0.0, at->before[count] = 0.0;
-            largest = fmax(largest, removed);
-            lasts[count++] = c;
-        }
-    }
-    if (!count) {
-        return 0;
-    }
-    for (int a = 0; a < count; a++) { /* in place: W is not needed any more */
-        for (int b = 0; b < count; b++) { W[a*count + b] = at->W[(ptrdiff_t)lasts[a]*d*n + lasts[b]*d]; }
+    const int d = s->d, n = at->n;
+    double *const P = at->after, *const nothing = at->before, *const W = at->part, residual = 0.0;
+    const double largest = largest_of(count, at->c, 1);
+    int iterations = 0;
+    for (int a = 0; a < count; a++) {
+        P[a] = nothing[a] = 0.0, at->c[a] = -at->c[a];
+        for (int b = 0; b < count; b++) { W[a*count + b] = at->W[(ptrdiff_t)which[a]*d*n + which[b]*d]; }
         W[a*count + a] *= 1.0 + RIGID_YIELDING;
     }
-    CHOSEN(solve_contacts)(count, 1, W, wanted, at->before, P, s->tolerance*largest, s->most, at->work, at->numbers, &iterations,
+    CHOSEN(solve_contacts)(count, 1, W, at->c, nothing, P, s->tolerance*largest, s->most, at->work, at->numbers, &iterations,
                           &residual);
     told->missed = told->missed || !(residual <= s->tolerance*largest);
     for (int i = 0; i < s->n_v; i++) {
-        out[i] = 0.0;
-        for (int a = 0; a < count; a++) { out[i] += at->X[(ptrdiff_t)i*n + lasts[a]*d]*P[a]; }
+        move[i] = 0.0;
+        for (int a = 0; a < count; a++) { move[i] += at->X[(ptrdiff_t)i*n + which[a]*d]*P[a]; }
     }
-    release(s->n_v, held->L, out);
-    return 1;
+    release(s->n_v, held->L, move);
+    for (int i = 0; i < s->n_v; i++) { out[i] += sign*move[i]; }
+}
+
+/* A displacement that removes a part of the penetration of contacts that last, and the rest of the gaps of shapes that
+   land, what is pressed together staying so; whether there is one. */
+static int push_out(const eomgen_rigid *s, const inertia *held, meeting *at, const double *next, double h, double *move,
+                    double *out, eomgen_rigid *told)
+{
+    const int m = at->m, d = s->d;
+    int count = 0, found = 0, land = 0;
+    across(s->n_v, at->n, at->J, next, at->undisturbed);
+    for (int i = 0; i < s->n_v; i++) { out[i] = 0.0; }
+    for (int c = 0; c < m; c++) {
+        const double gap = -at->records[RECORD_OF*c + 5], removed = -RIGID_REMOVED*gap;
+        const int loaded = at->P[c*d] > 0.0;
+        if (gap < 0.0 && at->rests[c] != BOUNCES && (loaded || h*at->undisturbed[c*d] < removed)) {
+            at->c[count] = removed, at->which[count++] = c;
+        }
+        land = land || (at->rests[c] == LANDS && loaded && gap + 0.5*h*at->undisturbed[c*d] > 0.0);
+    }
+    if (count) { displace(s, held, at, at->which, count, 1.0, move, out, told), found = 1; }
+    if (land) {
+        count = 0;
+        for (int c = 0; c < m; c++) {
+            if (at->rests[c] != BOUNCES && at->P[c*d] > 0.0) {
+                at->c[count] = fmax(0.5*h*at->undisturbed[c*d] - at->records[RECORD_OF*c + 5], 0.0), at->which[count++] = c;
+            }
+        }
+        displace(s, held, at, at->which, count, -1.0, move, out, told), found = 1;
+    }
+    return found;
 }

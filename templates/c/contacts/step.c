@@ -260,7 +260,7 @@ long CHOSEN(rigid_fixed)(const eomgen_rigid *s)
 long CHOSEN(rigid_further)(const eomgen_rigid *s)
 {
     const long m = s->room, n = 3*m;
-    return 2*n*s->n_v + n*n + 6*n + 3*m + n*(n + 8) + 3*m;
+    return 2*n*s->n_v + n*n + 6*n + 3*m + n*(n + 8) + 3*m + m*m;
 }
 
 static void place_meeting(const eomgen_rigid *s, meeting *at)
@@ -271,7 +271,8 @@ static void place_meeting(const eomgen_rigid *s, meeting *at)
     at->J = next, at->X = next + n*s->n_v, at->W = next + 2*n*s->n_v, next += 2*n*s->n_v + n*n;
     for (size_t k = 0; k < sizeof(rows)/sizeof(*rows); k++, next += n) { *rows[k] = next; }
     at->friction = next, at->arrive = next + m, at->back = next + 2*m, at->work = next + 3*m;
-    at->rests = s->numbers + 3*m, at->numbers = s->numbers + 4*m;
+    at->part = at->work + n*(n + 8) + 3*m;
+    at->rests = s->numbers + 3*m, at->numbers = s->numbers + 4*m, at->which = s->numbers + 8*m;
 }
 
 int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
@@ -352,7 +353,7 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
     memcpy(s->next + n_q, part[OF_NEW], (size_t)n*sizeof(double));
     s->m = at.m;
     if (at.m) { keep_impulses(s, &at, keys); }
-    if (at.m && push_out(s, &held, &at, part[OF_NEW], h, part[OF_AWAY], &told)) {
+    if (at.m && push_out(s, &held, &at, part[OF_NEW], h, part[OF_WORK], part[OF_AWAY], &told)) {
         move(s, s->next, 1.0, part[OF_AWAY], s->next);
     }
     if (s->n_c && !failed) {
