@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..limits.constraints import MEASURED
-from ..limits.impacts import HELD, ROUNDED, TOUCHING
+from ..limits.impacts import BEYOND, HELD, ROUNDED, TOUCHING
 from ..numeric import algebra
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
@@ -177,6 +177,25 @@ def strike_run(gaps: Gaps, t: float, x: Array, restitutions: Mapping[str, float]
     module = gaps.module if u is None else gaps.module.bind(None, u)
     own, states = Gaps(module, tuple(restitutions), gaps.forcing), _one_state(module, t, x)
     return _strike_gaps(states, own, own.normals(t, states.x[:, 0]), restitutions, (), rough)
+
+
+def describe_negative_gaps(
+    module: BoundModel, t: float, x: Array, events: Sequence[Mapping[str, Any]], forcing: Forcing
+) -> str:
+    """Says which gaps of a model's events are negative where a run begins, where bodies go on through each other."""
+    values = module.kernels.timed("events", nan=True)(t, x, u=forcing(t, x) if forcing else None)
+    limit = BEYOND * max(1.0, module.layout.length)
+    found = [
+        f"{event['name']} is {value:.6g}"
+        for event, value in zip(events, values.tolist(), strict=True)
+        if event.get("restitution") is not None and value < -limit
+    ]
+    if not found:
+        return ""
+    return (
+        f"the gap of event {', '.join(found)} at the start: an impact comes where it falls to 0 from above, so until "
+        "it has been positive the bodies move through each other; give a start where the gap is open"
+    )
 
 
 def strike_events(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..graph.core import Expr
@@ -11,7 +11,7 @@ from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import DescribedEntry, items
 from .fields import EVENT, OUTPUT
-from .mechanism import Event
+from .mechanism import Clock, Event, Switched
 from .names import nearest
 from .scope import late_names
 from .sympy_face import in_order
@@ -96,6 +96,23 @@ def _times(reader: Reader, path: str, value: Any) -> int:
         return value
     reader.wrong(path, value, "times")
     return 0
+
+
+def check_resets(
+    reader: Reader, events: Sequence[Event], clocks: Sequence[Clock], switched: Sequence[Switched]
+) -> None:
+    """Note new values of states that count samples, and others than 0 and 1 of whether a constraint is closed."""
+    counters = {clock.counter: clock.states for clock in clocks}
+    closed = {switch.state for switch in switched}
+    for event in events:
+        for name, value in event.reset:
+            path = f"events.{event.name}.reset.{name}"
+            if name in counters:
+                remedy = f"reset {', '.join(counters[name])}, or declare them with another period or offset"
+                reader.faults.add(path, f"{name!r} counts samples, and a sample would be missed or come twice", remedy)
+            elif name in closed and value.value not in (0.0, 1.0):
+                remedy = "give 1 to close the constraint, 0 to open it"
+                reader.faults.add(path, f"{name!r} is 1 while the constraint is closed and 0 while it is open", remedy)
 
 
 def instant(reader: Reader, path: str, value: Any) -> Expr:

@@ -17,7 +17,7 @@ from .body_shapes import read_shapes
 from .build_cam_points import declare_contacts
 from .build_elements import build_elements
 from .build_equations import build_equations, check_energies, declare_equations
-from .build_events import build_events
+from .build_events import build_events, check_resets
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
@@ -108,9 +108,9 @@ def build(description: Description) -> Mechanism:
     outputs = read_outputs()
     switched = build_switches(reader, switching, constraints)
     constraints = tuple(c for c in constraints if all(c is not s.constraint for s in switched))
-    events = (
-        *build_events(reader, sections["events"]), *samplings, *events_of_switches(reader, switching, switched)
-    )  # fmt: skip
+    own_events = build_events(reader, sections["events"])
+    check_resets(reader, own_events, clocks, switched)
+    events = (*own_events, *samplings, *events_of_switches(reader, switching, switched))
     inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
     kinds = ("coordinate", "velocity", *(("state",) if declared or held or switching else ()))
     starts = _initial(reader, "initial", values.get("initial", {}), (*kinds, "output"))

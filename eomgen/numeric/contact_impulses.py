@@ -55,6 +55,8 @@ def solve_contacts(problem: ContactProblem, start: Array, tolerance: float, most
         Iterations allowed.
     """
     P = np.array(start)
+    if not problem.c.any():  # nothing moves: no residual is small beside that
+        return ContactImpulses(np.zeros_like(P), 0, 0.0)
     best, least = np.array(P), problem.size(problem.misses(P)[0])
     count = 0
     sweeps = WARM if problem.m >= MANY else 0

@@ -13,7 +13,7 @@ from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from .layout import Layout
-    from .protocols import State
+    from .protocols import State, Timed
 
 
 class Evaluates(Protocol):
@@ -24,6 +24,8 @@ class Evaluates(Protocol):
     layout: Layout
 
     def state(self, name: str, nan: bool = False) -> State: ...
+
+    def timed(self, name: str, nan: bool = False) -> Timed: ...
 
 
 def find_culprit(
@@ -89,4 +91,10 @@ def _not_finite(kernels: Evaluates, t: float, x: Array, p: Array | None, u: Arra
         M = kernels.state("mass_matrix", nan=True)(x[: layout.n_q], t=t, p=p, u=u)
         if not np.isfinite(M).all():
             return "the mass matrix is not (a mass, an inertia or a length outside the domain of its law)"
+    if layout.states and "rhs" in kernels.core.names and x.size == layout.n_x:
+        fine = np.isfinite(kernels.timed("rhs", nan=True)(t, x, p=p, u=u))
+        bad = [name for name, known in zip(layout.x, fine, strict=True) if not known]
+        if bad and {*bad} <= {*layout.states}:
+            many = len(bad) > 1
+            return f"the rate{'s' * many} of {', '.join(bad)} {'are' if many else 'is'} not (outside the law's domain)"
     return ""

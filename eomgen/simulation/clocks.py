@@ -106,6 +106,10 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
     UsageError
         Tells the equation, its error and how much of one is allowed.
     """
+    layout = module.layout
+    for name in module.metadata.get("switched", ()):
+        if (value := x[layout.x.index(f"{name}_closed")]) not in (0.0, 1.0):
+            raise UsageError(f"{name}_closed is 1 while {name} is closed and 0 while it is open, not {value:g}")
     rows: list[tuple[str, str, str]] = module.metadata.get("held_rows", [])
     if (
         not rows
@@ -113,7 +117,6 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
         or "held_errors" not in module.kernels.core.names
     ):
         return
-    layout = module.layout
     found = module.kernels.timed("held_errors")(t, x)
     fast = max(1.0, layout.scales.speed(x[layout.n_q :]))
     for k, (label, state, kind) in enumerate(rows):

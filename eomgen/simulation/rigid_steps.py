@@ -7,12 +7,13 @@ Systems, 2008, section 10.1).  With the position q_m = q + h/2 N v half a step o
     M (v+ - v) + h b(q_m, (v + v+)/2) = J^T P + C^T L,      C(q+) v+ + C_t = 0,      q+ = q_m + h/2 N v+,
 
 with M, J and C of the middle where nothing else is said, and the laws of :mod:`~eomgen.numeric.contact_impulses`
-between impulses P and velocities J v+.  The normal velocity is to be at least -e times the one before where shapes
+between impulses P and velocities J v+. The normal velocity is to be at least -e times the one before where shapes
 touch, and -g/h where they are a gap g apart and come to rest on each other (D. E. Stewart, J. C. Trinkle, An implicit
 time-stepping scheme for rigid body dynamics with inelastic collisions and Coulomb friction, Int. J. Numer. Methods Eng.
-39 (1996), 2673-2691).  Where shapes land, which is an impact without rebound, it is 0 at once, so that friction acts on
-all of the impact, and the rest of their gap is closed in the positions.  What is left of penetrations and of open loops is removed from the positions alone (V. Acary,
-Projected event-capturing time-stepping schemes, Comput. Methods Appl. Mech. Eng. 256 (2013), 224-250).
+39 (1996), 2673-2691). Where shapes land, which is an impact without rebound, it is 0 at once, so that friction acts on
+all of the impact, and the rest of their gap is closed in the positions. What is left of penetrations and of open loops
+is removed from the positions alone (V. Acary, Projected event-capturing time-stepping schemes, Comput. Methods Appl.
+Mech. Eng. 256 (2013), 224-250).
 
 Constraints hold for the velocities at the end of a step and push in the middle, as in SHAKE and its form by velocities
 (J. P. Ryckaert, G. Ciccotti, H. J. C. Berendsen, J. Comput. Phys. 23 (1977), 327-341; H. C. Andersen, J. Comput. Phys.
@@ -27,7 +28,6 @@ are longer is done in two.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,20 +45,17 @@ from ..limits.rigid_contacts import (
     UNSOLVED,
     YIELDING,
 )
-from ..numeric import algebra
 from ..numeric.contact_impulses import ContactImpulses, solve_contacts
 from ..numeric.contact_problem import ContactProblem
 from ..numeric.scales import Array
 from ..runtime.late import eager
 from .rigid_in_c import DONE, TOO_LONG, rigid_stepper
+from .rigid_meeting import HeldInertia, Meeting, Spot
 from .rigid_rows import RigidContacts, RigidRows
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.signals import Forcing
-
-
-Spot = tuple[int, int, int]  #: two shapes, and the number of the place where they touch
 
 
 class RigidSteps:
@@ -166,12 +163,12 @@ class RigidSteps:
             return None
         if self._begins and self._passes(t, self.move(q, -0.5 * h * v), v, u, 0.5 * h):
             return None  # shapes that touch at the start and approach: later steps end with velocities that part them
-        held = _Held(self.module, middle, q_m, u)
+        held = HeldInertia(self.module, middle, q_m, u)
         bias = self.bias(middle, x, u=u)
         held.turn_round(v)
         free = held.free(v - h * (held.inverse @ bias))
         rows = self._near(self.contacts.rows(middle, q_m, u), v, free, h)
-        meeting = _Meeting(held, rows, v, self._last) if rows.gaps.size else None
+        meeting = Meeting(held, rows, v, self._last) if rows.gaps.size else None
         x[n_q:] = 0.5 * (v + free)
         # forces that do not change with velocities need one solution, which then is the one that counts
         rough = 1.0 if np.array_equal(self.bias(middle, x, u=u), bias) else ROUGH
@@ -199,7 +196,7 @@ class RigidSteps:
         pushed[:, : P.shape[1]] = P
         self.acting.append(np.concatenate([rows.pairs, rows.places, pushed], axis=1))
         if rows.gaps.size:
-            away = self._out(held, rows, P, new, h)
+            away = self._out(held, rows, P, new, h, self.tolerance * h * meeting.scale if meeting else 0.0)
             position = self.move(position, away) if away.any() else position
         if held.rows is not None:
             position, new = self._closed(held, t + h, position, new)
@@ -209,7 +206,7 @@ class RigidSteps:
     def _at_end(self, t: float, q: Array, v: Array) -> Any:
         return self.forcing(t, np.concatenate([q, v])) if self.forcing else None
 
-    def _bears(self, meeting: _Meeting | None, excess: Array, last: bool) -> bool:
+    def _bears(self, meeting: Meeting | None, excess: Array, last: bool) -> bool:
         """Whether contacts do not feel that velocities are projected by so much; if not in the last round, a miss."""
         felt = 0.0 if meeting is None else float(np.abs(meeting.rows.jacobian @ excess).max())
         if meeting is None or felt <= self.tolerance * meeting.scale:
@@ -218,7 +215,7 @@ class RigidSteps:
             self._misses, self.residual = True, max(self.residual, felt)
         return last
 
-    def _closed(self, held: _Held, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+    def _closed(self, held: HeldInertia, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Position and velocities on the constraints at t to rounding, by Newton steps along those of the middle."""
         u = self._at_end(t, q, v)
         before = np.inf
@@ -245,7 +242,7 @@ class RigidSteps:
         fastest = max(float(np.abs(rows.jacobian @ velocity).max()) for velocity in (v, free))
         return rows.chosen(np.flatnonzero(rows.gaps <= 2.0 * h * fastest))
 
-    def _contact(self, meeting: _Meeting | None, free: Array, h: float, rough: float) -> tuple[Array, Array]:
+    def _contact(self, meeting: Meeting | None, free: Array, h: float, rough: float) -> tuple[Array, Array]:
         """Velocities after the impulses of contacts, and these (m, d), to so many times the tolerance."""
         if meeting is None:
             return free, np.zeros((0, 2))
@@ -289,17 +286,18 @@ class RigidSteps:
         self._misses = self._misses or not found.residual <= rough * self.tolerance * scale
         self.iterations, self.most = max(self.iterations, found.iterations), max(self.most, len(found.impulses))
 
-    def _out(self, held: _Held, rows: RigidRows, P: Array, new: Array, h: float) -> Array:
+    def _out(self, held: HeldInertia, rows: RigidRows, P: Array, new: Array, h: float, least: float) -> Array:
         """A displacement (n_v,) that removes a part of the penetration of contacts that last, with load or without.
 
-        Where shapes land, the rest of their gaps is closed too, and what is pressed together stays so.
+        The ``least`` is what velocities within their tolerance make in one step.  Where shapes land, the rest of their
+        gaps is closed too, and what is pressed together stays so.
         """
         d = len(rows.jacobian) // len(rows.gaps)
         normal = rows.jacobian[::d]
         rate, loaded = normal @ new, P[:, 0] > 0.0
         removed, left = -REMOVED * rows.gaps, np.maximum(rows.gaps + 0.5 * h * rate, 0.0)
         out = np.zeros(len(new))
-        lasts = (rows.gaps < 0.0) & self._rests & (loaded | (h * rate < removed))
+        lasts = (rows.gaps < -least) & self._rests & (loaded | (h * rate < removed))
         if lasts.any():
             out += self._displaced(held, normal[lasts], removed[lasts])
         pressed = self._rests & loaded
@@ -307,7 +305,7 @@ class RigidSteps:
             out -= self._displaced(held, normal[pressed], left[pressed])
         return out
 
-    def _displaced(self, held: _Held, J: Array, wanted: Array) -> Array:
+    def _displaced(self, held: HeldInertia, J: Array, wanted: Array) -> Array:
         """A displacement (n_v,) by pushes along normals J (m, n_v) of at least as much as wanted (m,) along each."""
         spread = held.inverse @ J.T
         W = J @ spread
@@ -317,92 +315,3 @@ class RigidSteps:
         found = self._impulses(W, -wanted[:, None], nothing, nothing[:, None], allowed)
         self._misses = self._misses or not found.residual <= allowed
         return np.asarray(spread @ found.impulses.ravel())
-
-
-def _numbered(pairs: Sequence[Sequence[int]]) -> list[Spot]:
-    """Pairs of shapes, those that touch at several places numbered."""
-    found: list[Spot] = []
-    seen: dict[tuple[int, int], int] = {}
-    for a, b in pairs:
-        place = seen.get((a, b), 0)
-        seen[a, b] = place + 1
-        found.append((a, b, place))
-    return found
-
-
-class _Meeting:
-    """The contacts of one position, which the two rounds of a step share.
-
-    Attributes
-    ----------
-    before, start : (m, d) array
-        Velocities before the impulses, and a guess of these: those of the same pairs of shapes in the last step.
-    spread : (n_v, m d) array
-        Velocities by impulses.
-    compliance : (m d, m d) array
-        Velocities of contacts by impulses.
-    scale : float
-        (m/s) What the tolerance of their impulses is relative to.
-    """
-
-    def __init__(self, held: _Held, rows: RigidRows, v: Array, last: dict[Spot, Array]) -> None:
-        m = len(rows.gaps)
-        d = len(rows.jacobian) // m
-        self.rows, self.scale = rows, 0.0
-        self.before = (rows.jacobian @ v).reshape(m, d)
-        self.spread = held.inverse @ rows.jacobian.T
-        self.compliance = rows.jacobian @ self.spread
-        self.keys = _numbered(rows.pairs.tolist())
-        none = np.zeros(d)
-        self.start = np.array([last.get(key, none)[:d] for key in self.keys])
-
-
-class _Held:
-    """The inertia and the constraints at one position.
-
-    ``inverse`` is the matrix A with which velocities change by A f under impulses f, constraints held.
-    """
-
-    def __init__(self, module: BoundModel, t: float, q: Array, u: Any) -> None:
-        kernels = module.kernels
-        self.module = module
-        M = kernels.mass_matrix(q, u=u, t=t)
-        self.rows: Array | None = None
-        if not module.layout.n_c:
-            self.inverse = algebra.inv(M)
-            return
-        C = kernels.constraint_jacobian(q, u=u, t=t)
-        x = np.concatenate([q, np.zeros(module.layout.n_v)])
-        self.drift = kernels.velocity_constraints(x, u=u, t=t)
-        weight = np.trace(M) / max(float((C * C).sum()), np.finfo(float).tiny)
-        whole = algebra.inv(M + weight * (C.T @ C))  # regular where M is singular but constraints hold the rest
-        spread = whole @ C.T
-        self.back = spread @ algebra.pinv(C @ spread)
-        self.rows = C
-        self.inverse = whole - self.back @ spread.T
-        self.inverse = 0.5 * (self.inverse + self.inverse.T)
-
-    def turn_round(self, v: Array) -> None:
-        """Aim at velocities v+ with which the constraints hold for the mean of v and v+."""
-        if self.rows is not None:
-            self.wanted = -2.0 * self.drift - self.rows @ v
-
-    def aim(self, excess: Array) -> None:
-        """Aim at velocities smaller by an excess."""
-        if self.rows is not None:
-            self.wanted = self.wanted - self.rows @ excess
-
-    def free(self, v: Array) -> Array:
-        """Velocities as aimed at, from what forces alone would make of them."""
-        return v if self.rows is None else v - self.back @ (self.rows @ v - self.wanted)
-
-    def excess(self, q: Array, v: Array, t: float, u: Any) -> Array:
-        """What velocities v (n_v,) at a position have too much for the constraints there, in the metric of here."""
-        return np.asarray(self.back @ self.module.kernels.velocity_constraints(np.concatenate([q, v]), u=u, t=t))
-
-    def closing(self, q: Array, t: float, u: Any) -> Array:
-        """A displacement (n_v,) that closes the loops: a Newton step."""
-        if self.rows is None or not self.module.layout.n_h:
-            return np.zeros(self.inverse.shape[0])
-        found = self.module.kernels.constraints(q, u=u, t=t)
-        return np.asarray(-self.back[:, : len(found)] @ found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf
@@ -19,7 +20,7 @@ from ..runtime.room import read_flag, require_room, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run, watch_run
 from .compiled import can_run, integrate_compiled
-from .events import UNWATCHED, Events, warn_of_unknown
+from .events import UNWATCHED, WAIT, Events, calls_within, is_told_by_the_caller, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .passed_limits import warn_of_limits
 from .recording import record
@@ -212,6 +213,12 @@ def simulate(
         forcing.require_finite()
         bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
     run = Run(bound, forcing)
+    if any(event.action == WAIT for event in watched.model):
+        from ..analysis.impact import describe_negative_gaps
+
+        words = describe_negative_gaps(bound, start, x0, watched.declared, forcing)
+        if words and not is_told_by_the_caller():
+            warnings.warn(words, stacklevel=calls_within() + 1)
     if "contact_shapes" in bound.metadata:
         from .meetings import begin
 

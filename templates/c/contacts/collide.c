@@ -122,7 +122,7 @@ static int push_out(const eomgen_rigid *s, const inertia *held, meeting *at, con
     for (int c = 0; c < m; c++) {
         const double gap = -at->records[RECORD_OF*c + 5], removed = -RIGID_REMOVED*gap;
         const int loaded = at->P[c*d] > 0.0;
-        if (gap < 0.0 && at->rests[c] != BOUNCES && (loaded || h*at->undisturbed[c*d] < removed)) {
+        if (gap < -s->tolerance*h*at->scale && at->rests[c] != BOUNCES && (loaded || h*at->undisturbed[c*d] < removed)) {
             at->c[count] = removed, at->which[count++] = c;
         }
         land = land || (at->rests[c] == LANDS && loaded && gap + 0.5*h*at->undisturbed[c*d] > 0.0);

@@ -71,5 +71,12 @@ void CHOSEN(solve_contacts)(int m, int d, const double *W, const double *c, cons
         s.normal[i] = W[i*d*(n + 1)] > 0.0 ? W[i*d*(n + 1)] : 1.0;
         s.across[i] = across > 0.0 ? across : 1.0;
     }
+    double fastest = 0.0;
+    for (int i = 0; i < n; i++) { fastest = fmax(fastest, fabs(c[i])); }
+    if (fastest == 0.0) { /* nothing moves: no residual is small beside that */
+        memset(P, 0, (size_t)n*sizeof(double));
+        *count = 0, *residual = 0.0;
+        return;
+    }
     *count = iterate(&s, P, tolerance, most, residual);
 }

@@ -1,0 +1,187 @@
+"""Events that give new values while constraints are closed: as if these held always; contradictions are refused.
+
+The judges are the same models with the constraint for good, and closed forms of plastic impacts.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen.errors import ModelError, SimulationError, UsageError
+
+TARGETS = ("numpy", "cython")
+
+
+def sliders(reset: dict[str, Any], for_good: bool, masses: tuple[float, float] = (1.0, 3.0), ratio: float = 1.0) -> Any:
+    """Two sliders with s = ratio * r, which an event kicks at 0.5 s."""
+    m = eg.Model("sliders", gravity=(0, 0, 0))
+    a, b = (m.body(name, mass=mass) for name, mass in zip("ab", masses, strict=True))
+    m.prismatic("A", m.ground, a, axis="x", coordinate="s")
+    m.prismatic("B", m.ground, b, axis="x", coordinate="r")
+    m.coupling("c", {"s": 1, "r": -ratio}, **({} if for_good else {"opens": "100 - t"}))
+    m.event("kick", "t - 0.5", direction=1, reset=reset)
+    return m
+
+
+def arm(for_good: bool, kick: dict[str, Any]) -> eg.Model:
+    """A body in the plane whose pin sits on a slide that is closed for a time, or for good."""
+    m = eg.Model("arm", gravity=(0, -9.81, 0))
+    body = m.body("body", mass=2.0, inertia={"zz": 0.3}, com=(0.4, 0, 0))
+    m.planar("P", m.ground, body)
+    own = {} if for_good else {"opens": "100 - t"}
+    m.coupling("rail", equation="y(body.pin) - 0.5*x(body.pin)", **own)
+    body.marker("pin", at=(-0.2, 0.1, 0))
+    m.event("kick", "t - 0.3", direction=1, reset=kick)
+    m.initial(P_x=0.2, P_y=-0.1 + 0.5 * 0.0, P_3=0.0)
+    return m
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("masses", [(1.0, 1.0), (1.0, 3.0)])
+@pytest.mark.parametrize("ratio", [1.0, -2.5])
+def test_new_velocities_are_brought_onto_a_closed_constraint_as_onto_one_for_good(
+    target: str, masses: tuple[float, float], ratio: float
+) -> None:
+    reset = {"s_dot": "2 + s"}
+    mine, judge = (sliders(reset, g, masses, ratio).compile(target=target).simulate(1.0) for g in (False, True))
+    assert mine.x[:4, -1] == pytest.approx(judge.x[:, -1], abs=1e-9)
+    assert mine["s_dot"][-1] == pytest.approx(2.0 * ratio**2 / (1.0 + ratio**2), abs=1e-9)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "Radau", "RK4", "LSODA"])
+def test_every_integrator_does_so(method: str) -> None:
+    more = {"step": 1e-2} if method == "RK4" else {}
+    run = sliders({"s_dot": 2}, False).compile().simulate(1.0, method=method, **more)
+    assert run.x[:4, -1] == pytest.approx([0.5, 0.5, 1.0, 1.0], abs=1e-6)
+
+
+def test_many_runs_and_their_slopes_do_so() -> None:
+    m = sliders({"s_dot": "k"}, False)
+    m.parameter("k", 2.0)
+    module = m.compile()
+    ends = module.simulate_many(1.0, parameters={"k": [1.0, 2.0, 4.0]}).x
+    assert ends[:4] == pytest.approx(np.outer([0.25, 0.25, 0.5, 0.5], [1.0, 2.0, 4.0]), abs=1e-9)
+    slopes = module.sensitivities(["k"], 1.0).dx[:4, 0, -1]
+    assert slopes == pytest.approx([0.25, 0.25, 0.5, 0.5], abs=1e-6)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("kick", [{"P_3_dot": 4}, {"P_x_dot": 1, "P_y_dot": -1}, {"P_y_dot": "-P_y_dot"}])
+def test_a_slide_of_a_body_in_the_plane(target: str, kick: dict[str, Any]) -> None:
+    module, judge = arm(False, kick).compile(target=target), arm(True, kick).compile(target=target)
+    x = judge.x0(P_3_dot=0.7)
+    start = dict(zip(judge.x_names, x.tolist(), strict=True))
+    after = [one.simulate(0.3000001, start, rtol=1e-11, atol=1e-13).x[3:6, -1] for one in (module, judge)]
+    assert after[0] == pytest.approx(after[1], abs=2e-6)
+    assert np.abs(after[0] - module.simulate(0.29, start).x[3:6, -1]).max() > 0.1  # the kick is felt
+
+
+def test_other_values_are_not_touched() -> None:
+    """A reset of what no closed constraint speaks of stays as it is written, errors that die away too."""
+    m = eg.Model("free", gravity=(0, 0, 0))
+    for name in "abc":
+        m.prismatic(name.upper(), m.ground, m.body(name, mass=1.0), axis="x", coordinate=name + "_s")
+    m.coupling("pair", {"a_s": 1, "b_s": -1}, closes="0.2 - t")
+    m.event("kick", "t - 0.5", direction=1, reset={"c_s": 7, "c_s_dot": -1})
+    run = m.compile(target="numpy").simulate(1.0, {"a_s_dot": 1.0})  # closes 0.2 m apart
+    assert run["c_s"][-1] == pytest.approx(6.5, abs=1e-9)
+    assert run["a_s_dot"][-1] + run["b_s_dot"][-1] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_lock_keeps_its_coordinate_where_a_reset_puts_it() -> None:
+    m = eg.Model("locked", gravity=(0, -9.81, 0))
+    body = m.body("body", mass=1.0, inertia={"zz": 0.1}, com=(0.5, 0, 0))
+    m.revolute("A", m.ground, body, axis="z", coordinate="theta")
+    m.lock("brake", "A", opens="100 - t")
+    m.event("kick", "t - 0.5", direction=1, reset={"theta": 1, "theta_dot": 3})
+    run = m.compile(target="numpy").simulate(2.0)
+    assert run["theta"][-1] == pytest.approx(1.0, abs=1e-12)
+    assert run["theta_dot"][-1] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_positions_that_a_closed_equation_does_not_have_are_refused(target: str) -> None:
+    """Those onto which the mechanism would be moved are not told from those that the user wants."""
+    with pytest.raises(SimulationError, match=r"resets at t = 0\.5.*contradict what is closed \(c\)"):
+        sliders({"s": 0.3}, False).compile(target=target).simulate(1.0)
+    run = sliders({"s": 0.3, "r": 0.3, "s_dot": 1}, False).compile(target=target).simulate(1.0)
+    assert run.x[:4, -1] == pytest.approx([0.55, 0.55, 0.5, 0.5], abs=1e-9)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_velocities_obey_loops_and_what_is_closed(target: str) -> None:
+    """A slider-crank whose block drags another by a clutch: as if the clutch were there for good."""
+
+    def make(for_good: bool) -> eg.Model:
+        m = eg.Model("dragged", gravity=(0, -9.81, 0))
+        crank = m.body("crank", mass=1.0, inertia={"zz": 0.01}, com=(0.1, 0, 0))
+        rod = m.body("rod", mass=1.0, inertia={"zz": 0.02}, com=(0.25, 0, 0))
+        block, other = m.body("block", mass=1.0), m.body("other", mass=2.0)
+        m.revolute("A", m.ground, crank, axis="z", coordinate="theta")
+        m.revolute("B", crank.at(0.2, 0, 0), rod, axis="z", coordinate="phi")
+        m.prismatic("C", m.ground, block, axis="x", coordinate="s")
+        m.revolute("D", rod.at(0.5, 0, 0), block, axis="z", coordinate="psi")
+        m.prismatic("E", m.ground, other, axis="x", coordinate="r")
+        m.coupling("clutch", equation="vx(block) - r_dot", **({} if for_good else {"opens": "100 - t"}))
+        m.event("kick", "t - 0.2", direction=1, reset={"theta_dot": "theta_dot + 3"})
+        m.guess(phi=-0.2, s=0.65)
+        m.initial(theta=0.4, theta_dot=1.0)
+        return m
+
+    mine, judge = make(False).compile(target=target), make(True).compile(target=target)
+    x = judge.x0()
+    start = dict(zip(judge.x_names, x.tolist(), strict=True))
+    found = [one.simulate(0.4, start, rtol=1e-10, atol=1e-12) for one in (mine, judge)]
+    assert found[0].x[: len(x), -1] == pytest.approx(found[1].x[:, -1], abs=1e-6)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("against", ["driver", "coupling", "closed"])
+def test_a_constraint_that_closes_against_another_is_refused(target: str, against: str) -> None:
+    m = eg.Model("against", gravity=(0, 0, 0))
+    for name in "ab":
+        m.prismatic(name.upper(), m.ground, m.body(name, mass=1.0), axis="x", coordinate=name + "_s")
+    if against == "driver":
+        m.driver("d", "a_s", "t")
+    else:
+        m.coupling("d", equation="a_s_dot - 1", **({"closes": "0.2 - t"} if against == "closed" else {}))
+    m.lock("brake", "A", closes="0.5 - t")
+    module = m.compile(target=target)
+    with pytest.raises(SimulationError, match=r"t = 0\.5.*contradict what is closed \(.*brake\) or holds always"):
+        module.simulate(1.0)
+    assert module.simulate(0.4)["a_s_dot"][-1] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_one_that_demands_the_same_closes() -> None:
+    m = eg.Model("same", gravity=(0, 0, 0))
+    for name, mass in (("a", 1.0), ("b", 2.0)):
+        m.prismatic(name.upper(), m.ground, m.body(name, mass=mass), axis="x", coordinate=name + "_s")
+    m.coupling("first", equation="a_s_dot - b_s_dot", closes="0.2 - t")
+    m.coupling("again", equation="2*b_s_dot - 2*a_s_dot", closes="0.5 - t")
+    run = m.compile(target="numpy").simulate(1.0, {"a_s_dot": 3.0})
+    assert run.x[2:4, -1] == pytest.approx([1.0, 1.0], abs=1e-9)
+
+
+def test_states_of_constraints_are_0_or_1() -> None:
+    m = eg.Model("half", gravity=(0, 0, 0))
+    m.prismatic("A", m.ground, m.body("a", mass=1.0), axis="x", coordinate="s")
+    m.lock("brake", "A", opens="0.2 - t")
+    with pytest.raises(UsageError, match="brake_closed is 1 while brake is closed and 0 while it is open, not 0.5"):
+        m.compile(target="numpy").simulate(0.1, {"brake_closed": 0.5})
+    m.event("kick", "t - 0.1", reset={"brake_closed": 0.5})
+    with pytest.raises(ModelError, match=r"events.kick.reset.brake_closed.*give 1 to close the constraint, 0 to open"):
+        m.compile(target="numpy")
+
+
+def test_a_counter_of_samples_is_not_reset() -> None:
+    m = eg.Model("sampled", gravity=(0, 0, 0))
+    m.prismatic("A", m.ground, m.body("a", mass=1.0), axis="x", coordinate="s")
+    m.sampled("k", "s", period=0.1)
+    counter = m.compile(target="numpy").x_names[-1]
+    m.event("kick", "t - 0.35", reset={counter: 10})
+    with pytest.raises(ModelError, match=rf"events.kick.reset.{counter}.*counts samples"):
+        m.compile(target="numpy")
