@@ -10,10 +10,10 @@ with M, J and C of the middle where nothing else is said, and the laws of :mod:`
 between impulses P and velocities J v+. The normal velocity is to be at least -e times the one before where shapes
 touch, and -g/h where they are a gap g apart and come to rest on each other (D. E. Stewart, J. C. Trinkle, An implicit
 time-stepping scheme for rigid body dynamics with inelastic collisions and Coulomb friction, Int. J. Numer. Methods Eng.
-39 (1996), 2673-2691). Where shapes land, which is an impact without rebound, it is 0 at once, so that friction acts on
-all of the impact, and the rest of their gap is closed in the positions. What is left of penetrations and of open loops
-is removed from the positions alone (V. Acary, Projected event-capturing time-stepping schemes, Comput. Methods Appl.
-Mech. Eng. 256 (2013), 224-250).
+39 (1996), 2673-2691). Where shapes land, an impact without rebound, the middle of the step is the time when they meet,
+so that all of the impact is in one step, and friction with it. What is left of penetrations and of open loops is
+removed from the positions alone (V. Acary, Projected event-capturing time-stepping schemes, Comput. Methods Appl. Mech.
+Eng. 256 (2013), 224-250).
 
 Constraints hold for the velocities at the end of a step and push in the middle, as in SHAKE and its form by velocities
 (J. P. Ryckaert, G. Ciccotti, H. J. C. Berendsen, J. Comput. Phys. 23 (1977), 327-341; H. C. Andersen, J. Comput. Phys.
@@ -31,6 +31,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import SimulationError
 from ..limits.rigid_contacts import (
@@ -38,6 +39,8 @@ from ..limits.rigid_contacts import (
     GENTLER,
     GROWN,
     HALVINGS,
+    LANDED,
+    LANDINGS,
     REMOVED,
     RESTING,
     ROUGH,
@@ -154,20 +157,25 @@ class RigidSteps:
 
     def _in_python(self, t: float, q: Array, v: Array, h: float) -> tuple[Array, Array] | None:
         """The same here, which says what is wrong where compiled code fails."""
-        middle, n_q = t + 0.5 * h, len(q)
+        first, n_q = 0.5 * h, len(q)
         self._misses = False
-        q_m = self.move(q, 0.5 * h * v)
-        x = np.concatenate([q_m, v])
-        u = self.forcing(middle, x) if self.forcing else None
-        if self._passes(t, q, v, u, 0.5 * h):
-            return None
-        if self._begins and self._passes(t, self.move(q, -0.5 * h * v), v, u, 0.5 * h):
-            return None  # shapes that touch at the start and approach: later steps end with velocities that part them
-        held = HeldInertia(self.module, middle, q_m, u)
-        bias = self.bias(middle, x, u=u)
-        held.turn_round(v)
-        free = held.free(v - h * (held.inverse @ bias))
-        rows = self._near(self.contacts.rows(middle, q_m, u), v, free, h)
+        for k in range(LANDINGS + 1):  # where shapes land, again with the middle at that time
+            middle, q_m = t + first, self.move(q, first * v)
+            x = np.concatenate([q_m, v])
+            u = self.forcing(middle, x) if self.forcing else None
+            if not k and self._passes(t, q, v, u, 0.5 * h):
+                return None
+            if not k and self._begins and self._passes(t, self.move(q, -0.5 * h * v), v, u, 0.5 * h):
+                return None  # touching and approaching: later steps end with velocities that part shapes
+            held = HeldInertia(self.module, middle, q_m, u)
+            bias = self.bias(middle, x, u=u)
+            held.turn_round(v if not k else None)
+            free = held.free(v - h * (held.inverse @ bias))
+            rows = self._near(self.contacts.rows(middle, q_m, u), v, free, h)
+            later = _until_landing(rows, v, free, h, self.tolerance) if k < LANDINGS else 0.0
+            if not later:
+                break
+            first += later
         meeting = Meeting(held, rows, v, self._last) if rows.gaps.size else None
         x[n_q:] = 0.5 * (v + free)
         # forces that do not change with velocities need one solution, which then is the one that counts
@@ -180,7 +188,7 @@ class RigidSteps:
             again = self.bias(middle, x, u=u)
             settled = k > 0 or (rough == 1.0 and np.array_equal(again, bias))
             if held.rows is not None:
-                position = self.move(q_m, 0.5 * h * new)
+                position = self.move(q_m, (h - first) * new + (first - 0.5 * h) * (free - v))
                 position = self.move(position, held.closing(position, t + h, self._at_end(t + h, position, new)))
                 excess = held.excess(position, new, t + h, self._at_end(t + h, position, new))
                 settled = self._bears(meeting, excess, last=k == ROUNDS - 1) and settled
@@ -189,9 +197,9 @@ class RigidSteps:
                 break
             bias = again
             free = held.free(v - h * (held.inverse @ bias))
-        if self._passes(middle, q_m, new, u, 0.5 * h):
+        if self._passes(middle, q_m, new, u, h - first):
             return None
-        position = self.move(q_m, 0.5 * h * new)
+        position = self.move(q_m, (h - first) * new + (first - 0.5 * h) * (free - v))
         pushed = np.zeros((len(P), 3))
         pushed[:, : P.shape[1]] = P
         self.acting.append(np.concatenate([rows.pairs, rows.places, pushed], axis=1))
@@ -248,12 +256,12 @@ class RigidSteps:
             return free, np.zeros((0, 2))
         rows, before, W = meeting.rows, meeting.before, meeting.compliance
         undisturbed = (rows.jacobian @ free).reshape(before.shape)
-        fast = before[:, 0] < -RESTING * np.abs(undisturbed[:, 0] - before[:, 0])
-        strikes = fast & (rows.gaps + h * undisturbed[:, 0] < 0.0)
-        bounces = strikes & (rows.restitution > 0.0)
-        self._rests, self._lands = ~bounces, strikes & ~bounces
-        arrive = np.where((rows.gaps > 0.0) & ~self._lands, -rows.gaps / h, 0.0)
+        hits = _strikes(before[:, 0], undisturbed[:, 0], rows.gaps, h)
+        bounces = hits & (rows.restitution > 0.0)
+        lands = hits & ~bounces & (rows.gaps <= -LANDED * h * before[:, 0])
+        arrive = np.where((rows.gaps > 0.0) & ~lands, -rows.gaps / h, 0.0)
         back = np.where(bounces, -rows.restitution * before[:, 0] - arrive, 0.0)
+        self._rests = ~bounces
         scale = meeting.scale = max(float(np.abs(before).max()), float(np.abs(undisturbed).max()))
         for k in range(GENTLER + 1):
             part = 0.0 if k == GENTLER else 0.5**k
@@ -289,24 +297,15 @@ class RigidSteps:
     def _out(self, held: HeldInertia, rows: RigidRows, P: Array, new: Array, h: float, least: float) -> Array:
         """A displacement (n_v,) that removes a part of the penetration of contacts that last, with load or without.
 
-        The ``least`` is what velocities within their tolerance make in one step.  Where shapes land, the rest of their
-        gaps is closed too, and what is pressed together stays so.
+        The ``least`` is what velocities within their tolerance make in one step.
         """
         d = len(rows.jacobian) // len(rows.gaps)
         normal = rows.jacobian[::d]
-        rate, loaded = normal @ new, P[:, 0] > 0.0
-        removed, left = -REMOVED * rows.gaps, np.maximum(rows.gaps + 0.5 * h * rate, 0.0)
-        out = np.zeros(len(new))
-        lasts = (rows.gaps < -least) & self._rests & (loaded | (h * rate < removed))
-        if lasts.any():
-            out += self._displaced(held, normal[lasts], removed[lasts])
-        pressed = self._rests & loaded
-        if (self._lands & pressed & (left > 0.0)).any():
-            out -= self._displaced(held, normal[pressed], left[pressed])
-        return out
-
-    def _displaced(self, held: HeldInertia, J: Array, wanted: Array) -> Array:
-        """A displacement (n_v,) by pushes along normals J (m, n_v) of at least as much as wanted (m,) along each."""
+        removed = -REMOVED * rows.gaps
+        lasts = (rows.gaps < -least) & self._rests & ((P[:, 0] > 0.0) | (h * (normal @ new) < removed))
+        if not lasts.any():
+            return np.zeros(len(new))
+        J, wanted = normal[lasts], removed[lasts]
         spread = held.inverse @ J.T
         W = J @ spread
         W += YIELDING * np.diag(np.diag(W))
@@ -315,3 +314,23 @@ class RigidSteps:
         found = self._impulses(W, -wanted[:, None], nothing, nothing[:, None], allowed)
         self._misses = self._misses or not found.residual <= allowed
         return np.asarray(spread @ found.impulses.ravel())
+
+
+def _strikes(before: Array, undisturbed: Array, gaps: Array, h: float) -> NDArray[np.bool_]:
+    """Which shapes approach faster than forces make them within a step, and would meet (m,)."""
+    found: NDArray[np.bool_] = (before < -RESTING * np.abs(undisturbed - before)) & (gaps + h * undisturbed < 0.0)
+    return found
+
+
+def _until_landing(rows: RigidRows, v: Array, free: Array, h: float, tolerance: float) -> float:
+    """The time from the middle of a step to the first landing without rebound; 0 if none is to come or one is now."""
+    if not rows.gaps.size:
+        return 0.0
+    d = len(rows.jacobian) // len(rows.gaps)
+    before, undisturbed = rows.jacobian @ v, rows.jacobian @ free
+    least = tolerance * max(float(np.abs(before).max()), float(np.abs(undisturbed).max()))
+    before, undisturbed = before[::d], undisturbed[::d]
+    lands = _strikes(before, undisturbed, rows.gaps, h) & (rows.restitution == 0.0) & (before < -least)
+    if not lands.any() or (rows.gaps[lands] <= -LANDED * h * before[lands]).any():
+        return 0.0
+    return float(np.min(-rows.gaps[lands] / before[lands]))

@@ -180,7 +180,7 @@ cdef class RigidStepper:
     cdef int make_room(self, int room) except -1:
         """Memory for more contacts; what is known of the last ones stays."""
         cdef eomgen_rigid *s = &self.s
-        cdef cnp.npy_intp numbers = 12 * room, acting = (ACTING + 3) * room, many
+        cdef cnp.npy_intp numbers = 11 * room, acting = (ACTING + 3) * room, many
         cdef cnp.ndarray keys = np.zeros(numbers, np.intc), found = cnp.PyArray_ZEROS(1, &acting, cnp.NPY_DOUBLE, 0)
         s.room = room
         many = eomgen_rigid_further(s)

@@ -1,7 +1,5 @@
 /* Impulses of the contacts that act in one step. */
 
-enum { BOUNCES, RESTS, LANDS }; /* lands: an impact without rebound */
-
 typedef struct {
     int m, n; /* contacts, their rows */
     double *records;                              /* in the order of the contacts */
@@ -9,8 +7,7 @@ typedef struct {
     double *before, *undisturbed, *after, *c, *P; /* velocities, what the laws start from, impulses */
     double *friction, *arrive, *back, *out;
     double *work, scale;                          /* scale: what the tolerance of impulses is relative to */
-    double *part;                                 /* of W */
-    int *rests, *numbers, *which;                 /* whether they bounce, rest or land */
+    int *rests, *numbers;
 } meeting;
 
 /* Impulses of the same pairs in the last step, places of one pair numbered. */
@@ -38,6 +35,31 @@ static void recall(const eomgen_rigid *s, meeting *at, int *keys)
     }
 }
 
+/* Whether shapes approach faster than forces make them within a step, and would meet. */
+static int strikes(double before, double undisturbed, double gap, double h)
+{
+    return before < -RIGID_RESTING*fabs(undisturbed - before) && gap + h*undisturbed < 0.0;
+}
+
+/* The time from the middle of the step to the first landing, an impact without rebound; 0 where none is to come, or one is now. */
+static double until_landing(const eomgen_rigid *s, meeting *at, const double *free, double h)
+{
+    double first = 0.0, least;
+    across(s->n_v, at->n, at->J, free, at->undisturbed);
+    least = s->tolerance*fmax(largest_of(at->n, at->before, 1), largest_of(at->n, at->undisturbed, 1));
+    for (int c = 0; c < at->m; c++) {
+        const double gap = -at->records[RECORD_OF*c + 5], before = at->before[c*s->d];
+        if (at->records[RECORD_OF*c + 13] != 0.0 || before >= -least || !strikes(before, at->undisturbed[c*s->d], gap, h)) {
+            continue;
+        }
+        if (gap <= -RIGID_LANDED*h*before) {
+            return 0.0;
+        }
+        first = first > 0.0 ? fmin(first, -gap/before) : -gap/before;
+    }
+    return first;
+}
+
 /* Impulses and velocities `out` after them for velocities `free` without, to a tolerance so many times as large; what was reached. */
 static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, const double *free, double h, double rough, double *out,
                     eomgen_rigid *told)
@@ -50,10 +72,10 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
     for (int c = 0; c < m; c++) {
         const double gap = -at->records[RECORD_OF*c + 5], e = at->records[RECORD_OF*c + 13];
         const double before = at->before[c*d], undisturbed = at->undisturbed[c*d];
-        const int strikes = before < -RIGID_RESTING*fabs(undisturbed - before) && gap + h*undisturbed < 0.0;
-        at->rests[c] = !strikes ? RESTS : e > 0.0 ? BOUNCES : LANDS;
-        at->arrive[c] = gap > 0.0 && at->rests[c] != LANDS ? -gap/h : 0.0;
-        at->back[c] = at->rests[c] == BOUNCES ? -e*before - at->arrive[c] : 0.0;
+        const int hits = strikes(before, undisturbed, gap, h), lands = hits && e == 0.0 && gap <= -RIGID_LANDED*h*before;
+        at->arrive[c] = gap > 0.0 && !lands ? -gap/h : 0.0;
+        at->back[c] = hits && e > 0.0 ? -e*before - at->arrive[c] : 0.0;
+        at->rests[c] = !(hits && e > 0.0);
         rebounds = rebounds || at->back[c] != 0.0;
     }
     memcpy(at->out, at->P, (size_t)n*sizeof(double)); /* what the solution starts from */
@@ -86,56 +108,38 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
     for (int i = 0; i < s->n_v; i++) { out[i] += free[i]; }
 }
 
-/* Adds a displacement by pushes along the normals of some contacts, by `sign` times at least at->c along each. */
-static void displace(const eomgen_rigid *s, const inertia *held, meeting *at, const int *which, int count, double sign,
-                     double *move, double *out, eomgen_rigid *told)
+/* A displacement that removes a part of the penetration of contacts that last; whether there is one. */
+static int push_out(const eomgen_rigid *s, const inertia *held, meeting *at, const double *next, double h, double *out,
+                    eomgen_rigid *told)
 {
-    const int d = s->d, n = at->n;
-    double *const P = at->after, *const nothing = at->before, *const W = at->part, residual = 0.0;
-    const double largest = largest_of(count, at->c, 1);
-    int iterations = 0;
-    for (int a = 0; a < count; a++) {
-        P[a] = nothing[a] = 0.0, at->c[a] = -at->c[a];
-        for (int b = 0; b < count; b++) { W[a*count + b] = at->W[(ptrdiff_t)which[a]*d*n + which[b]*d]; }
+    const int m = at->m, d = s->d, n = at->n;
+    double *const W = at->W, *const wanted = at->c, *const P = at->after;
+    double largest = 0.0, residual = 0.0;
+    int *const lasts = at->rests;
+    int count = 0, iterations = 0;
+    across(s->n_v, n, at->J, next, at->undisturbed);
+    for (int c = 0; c < m; c++) {
+        const double gap = -at->records[RECORD_OF*c + 5], removed = -RIGID_REMOVED*gap;
+        if (gap < -s->tolerance*h*at->scale && at->rests[c] && (at->P[c*d] > 0.0 || h*at->undisturbed[c*d] < removed)) {
+            wanted[count] = -removed, P[count] = 0.0, at->before[count] = 0.0;
+            largest = fmax(largest, removed);
+            lasts[count++] = c;
+        }
+    }
+    if (!count) {
+        return 0;
+    }
+    for (int a = 0; a < count; a++) { /* in place: W is not needed any more */
+        for (int b = 0; b < count; b++) { W[a*count + b] = at->W[(ptrdiff_t)lasts[a]*d*n + lasts[b]*d]; }
         W[a*count + a] *= 1.0 + RIGID_YIELDING;
     }
-    CHOSEN(solve_contacts)(count, 1, W, at->c, nothing, P, s->tolerance*largest, s->most, at->work, at->numbers, &iterations,
+    CHOSEN(solve_contacts)(count, 1, W, wanted, at->before, P, s->tolerance*largest, s->most, at->work, at->numbers, &iterations,
                           &residual);
     told->missed = told->missed || !(residual <= s->tolerance*largest);
     for (int i = 0; i < s->n_v; i++) {
-        move[i] = 0.0;
-        for (int a = 0; a < count; a++) { move[i] += at->X[(ptrdiff_t)i*n + which[a]*d]*P[a]; }
+        out[i] = 0.0;
+        for (int a = 0; a < count; a++) { out[i] += at->X[(ptrdiff_t)i*n + lasts[a]*d]*P[a]; }
     }
-    release(s->n_v, held->L, move);
-    for (int i = 0; i < s->n_v; i++) { out[i] += sign*move[i]; }
-}
-
-/* A displacement that removes a part of the penetration of contacts that last, and the rest of the gaps of shapes that
-   land, what is pressed together staying so; whether there is one. */
-static int push_out(const eomgen_rigid *s, const inertia *held, meeting *at, const double *next, double h, double *move,
-                    double *out, eomgen_rigid *told)
-{
-    const int m = at->m, d = s->d;
-    int count = 0, found = 0, land = 0;
-    across(s->n_v, at->n, at->J, next, at->undisturbed);
-    for (int i = 0; i < s->n_v; i++) { out[i] = 0.0; }
-    for (int c = 0; c < m; c++) {
-        const double gap = -at->records[RECORD_OF*c + 5], removed = -RIGID_REMOVED*gap;
-        const int loaded = at->P[c*d] > 0.0;
-        if (gap < -s->tolerance*h*at->scale && at->rests[c] != BOUNCES && (loaded || h*at->undisturbed[c*d] < removed)) {
-            at->c[count] = removed, at->which[count++] = c;
-        }
-        land = land || (at->rests[c] == LANDS && loaded && gap + 0.5*h*at->undisturbed[c*d] > 0.0);
-    }
-    if (count) { displace(s, held, at, at->which, count, 1.0, move, out, told), found = 1; }
-    if (land) {
-        count = 0;
-        for (int c = 0; c < m; c++) {
-            if (at->rests[c] != BOUNCES && at->P[c*d] > 0.0) {
-                at->c[count] = fmax(0.5*h*at->undisturbed[c*d] - at->records[RECORD_OF*c + 5], 0.0), at->which[count++] = c;
-            }
-        }
-        displace(s, held, at, at->which, count, -1.0, move, out, told), found = 1;
-    }
-    return found;
+    release(s->n_v, held->L, out);
+    return 1;
 }

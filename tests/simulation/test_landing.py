@@ -1,0 +1,110 @@
+"""Shapes that land without rebound, by moreau: one impact, whatever the part of the step in which they meet.
+
+The judges are the closed form of a plastic impact with friction, and the limit of small restitutions.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+
+TARGETS = ("numpy", "cython")
+
+
+def rod(restitution: float, friction: float) -> eg.Model:
+    """A rod of 1 m and 1 kg over a floor."""
+    m = eg.Model("rod", gravity=(0, 0, 0))
+    body = m.body("body", mass=1.0, inertia={"zz": 1 / 12})
+    m.planar("j", m.ground, body)
+    law = {"normal_law": "rigid", "restitution": restitution, "friction": friction}
+    shape = {"shape": "segment", "on": body, "length": 1.0, "radius": 0.01}
+    m.contacts("c", shape, {"shape": "half_plane", "on": m.ground}, law)
+    return m
+
+
+def plastic(angle: float, friction: float, v: tuple[float, float, float]) -> np.ndarray:
+    """Velocities (x, y, angle) after: the tip sticks if Coulomb's law allows, else it slides as it would at the end."""
+    tip = -0.5 * np.array([np.cos(angle), np.sin(angle)])  # from the centre
+    n, t = np.array([0.0, 1.0, tip[0]]), np.array([1.0, 0.0, -tip[1] + 0.01])  # the round end touches 1 cm below
+    inverse = np.diag([1.0, 1.0, 12.0])
+    before = np.array(v)
+    J = np.array([n, t])
+    stick = -np.linalg.solve(J @ inverse @ J.T, J @ before)
+    if abs(stick[1]) <= friction * stick[0]:
+        return np.asarray(before + inverse @ J.T @ stick)
+    for side in (1.0, -1.0):
+        along = n - side * friction * t
+        P = -(n @ before) / (n @ inverse @ along)
+        after = before + inverse @ along * P
+        if P > 0.0 and side * (t @ after) >= 0.0:
+            return np.asarray(after)
+    raise AssertionError
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("friction", [0.0, 0.1, 0.5])
+@pytest.mark.parametrize("h", [1e-4, 2.5e-5])
+def test_an_impact_with_friction_does_not_depend_on_where_in_the_step_it_falls(
+    target: str, friction: float, h: float
+) -> None:
+    module, angle = rod(0.0, friction).compile(target=target), 1.0
+    found = []
+    for gap in np.linspace(1.05e-3, 1.05e-3 + 2 * h, 9):
+        start = {"j_y": 0.5 * np.sin(angle) + 0.01 + gap, "j_y_dot": -1.0, "j_3": angle, "j_x_dot": 0.5}
+        found.append(module.simulate(1.6e-3, start, method="moreau", step=h).x[3:, -1])
+    expected = plastic(angle, friction, (0.5, -1.0, 0.0))
+    assert np.array(found) == pytest.approx(np.tile(expected, (9, 1)), abs=1e-6)
+    assert np.ptp(found, axis=0).max() < 1e-6
+
+
+def test_it_is_the_limit_of_small_restitutions() -> None:
+    start = {"j_y": 0.5 * np.sin(1.0) + 0.0112, "j_y_dot": -1.0, "j_3": 1.0, "j_x_dot": 0.5}
+    ends = [
+        rod(e, 0.1).compile(target="numpy").simulate(1.6e-3, start, method="moreau", step=2.5e-5).x[3:, -1]
+        for e in (0.0, 1e-12)
+    ]
+    assert ends[0] == pytest.approx(ends[1], abs=1e-4)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_what_lands_touches(target: str) -> None:
+    """A stack that falls: its parts stay together, and no gap is left under it."""
+    m = eg.Model("stack", gravity=(0, -9.81, 0))
+    boxes = []
+    for k in range(3):
+        box = m.body(f"b{k}", mass=1.0, inertia={"zz": 0.01})
+        m.planar(f"j{k}", m.ground, box)
+        boxes.append({"shape": "box", "on": box, "size": (0.3, 0.2)})
+    law = {"normal_law": "rigid", "restitution": 0.0, "friction": 0.5}
+    m.contacts("floor", boxes, {"shape": "half_plane", "on": m.ground}, law)
+    m.contacts("between", boxes, law=law)
+    height = 0.0113
+    run = m.compile(target=target).simulate(
+        0.2, {f"j{k}_y": 0.1 + 0.2 * k + height for k in range(3)}, method="moreau", step=1e-3
+    )
+    fallen = int(np.searchsorted(run.t, np.sqrt(2.0 * height / 9.81))) + 2
+    for k in range(3):
+        assert run[f"j{k}_y"][fallen:] == pytest.approx(0.1 + 0.2 * k, abs=5e-5)
+        assert run[f"j{k}_y_dot"][fallen:] == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("gap", [0.0, 1e-7, 0.01])
+def test_a_plastic_cradle_leaves_no_residual(target: str, gap: float) -> None:
+    """Three balls that go on as one: nothing moves beside them, and no residual is too large for that."""
+    m: Any = eg.Model("cradle", gravity=(0, 0, 0))
+    for k in range(3):
+        m.prismatic(f"j{k}", m.ground, m.body(f"b{k}", mass=1.0), axis="x", coordinate=f"x{k}")
+    balls = [{"shape": "sphere", "on": f"b{k}", "radius": 0.1} for k in range(3)]
+    m.contacts("c", balls, law={"normal_law": "rigid", "restitution": 0.0})
+    module = m.compile(target=target)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = module.simulate(1.0, {"x0": -0.3, "x1": 0.0, "x2": 0.2 + gap, "x0_dot": 1.0}, method="moreau", step=1e-3)
+    assert run.x[3:, -1] == pytest.approx([1 / 3] * 3, abs=1e-4)
+    assert run.x[3:].sum(axis=0) == pytest.approx(1.0, abs=1e-13)
