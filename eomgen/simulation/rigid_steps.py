@@ -261,7 +261,7 @@ class RigidSteps:
         lands = hits & ~bounces & (rows.gaps <= -LANDED * h * before[:, 0])
         arrive = np.where((rows.gaps > 0.0) & ~lands, -rows.gaps / h, 0.0)
         back = np.where(bounces, -rows.restitution * before[:, 0] - arrive, 0.0)
-        self._rests = ~bounces
+        self._rests = ~(bounces | lands)
         scale = meeting.scale = max(float(np.abs(before).max()), float(np.abs(undisturbed).max()))
         for k in range(GENTLER + 1):
             part = 0.0 if k == GENTLER else 0.5**k

@@ -108,3 +108,33 @@ def test_a_plastic_cradle_leaves_no_residual(target: str, gap: float) -> None:
         run = module.simulate(1.0, {"x0": -0.3, "x1": 0.0, "x2": 0.2 + gap, "x0_dot": 1.0}, method="moreau", step=1e-3)
     assert run.x[3:, -1] == pytest.approx([1 / 3] * 3, abs=1e-4)
     assert run.x[3:].sum(axis=0) == pytest.approx(1.0, abs=1e-13)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("part", [0.1, 0.35, 0.6, 0.85])
+def test_a_landing_keeps_momenta(target: str, part: float) -> None:
+    """A disc lands on the end of a free rod, with friction, wherever in the step: momentum and its moment stay."""
+    m = eg.Model("free", gravity=(0, 0, 0))
+    rod_, disc = m.body("rod", mass=2.0, inertia={"zz": 0.1}), m.body("disc", mass=0.5, inertia={"zz": 0.002})
+    m.planar("a", m.ground, rod_)
+    m.planar("b", m.ground, disc)
+    law = {"normal_law": "rigid", "restitution": 0.0, "friction": 0.7}
+    m.contacts(
+        "c", {"shape": "box", "on": rod_, "size": (0.8, 0.1)}, {"shape": "circle", "on": disc, "radius": 0.1}, law
+    )
+    start = {
+        "b_x": 0.3,
+        "b_y": 0.15 + 0.02 + part * 2e-3,
+        "b_y_dot": -2.0,
+        "b_x_dot": 1.5,
+        "b_3_dot": 30.0,
+        "a_3_dot": 0.4,
+    }
+    run = m.compile(target=target).simulate(0.014, start, method="moreau", step=1e-3)
+    x, y, vx, vy, w = (np.array([run[f"{k}_{n}"] for k in "ab"]) for n in ("x", "y", "x_dot", "y_dot", "3_dot"))
+    mass, inertia = np.array([2.0, 0.5]), np.array([0.1, 0.002])
+    assert abs(vy[1, -1] - vy[1, 0]) > 0.5
+    hit = 1 + int(np.argmax(np.abs(np.diff(vy[1])) > 0.1))
+    for kept in (mass @ vx, mass @ vy, (mass @ (x * vy - y * vx) + inertia @ w)[: hit + 1]):
+        assert kept == pytest.approx(np.full(len(kept), kept[0]), abs=1e-12)
+    assert np.diff(run["energy"]).max() < 1e-6 * run["energy"][0]

@@ -75,7 +75,7 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
         const int hits = strikes(before, undisturbed, gap, h), lands = hits && e == 0.0 && gap <= -RIGID_LANDED*h*before;
         at->arrive[c] = gap > 0.0 && !lands ? -gap/h : 0.0;
         at->back[c] = hits && e > 0.0 ? -e*before - at->arrive[c] : 0.0;
-        at->rests[c] = !(hits && e > 0.0);
+        at->rests[c] = !lands && !(hits && e > 0.0);
         rebounds = rebounds || at->back[c] != 0.0;
     }
     memcpy(at->out, at->P, (size_t)n*sizeof(double)); /* what the solution starts from */
