@@ -2,8 +2,9 @@
 
 Friction compares the impulses along both, so a gap written at half its size would have twice the friction.  A distance
 changes by n . d where a body moves by d without turning, with n of length 1; so do places along the surface.  The
-sliding joints of the tree move bodies in this way: the parts of n along their directions are known, and together they
-are no longer than 1, or just as long where the directions are all there are: in space, or in a plane mechanism.
+sliding joints of an open tree move bodies in this way: the parts of n along their directions are known, and together
+they are no longer than 1, and just as long where the directions span space.  Of closed loops, whose coordinates depend
+on each other, and of directions that span less, a gap that is too small is not told.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ def require_distances(
     ------
     UsageError
     """
-    joints = module.layout.metadata.get("translations", ())
+    layout = module.layout
+    joints = layout.metadata.get("translations", ())
     rubs = np.flatnonzero(sliding.coefficients[sliding.owner] > 0.0)
-    if not joints or not rubs.size or "poses" not in module.kernels.core.names:
+    if not joints or not rubs.size or layout.n_c or "poses" not in module.kernels.core.names:
         return
-    moves, spins = _motions(module, t, q)
     for gap in sorted({*sliding.owner[rubs].tolist()}):
         own = [k for k in rubs.tolist() if sliding.owner[k] == gap]
         rows = np.vstack([normals[gap], sliding.rows[own]])
@@ -47,37 +48,23 @@ def require_distances(
             while (inner := joints[chain[-1]][1]) >= 0:
                 chain.append(inner)
             places = [k for i in chain if crossed[i] for k in joints[i][3]]
-            D = moves[joints[j][2]][places]
+            D = _directions(module, t, q, joints[j][2], places)
             lengths = np.linalg.norm(algebra.lstsq(D, rows[:, places].T, rcond=MEASURED), axis=0)
-            exact = _is_whole(D, moves, spins)
+            exact = np.linalg.matrix_rank(D, tol=MEASURED) == 3
             for what, length in zip(said, lengths.tolist(), strict=True):
                 if length > 1.0 + MEASURED or (exact and MEASURED < length < 1.0 - MEASURED):
                     raise UsageError(
                         f"{what} changes by {length:.6g} for each unit of length by which joint {name} moves along it: "
                         "friction compares the impulses along the gap and along its sliding velocity, so the gap must "
                         f"be the distance and the velocity that of its place; divide it by {length:.6g}"
+                        f"{'' if exact else ', or more where they move askew'}"
                     )
 
 
-def _motions(module: BoundModel, t: float, q: Array) -> tuple[Array, Array]:
-    """Velocities of the origins of all bodies (n_bodies, n_v, 3) and their angular velocities by each velocity."""
-    scales, moving = module.layout.scales, module.layout.n_v - len(module.layout.states)
-    step = MEASURED
-    ends = np.stack([scales.move(q, side * step * e) for e in np.eye(module.layout.n_v)[:moving] for side in (1, -1)])
-    poses = np.moveaxis(np.asarray(module.poses(np.ascontiguousarray(ends.T), t=t)), -1, 0)
-    change = (poses[::2] - poses[1::2]) / (2.0 * step * scales.q[:moving, None, None, None])
-    turned = change[..., :3, :3] @ np.swapaxes(poses[::2, :, :3, :3], -1, -2)
-    spins = np.stack([turned[..., 2, 1], turned[..., 0, 2], turned[..., 1, 0]], axis=-1)
-    return np.swapaxes(change[..., :3, 3], 0, 1), np.swapaxes(spins, 0, 1)
-
-
-def _is_whole(D: Array, moves: Array, spins: Array) -> bool:
-    """Whether directions (k, 3) are all in which bodies can be touched: of space, or of the plane of all motions."""
-    _, sizes, directions = algebra.svd(D)
-    rank = int(np.count_nonzero(sizes > MEASURED * sizes[0]))
-    if rank != 2:
-        return rank == 3
-    across = directions[2]
-    flat = np.abs(moves @ across).max(initial=0.0) <= MEASURED * np.abs(moves).max(initial=0.0)
-    tilted = np.linalg.norm(np.cross(spins, across), axis=-1).max(initial=0.0)
-    return bool(flat and tilted <= MEASURED * max(1.0, np.abs(spins).max(initial=0.0)))
+def _directions(module: BoundModel, t: float, q: Array, body: int, places: Sequence[int]) -> Array:
+    """Directions (k, 3) in which velocities at some places move a body; a difference over a length is exact here."""
+    scales = module.layout.scales
+    units = np.eye(module.layout.n_v)[list(places)]
+    ends = np.stack([scales.move(q, side * e) for e in units for side in (0.5, -0.5)])
+    origins = np.asarray(module.poses(np.ascontiguousarray(ends.T), t=t))[body, :3, 3]
+    return np.asarray((origins[:, ::2] - origins[:, 1::2]) / scales.q[list(places)]).T

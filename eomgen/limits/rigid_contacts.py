@@ -34,10 +34,9 @@ PATIENT = 8
 #: Approach below this multiple of what forces change in one step is rest, without a rebound: a body that rests
 #: approaches at once the change of a step.
 RESTING = 2.0
-#: Part of its way in a step by which a shape may be apart from what it lands on and counts as there; where it is more,
-#: the step is done again with its middle at the time of landing, up to so many times: the first is right but for how
-#: normals turn on the way, and the second for the square of that.
-LANDED, LANDINGS = 1e-3, 3
+#: Velocity, in those of the contacts, by which contacts are taken to part where they should not act at all: impulses of
+#: others move none so fast.
+APART = 4.0
 #: Part of a penetration that one step removes: an even part of it, so that pairs that share a body do not overshoot.
 REMOVED = 0.2
 YIELDING = 1e-3  #: part of its compliance by which a contact is softer where penetrations are removed: jams have an end

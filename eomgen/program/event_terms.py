@@ -57,13 +57,14 @@ def find_translations(kinematics: Kinematics) -> list[list[Any]]:
     """
     found: list[list[Any]] = []
     outer = {GROUND: -1}  #: by body, the outermost of them so far
-    kinds = dict(zip(kinematics.velocity_labels, kinematics.velocity_kinds, strict=True))
+    labels = zip(kinematics.velocity_labels, kinematics.velocity_kinds, strict=True)
+    lengths = {name: i for i, (name, kind) in enumerate(labels) if kind == "length"}
     for branch in kinematics.topology.branches:
         spec = kinematics.mechanism.joints[branch.joint]
         slides = isinstance(spec.joint, (Prismatic, Cylindrical, Planar, Translational, Free))
         outer[branch.body] = outer[branch.parent]
         if slides:
-            places = [i for i, name in enumerate(kinds) if name in spec.coordinates and kinds[name] == "length"]
+            places = [lengths[name] for name in spec.coordinates if name in lengths]
             outer[branch.body] = len(found)
             found.append([spec.name, outer[branch.parent], branch.body, places])
     return found

@@ -73,8 +73,11 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
         unknown = [*forces, *(row.multiplier for row in rows)]
         a, columns = _motion(linear, mobility, unknown, users)
         found = _linear_parts([*kinematics.a, *multipliers], measured, unknown, a, columns)
-        inner = [row[len(laws) :] for row in found.gain[len(reactions) :]]
-        after = AfterEvents(kinematics, rows, inner, columns[len(laws) :]).velocities() if rows else {}
+        after = (
+            AfterEvents(kinematics, rows, [a[: len(kinematics.v)] for a in columns[len(laws) :]]).velocities()
+            if rows
+            else {}
+        )
         still, gain = hold(found, rows, len(laws))
         gain = _asked_at_states(kinematics, gain) if laws else gain
         symbols += [row.multiplier for row in rows]

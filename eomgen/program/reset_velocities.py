@@ -32,7 +32,8 @@ class RowAfter(NamedTuple):
     on: Expr
     jacobian: Sequence[Expr]
     rate: Expr
-    change: Expr  #: of C by the event; equations of velocities have none
+    error: Expr  #: C; 0 for equations of velocities
+    change: Expr  #: of it by the event
     size: Expr
 
 
@@ -44,15 +45,12 @@ class AfterEvents:
     ----------
     kinematics : Kinematics
     rows : sequence of SwitchedRow
-    inner : matrix
-        C M^-1 C^T of the rows with its sign changed.
     columns : matrix
         By row, the accelerations that a unit of its multiplier makes.
     """
 
     kinematics: Kinematics
     rows: Sequence[SwitchedRow]
-    inner: Matrix
     columns: Matrix
 
     def velocities(self) -> dict[str, tuple[tuple[str, Expr], ...]]:
@@ -71,45 +69,58 @@ class AfterEvents:
     def _after(self, event: Event, closes: bool) -> list[Expr]:
         k, given = self.kinematics, dict(event.reset)
         new = {k.graph.symbol(name): value for name, value in given.items()}
-        v = substitute(list(k.v), new)
+        v = given_v = substitute(list(k.v), new)
         own = [self._closed(row, given, new) for row in self.rows]
-        anyone = own[0].on
-        for one in own[1:]:
-            anyone = where(one.on, 1.0, anyone)
-        moving = not {*k.names, *k.velocity_names}.isdisjoint(given)
-        lasting = self._lasting(anyone, new) if moving else []
-        if closes:
-            acting, columns = own, substituted(self.columns, new)
-            inner = substituted(self.inner, new)
-        else:
-            acting = [*(lasting if len(lasting) <= MOST else ()), *own]
-            columns = [self._shortest(one) for one in acting]
-            inner = [[total([j * c for j, c in zip(one.jacobian, column, strict=True)]) for column in columns]
-                     for one in acting]  # fmt: skip
-        A = switched_matrix(inner, [one.on for one in acting])
-        (impulses,) = solve_switched(A, [[-(one.on * one.rate) for one in acting]])
-        after = []
-        for j, before in enumerate(v):
-            after.append(total([before, *(c[j] * i for c, i in zip(columns, impulses, strict=True))]))
+        lasting = list[RowAfter]()
+        if not {*k.names, *k.velocity_names}.isdisjoint(given):
+            lasting = self._lasting(own, new)
+            held = [one._replace(on=closed(row)) for one, row in zip(own, self.rows, strict=True)] if closes else own
+            acting = [*(lasting if len(lasting) <= MOST else ()), *held]
+            v = self._moved(v, v, acting, [self._shortest(one) for one in acting])
+        if closes:  # an impact
+            v = self._moved(v, given_v, own, substituted(self.columns, new))
         fits = k.graph.one
         for one in (*lasting, *own):
-            fits = fits * self._fulfilled(one, v, after)
-        return [x / fits for x in after]
+            fits = fits * self._fulfilled(one, given_v, v)
+        no_number = k.graph.apply("log", fits)  # 0 where all are fulfilled
+        return [x + no_number for x in v]
+
+    def _moved(
+        self, v: Sequence[Expr], known: Sequence[Expr], acting: Sequence[RowAfter], columns: Matrix
+    ) -> list[Expr]:
+        """Velocities that fulfil equations, from v by multiples of columns; their rates are those at ``known``."""
+        rates = [_rate(one, known, v) for one in acting]
+        inner = [[total([j * c for j, c in zip(one.jacobian, column, strict=True)]) for column in columns]
+                 for one in acting]  # fmt: skip
+        A = switched_matrix(inner, [one.on for one in acting])
+        (impulses,) = solve_switched(A, [[-(one.on * rate) for one, rate in zip(acting, rates, strict=True)]])
+        return [
+            total([before, *(c[j] * i for c, i in zip(columns, impulses, strict=True))]) for j, before in enumerate(v)
+        ]
 
     def _closed(self, row: SwitchedRow, given: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> RowAfter:
         """Equations that may be no numbers while they are open: those of what closes now."""
         on = given.get(row.state, closed(row))
         rate, error, *J = substitute([row.rate, row.errors[0], *row.jacobian], new)
         before = substitute([row.errors[0]], {s: x for s, x in new.items() if s.node[1] == row.state})[0]
-        return RowAfter(on, J, rate, error - before, self._size(row.kind))
+        return RowAfter(on, J, rate, error, error - before, self._size(row.kind))
 
-    def _lasting(self, on: Expr, new: Mapping[Expr, Expr]) -> list[RowAfter]:
-        """The equations of the mechanism, which have to hold beside those that are closed."""
+    def _lasting(self, own: Sequence[RowAfter], new: Mapping[Expr, Expr]) -> list[RowAfter]:
+        """The equations of the mechanism that are connected with closed ones, beside which they have to hold."""
         c, found = self.kinematics.constraints, []
+        on = own[0].on
+        for one in own[1:]:
+            on = where(one.on, 1.0, on)
+        reached = {k for row in self.rows for k, x in enumerate(row.jacobian) if not x.is_zero}
+        known = [{k for k, x in enumerate(row) if not x.is_zero} for row in c.jacobian]
+        while more := set[int]().union(*(row for row in known if row & reached)) - reached:
+            reached |= more
         for i, (J, rate, kind) in enumerate(zip(c.jacobian, c.velocity, c.kinds, strict=True)):
+            if not known[i] & reached:
+                continue
             value = c.values[i] if i < len(c.values) else self.kinematics.graph.zero
             now, speed, *slopes = substitute([value, rate, *J], new)
-            found.append(RowAfter(on, slopes, speed, now - value, self._size(kind)))
+            found.append(RowAfter(on, slopes, speed, now, now - value, self._size(kind)))
         return found
 
     def _shortest(self, one: RowAfter) -> list[Expr]:
@@ -122,15 +133,20 @@ class AfterEvents:
 
     def _fulfilled(self, one: RowAfter, before: Sequence[Expr], after: Sequence[Expr]) -> Expr:
         """1 where an equation holds after the event, or need not hold, else 0."""
-        graph, parts, sizes = self.kinematics.graph, [one.rate], [one.size]
+        graph, sizes = self.kinematics.graph, [one.size]
         for j, v, w in zip(one.jacobian, before, after, strict=True):
             if not j.is_zero:
-                parts.append(j * (w - v))
                 sizes.append(graph.apply("abs", j) * (graph.apply("abs", v) + graph.apply("abs", w)))
-        holds = graph.apply("le", graph.apply("abs", total(parts)), MEASURED * total(sizes))
-        if not one.change.is_zero:
-            holds = holds * graph.apply("le", graph.apply("abs", one.change), MEASURED * one.size)
+        holds = graph.apply("le", graph.apply("abs", _rate(one, before, after)), MEASURED * total(sizes))
+        if not one.change.is_zero:  # an error that was there before may stay, and may go
+            off = graph.apply("min", graph.apply("abs", one.change), graph.apply("abs", one.error))
+            holds = holds * graph.apply("le", off, MEASURED * one.size)
         return where(one.on, holds, 1.0)
+
+
+def _rate(one: RowAfter, known: Sequence[Expr], v: Sequence[Expr]) -> Expr:
+    """C' at velocities v, from that at known ones."""
+    return total([one.rate, *(j * (x - y) for j, x, y in zip(one.jacobian, v, known, strict=True) if not j.is_zero)])
 
 
 def substituted(matrix: Matrix, new: Mapping[Expr, Expr]) -> Matrix:

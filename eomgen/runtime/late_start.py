@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import UsageError
 from ..numeric.scales import Array
 from .layout import Layout
 from .tapes import play_arrays
@@ -18,8 +19,14 @@ def started(layout: Layout, p: Array) -> Layout:
     """The same with initial values and guesses at parameters (n_p,) of other values."""
     found = copy(layout)
     for section, (names, tape) in layout.metadata["start_terms"].items():
-        values = map(float, play_arrays(tape, p, NO_STATE))
-        setattr(found, section, getattr(layout, section) | dict(zip(names, values, strict=True)))
+        values = dict(zip(names, map(float, play_arrays(tape, p, NO_STATE)), strict=True))
+        if bad := [name for name, value in values.items() if not np.isfinite(value)]:
+            shown = ", ".join(f"{name} = {x:.6g}" for name, x in zip(layout.p, p, strict=True))
+            raise UsageError(
+                f"{section.partition('_')[0]}.{bad[0]} is no number with {shown}: look for a division by zero, or a "
+                "root or logarithm of a negative number"
+            )
+        setattr(found, section, getattr(layout, section) | values)
     return found
 
 

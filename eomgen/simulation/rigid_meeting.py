@@ -80,10 +80,10 @@ class HeldInertia:
         self.inverse = whole - self.back @ spread.T
         self.inverse = 0.5 * (self.inverse + self.inverse.T)
 
-    def turn_round(self, v: Array | None) -> None:
-        """Aim at velocities v+ with which the constraints hold for the mean of v and v+; for v+ itself without v."""
+    def turn_round(self, v: Array) -> None:
+        """Aim at velocities v+ with which the constraints hold for the mean of v and v+."""
         if self.rows is not None:
-            self.wanted = -self.drift if v is None else -2.0 * self.drift - self.rows @ v
+            self.wanted = -2.0 * self.drift - self.rows @ v
 
     def aim(self, excess: Array) -> None:
         """Aim at velocities smaller by an excess."""

@@ -10,10 +10,10 @@ with M, J and C of the middle where nothing else is said, and the laws of :mod:`
 between impulses P and velocities J v+. The normal velocity is to be at least -e times the one before where shapes
 touch, and -g/h where they are a gap g apart and come to rest on each other (D. E. Stewart, J. C. Trinkle, An implicit
 time-stepping scheme for rigid body dynamics with inelastic collisions and Coulomb friction, Int. J. Numer. Methods Eng.
-39 (1996), 2673-2691). Where shapes land, an impact without rebound, the middle of the step is the time when they meet,
-so that all of the impact is in one step, and friction with it. What is left of penetrations and of open loops is
-removed from the positions alone (V. Acary, Projected event-capturing time-stepping schemes, Comput. Methods Appl. Mech.
-Eng. 256 (2013), 224-250).
+39 (1996), 2673-2691). Where shapes land, an impact without rebound, they go on with a part of the whole impact,
+friction and what else acts with it, after which they meet in the middle of the next step, where the rest follows: both
+end as the impact at once. What is left of penetrations and of open loops is removed from the positions alone (V. Acary,
+Projected event-capturing time-stepping schemes, Comput. Methods Appl. Mech. Eng. 256 (2013), 224-250).
 
 Constraints hold for the velocities at the end of a step and push in the middle, as in SHAKE and its form by velocities
 (J. P. Ryckaert, G. Ciccotti, H. J. C. Berendsen, J. Comput. Phys. 23 (1977), 327-341; H. C. Andersen, J. Comput. Phys.
@@ -35,12 +35,11 @@ from numpy.typing import NDArray
 
 from ..errors import SimulationError
 from ..limits.rigid_contacts import (
+    APART,
     CLOSINGS,
     GENTLER,
     GROWN,
     HALVINGS,
-    LANDED,
-    LANDINGS,
     REMOVED,
     RESTING,
     ROUGH,
@@ -157,25 +156,20 @@ class RigidSteps:
 
     def _in_python(self, t: float, q: Array, v: Array, h: float) -> tuple[Array, Array] | None:
         """The same here, which says what is wrong where compiled code fails."""
-        first, n_q = 0.5 * h, len(q)
+        middle, n_q = t + 0.5 * h, len(q)
         self._misses = False
-        for k in range(LANDINGS + 1):  # where shapes land, again with the middle at that time
-            middle, q_m = t + first, self.move(q, first * v)
-            x = np.concatenate([q_m, v])
-            u = self.forcing(middle, x) if self.forcing else None
-            if not k and self._passes(t, q, v, u, 0.5 * h):
-                return None
-            if not k and self._begins and self._passes(t, self.move(q, -0.5 * h * v), v, u, 0.5 * h):
-                return None  # touching and approaching: later steps end with velocities that part shapes
-            held = HeldInertia(self.module, middle, q_m, u)
-            bias = self.bias(middle, x, u=u)
-            held.turn_round(v if not k else None)
-            free = held.free(v - h * (held.inverse @ bias))
-            rows = self._near(self.contacts.rows(middle, q_m, u), v, free, h)
-            later = _until_landing(rows, v, free, h, self.tolerance) if k < LANDINGS else 0.0
-            if not later:
-                break
-            first += later
+        q_m = self.move(q, 0.5 * h * v)
+        x = np.concatenate([q_m, v])
+        u = self.forcing(middle, x) if self.forcing else None
+        if self._passes(t, q, v, u, 0.5 * h):
+            return None
+        if self._begins and self._passes(t, self.move(q, -0.5 * h * v), v, u, 0.5 * h):
+            return None  # shapes that touch at the start and approach: later steps end with velocities that part them
+        held = HeldInertia(self.module, middle, q_m, u)
+        bias = self.bias(middle, x, u=u)
+        held.turn_round(v)
+        free = held.free(v - h * (held.inverse @ bias))
+        rows = self._near(self.contacts.rows(middle, q_m, u), v, free, h)
         meeting = Meeting(held, rows, v, self._last) if rows.gaps.size else None
         x[n_q:] = 0.5 * (v + free)
         # forces that do not change with velocities need one solution, which then is the one that counts
@@ -188,7 +182,7 @@ class RigidSteps:
             again = self.bias(middle, x, u=u)
             settled = k > 0 or (rough == 1.0 and np.array_equal(again, bias))
             if held.rows is not None:
-                position = self.move(q_m, (h - first) * new + (first - 0.5 * h) * (free - v))
+                position = self.move(q_m, 0.5 * h * new)
                 position = self.move(position, held.closing(position, t + h, self._at_end(t + h, position, new)))
                 excess = held.excess(position, new, t + h, self._at_end(t + h, position, new))
                 settled = self._bears(meeting, excess, last=k == ROUNDS - 1) and settled
@@ -197,9 +191,9 @@ class RigidSteps:
                 break
             bias = again
             free = held.free(v - h * (held.inverse @ bias))
-        if self._passes(middle, q_m, new, u, h - first):
+        if self._passes(middle, q_m, new, u, 0.5 * h):
             return None
-        position = self.move(q_m, (h - first) * new + (first - 0.5 * h) * (free - v))
+        position = self.move(q_m, 0.5 * h * new)
         pushed = np.zeros((len(P), 3))
         pushed[:, : P.shape[1]] = P
         self.acting.append(np.concatenate([rows.pairs, rows.places, pushed], axis=1))
@@ -256,18 +250,22 @@ class RigidSteps:
             return free, np.zeros((0, 2))
         rows, before, W = meeting.rows, meeting.before, meeting.compliance
         undisturbed = (rows.jacobian @ free).reshape(before.shape)
-        hits = _strikes(before[:, 0], undisturbed[:, 0], rows.gaps, h)
-        bounces = hits & (rows.restitution > 0.0)
-        lands = hits & ~bounces & (rows.gaps <= -LANDED * h * before[:, 0])
-        arrive = np.where((rows.gaps > 0.0) & ~lands, -rows.gaps / h, 0.0)
+        fast = before[:, 0] < -RESTING * np.abs(undisturbed[:, 0] - before[:, 0])
+        strikes = fast & (rows.gaps + h * undisturbed[:, 0] < 0.0)
+        bounces = strikes & (rows.restitution > 0.0)
+        arrive = np.where(rows.gaps > 0.0, -rows.gaps / h, 0.0)
         back = np.where(bounces, -rows.restitution * before[:, 0] - arrive, 0.0)
-        self._rests = ~(bounces | lands)
         scale = meeting.scale = max(float(np.abs(before).max()), float(np.abs(undisturbed).max()))
+        lands = strikes & ~bounces & (rows.gaps > 0.0) & (before[:, 0] < -self.tolerance * scale)
+        self._rests = ~bounces
         for k in range(GENTLER + 1):
             part = 0.0 if k == GENTLER else 0.5**k
             c = undisturbed.copy()
             c[:, 0] -= arrive + part * back
-            found = self._impulses(W, c, rows.friction, meeting.start, rough * self.tolerance * scale)
+            landed = self._landing(meeting, undisturbed, c, lands, h, rough) if lands.any() and not k else None
+            if landed is None:
+                landed = self._impulses(W, c, rows.friction, meeting.start, rough * self.tolerance * scale)
+            found = landed
             P = found.impulses.ravel()
             if not back.any():
                 break
@@ -282,6 +280,30 @@ class RigidSteps:
         self._last = dict(zip(meeting.keys, found.impulses, strict=True))
         meeting.start = found.impulses
         return free + meeting.spread @ P, found.impulses
+
+    def _landing(
+        self, meeting: Meeting, undisturbed: Array, c: Array, lands: NDArray[np.bool_], h: float, rough: float
+    ) -> ContactImpulses | None:
+        """The part of an impact without rebound that leaves shapes as fast as they meet in the next middle.
+
+        It is a part of all impulses, friction too, between those without the contacts that land and those of the whole
+        impact, so that the rest, which comes then, ends as the whole would have.  None where these are not found.
+        """
+        rows, W, scale = meeting.rows, meeting.compliance, meeting.scale
+        tolerance = rough * self.tolerance * scale
+        c = c.copy()
+        c[lands, 0] = undisturbed[lands, 0]
+        whole = self._impulses(W, c, rows.friction, meeting.start, tolerance)
+        c[lands, 0] = APART * scale
+        without = self._impulses(W, c, rows.friction, meeting.start, tolerance)
+        residual = max(whole.residual, without.residual)
+        if not residual <= tolerance:
+            return None
+        approach = (undisturbed.ravel() + W @ without.impulses.ravel()).reshape(c.shape)[lands, 0]
+        parts = np.where(approach < 0.0, 1.0 + rows.gaps[lands] / np.where(approach < 0.0, h * approach, 1.0), 0.0)
+        part = max(float(parts.max()), 0.0)
+        impulses = (1.0 - part) * without.impulses + part * whole.impulses
+        return ContactImpulses(impulses, max(whole.iterations, without.iterations), residual)
 
     def _impulses(self, W: Array, c: Array, friction: Array, start: Array, tolerance: float) -> ContactImpulses:
         if self._solve is None:
@@ -314,23 +336,3 @@ class RigidSteps:
         found = self._impulses(W, -wanted[:, None], nothing, nothing[:, None], allowed)
         self._misses = self._misses or not found.residual <= allowed
         return np.asarray(spread @ found.impulses.ravel())
-
-
-def _strikes(before: Array, undisturbed: Array, gaps: Array, h: float) -> NDArray[np.bool_]:
-    """Which shapes approach faster than forces make them within a step, and would meet (m,)."""
-    found: NDArray[np.bool_] = (before < -RESTING * np.abs(undisturbed - before)) & (gaps + h * undisturbed < 0.0)
-    return found
-
-
-def _until_landing(rows: RigidRows, v: Array, free: Array, h: float, tolerance: float) -> float:
-    """The time from the middle of a step to the first landing without rebound; 0 if none is to come or one is now."""
-    if not rows.gaps.size:
-        return 0.0
-    d = len(rows.jacobian) // len(rows.gaps)
-    before, undisturbed = rows.jacobian @ v, rows.jacobian @ free
-    least = tolerance * max(float(np.abs(before).max()), float(np.abs(undisturbed).max()))
-    before, undisturbed = before[::d], undisturbed[::d]
-    lands = _strikes(before, undisturbed, rows.gaps, h) & (rows.restitution == 0.0) & (before < -least)
-    if not lands.any() or (rows.gaps[lands] <= -LANDED * h * before[lands]).any():
-        return 0.0
-    return float(np.min(-rows.gaps[lands] / before[lands]))

@@ -78,7 +78,7 @@ def sensitivities(
         Coordinates and rates that keep their initial values when something else changes; the constraints give the
         rest, by the smallest change where they leave a choice.  By default those given in ``initial``, then the
         declared ones, then the independent ones, while they leave each other room; declared ones that are
-        expressions of parameters follow these, unless they are named here.
+        expressions of parameters follow these then, as a run with other parameters does.
     method : str or OdeSolver subclass, optional
         Of SciPy.
     rtol, atol, t_eval, events : optional

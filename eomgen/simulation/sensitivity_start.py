@@ -147,11 +147,13 @@ def start_sensitivity(
     N = scales.rates(x[:n_q], np.eye(n_v))
     # positions
     rows, right = [*scales.jacobian(E[:n_h, :n_q] @ N)], [*(-other[:n_h] / scales.c[:n_h, None])]
+    turns = _turns(layout, x[:n_q], wanted)
     for name in held:
         if name in layout.q:
             for row in initial.gradients(x[:n_q], name):
+                k = int(np.flatnonzero(row)[0])
                 rows.append(row)
-                right.append(wanted[name] / scales.q[np.flatnonzero(row)[0]])
+                right.append(turns.get(k, wanted[name]) / scales.q[k])
         elif name in layout.loops:
             k = layout.loops.index(name)
             line, size = n_h + n_c + k, layout.loop_scales[k]
@@ -175,6 +177,21 @@ def start_sensitivity(
             right.append((wanted[name] - other[line] - E[line, :n_q] @ dq) / size)
     dv = scales.q[:, None] * _solve(rows, right, n_v, count, columns)
     return np.vstack([dq, dv])
+
+
+def _turns(layout: Layout, q: Array, wanted: Mapping[str, Array]) -> dict[int, Array]:
+    """Rotations (k,) that changes of held Euler parameters make, by the places of their angular velocities in v."""
+    found: dict[int, Array] = {}
+    for i, j in layout.quaternion_slots:
+        held = [k for k in range(4) if layout.q[i + k] in wanted]
+        changes = np.array([wanted[layout.q[i + k]] for k in held])
+        if changes.any():
+            assert layout.space is not None
+            G = np.stack([layout.space.rates(q, e)[i : i + 4] for e in np.eye(layout.n_v)[j : j + 3]], axis=1)
+            whole = np.zeros((4, changes.shape[1]))
+            whole[held] = changes  # of length 1, those not given are 0
+            found |= dict(zip(range(j, j + 3), algebra.lstsq(G, whole, rcond=STATE), strict=True))
+    return found
 
 
 def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, columns: Differentiated) -> Array:

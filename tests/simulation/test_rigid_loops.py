@@ -188,7 +188,7 @@ def test_a_coupler_that_friction_jams(restitution: float, target: str) -> None:
     angle = run["a"] + run["b"]
     centre = np.array([LENGTHS[0] * turned(a)[:, 0] + turned(c) @ CIRCLE for a, c in zip(run["a"], angle, strict=True)])
     last = int(np.flatnonzero(np.abs(run["a_dot"]) > 1e-6)[-1])
-    (x, y), turn = centre[last + 1] - centre[last], angle[last + 1] - angle[last]  # in the step that jams
+    (x, y), turn = centre[last] - centre[last - 1], angle[last] - angle[last - 1]
     assert abs(y) < 0.3 * abs(x + RADIUS * turn)  # how the place that touches moves
     y = centre[:, 1]
     assert y[-1] == pytest.approx(RADIUS - 0.05, abs=1e-3)

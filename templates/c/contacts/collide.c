@@ -1,5 +1,7 @@
 /* Impulses of the contacts that act in one step. */
 
+enum { BOUNCES, RESTS, LANDS }; /* LANDS: an impact without rebound, across a gap */
+
 typedef struct {
     int m, n; /* contacts, their rows */
     double *records;                              /* in the order of the contacts */
@@ -35,29 +37,30 @@ static void recall(const eomgen_rigid *s, meeting *at, int *keys)
     }
 }
 
-/* Whether shapes approach faster than forces make them within a step, and would meet. */
-static int strikes(double before, double undisturbed, double gap, double h)
+/* The part of an impact without rebound that leaves shapes as fast as they meet in the next middle: a part of all impulses,
+   friction too, between those without the contacts that land and those of the whole impact, so that the rest, which comes then,
+   ends as the whole would have. 0 where these are not found; at->c holds what the laws of the others start from then too. */
+static int land(const eomgen_rigid *s, meeting *at, double h, double tolerance, int *count, double *residual)
 {
-    return before < -RIGID_RESTING*fabs(undisturbed - before) && gap + h*undisturbed < 0.0;
-}
-
-/* The time from the middle of the step to the first landing, an impact without rebound; 0 where none is to come, or one is now. */
-static double until_landing(const eomgen_rigid *s, meeting *at, const double *free, double h)
-{
-    double first = 0.0, least;
-    across(s->n_v, at->n, at->J, free, at->undisturbed);
-    least = s->tolerance*fmax(largest_of(at->n, at->before, 1), largest_of(at->n, at->undisturbed, 1));
-    for (int c = 0; c < at->m; c++) {
-        const double gap = -at->records[RECORD_OF*c + 5], before = at->before[c*s->d];
-        if (at->records[RECORD_OF*c + 13] != 0.0 || before >= -least || !strikes(before, at->undisturbed[c*s->d], gap, h)) {
-            continue;
+    const int m = at->m, d = s->d, n = at->n;
+    double *const whole = at->after, rest = 0.0, part = 0.0;
+    int more = 0;
+    for (int c = 0; c < m; c++) { at->c[c*d] = at->rests[c] == LANDS ? at->undisturbed[c*d] : at->c[c*d]; }
+    memcpy(whole, at->out, (size_t)n*sizeof(double));
+    CHOSEN(solve_contacts)(m, d, at->W, at->c, at->friction, whole, tolerance, s->most, at->work, at->numbers, count, residual);
+    for (int c = 0; c < m; c++) { at->c[c*d] = at->rests[c] == LANDS ? RIGID_APART*at->scale : at->c[c*d]; }
+    memcpy(at->P, at->out, (size_t)n*sizeof(double));
+    CHOSEN(solve_contacts)(m, d, at->W, at->c, at->friction, at->P, tolerance, s->most, at->work, at->numbers, &more, &rest);
+    *residual = fmax(*residual, rest), *count = more > *count ? more : *count;
+    for (int c = 0; c < m; c++) {
+        if (at->rests[c] == LANDS) {
+            const double approach = at->undisturbed[c*d] + dot(n, at->W + (ptrdiff_t)c*d*n, at->P);
+            part = approach < 0.0 ? fmax(part, 1.0 + at->arrive[c]/-approach) : part;
+            at->c[c*d] = at->undisturbed[c*d] - at->arrive[c];
         }
-        if (gap <= -RIGID_LANDED*h*before) {
-            return 0.0;
-        }
-        first = first > 0.0 ? fmin(first, -gap/before) : -gap/before;
     }
-    return first;
+    for (int r = 0; r < n; r++) { at->P[r] = (1.0 - part)*at->P[r] + part*whole[r]; }
+    return *residual <= tolerance;
 }
 
 /* Impulses and velocities `out` after them for velocities `free` without, to a tolerance so many times as large; what was reached. */
@@ -66,16 +69,17 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
 {
     const int m = at->m, d = s->d, n = at->n;
     double scale, residual = 0.0;
-    int rebounds = 0, count = 0;
+    int rebounds = 0, lands = 0, count = 0;
     across(s->n_v, n, at->J, free, at->undisturbed);
     scale = at->scale = fmax(largest_of(n, at->before, 1), largest_of(n, at->undisturbed, 1));
     for (int c = 0; c < m; c++) {
         const double gap = -at->records[RECORD_OF*c + 5], e = at->records[RECORD_OF*c + 13];
         const double before = at->before[c*d], undisturbed = at->undisturbed[c*d];
-        const int hits = strikes(before, undisturbed, gap, h), lands = hits && e == 0.0 && gap <= -RIGID_LANDED*h*before;
-        at->arrive[c] = gap > 0.0 && !lands ? -gap/h : 0.0;
-        at->back[c] = hits && e > 0.0 ? -e*before - at->arrive[c] : 0.0;
-        at->rests[c] = !lands && !(hits && e > 0.0);
+        const int strikes = before < -RIGID_RESTING*fabs(undisturbed - before) && gap + h*undisturbed < 0.0;
+        at->arrive[c] = gap > 0.0 ? -gap/h : 0.0;
+        at->rests[c] = strikes && e > 0.0 ? BOUNCES : strikes && gap > 0.0 && before < -s->tolerance*scale ? LANDS : RESTS;
+        at->back[c] = at->rests[c] == BOUNCES ? -e*before - at->arrive[c] : 0.0;
+        lands = lands || at->rests[c] == LANDS;
         rebounds = rebounds || at->back[c] != 0.0;
     }
     memcpy(at->out, at->P, (size_t)n*sizeof(double)); /* what the solution starts from */
@@ -84,9 +88,11 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
         double work = 0.0, moved = 0.0;
         memcpy(at->c, at->undisturbed, (size_t)n*sizeof(double));
         for (int c = 0; c < m; c++) { at->c[c*d] -= at->arrive[c] + part*at->back[c]; }
-        memcpy(at->P, at->out, (size_t)n*sizeof(double));
-        CHOSEN(solve_contacts)(m, d, at->W, at->c, at->friction, at->P, rough*s->tolerance*scale, s->most, at->work, at->numbers,
-                              &count, &residual);
+        if (!lands || k || !land(s, at, h, rough*s->tolerance*scale, &count, &residual)) {
+            memcpy(at->P, at->out, (size_t)n*sizeof(double));
+            CHOSEN(solve_contacts)(m, d, at->W, at->c, at->friction, at->P, rough*s->tolerance*scale, s->most, at->work,
+                                  at->numbers, &count, &residual);
+        }
         if (!rebounds) {
             break;
         }
@@ -120,7 +126,7 @@ static int push_out(const eomgen_rigid *s, const inertia *held, meeting *at, con
     across(s->n_v, n, at->J, next, at->undisturbed);
     for (int c = 0; c < m; c++) {
         const double gap = -at->records[RECORD_OF*c + 5], removed = -RIGID_REMOVED*gap;
-        if (gap < -s->tolerance*h*at->scale && at->rests[c] && (at->P[c*d] > 0.0 || h*at->undisturbed[c*d] < removed)) {
+        if (gap < -s->tolerance*h*at->scale && at->rests[c] != BOUNCES && (at->P[c*d] > 0.0 || h*at->undisturbed[c*d] < removed)) {
             wanted[count] = -removed, P[count] = 0.0, at->before[count] = 0.0;
             largest = fmax(largest, removed);
             lasts[count++] = c;

@@ -205,11 +205,11 @@ static void close_all(eomgen_rigid *s, const inertia *held, double t, double *wo
 }
 
 /* Whether contacts do not feel that velocities are projected onto the constraints at the end, at which the next solution aims. */
-static int bears(eomgen_rigid *s, const inertia *held, meeting *at, double t, const double *ahead, const double *v, int last, double *work,
+static int bears(eomgen_rigid *s, const inertia *held, meeting *at, double t, double h, const double *v, int last, double *work,
                  double *seen, double *aim, double *d, eomgen_rigid *told, int *failed)
 {
     double felt;
-    move(s, s->x_m, 1.0, ahead, s->next);
+    move(s, s->x_m, 0.5*h, v, s->next);
     memcpy(s->next + s->n_q, v, (size_t)s->n_v*sizeof(double));
     *failed = *failed ? *failed : find_inputs(s, t);
     if (s->n_h) {
@@ -239,13 +239,13 @@ static long sum_of(const long *sizes, int count)
 
 /* Places of all that a step needs, whatever its contacts. */
 enum { OF_L, OF_Q, OF_R, OF_C, OF_SIZES, OF_DRIFT, OF_BIAS, OF_AGAIN, OF_FREE, OF_NEW, OF_AWAY, OF_WORK, OF_SPOTS, OF_AXES, OF_AIM,
-       OF_SEEN, OF_INPUTS, OF_AHEAD, FIXED };
+       OF_SEEN, OF_INPUTS, FIXED };
 
 static void fixed_sizes(const eomgen_rigid *s, long sizes[FIXED])
 {
     const long n = s->n_v, n_c = s->n_c, wide = n + s->n_rows;
     const long found[FIXED] = {n*n, n_c*n, n_c*n_c, s->n_rows*n, wide, n_c, n, n, n, n, n, 2*wide, s->n_spots, 6*n, n_c, n_c,
-                                s->n_u, n};
+                                s->n_u};
     memcpy(sizes, found, sizeof found);
 }
 
@@ -277,8 +277,8 @@ static void place_meeting(const eomgen_rigid *s, meeting *at)
 int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
 {
     const int n_q = s->n_q, n = s->n_v;
-    const double *const v = s->x + n_q;
-    double *part[FIXED], *next = s->held, *const x_m = s->x_m, rough, middle = t, first = 0.5*h;
+    const double middle = t + 0.5*h, *const v = s->x + n_q;
+    double *part[FIXED], *next = s->held, *const x_m = s->x_m, rough;
     long sizes[FIXED];
     eomgen_rigid told = *s;
     inertia held;
@@ -290,41 +290,31 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
     place_meeting(s, &at);
     told.residual = told.depth = 0.0, told.missed = told.iterations = 0;
 
-    for (int again = 0; !failed; again++) { /* where shapes land, again with the middle at that time */
-        double later;
-        middle = t + first;
-        move(s, s->x, first, v, x_m);
-        memcpy(x_m + n_q, v, (size_t)n*sizeof(double));
-        if (s->inputs != NULL && s->inputs(s->forcing, middle, x_m, s->u)) {
-            return EOMGEN_NO_INPUT;
-        }
-        if (!again && passes(s, t, 0.5*h, s->x, &failed)) {
+    move(s, s->x, 0.5*h, v, x_m);
+    memcpy(x_m + n_q, v, (size_t)n*sizeof(double));
+    if (s->inputs != NULL && s->inputs(s->forcing, middle, x_m, s->u)) {
+        return EOMGEN_NO_INPUT;
+    }
+    if (passes(s, t, 0.5*h, s->x, &failed)) {
+        return EOMGEN_TOO_LONG;
+    }
+    if (s->begins && !failed) { /* shapes that touch at the start and approach: later steps end with velocities that part them */
+        memcpy(s->next + n_q, v, (size_t)n*sizeof(double));
+        move(s, s->x, -0.5*h, v, s->next);
+        if (passes(s, t, 0.5*h, s->next, &failed)) {
             return EOMGEN_TOO_LONG;
         }
-        if (!again && s->begins && !failed) { /* touching and approaching: later steps end with velocities that part shapes */
-            memcpy(s->next + n_q, v, (size_t)n*sizeof(double));
-            move(s, s->x, -0.5*h, v, s->next);
-            if (passes(s, t, 0.5*h, s->next, &failed)) {
-                return EOMGEN_TOO_LONG;
-            }
-        }
-        if (failed || call(s, &s->bias, middle, x_m, part[OF_BIAS])
-            || find_inertia(s, middle, &held, part[OF_C], part[OF_SIZES], x_m, part[OF_DRIFT])) {
-            return EOMGEN_LOOK;
-        }
-        for (int r = 0; r < s->n_c; r++) { /* constraints hold for the mean of the velocities at first, in a landing for those after */
-            const double drift = part[OF_DRIFT][r];
-            part[OF_AIM][r] = again ? -drift : -2.0*drift - dot(n, part[OF_C] + s->rows[r]*n, v);
-        }
-        memcpy(part[OF_INPUTS], s->u, (size_t)s->n_u*sizeof(double));
-        fall(&held, part[OF_C], s->rows, part[OF_AIM], v, h, part[OF_BIAS], part[OF_WORK], part[OF_FREE]);
-        failed = find_contacts(s, middle, &held, h, part[OF_FREE], part[OF_SPOTS], part[OF_AXES], &at, keys, &told);
-        later = failed || again == RIGID_LANDINGS || !at.m ? 0.0 : until_landing(s, &at, part[OF_FREE], h);
-        if (!(later > 0.0)) {
-            break;
-        }
-        first += later;
     }
+    if (failed || call(s, &s->bias, middle, x_m, part[OF_BIAS])
+        || find_inertia(s, middle, &held, part[OF_C], part[OF_SIZES], x_m, part[OF_DRIFT])) {
+        return EOMGEN_LOOK;
+    }
+    for (int r = 0; r < s->n_c; r++) { /* constraints hold for the mean of the velocities at first */
+        part[OF_AIM][r] = -2.0*part[OF_DRIFT][r] - dot(n, part[OF_C] + s->rows[r]*n, v);
+    }
+    memcpy(part[OF_INPUTS], s->u, (size_t)s->n_u*sizeof(double));
+    fall(&held, part[OF_C], s->rows, part[OF_AIM], v, h, part[OF_BIAS], part[OF_WORK], part[OF_FREE]);
+    failed = find_contacts(s, middle, &held, h, part[OF_FREE], part[OF_SPOTS], part[OF_AXES], &at, keys, &told);
     for (int i = 0; i < n; i++) { x_m[n_q + i] = 0.5*(v[i] + part[OF_FREE][i]); }
     failed = failed ? failed : call(s, &s->bias, middle, x_m, part[OF_AGAIN]);
     /* forces that do not change with velocities need one solution, which then is the one that counts */
@@ -336,16 +326,13 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
         } else {
             memcpy(part[OF_NEW], part[OF_FREE], (size_t)n*sizeof(double));
         }
-        for (int i = 0; i < n; i++) { /* from the middle to the end: forces move nothing else than with it half a step on */
-            part[OF_AHEAD][i] = (h - first)*part[OF_NEW][i] + (first - 0.5*h)*(part[OF_FREE][i] - v[i]);
-        }
         if (!settled || s->n_c) {
             for (int i = 0; i < n; i++) { x_m[n_q + i] = 0.5*(v[i] + part[OF_NEW][i]); }
             failed = call(s, &s->bias, middle, x_m, part[OF_AGAIN]);
             settled = settled || (rough == 1.0 && memcmp(part[OF_AGAIN], part[OF_BIAS], (size_t)n*sizeof(double)) == 0);
         }
         if (s->n_c && !failed) {
-            settled = bears(s, &held, &at, t + h, part[OF_AHEAD], part[OF_NEW], round == RIGID_ROUNDS - 1, part[OF_WORK], part[OF_SEEN],
+            settled = bears(s, &held, &at, t + h, h, part[OF_NEW], round == RIGID_ROUNDS - 1, part[OF_WORK], part[OF_SEEN],
                             part[OF_AIM], part[OF_AWAY], &told, &failed) && settled;
             memcpy(s->u, part[OF_INPUTS], (size_t)s->n_u*sizeof(double));
         }
@@ -358,10 +345,10 @@ int CHOSEN(rigid_step)(eomgen_rigid *s, double t, double h)
         return failed;
     }
     memcpy(x_m + n_q, part[OF_NEW], (size_t)n*sizeof(double));
-    if (passes(s, middle, h - first, x_m, &failed)) {
+    if (passes(s, middle, 0.5*h, x_m, &failed)) {
         return EOMGEN_TOO_LONG;
     }
-    move(s, x_m, 1.0, part[OF_AHEAD], s->next);
+    move(s, x_m, 0.5*h, part[OF_NEW], s->next);
     memcpy(s->next + n_q, part[OF_NEW], (size_t)n*sizeof(double));
     s->m = at.m;
     if (at.m) { keep_impulses(s, &at, keys); }
