@@ -73,11 +73,9 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
         unknown = [*forces, *(row.multiplier for row in rows)]
         a, columns = _motion(linear, mobility, unknown, users)
         found = _linear_parts([*kinematics.a, *multipliers], measured, unknown, a, columns)
-        after = (
-            AfterEvents(kinematics, rows, [a[: len(kinematics.v)] for a in columns[len(laws) :]]).velocities()
-            if rows
-            else {}
-        )
+        if rows:
+            by_multipliers = [column[: len(kinematics.v)] for column in columns[len(laws) :]]
+            after = AfterEvents(kinematics, rows, by_multipliers).velocities()
         still, gain = hold(found, rows, len(laws))
         gain = _asked_at_states(kinematics, gain) if laws else gain
         symbols += [row.multiplier for row in rows]

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
+from eomgen.errors import ModelError, UsageError
 from eomgen.generation import generate
 
 TARGETS = ("cython", "numpy")
@@ -158,3 +159,38 @@ def test_an_exported_package_follows_too(tmp_path: Path, monkeypatch: pytest.Mon
     finally:
         for name in [name for name in sys.modules if name.partition(".")[0] == "thrown"]:
             del sys.modules[name]
+
+
+@pytest.mark.parametrize("names", [("e0", "e3"), ("e0", "e1", "e2", "e3")])
+@pytest.mark.parametrize("joint", ["spherical", "free"])
+def test_slopes_of_euler_parameters(names: tuple[str, ...], joint: str) -> None:
+    """d(cos(a/2), n sin(a/2))/da, and the fit that they lead."""
+    m = eg.Model("turned", gravity=(0, 0, 0))
+    m.parameter("a", 0.5)
+    body = m.body("body", mass=1.0, inertia={"xx": 1.0, "yy": 2.0, "zz": 3.0})
+    getattr(m, joint)("S", m.ground, body, rotation="euler_parameters")
+    n = {"e3": 1.0} if len(names) == 2 else {"e1": 0.6, "e2": 0.0, "e3": 0.8}
+    m.initial({"S_e0": "cos(a/2)"} | {f"S_{k}": f"{n[k]}*sin(a/2)" for k in names[1:]})
+    module = m.compile(target="numpy")
+    slopes = module.sensitivities(["a"], 0.5)
+    expected = {"e0": -0.5 * np.sin(0.25)} | {k: 0.5 * x * np.cos(0.25) for k, x in n.items()}
+    for k, value in expected.items():
+        assert slopes[f"S_{k}", "a"][0] == pytest.approx(value, abs=1e-12)
+    run = module.simulate(0.5, parameters={"a": 0.7}, t_eval=np.linspace(0.0, 0.5, 4))
+    data = {"t": run.t} | {f"S_{k}": run[f"S_{k}"] for k in ("e0", "e3")}
+    assert module.fit(data, ["a"]).parameters["a"] == pytest.approx(0.7, rel=1e-6)
+
+
+def test_values_that_are_no_numbers_are_named() -> None:
+    m = eg.Model("root", gravity=(0, 0, 0))
+    m.parameter("a", 0.5)
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="q")
+    m.initial(q="sqrt(a)")
+    module = m.compile(target="numpy")
+    with pytest.raises(UsageError, match=r"initial\.q is no number with a = -1"):
+        module.bind({"a": -1.0})
+    with pytest.raises(UsageError, match=r"initial\.q is no number with a = -1"):
+        module.simulate(1.0, parameters={"a": -1.0})
+    m.initial(q="sqrt(-a)")
+    with pytest.raises(ModelError, match=r"initial\.q: is no number at the declared parameters"):
+        m.compile(target="numpy")

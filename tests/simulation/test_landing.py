@@ -138,3 +138,38 @@ def test_a_landing_keeps_momenta(target: str, part: float) -> None:
     for kept in (mass @ vx, mass @ vy, (mass @ (x * vy - y * vx) + inertia @ w)[: hit + 1]):
         assert kept == pytest.approx(np.full(len(kept), kept[0]), abs=1e-12)
     assert np.diff(run["energy"]).max() < 1e-6 * run["energy"][0]
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("gap", [0.01, 0.0103])
+def test_a_landing_moves_nothing_else(target: str, gap: float) -> None:
+    """A box that a large force presses to the floor, where friction holds it, while another lands beside it."""
+    m = eg.Model("beside", gravity=(0, -9.81, 0))
+    held, other = m.body("held", mass=0.1, inertia={"zz": 0.001}), m.body("other", mass=1.0, inertia={"zz": 0.01})
+    m.planar("a", m.ground, held)
+    m.planar("b", m.ground, other)
+    m.force("press", held.at(0, 0, 0), (300, -1000, 0))
+    boxes = [{"shape": "box", "on": body, "size": (0.2, 0.2)} for body in (held, other)]
+    law = {"normal_law": "rigid", "restitution": 0.0, "friction": 0.5}
+    m.contacts("floor", boxes, {"shape": "half_plane", "on": m.ground}, law)
+    start = {"a_y": 0.1, "b_x": 2.0, "b_y": 0.1 + gap, "b_y_dot": -1.0}
+    run = m.compile(target=target).simulate(0.03, start, method="moreau", step=1e-3)
+    assert run["b_y"][-1] == pytest.approx(0.1, abs=1e-9)
+    assert np.abs(run["a_x"]).max() < 1e-10
+    assert np.abs(run["a_y"] - 0.1).max() < 1e-10
+
+
+def test_fast_bodies_stop_at_thin_walls_while_others_land() -> None:
+    m = eg.Model("wall", gravity=(0, -9.81, 0))
+    fast, ball = m.body("fast", mass=1.0, inertia={"zz": 0.01}), m.body("ball", mass=1.0, inertia={"zz": 0.01})
+    m.planar("a", m.ground, fast)
+    m.planar("b", m.ground, ball)
+    small, large = ({"shape": "circle", "on": b, "radius": r} for b, r in ((fast, 0.005), (ball, 0.1)))
+    wall = {"shape": "box", "on": m.ground.at(0.5, 1.0, 0), "size": (0.01, 2.0)}
+    law = {"normal_law": "rigid", "restitution": 0.0, "friction": 0.2}
+    m.contacts("stop", small, wall, law)
+    m.contacts("floor", large, {"shape": "half_plane", "on": m.ground}, law)
+    module = m.compile()
+    for phase in np.linspace(0.0, 0.02, 23):
+        start = {"a_x": 0.1 + phase, "a_y": 1.0, "a_x_dot": 20.0, "b_x": -1.0, "b_y": 0.1 + 0.0189, "b_y_dot": -1.0}
+        assert module.simulate(0.04, start, method="moreau", step=1e-3)["a_x"].max() < 0.5

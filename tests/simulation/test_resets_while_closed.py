@@ -185,3 +185,52 @@ def test_a_counter_of_samples_is_not_reset() -> None:
     m.event("kick", "t - 0.35", reset={counter: 10})
     with pytest.raises(ModelError, match=rf"events.kick.reset.{counter}.*counts samples"):
         m.compile(target="numpy")
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_positions_are_refused_at_rest_too(target: str) -> None:
+    """Where new velocities are 0, whatever they are divided by."""
+    module = sliders({"s": "s + 1", "s_dot": 0, "r_dot": 0}, False).compile(target=target)
+    with pytest.raises(SimulationError, match="contradict what is closed"):
+        module.simulate(1.0, {"s_dot": 1.0, "r_dot": 1.0})
+
+
+def dragged(count: int, kick: dict[str, Any], **clutch: str) -> eg.Model:
+    """Slider-cranks, of which the first drags a sledge by a clutch."""
+    m = eg.Model("dragged", gravity=(0, -9.81, 0))
+    for k in range(count):
+        crank = m.body(f"crank{k}", mass=1.0, inertia={"zz": 0.01}, com=(0.1, 0, 0))
+        rod = m.body(f"rod{k}", mass=1.0, inertia={"zz": 0.02}, com=(0.25, 0, 0))
+        block = m.body(f"block{k}", mass=1.0)
+        m.revolute(f"A{k}", m.ground.at(0, 2 * k, 0), crank, axis="z", coordinate=f"theta{k}")
+        m.revolute(f"B{k}", crank.at(0.2, 0, 0), rod, axis="z", coordinate=f"phi{k}")
+        m.prismatic(f"C{k}", m.ground.at(0, 2 * k, 0), block, axis="x", coordinate=f"s{k}")
+        m.revolute(f"D{k}", rod.at(0.5, 0, 0), block, axis="z", coordinate=f"psi{k}")
+        m.guess({f"phi{k}": -0.2, f"s{k}": 0.65})
+        m.initial({f"theta{k}": 0.4, f"theta{k}_dot": 1.0})
+    m.prismatic("E", m.ground, m.body("other", mass=2.0), axis="x", coordinate="r")
+    m.coupling("clutch", equation="vx(block0) - r_dot", **clutch)
+    m.event("kick", "t - 0.2", direction=1, reset=kick)
+    return m
+
+
+def test_a_kick_and_a_clutch_that_closes_at_once() -> None:
+    """As the kick by one event and the impact of the clutch by another, right after it."""
+    kick, close = {"theta0_dot": "theta0_dot + 3"}, {"clutch_closed": 1}
+    at_once = dragged(1, kick | close, closes="100 - t").compile(target="numpy").simulate(0.3)
+    m = dragged(1, kick, closes="100 - t")
+    m.event("later", "t - 0.2 - 1e-9", direction=1, reset=close)
+    one_by_one = m.compile(target="numpy").simulate(0.3)
+    assert at_once.x[:, -1] == pytest.approx(one_by_one.x[:, -1], abs=1e-6)
+    assert abs(at_once["r_dot"][-1]) > 1e-2
+
+
+@pytest.mark.parametrize("count", [1, 21])
+def test_loops_apart_from_what_is_closed_are_left_to_themselves(count: int) -> None:
+    kick = {f"theta{count - 1}_dot": f"0.5*theta{count - 1}_dot"}
+    keys: tuple[dict[str, str], ...] = ({"opens": "100 - t"}, {})
+    mine, judge = (dragged(count, kick, **one).compile(target="numpy") for one in keys)
+    x = judge.x0()
+    start = dict(zip(judge.x_names, x.tolist(), strict=True))
+    found = [one.simulate(0.3, start).x[: len(x), -1] for one in (mine, judge)]
+    assert found[0] == pytest.approx(found[1], abs=1e-5)
