@@ -15,10 +15,11 @@ from ..runtime.room import read_number, read_numbers
 from .eigenvalue_rounding import own_accelerations
 from .linear_given import find_given_tangent, refuse_inputs
 from .linearization import Linearization
-from .tangent import displacement_names, displacement_rates, find_tangent, projected_directions
+from .tangent import TangentSpace, displacement_names, displacement_rates, find_tangent, projected_directions
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+    from ..runtime.layout import Layout
 
 FORMS = ("minimal", "full")
 
@@ -105,7 +106,7 @@ def linearize(
             layout, time, state, module.u, (moved[chosen], U[chosen], C, D), names, rates[chosen], None, tangent
         )
     refuse_closed(layout, state[layout.n_x - len(layout.states) :], "linearize in minimal form")
-    tangent = find_tangent(module, time, state, J, independent)
+    tangent = _without_switches(layout, find_tangent(module, time, state, J, independent))
     n_q, n_z = layout.n_q, len(tangent.positions)
     moved = J @ tangent.T
     turned = np.hstack([tangent.Z, np.zeros_like(tangent.B)])
@@ -124,6 +125,15 @@ def linearize(
     return Linearization(
         layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent, own
     )
+
+
+def _without_switches(layout: Layout, tangent: TangentSpace) -> TangentSpace:
+    """The same without the states that are 0 while a constraint is open, which no motion changes."""
+    switched = [layout.v.index(f"{name}_closed") for name in layout.metadata.get("switched", ())]
+    kept = ~np.isin(tangent.velocities, switched)
+    n_z = len(tangent.positions)
+    T = np.hstack([tangent.T[:, :n_z], tangent.T[:, n_z:][:, kept]])
+    return tangent._replace(velocities=tangent.velocities[kept], B=tangent.B[:, kept], T=T)
 
 
 def _outputs(

@@ -71,7 +71,7 @@ class Linearization:
         if second is not None:
             self.mass, self.damping, self.stiffness = second
         self.tangent = tangent
-        n_z = len(states) - layout.n_dof if tangent is not None else layout.n_q
+        n_z = layout.n_q if tangent is None else len(states) - len(tangent.velocities)
         self.position_names, self.velocity_names = states[:n_z], states[n_z:]
 
     @property

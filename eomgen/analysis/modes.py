@@ -80,7 +80,8 @@ class Modes:
         assert linear.mass is not None
         assert linear.tangent is not None
         self.linear, self.name, self._module = linear, linear.name, module
-        n = len(linear.velocity_names) - len(linear.layout.states)  # those of first-order states are the last
+        states = {*linear.layout.states}
+        n = sum(name not in states for name in linear.velocity_names)  # those of first-order states are the last
         self.names, self.v_names = linear.velocity_names[:n], linear.layout.v
         self.squares, self.shapes = _undamped(linear.mass[:n, :n], stiffness(linear)[:n, :n])
         turned = np.abs(linear.A[: len(linear.position_names), len(linear.position_names) :])
