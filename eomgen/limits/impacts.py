@@ -27,6 +27,8 @@ MOMENT = 1e-6
 STARTED = 1e-5
 #: Part of the span by which the rates on one side of an event are looked at.
 ASIDE = 1e-7
+#: Part of the slopes after a reset by which errors of closed equations may grow: those of differences over ASIDE, 1e-8.
+CONTRADICTS = 1e-5
 #: Part of the rates by which they may differ on both sides of an event and count as continuous.
 SMOOTH = 1e-9
 #: Part of the span within which events are simultaneous.

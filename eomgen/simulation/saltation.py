@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import NoDerivativeError, UsageError
-from ..limits.impacts import ASIDE, SIMULTANEOUS, SMOOTH, TOUCHING
+from ..limits.impacts import ASIDE, CONTRADICTS, SIMULTANEOUS, SMOOTH, TOUCHING
 from ..numeric.scales import Array
 from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Events, RunEvent, Together
 from .impact_slopes import after_impact, after_reset
@@ -125,7 +125,9 @@ class Saltation:
         forcing = self.run.forcing
         here = self.module.bind(u=forcing(t, x))
         if self.events.model[index].action == RESET:
-            return after_reset(self.run, here, t, x, move, x_after, index, forcing(t, x))
+            found = after_reset(self.run, here, t, x, move, x_after, index, forcing(t, x))
+            self._refuse_contradictions(t, (x, x_after), (move.x, found), move, index)
+            return found
         declared = self.events.declared
         values = self.module.kernels.timed("events", nan=True)(t, x, u=forcing(t, x))
         near = TOUCHING * max(1.0, self.module.layout.length)
@@ -259,6 +261,36 @@ class Saltation:
             near = max(self._error(x, gradient), abs(rate) * SIMULTANEOUS * abs(self.span[1] - self.span[0]))
             if abs(value) <= near:
                 raise self._at_once(t, [self.names[own], self.names[other]])
+
+    def _refuse_contradictions(
+        self, t: float, x: tuple[Array, Array], d: tuple[Array, Array], move: Move, index: int
+    ) -> None:
+        """Refuse a reset whose new positions obey what is closed here, but not where a parameter changes.
+
+        ``x`` and ``d`` are states and their derivatives (n_x, k) before and after it.
+        """
+        module, layout = self.module, self.module.layout
+        rows = module.metadata.get("held_rows", [])
+        closed = [k for k, (_, state, _) in enumerate(rows) if x[0][layout.x.index(state)] > 0.5]
+        if not closed or "held_errors" not in module.kernels.core.names:
+            return
+        errors = module.kernels.timed("held_errors")
+        for column, name in enumerate(self.run.columns.names):
+            h = ASIDE / max(1.0, float(np.abs(d[0][:, column]).max()), float(np.abs(d[1][:, column]).max()))
+            slopes = []
+            for state, slope in zip(x, d, strict=True):
+                ends = [
+                    errors(t + s * move.t[column], state + s * slope[:, column], p=module.p + s * move.p[:, column])
+                    for s in (h, -h)
+                ]
+                slopes.append((ends[0] - ends[1])[::2][closed] / (2.0 * h))
+            least = CONTRADICTS * float(np.abs(d[1][:, column]).max())
+            if np.minimum(np.abs(slopes[1] - slopes[0]), np.abs(slopes[1])).max() > least:
+                raise NoDerivativeError(
+                    f"event {self.events.declared[index]['name']} gives positions at t = {t:.6g} s that contradict "
+                    f"what is closed ({', '.join(rows[k][0] for k in closed)}) as soon as {name} changes, so there is "
+                    "no derivative; give positions that obey it for all values"
+                )
 
     @staticmethod
     def _at_an_end(t: float, name: str, what: str) -> NoDerivativeError:

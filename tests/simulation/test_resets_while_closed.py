@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen.errors import ModelError, SimulationError, UsageError
+from eomgen.errors import ModelError, NoDerivativeError, SimulationError, UsageError
 
 TARGETS = ("numpy", "cython")
 
@@ -234,3 +234,17 @@ def test_loops_apart_from_what_is_closed_are_left_to_themselves(count: int) -> N
     start = dict(zip(judge.x_names, x.tolist(), strict=True))
     found = [one.simulate(0.3, start).x[: len(x), -1] for one in (mine, judge)]
     assert found[0] == pytest.approx(found[1], abs=1e-5)
+
+
+def test_slopes_by_what_a_closed_constraint_forbids_are_refused() -> None:
+    """s = r is closed, and the event moves s by k: fine for k = 0, and for no k beside it."""
+
+    def moved(reset: dict[str, Any]) -> Any:
+        m = sliders(reset, False)
+        m.parameter("k", 0.0)
+        return m.compile(target="numpy")
+
+    with pytest.raises(NoDerivativeError, match=r"event kick gives positions.*contradict what is closed.*k changes"):
+        moved({"s": "s + k"}).sensitivities(["k"], 1.0, {"s_dot": 1.0, "r_dot": 1.0})
+    both = moved({"s": "s + k", "r": "r + k"}).sensitivities(["k"], 1.0, {"s_dot": 1.0, "r_dot": 1.0})
+    assert both.dx[:2, 0, -1] == pytest.approx([1.0, 1.0], abs=1e-6)
