@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import UsageError
 from ..limits.constraints import MEASURED
 from ..numeric import algebra
+from ..numeric.ranks import rank
 from ..numeric.scales import Array
 from .impact_friction import Sliding
 
@@ -36,7 +37,8 @@ def require_distances(
     layout = module.layout
     joints = layout.metadata.get("translations", ())
     rubs = np.flatnonzero(sliding.coefficients[sliding.owner] > 0.0)
-    if not joints or not rubs.size or layout.n_c or "poses" not in module.kernels.core.names:
+    depend = layout.n_c or layout.metadata.get("held_rows")  # coordinates, on each other
+    if not joints or not rubs.size or depend or "poses" not in module.kernels.core.names:
         return
     for gap in sorted({*sliding.owner[rubs].tolist()}):
         own = [k for k in rubs.tolist() if sliding.owner[k] == gap]
@@ -50,7 +52,7 @@ def require_distances(
             places = [k for i in chain if crossed[i] for k in joints[i][3]]
             D = _directions(module, t, q, joints[j][2], places)
             lengths = np.linalg.norm(algebra.lstsq(D, rows[:, places].T, rcond=MEASURED), axis=0)
-            exact = np.linalg.matrix_rank(D, tol=MEASURED) == 3
+            exact = rank(D).rank == 3
             for what, length in zip(said, lengths.tolist(), strict=True):
                 if length > 1.0 + MEASURED or (exact and MEASURED < length < 1.0 - MEASURED):
                     raise UsageError(

@@ -126,6 +126,7 @@ def _python_files(context: dict[str, Any], core: Mapping[str, str]) -> dict[str,
     own = {name: render(f"python/{name}.j2", context) for name in names}
     parts = ("signals", "start_terms", "states", "clocks", "contact_shapes")
     declared = {key: bool(context["metadata"].get(key)) for key in parts}
+    declared["start_terms"] |= bool(context["metadata"].get("start_fixed"))
     declared["clocks"] |= bool(context["metadata"].get("switched"))  # of which runs go forward in time too
     found = carry_slim({**core, **own}, **declared) if slim else carry({**core, **own})
     context = context | {"folders": sorted({name.partition("/")[0] for name in found if "/" in name})}

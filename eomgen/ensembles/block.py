@@ -175,7 +175,8 @@ def find_forcing(module: BoundModel, plan: Plan) -> Forcing:
 def forcing_of(module: BoundModel, cases: Cases, plan: Plan, k: int) -> Forcing:
     """The inputs of run k."""
     forcing = find_forcing(module, plan)
-    forcing.attach(module.bind(**cases.column(k)))
+    with suppress(UsageError):  # of a run that cannot begin either
+        forcing.attach(module.bind(**cases.column(k)))
     forcing.unsettled = frozenset()
     forcing.begin(*plan.span)
     return forcing

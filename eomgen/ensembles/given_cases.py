@@ -187,6 +187,9 @@ def _assemble_all(
         for name, value in (late_values(module.layout, cases.p) | cases.values).items():
             if np.ndim(value):
                 x[module.x_names.index(name)] = value
+        for k in np.flatnonzero(~np.isfinite(x).all(axis=0)).tolist():  # of what follows from parameters
+            failed[k] = True
+            words.append(f"{module.x_names[int(np.argmin(np.isfinite(x[:, k])))]} is no number at the start")
         return x, failed, words
     if cases.states is not None and cases.alike:
         with suppress(EomgenError):  # some cannot be: find out which

@@ -12,7 +12,9 @@ from ..graph.differentiate import gradient
 from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import symbols_of
 from ..graph.tape import record_tape
+from ..graph.traverse import reachable
 from ..kinematics import Kinematics
+from ..operations import OPERATIONS
 
 
 def describe_start(kinematics: Kinematics) -> dict[str, Any]:
@@ -20,7 +22,8 @@ def describe_start(kinematics: Kinematics) -> dict[str, Any]:
 
     Their numbers are those at the declared parameters.  ``start_terms`` are the tapes of those that follow from
     parameters, by section with their names; ``start_slopes`` the derivatives of initial values that do not vanish, with
-    the name and the place of the parameter of each.
+    the name and the place of the parameter of each.  ``start_fixed`` are those that call tables or functions of the
+    model, which no tape can play, with the places of their parameters.
     """
     m = kinematics.mechanism
     given = {"initial": m.initial, "initial_outputs": m.initial_outputs, "guess": m.guess}
@@ -34,6 +37,10 @@ def describe_start(kinematics: Kinematics) -> dict[str, Any]:
         raise ModelError([m.problem(f"{key.partition('_')[0]}.{name}", what, remedy) for key, name in bad])
     places = {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)}
     late = {key: {n: x for n, x in terms.items() if symbols_of([x])} for key, terms in given.items()}
+    fixed = {n: x for terms in late.values() for n, x in terms.items() if not _is_of_operations(x)}
+    late = {key: {n: x for n, x in terms.items() if n not in fixed} for key, terms in late.items()}
+    if fixed:
+        found["start_fixed"] = {n: sorted(places[name][1] for name in symbols_of([x])) for n, x in fixed.items()}
     if not any(late.values()):
         return found
     known = [kinematics.graph.symbol(name) for name in places]
@@ -48,6 +55,11 @@ def describe_start(kinematics: Kinematics) -> dict[str, Any]:
     }
     tape = record_tape([slope for *_, slope in slopes], places.__getitem__)
     return found | {"start_terms": terms, "start_slopes": [[[name, k] for name, k, _ in slopes], list(tape)]}
+
+
+def _is_of_operations(x: Expr) -> bool:
+    """Whether a tape can play it."""
+    return {x.graph.nodes[i][0] for i in reachable(x.graph, [x.id])} <= {"sym", "const", *OPERATIONS}
 
 
 def _numbers(given: Mapping[str, Expr], values: Mapping[str, float | None]) -> dict[str, float]:

@@ -54,7 +54,7 @@ class Kernels:
         if p is not None and "scales" in core.names:
             scales = core.state("scales", self.context, layout.shape("scales"), self._unscaled, False, UsageError)
             self.layout = layout = layout.sized(scales(np.empty(0)))
-        if p is not None and "start_terms" in layout.metadata:
+        if p is not None and not layout.metadata.keys().isdisjoint(("start_terms", "start_fixed")):
             from .late_start import started
 
             self.layout = layout = started(layout, self.context.p)

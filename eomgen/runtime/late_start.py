@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from copy import copy
 from typing import Any
 
@@ -17,8 +18,15 @@ NO_STATE = np.empty((0, 1))  #: initial values depend on parameters only
 
 def started(layout: Layout, p: Array) -> Layout:
     """The same with initial values and guesses at parameters (n_p,) of other values."""
-    found = copy(layout)
-    for section, (names, tape) in layout.metadata["start_terms"].items():
+    found, declared = copy(layout), layout.metadata["p_values"]
+    for name, places in layout.metadata.get("start_fixed", {}).items():
+        if any(p[k] != declared[k] for k in places):
+            warnings.warn(
+                f"the initial value of {name} calls a table or a function of the model, so it stays at the declared "
+                f"parameters and does not follow {', '.join(layout.p[k] for k in places)}; give {name} for the run",
+                stacklevel=2,
+            )
+    for section, (names, tape) in layout.metadata.get("start_terms", {}).items():
         values = dict(zip(names, map(float, play_arrays(tape, p, NO_STATE)), strict=True))
         if bad := [name for name, value in values.items() if not np.isfinite(value)]:
             shown = ", ".join(f"{name} = {x:.6g}" for name, x in zip(layout.p, p, strict=True))

@@ -194,3 +194,29 @@ def test_values_that_are_no_numbers_are_named() -> None:
     m.initial(q="sqrt(-a)")
     with pytest.raises(ModelError, match=r"initial\.q: is no number at the declared parameters"):
         m.compile(target="numpy")
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_one_bad_set_of_parameters_fails_its_own_run(target: str) -> None:
+    m = eg.Model("root", gravity=(0, 0, 0))
+    m.parameter("a", 0.5)
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="q")
+    m.initial(q="sqrt(a)")
+    runs = m.compile(target=target).simulate_many(0.1, parameters={"a": [-1.0, 4.0]})
+    assert np.isnan(runs.x[:, 0]).all()
+    assert runs.x[0, 1] == pytest.approx(2.0, abs=1e-12)
+    assert (runs.status != 0).tolist() == [True, False]
+
+
+def test_tables_stay_and_it_is_said() -> None:
+    m = eg.Model("looked_up", gravity=(0, 0, 0))
+    m.parameter("a", 1.0)
+    m.parameter("b", 1.0)
+    m.prismatic("J", m.ground, m.body("b1", mass=1.0), axis="x", coordinate="q")
+    m.table("f", [0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 4.0, 9.0])
+    m.initial(q="f(a)", q_dot="2*b")
+    module = m.compile(target="numpy")
+    assert module.x0() == pytest.approx([1.0, 2.0])
+    assert module.bind({"b": 3.0}).x0() == pytest.approx([1.0, 6.0])
+    with pytest.warns(UserWarning, match="initial value of q calls a table or a function of the model.*follow a"):
+        assert module.bind({"a": 2.0}).x0() == pytest.approx([1.0, 2.0])
