@@ -175,8 +175,10 @@ def find_forcing(module: BoundModel, plan: Plan) -> Forcing:
 def forcing_of(module: BoundModel, cases: Cases, plan: Plan, k: int) -> Forcing:
     """The inputs of run k."""
     forcing = find_forcing(module, plan)
-    with suppress(UsageError):  # of a run that cannot begin either
-        forcing.attach(module.bind(**cases.column(k)))
+    bound = module
+    with suppress(UsageError):  # where these parameters have no start, the run does not begin
+        bound = module.bind(**cases.column(k))
+    forcing.attach(bound)
     forcing.unsettled = frozenset()
     forcing.begin(*plan.span)
     return forcing
