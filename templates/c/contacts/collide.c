@@ -40,7 +40,7 @@ static void recall(const eomgen_rigid *s, meeting *at, int *keys)
 /* The part of an impact without rebound that leaves shapes as fast as they meet in the next middle: a part of all impulses,
    friction too, between those without the contacts that land and those of the whole impact, so that the rest, which comes then,
    ends as the whole would have. 0 where these are not found; at->c holds what the laws of the others start from then too. */
-static int land(const eomgen_rigid *s, meeting *at, double h, double tolerance, int *count, double *residual)
+static int land(const eomgen_rigid *s, meeting *at, double tolerance, int *count, double *residual)
 {
     const int m = at->m, d = s->d, n = at->n;
     double *const whole = at->after, rest = 0.0, part = 0.0;
@@ -88,7 +88,7 @@ static void collide(const eomgen_rigid *s, const inertia *held, meeting *at, con
         double work = 0.0, moved = 0.0;
         memcpy(at->c, at->undisturbed, (size_t)n*sizeof(double));
         for (int c = 0; c < m; c++) { at->c[c*d] -= at->arrive[c] + part*at->back[c]; }
-        if (!lands || k || !land(s, at, h, rough*s->tolerance*scale, &count, &residual)) {
+        if (!lands || k || !land(s, at, rough*s->tolerance*scale, &count, &residual)) {
             memcpy(at->P, at->out, (size_t)n*sizeof(double));
             CHOSEN(solve_contacts)(m, d, at->W, at->c, at->friction, at->P, rough*s->tolerance*scale, s->most, at->work,
                                   at->numbers, &count, &residual);
