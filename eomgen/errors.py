@@ -30,16 +30,29 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
+from types import FrameType
 from typing import Any, NamedTuple
 
 from .texts import shortened, visible
 
 #: Characters of each part of a problem that are shown: names and expressions may be as long as the file.
 SHOWN = 2000
+#: What to do where a value is not finite.
+TO_BE_FINITE = "look for a division by zero, or a root or logarithm of a negative number"
 #: Files that users do not write: installed packages and eomgen's own.
 _HERE = re.escape(os.path.dirname(os.path.abspath(__file__)))
 _INSTALLED = re.compile(rf"[/\\](site|dist)-packages[/\\]|^{_HERE}|^<frozen")
+
+
+def calls_within() -> int:
+    """How many calls, this one's caller first, lie within the package: a warning's ``stacklevel`` is one more."""
+    package, calls = __name__.rpartition("errors")[0], 0
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None and str(frame.f_globals.get("__name__")).startswith(package):
+        frame, calls = frame.f_back, calls + 1
+    return calls
 
 
 class EomgenError(Exception):
@@ -53,7 +66,6 @@ class EomgenError(Exception):
 
         ``%xmode Verbose`` shows all of them.
         """
-        import sys
         import traceback
 
         shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()

@@ -65,7 +65,7 @@ class Kernel(NamedTuple):
         """How many numbers ``x`` has."""
         each = {"q": sizes.n_q, "q_guess": sizes.n_q, "q_rate": sizes.n_q, "v": sizes.n_v, "a": sizes.n_v, "cj": 1}
         each |= dict.fromkeys(("v_i", "a_i"), sizes.n_dof) | {"q_i": sizes.n_dof - sizes.n_states}
-        each["impulses"] = sizes.n_events
+        each |= {"impulses": sizes.n_events, "held_impulses": sizes.n_held // 2}
         each |= dict.fromkeys(("multipliers", "multiplier_rates"), sizes.n_c)
         each |= dict.fromkeys(("corrections", "correction_rates"), sizes.n_h) | {"rate_weights": sizes.n_x}
         each |= {"dq": sizes.n_q, "du": sizes.n_u} | dict.fromkeys(("dv", "da", "weights"), sizes.n_v)
@@ -79,8 +79,8 @@ INERTIAL = "of bodies, about their origins: twist, its rate less gravity; m, m c
 #: y, then y', of which only the rates of q and v are there
 DAE = ("q", "v", "multipliers", "corrections", "q_rate", "a", "multiplier_rates", "correction_rates")
 
-#: velocities, their change, impulses of the constraint rows and of the gaps
-STRIKE = ("q", "v", "a", "multipliers", "impulses")
+#: velocities, their change, impulses of the constraint rows, of the gaps and of what closes and opens
+STRIKE = ("q", "v", "a", "multipliers", "impulses", "held_impulses")
 BENT = ("q", "v", "a", "weights", "dq", "dv", "da")  #: a motion, weights of its forces, a direction
 
 KERNELS: tuple[Kernel, ...] = (
@@ -122,7 +122,7 @@ KERNELS: tuple[Kernel, ...] = (
         "strike_derivatives",
         STRIKE,
         lambda s: (s.n_strike, s.n_x + 1 + s.n_u + s.n_p),
-        "[M a + C_q^T l - n^T g, a/s^2 + C_q^T l, C_q v + C_t, rates of events] by [q, v, t, u, p]",
+        "[M a + C_q^T l - n^T g, a/s^2 + C_q^T l, C_q v + C_t, rates of events, of what is closed] by [q, v, t, u, p]",
         late=True,
     ),
     Kernel(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import TO_BE_FINITE
 from ..limits.constraints import CONTRADICTION
 from ..numeric.closure import close
 from ..numeric.scales import Array
@@ -34,7 +35,7 @@ def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> 
     undefined = ~np.isfinite(position(np.array(near))[0])  # whatever the position, by the time
     if undefined.any():
         owners = dict.fromkeys(layout.constraint_labels[i].partition(".")[0] for i in np.flatnonzero(undefined))
-        what = "no finite value: look for a root or logarithm of a negative number, or a division by zero"
+        what = f"no finite value: {TO_BE_FINITE}"
         return f"beyond it, at t = {t:.6g} s, {', '.join(owners)} has {what}"
     place = ", ".join(f"{n} = {v:.6g}" for n, v in zip(driven.led, y, strict=True)) or f"t = {t:.6g} s"
     if not gaps.max() > CONTRADICTION:

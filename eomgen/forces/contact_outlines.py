@@ -1,6 +1,7 @@
-"""Force elements, contact with closed outlines in the plane: corners, a smooth curve, a sprocket -> their pieces.
+"""Force elements, contact with profiles and outlines in the plane: corners, a smooth curve, a sprocket -> their pieces.
 
-Pieces are those of :mod:`.contact_profiles`, one after the other clockwise, so that the solid lies inside.
+Pieces are those of :mod:`.contact_profiles`, one after the other from left to right, or clockwise about a solid, and
+the corners where two of them turn towards each other.
 """
 
 from __future__ import annotations
@@ -15,9 +16,62 @@ from ..graph.core import Expr, cos, sin, sqrt
 from ..limits.contacts import SHARED
 from .branches import where
 from .contact_insides import notch
-from .contact_profiles import Point, ProfilePart, arc, beside_bowls, biarcs, edge, length, minus, tangent, times, unit
+from .contact_profiles import (
+    Point,
+    ProfilePart,
+    arc,
+    beside_bowls,
+    biarcs,
+    dot,
+    edge,
+    length,
+    minus,
+    tangent,
+    times,
+    unit,
+)
 
 Pair = tuple[float, float]
+
+
+def straight_pieces(points: Sequence[Point]) -> list[ProfilePart]:
+    """Edges from point to point; the first and the last go on beyond their ends."""
+    width = SHARED * length(minus(points[-1], points[0]))
+    edges = [minus(b, a) for a, b in itertools.pairwise(points)]
+    ways = [unit(one) for one in edges]
+    sides = [None, *ways, None]
+    found = [edge(points[k], one, sides[k], sides[k + 2], width, walls=True) for k, one in enumerate(edges)]
+    return found + [notch(points[k], ways[k - 1], ways[k], width) for k in range(1, len(edges))]
+
+
+def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
+    """Two circular arcs of one tangent from point to point (biarcs), and straight lines beyond the ends.
+
+    The tangent at a point is that of the circle through it and its neighbours, so that points of a circle give the
+    circle; the arcs are those of equal tangent lengths (Bolton, 1975, Computer-Aided Design 7, 83-89).
+    """
+    width = SHARED * length(minus(points[-1], points[0]))
+    ways = _tangents(points)
+    first, last = minus(points[1], points[0]), minus(points[-1], points[-2])
+    ray = times(ways[0], length(first))
+    found = [edge(minus(points[0], ray), ray, None, ways[0], width)]
+    for (a, b), (s, t) in zip(itertools.pairwise(points), itertools.pairwise(ways), strict=True):
+        found += biarcs(a, b, s, t, width)
+    return beside_bowls([*found, edge(points[-1], times(ways[-1], length(last)), ways[-1], None, width)])
+
+
+def _tangents(points: Sequence[Point]) -> list[Point]:
+    """Directions of the circles through each point and its neighbours."""
+    inner = [tangent(a, b, c) for a, b, c in zip(points, points[1:], points[2:], strict=False)]
+    first, last = minus(points[1], points[0]), minus(points[-1], points[-2])
+    return [_mirrored(inner[0], first), *inner, _mirrored(inner[-1], last)]
+
+
+def _mirrored(way: Point, chord: Point) -> Point:
+    """The tangent at the other end of a chord of a circle."""
+    c = unit(chord)
+    along = 2.0 * dot(way, c)
+    return along * c[0] - way[0], along * c[1] - way[1]
 
 
 def straight_ring(points: Sequence[Point]) -> list[ProfilePart]:

@@ -1,12 +1,11 @@
 """Force elements, contact with a profile in the plane: points of ground -> pieces, and how a circle touches a piece.
 
-A piece owns the points whose nearest point of the profile it holds: those between the bisectors at its ends.  Its depth
-counts for them alone, so that every circle meets one piece, or several where it bridges a valley that is narrower.
+A piece owns the points whose nearest point of the profile it holds, those between the bisectors at its ends, and where
+a neighbour turns towards it all that it faces.  So a circle meets one piece, or several where it bridges a valley.
 """
 
 from __future__ import annotations
 
-import itertools
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import reduce
@@ -16,13 +15,13 @@ from ..frames import Frame
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
-from ..limits.contacts import SHARED
 from ..records import dataclass
 from .branches import where
 from .contact import Contact, Touch
 from .force import View
 
 Point = tuple[Expr, Expr]
+WALLS = 7  #: place among the sizes of an edge of whether it is felt beside its neighbours
 
 
 class ProfilePart(NamedTuple):
@@ -44,17 +43,6 @@ class ProfilePart(NamedTuple):
         (c, s), (x, y) = self.along, self.origin
         turn = ((c, -s, zero), (s, c, zero), (zero, zero, one))
         return Frame(vec.product(base.rotation, turn), vec.add(base.position, vec.times(base.rotation, (x, y, zero))))
-
-
-def straight_pieces(points: Sequence[Point]) -> list[ProfilePart]:
-    """Edges from point to point; the first and the last go on beyond their ends."""
-    width = SHARED * length(minus(points[-1], points[0]))
-    edges = [minus(b, a) for a, b in itertools.pairwise(points)]
-    ways = [unit(one) for one in edges]
-    return [
-        edge(points[k], one, ways[k - 1] if k else None, ways[k + 1] if k + 1 < len(edges) else None, width)
-        for k, one in enumerate(edges)
-    ]
 
 
 def edge(
@@ -93,22 +81,6 @@ def hollow(radius: Expr, turned: Point | None) -> tuple[Expr, Expr, Expr]:
     return where(inwards, turned[0], 0.0), where(inwards, turned[1], 0.0), where(inwards, radius, 0.0)
 
 
-def smooth_pieces(points: Sequence[Point]) -> list[ProfilePart]:
-    """Two circular arcs of one tangent from point to point (biarcs), and straight lines beyond the ends.
-
-    The tangent at a point is that of the circle through it and its neighbours, so that points of a circle give the
-    circle; the arcs are those of equal tangent lengths (Bolton, 1975, Computer-Aided Design 7, 83-89).
-    """
-    width = SHARED * length(minus(points[-1], points[0]))
-    ways = _tangents(points)
-    first, last = minus(points[1], points[0]), minus(points[-1], points[-2])
-    ray = times(ways[0], length(first))
-    found = [edge(minus(points[0], ray), ray, None, ways[0], width)]
-    for (a, b), (s, t) in zip(itertools.pairwise(points), itertools.pairwise(ways), strict=True):
-        found += biarcs(a, b, s, t, width)
-    return [*found, edge(points[-1], times(ways[-1], length(last)), ways[-1], None, width)]
-
-
 def biarcs(a: Point, b: Point, s: Point, t: Point, width: Expr) -> tuple[ProfilePart, ProfilePart]:
     """Two arcs of one tangent from a point to another, at which the directions are s and t."""
     v, both = minus(b, a), (s[0] + t[0], s[1] + t[1])
@@ -128,25 +100,11 @@ def solid_depth(pieces: Sequence[ProfilePart], depth: Expr) -> Expr:
     return reduce(lambda least, bend: least / graph.apply("max", 1.0, least * bend), bends, depth)
 
 
-def _tangents(points: Sequence[Point]) -> list[Point]:
-    """Directions of the circles through each point and its neighbours."""
-    inner = [tangent(a, b, c) for a, b, c in zip(points, points[1:], points[2:], strict=False)]
-    first, last = minus(points[1], points[0]), minus(points[-1], points[-2])
-    return [_mirrored(inner[0], first), *inner, _mirrored(inner[-1], last)]
-
-
 def tangent(a: Point, b: Point, c: Point) -> Point:
     """The direction at b of the circle through three points."""
     before, after = minus(b, a), minus(c, b)
     p, q = dot(before, before), dot(after, after)
     return unit((before[0] * q + after[0] * p, before[1] * q + after[1] * p))
-
-
-def _mirrored(way: Point, chord: Point) -> Point:
-    """The tangent at the other end of a chord of a circle."""
-    c = unit(chord)
-    along = 2.0 * dot(way, c)
-    return along * c[0] - way[0], along * c[1] - way[1]
 
 
 def arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: Point | None = None) -> ProfilePart:

@@ -23,7 +23,7 @@ from ..numeric.polygon_edges import EDGE
 from ..records import dataclass
 from .contact_fields import field_lines
 from .contact_insides import bowls, notches, piece_numbers, told_by_arcs
-from .contact_outlines import smooth_ring, sprocket_ring, straight_ring
+from .contact_outlines import smooth_pieces, smooth_ring, sprocket_ring, straight_pieces, straight_ring
 from .contact_profiles import (
     Point,
     ProfilePart,
@@ -32,9 +32,7 @@ from .contact_profiles import (
     length,
     minus,
     peaks,
-    smooth_pieces,
     solid_depth,
-    straight_pieces,
 )
 from .contact_shape_fields import GROUNDS
 from .contact_solids import cuboid_parts
@@ -232,9 +230,9 @@ class ContactShape:
             Feature(one.kind, one.frame(frame), (*one.sizes, told), None if one.open else one.half + told, depth)
             for one in surface
         ]
+        hollows = [*notches(pieces), *bowls(pieces)]
+        found += [Feature(one.kind, one.frame(frame), (*one.sizes, depth), one.half, depth) for one in hollows]
         if self.kind not in GROUNDS:
-            hollows = [*notches(pieces), *bowls(pieces)]
-            found += [Feature(one.kind, one.frame(frame), (*one.sizes, depth), one.half, depth) for one in hollows]
             reach = greatest([length(one.origin) + one.half for one in surface])
             kind = f"{INSIDE}{len(surface)}"
             found.append(Feature(kind, frame, (*piece_numbers(surface), told), reach, depth))

@@ -14,7 +14,7 @@ from .contact_ellipsoids import EllipsoidEllipsoid, EllipsoidPlane, EllipsoidRod
 from .contact_fields import FieldEllipsoid, FieldRound, HeightField
 from .contact_insides import BowlRound, InsideRound, NotchRound
 from .contact_polygons import PolygonPolygon
-from .contact_profiles import ArcRound, EdgeRound
+from .contact_profiles import WALLS, ArcRound, EdgeRound
 from .contact_rounds import PolygonRound, RoundRound, SegmentRound
 from .contact_shapes import SOLE, greatest
 from .contact_solids import BlockRound, EdgeRod, RodRod
@@ -96,6 +96,8 @@ def touching(
         return (NotchRound if kinds[0] == "notch" else BowlRound)(*elastic, first, radius)
     if part_of(kinds[0]) == INSIDE:
         return InsideRound(*laws, first, radius)
+    if kinds[1] == "rim" and kinds[0] == "edge":
+        first = (*first[:WALLS], radius.graph.zero, *first[WALLS + 1 :])  # soil has no energy that parts could share
     if kinds[0] in ("edge", "arc"):
         return (EdgeRound if kinds[0] == "edge" else ArcRound)(*laws, first, radius)
     if kinds[0] in ("segment", "rod"):

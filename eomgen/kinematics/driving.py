@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..constraints import Driver
-from ..errors import AssemblyError, ModelError
+from ..errors import TO_BE_FINITE, AssemblyError, ModelError
 from ..graph.substitute import symbols_of
 from ..limits.constraints import CONTRADICTION
 from ..numeric import Assembly, rank
@@ -120,8 +120,7 @@ def _explain(
     if lost:
         names, labels = [drivers[i] for i in lost], functions.kinematics.constraints.labels
         return AssemblyError(
-            f"{', '.join(names)} has no finite value at t = 0: look for a division by zero, or a root or logarithm "
-            "of a negative number",
+            f"{', '.join(names)} has no finite value at t = 0: {TO_BE_FINITE}",
             [labels[i] for i in lost],
         )
     kept, spare = _needed(functions, drivers, q)

@@ -39,6 +39,9 @@ RESTING = 2.0
 APART = 4.0
 #: Part of a penetration that one step removes: an even part of it, so that pairs that share a body do not overshoot.
 REMOVED = 0.2
+#: Square of the compliance between two contacts, as a part of the product of their own, up to which it is rounding: the
+#: square of 1e-16 times a condition of 1e6, as above.
+LINKED = 1e-20
 YIELDING = 1e-3  #: part of its compliance by which a contact is softer where penetrations are removed: jams have an end
 GROWN = 1e-12  #: part of the energy that impacts move by which their sum may grow by rounding
 #: Halvings of one step until no shapes pass each other in its halves: speeds of 65,000 times what the step suits.

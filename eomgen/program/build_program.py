@@ -196,7 +196,8 @@ def _measure(terms: SystemTerms) -> Sizes:
 def _strike_rows(terms: SystemTerms) -> int:
     """Rows of ``strike_derivatives``: of models whose events change velocities that impulses or constraints rule."""
     ruled = terms.impacts or (terms.resets and terms.constraint_jacobian)
-    return 2 * terms.n_v + terms.n_c + len(terms.events) if ruled and not terms.given_rates else 0
+    count = 2 * terms.n_v + terms.n_c + len(terms.events) + len(terms.held_errors) // 2
+    return count if ruled and not terms.given_rates else 0
 
 
 def _select(kernels: Sequence[str] | None) -> list[Kernel]:

@@ -32,11 +32,11 @@ def output_derivatives(terms: SystemTerms) -> list[Expr]:
     return derivatives(terms, terms.outputs, (*terms.q, *terms.v, *terms.a, *terms.u, *terms.p))
 
 
-def strike_rows(terms: SystemTerms, impulses: Sequence[Expr]) -> list[Expr]:
+def strike_rows(terms: SystemTerms, impulses: Sequence[Expr], of_held: Sequence[Expr]) -> list[Expr]:
     """What rules velocities at an instant, a being their change.
 
-    The momentum balance with impulses l of constraints and g of gaps with normals n; the least scaled change;
-    constraints of velocities; the events' rates.
+    The momentum balance with impulses l of constraints, g of gaps with normals n, and those of constraints that close
+    and open; the least scaled change; constraints of velocities; the events' rates; those of what is closed.
     """
     graph = terms.graph
     v, a, l = ([graph.symbol(name) for name in names] for names in (terms.v, terms.a, terms.multipliers))
@@ -52,5 +52,9 @@ def strike_rows(terms: SystemTerms, impulses: Sequence[Expr]) -> list[Expr]:
         least = [x + c * one for x, c in zip(least, row, strict=True)]
     for i, g in enumerate(impulses):
         change = [x - normals.get((i, k), graph.zero) * g for k, x in enumerate(change)]
+    held = terms.held_errors[1::2]
+    by_held = jacobian(held, v[: terms.n_v - terms.n_states])
+    for (i, k), slope in by_held.items():
+        change[k] = change[k] + slope * of_held[i]
     moved = [x + y for x, y in zip(rates, drift, strict=True)]
-    return [*change, *least, *terms.velocity_constraints, *moved]
+    return [*change, *least, *terms.velocity_constraints, *moved, *held]

@@ -26,6 +26,7 @@ def port_symbols(terms: SystemTerms, n_h: int) -> Mapping[str, tuple[str, ...]]:
         "correction_rates": tuple(f"rate(correction[{i}])" for i in range(n_h)),
         "cj": ("cj",),
         "impulses": tuple(f"impulse[{i}]" for i in range(len(terms.events))),
+        "held_impulses": tuple(f"held_impulse[{i}]" for i in range(len(terms.held_errors) // 2)),
         "dq": tuple(f"d({q})" for q in terms.q),
         "dv": tuple(f"d({v})" for v in terms.v),
         "du": tuple(f"d({u})" for u in terms.u),

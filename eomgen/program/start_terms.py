@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-from ..errors import ModelError
+from ..errors import TO_BE_FINITE, ModelError
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.evaluate import compile_evaluator
@@ -32,9 +32,8 @@ def describe_start(kinematics: Kinematics) -> dict[str, Any]:
         key: _numbers(terms, values) for key, terms in given.items() if terms or key != "initial_outputs"
     }
     if bad := [(key, name) for key, of in found.items() for name, x in of.items() if not isfinite(x)]:
-        remedy = "look for a division by zero, or a root or logarithm of a negative number"
         what = "is no number at the declared parameters"
-        raise ModelError([m.problem(f"{key.partition('_')[0]}.{name}", what, remedy) for key, name in bad])
+        raise ModelError([m.problem(f"{key.partition('_')[0]}.{name}", what, TO_BE_FINITE) for key, name in bad])
     places = {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)}
     late = {key: {n: x for n, x in terms.items() if symbols_of([x])} for key, terms in given.items()}
     fixed = {n: x for terms in late.values() for n, x in terms.items() if not _is_of_operations(x)}

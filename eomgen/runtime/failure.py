@@ -14,6 +14,7 @@ from ..limits.rounding import LARGE_ROOT, TINY_ROOT
 from ..numeric.scales import Array
 from .layout import Layout
 
+Own = Array | None  #: p or u of a call; None for those that are bound
 SHOWN = 8  #: coordinates listed in a message
 
 WORDS = {
@@ -57,7 +58,7 @@ class Fail:
     def __init__(
         self,
         layout: Layout,
-        culprit: Callable[[int, float, Array, Array | None, Array | None], str] | None = None,
+        culprit: Callable[[int, float, Array, Own, Own], str] | None = None,
         poses: Callable[..., Array] | None = None,
     ) -> None:
         self.layout = layout
@@ -69,17 +70,15 @@ class Fail:
         what, names = ("parameter", self.layout.p) if label == "p" else ("input", self.layout.u)
         return self.layout.values(what, names, given, bound) if isinstance(given, Mapping) else given
 
-    def trouble(self, x: Array, t: float = 0.0, p: Array | None = None) -> tuple[str, str] | None:
+    def trouble(self, x: Array, t: float = 0.0, p: Own = None) -> tuple[str, str] | None:
         """What is wrong at a state with a rolling disc or with how a rotation is described, and the remedy."""
         return flat_disc(self.layout, x, t, p, self.poses) or rotation_trouble(self.layout, x)
 
-    def __call__(
-        self, name: str, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None
-    ) -> None:
+    def __call__(self, name: str, status: int, t: float, x: Array, p: Own = None, u: Own = None) -> None:
         raise self.exception(name, status, t, x, p, u)
 
     def exception(
-        self, name: str, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None
+        self, name: str, status: int, t: float, x: Array, p: Own = None, u: Own = None
     ) -> EvaluationError:
         """The exception, not raised."""
         what, remedy = WORDS.get(status, (f"the kernel returned status {status}", "this is a defect of eomgen"))
@@ -99,7 +98,8 @@ class Fail:
         elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE_ROOT]):
             blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
         elif name == "resets" and (switched := self.layout.metadata.get("switched")):
-            blame = f": new values are no numbers, or contradict what is closed ({', '.join(switched)}) or holds always"
+            held = ", ".join(one for one in switched if x[self.layout.x.index(f"{one}_closed")] > 0.5)
+            blame = f": new values are no numbers, or contradict what is closed ({held or 'nothing'}), closes or holds always"
             remedy = "give new values that obey it, or open it first (releases)"
         elif status == 4 and not len(self.layout.independent):
             what = "the constraints are singular here, and the mechanism has no degree of freedom"
@@ -114,9 +114,8 @@ class Fail:
         return error(f"{name} at t = {t:.6g}{place(names, x)}: {what}{blame}; {remedy}", t, x)
 
     def _names(self, kernel: str) -> Sequence[str]:
-        takes = NAMED[kernel].inputs if kernel in NAMED else ()
         known = {("q",): self.layout.q, ("q", "v"): self.layout.x, ("q", "v", "a"): self.layout.x + self.layout.a}
-        return known.get(takes, ())
+        return known.get(NAMED[kernel].inputs if kernel in NAMED else (), ())
 
 
 def no_rotation(layout: Layout, x: Array) -> tuple[str, str] | None:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError, UnavailableError
+from ..errors import AssemblyError, UnavailableError, calls_within
 from ..limits.constraints import GONE, INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
 from ..numeric.assembly_velocity import VelocityEquations, assemble_velocity
@@ -137,7 +137,7 @@ class Initial:
         warnings.warn(
             f"{what} cannot be reached from the reference position on the same branch: {error}.  The loops are closed "
             "from the nearest guess instead; branches() gives all positions found, assemble() the one near a guess",
-            stacklevel=2,
+            stacklevel=calls_within() + 1,
         )
 
     @np.errstate(all="ignore")

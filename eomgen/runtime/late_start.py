@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import TO_BE_FINITE, UsageError, calls_within
 from ..numeric.scales import Array
 from .layout import Layout
 from .tapes import play_arrays
@@ -24,16 +24,13 @@ def started(layout: Layout, p: Array) -> Layout:
             warnings.warn(
                 f"the initial value of {name} calls a table or a function of the model, so it stays at the declared "
                 f"parameters and does not follow {', '.join(layout.p[k] for k in places)}; give {name} for the run",
-                stacklevel=2,
+                stacklevel=calls_within() + 1,
             )
     for section, (names, tape) in layout.metadata.get("start_terms", {}).items():
         values = dict(zip(names, map(float, play_arrays(tape, p, NO_STATE)), strict=True))
         if bad := [name for name, value in values.items() if not np.isfinite(value)]:
             shown = ", ".join(f"{name} = {x:.6g}" for name, x in zip(layout.p, p, strict=True))
-            raise UsageError(
-                f"{section.partition('_')[0]}.{bad[0]} is no number with {shown}: look for a division by zero, or a "
-                "root or logarithm of a negative number"
-            )
+            raise UsageError(f"{section.partition('_')[0]}.{bad[0]} is no number with {shown}: {TO_BE_FINITE}")
         setattr(found, section, getattr(layout, section) | values)
     return found
 

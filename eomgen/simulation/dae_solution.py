@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import SimulationError, UsageError
+from ..errors import SimulationError, UsageError, calls_within
 from ..limits.runs import ATOL, ENDLESS, ENOUGH, RTOL
 from ..numeric.scales import Array
 from ..runtime.dae import DaeForm
@@ -23,7 +23,7 @@ from ..runtime.refusals import refuse_rigid
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
 from .event_values import EventValues
-from .events import GO_ON, UNWATCHED, Events, calls_within, instant, warn_of_unknown
+from .events import GO_ON, UNWATCHED, Events, instant, warn_of_unknown
 from .integrate import Solution, require_end
 from .recording import record
 from .resets import Resets

@@ -6,18 +6,16 @@ for a run are its names, expressions as text, or functions f(t, x) with SciPy's 
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from math import isfinite, nan
-from types import FrameType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError, ZenoError
+from ..errors import UsageError, ZenoError, calls_within
 from ..limits.rounding import TINY
 from ..limits.runs import CROWD, EARLIEST, INSTANT
 from ..numeric.counts import as_count
@@ -112,7 +110,7 @@ class Events:
     def __init__(self, layout: Layout, given: Any) -> None:
         self.layout = layout
         self.declared: list[dict[str, Any]] = layout.metadata.get("events") or []
-        self.names: list[str] = []
+        self.names, self.last = list[str](), ""  #: last: the reset that came last, as messages name it
         self.model: list[RunEvent] = []
         self.formulas: list[tuple[RunEvent, Formula]] = []
         self.functions: list[RunEvent] = []
@@ -188,6 +186,7 @@ class Events:
         after = np.array(x, dtype=float)
         for i in fired:
             if self.model[i].action == RESET:
+                self.last = f" at event {self.names[i]}"
                 after = self.renewed(module, forcing, t, after, i)
                 after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
@@ -299,15 +298,6 @@ def warn_of_unknown(names: Sequence[str]) -> None:
             "nothing was found; look for a logarithm, root or quotient outside its domain",
             stacklevel=calls_within() + 1,
         )
-
-
-def calls_within() -> int:
-    """How many calls, this one's caller first, lie within the package."""
-    package, calls = __name__.rpartition("simulation")[0], 0
-    frame: FrameType | None = sys._getframe(1)
-    while frame is not None and str(frame.f_globals.get("__name__")).startswith(package):
-        frame, calls = frame.f_back, calls + 1
-    return calls
 
 
 def _of_kernel(kernel: Any, forcing: Forcing) -> Together:

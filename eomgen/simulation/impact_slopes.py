@@ -4,16 +4,19 @@ An impact of one gap with normal n (see :mod:`..analysis.impact`) solves
 
     M (v+ - v-) + C_q^T l = n^T g        C_q v+ + C_t = 0        r+ + e r- = 0,  r = n v + gap_t
 
-and velocities that a reset has set to v* go to the nearest on the constraints, (v+ - v*) / s^2 + C_q^T l = 0.  Both are
-differentiated implicitly; changes of l drop out along the free motions B, C_q B = 0.
+with the rows of what is closed for a time among those of C_q, and velocities that a reset has set to v* go to the
+nearest on the constraints, (v+ - v*) / s^2 + C_q^T l = 0.  Both are differentiated implicitly; changes of l drop out
+along the free motions B, C_q B = 0.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..analysis.closed_rows import closed_rows, with_closed_rows
 from ..analysis.constrained import free_motions, solve_multipliers
 from ..errors import NoDerivativeError
 from ..limits.impacts import OFF
@@ -37,26 +40,33 @@ class Strike:
     t : float
     x : (n_x,) array
         The state right after.
+    closed : sequence of int
+        Equations of constraints that close and open that rule too.
     """
 
-    def __init__(self, module: BoundModel, t: float, x: Array) -> None:
-        self.module, self.t, self.layout = module, t, module.layout
+    def __init__(self, module: BoundModel, t: float, x: Array, closed: Sequence[int] = ()) -> None:
+        self.module, self.t, self.layout, self.closed = module, t, module.layout, closed
         self.q, self.v = x[: self.layout.n_q], x[self.layout.n_q :]
-        self.C_q = module.kernels.constraint_jacobian(self.q, t=t, rows="all")
-        self.B = free_motions(self.C_q, self.layout.scales)
+        self.C_q, self.scales = module.kernels.constraint_jacobian(self.q, t=t, rows="all"), self.layout.scales
+        if closed:
+            self.C_q, self.scales = with_closed_rows(module, t, x, self.C_q)
+        self.B = free_motions(self.C_q, self.scales)
         self._slopes = module.kernels.timed("strike_derivatives")
 
     def rows(self, v: Array, change: Array, l: Array, g: Array) -> tuple[Array, Array, Array, Array]:
         """Derivatives by [q, v, t, u, p] of M a + C_q^T l - n^T g, of a / s^2 + C_q^T l, of C_q v + C_t and of the
         events' rates."""
         n_v, n_c = self.layout.n_v, self.layout.n_c
-        every = self._slopes(self.t, np.concatenate([self.q, v, change, l, g]))
-        first, second, third, fourth = np.split(every, [n_v, 2 * n_v, 2 * n_v + n_c])
-        return first, second, third, fourth
+        held = np.zeros(self.layout.n_held // 2)
+        held[[*self.closed]] = l[n_c:]
+        every = self._slopes(self.t, np.concatenate([self.q, v, change, l[:n_c], g, held]))
+        ends = np.cumsum([n_v, n_v, n_c, self.layout.n_events])
+        first, second, third, fourth, fifth = np.split(every, ends)
+        return first, second, np.vstack([third, fifth[[*self.closed]]]), fourth
 
     def solve(self, metric: Array, dv: Array, force: Array, rate: Array, n: Array, gap: Array) -> Array:
         """The changes (n_v, k) of v+: metric (dv+ - dv) + force = n^T dg along B, C_q dv+ = -rate, n dv+ = -gap."""
-        w = -minimum_norm(self.C_q, rate, self.layout.scales) if len(rate) else np.zeros_like(dv)
+        w = -minimum_norm(self.C_q, rate, self.scales) if len(rate) else np.zeros_like(dv)
         B, free, closed = self.B, self.B.shape[1], n @ self.B
         K = np.zeros((free + len(n), free + len(n)))
         K[:free, :free], K[:free, free:], K[free:, :free] = B.T @ metric @ B, -closed.T, closed
@@ -86,15 +96,15 @@ def after_impact(
     e : float
         Restitution.
     """
-    layout, strike = module.layout, Strike(module, t, x)
+    layout, strike = module.layout, Strike(module, t, x, closed_rows(module, x))
     n_q, n_x, names = layout.n_q, layout.n_x, layout.u
-    change, none, rest = strike.v - v, np.zeros(layout.n_c), np.zeros(layout.n_events)
+    change, none, rest = strike.v - v, np.zeros(len(strike.C_q)), np.zeros(layout.n_events)
     M = module.kernels.mass_matrix(strike.q, t=t)
     n = strike.rows(v, change, none, rest)[3][event : event + 1, n_q:n_x]
     g = np.array(rest)
     g[event] = algebra.lstsq(strike.B.T @ n.T, strike.B.T @ M @ change, rcond=None)[0]
     force = M @ change - n[0] * g[event]
-    l = solve_multipliers(strike.C_q[None], force[:, None], layout.scales)[:, 0]
+    l = solve_multipliers(strike.C_q[None], force[:, None], strike.scales)[:, 0]
     held = move._replace(x=np.vstack([move.x[:n_q], np.zeros_like(move.x[n_q:])]))
     balance, _, rate, after = strike.rows(strike.v, change, l, g)
     before = strike.rows(v, change, l, g)[3]

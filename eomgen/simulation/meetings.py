@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import EvaluationError
+from ..errors import EvaluationError, calls_within
 from ..limits.runs import SUNK, UNHURRIED
 from ..numeric.scales import Array
-from .events import calls_within, is_told_by_the_caller
+from .events import is_told_by_the_caller
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

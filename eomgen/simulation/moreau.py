@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import EvaluationError, SimulationError, UsageError
+from ..errors import EvaluationError, SimulationError, UsageError, calls_within
 from ..limits.rigid_contacts import ITERATIONS, SOLVED
 from ..limits.runs import SAME
 from ..numeric.counts import as_count
@@ -21,7 +21,7 @@ from ..runtime.signals import Forcing
 from ..texts import shown
 from .bound_run import watch_run
 from .contact_forces import ContactForces, ForceSums
-from .events import Events, calls_within, is_told_by_the_caller
+from .events import Events, is_told_by_the_caller
 from .integrate import Solution
 from .meetings import deep_start
 from .recording import record

@@ -6,9 +6,10 @@ import warnings
 
 import numpy as np
 
+from ..errors import calls_within
 from ..runtime.layout import Layout
 from ..runtime.trajectory import Trajectory
-from .events import calls_within, is_told_by_the_caller
+from .events import is_told_by_the_caller
 
 SHOWN = 4  #: limits that a warning names
 

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..limits.rigid_contacts import LINKED
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .rigid_rows import RigidRows
@@ -53,6 +55,16 @@ class Meeting:
         self.keys = _numbered(rows.pairs.tolist())
         none = np.zeros(d)
         self.start = np.array([last.get(key, none)[:d] for key in self.keys])
+
+    def shared(self, values: Array, acts: NDArray[np.bool_]) -> Array:
+        """Of each contact (m,) the greatest value of those that act on each other, by impulses (m, d) that are none."""
+        m, d = acts.shape
+        own = np.diag(self.compliance)
+        linked = (self.compliance**2 > LINKED * np.outer(own, own)).reshape(m, d, m, d).any(axis=(1, 3))
+        linked &= np.outer(acts.any(axis=1), acts.any(axis=1))
+        while not np.array_equal(values, more := np.maximum(values, (linked * values).max(axis=1))):
+            values = more
+        return values
 
 
 class HeldInertia:

@@ -287,7 +287,8 @@ class RigidSteps:
         """The part of an impact without rebound that leaves shapes as fast as they meet in the next middle.
 
         It is a part of all impulses, friction too, between those without the contacts that land and those of the whole
-        impact, so that the rest, which comes then, ends as the whole would have.  None where these are not found.
+        impact, so that the rest, which comes then, ends as the whole would have.  Contacts that act on each other have
+        one part.  None where the impulses are not found.
         """
         rows, W, scale = meeting.rows, meeting.compliance, meeting.scale
         tolerance = rough * self.tolerance * scale
@@ -299,9 +300,10 @@ class RigidSteps:
         residual = max(whole.residual, without.residual)
         if not residual <= tolerance:
             return None
-        approach = (undisturbed.ravel() + W @ without.impulses.ravel()).reshape(c.shape)[lands, 0]
-        parts = np.where(approach < 0.0, 1.0 + rows.gaps[lands] / np.where(approach < 0.0, h * approach, 1.0), 0.0)
-        part = max(float(parts.max()), 0.0)
+        approach = (undisturbed.ravel() + W @ without.impulses.ravel()).reshape(c.shape)[:, 0]
+        meets = lands & (approach < 0.0)
+        own = np.where(meets, np.maximum(0.0, 1.0 + rows.gaps / np.where(meets, h * approach, 1.0)), 0.0)
+        part = meeting.shared(own, (whole.impulses != 0.0) | (without.impulses != 0.0))[:, None]
         impulses = (1.0 - part) * without.impulses + part * whole.impulses
         return ContactImpulses(impulses, max(whole.iterations, without.iterations), residual)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
+from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError, calls_within
 from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names
 from ..runtime.option_types import Number, SolverOptions
@@ -20,7 +20,7 @@ from ..runtime.room import read_flag, require_room, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run, watch_run
 from .compiled import can_run, integrate_compiled
-from .events import UNWATCHED, WAIT, Events, calls_within, is_told_by_the_caller, warn_of_unknown
+from .events import UNWATCHED, WAIT, Events, is_told_by_the_caller, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .passed_limits import warn_of_limits
 from .recording import record
@@ -271,7 +271,7 @@ def simulate(
             lambda: record(bound, forcing, solution, title, settings, watched.names),
         ) from interrupt.__cause__
     except EvaluationError as error:  # of a reset
-        raise SimulationError(f"{title} stopped: {error}") from error
+        raise SimulationError(f"{title} stopped{watched.last}: {error}") from error
     except Crawling as crawl:
         raise run.gave_up(crawl, end, title, settings) from None
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:

@@ -37,13 +37,32 @@ static void recall(const eomgen_rigid *s, meeting *at, int *keys)
     }
 }
 
+/* Whether one of two contacts moves the other, and both have impulses, of P or of `whole`. */
+static int linked(const meeting *at, const double *whole, int a, int b)
+{
+    const int d = at->n/at->m, n = at->n;
+    int moves = 0, one = 0, other = 0;
+    for (int i = 0; i < d; i++) {
+        const int r = a*d + i;
+        one = one || at->P[r] != 0.0 || whole[r] != 0.0;
+        other = other || at->P[b*d + i] != 0.0 || whole[b*d + i] != 0.0;
+        for (int k = 0; k < d; k++) {
+            const int s = b*d + k;
+            const double w = at->W[(ptrdiff_t)r*n + s];
+            moves = moves || w*w > RIGID_LINKED*at->W[(ptrdiff_t)r*n + r]*at->W[(ptrdiff_t)s*n + s];
+        }
+    }
+    return moves && one && other;
+}
+
 /* The part of an impact without rebound that leaves shapes as fast as they meet in the next middle: a part of all impulses,
    friction too, between those without the contacts that land and those of the whole impact, so that the rest, which comes then,
-   ends as the whole would have. 0 where these are not found; at->c holds what the laws of the others start from then too. */
+   ends as the whole would have. Contacts that act on each other have one part. 0 where the impulses are not found; at->c holds
+   what the laws of the others start from then too. */
 static int land(const eomgen_rigid *s, meeting *at, double tolerance, int *count, double *residual)
 {
     const int m = at->m, d = s->d, n = at->n;
-    double *const whole = at->after, rest = 0.0, part = 0.0;
+    double *const whole = at->after, *const part = at->work, rest = 0.0;
     int more = 0;
     for (int c = 0; c < m; c++) { at->c[c*d] = at->rests[c] == LANDS ? at->undisturbed[c*d] : at->c[c*d]; }
     memcpy(whole, at->out, (size_t)n*sizeof(double));
@@ -53,13 +72,22 @@ static int land(const eomgen_rigid *s, meeting *at, double tolerance, int *count
     CHOSEN(solve_contacts)(m, d, at->W, at->c, at->friction, at->P, tolerance, s->most, at->work, at->numbers, &more, &rest);
     *residual = fmax(*residual, rest), *count = more > *count ? more : *count;
     for (int c = 0; c < m; c++) {
+        part[c] = 0.0;
         if (at->rests[c] == LANDS) {
             const double approach = at->undisturbed[c*d] + dot(n, at->W + (ptrdiff_t)c*d*n, at->P);
-            part = approach < 0.0 ? fmax(part, 1.0 + at->arrive[c]/-approach) : part;
+            part[c] = approach < 0.0 ? fmax(0.0, 1.0 + at->arrive[c]/-approach) : 0.0;
             at->c[c*d] = at->undisturbed[c*d] - at->arrive[c];
         }
     }
-    for (int r = 0; r < n; r++) { at->P[r] = (1.0 - part)*at->P[r] + part*whole[r]; }
+    for (int grows = 1; grows;) {
+        grows = 0;
+        for (int a = 0; a < m; a++) {
+            for (int b = 0; b < m; b++) {
+                if (part[a] < part[b] && linked(at, whole, a, b)) { part[a] = part[b], grows = 1; }
+            }
+        }
+    }
+    for (int r = 0; r < n; r++) { at->P[r] = (1.0 - part[r/d])*at->P[r] + part[r/d]*whole[r]; }
     return *residual <= tolerance;
 }
 
