@@ -13,6 +13,16 @@ from ..graph.substitute import symbols_of
 from ..records import dataclass
 from .constraint import POSITION, VELOCITY, Condition, Constraint, ConstraintView
 
+#: What can stand in an equation, as a remedy.
+ALLOWED = "a constraint can contain t, inputs, coordinates and velocities"
+#: Kinds of names that cannot, with what is added to that.
+_UNUSABLE = {
+    "energy": "not energies",
+    "reaction": "not reactions",
+    "multiplier": "not multipliers",
+    "rate of a state": "not rates of states",
+}
+
 
 @dataclass(frozen=True)
 class Linear(Constraint):
@@ -65,13 +75,10 @@ def _equation(e: Entry) -> Equation | None:
     used = {name: e.meaning(name) for name in sorted(symbols_of([expression]))}
     for name, meant in used.items():
         if meant.level == 2:
-            what = "acceleration" if meant.kind == "marker" else meant.kind
-            remedy = "a constraint can contain t, inputs, coordinates and velocities"
-            e.fault("equation", f"the {what} {name!r} cannot be used here", remedy)
-        if meant.kind in ("energy", "reaction", "multiplier"):
-            plural = "energies" if meant.kind == "energy" else f"{meant.kind}s"
-            remedy = f"a constraint can contain t, inputs, coordinates and velocities, not {plural}"
-            e.fault("equation", f"the {meant.kind} {name!r} cannot be used here", remedy)
+            what = {"marker": "acceleration", "rate of rate": "second rate"}.get(meant.kind, meant.kind)
+            e.fault("equation", f"the {what} {name!r} cannot be used here", ALLOWED)
+        elif meant.kind in _UNUSABLE:
+            e.fault("equation", f"the {meant.kind} {name!r} cannot be used here", f"{ALLOWED}, {_UNUSABLE[meant.kind]}")
     moving = [meant for meant in used.values() if meant.level is not None]
     rates = [name for name, meant in used.items() if meant.level == 1]
     if not moving and not e.at_fault("equation"):
@@ -96,8 +103,8 @@ TYPES = table(
             "offset": Field("expression", "value of that sum, an expression of parameters", default=0),
             "equation": Field(
                 "expression",
-                "instead of coordinates, an expression that is held at 0: of t, parameters, coordinates, places of "
-                "markers; with velocities the constraint is nonholonomic and must be linear in them",
+                "instead of coordinates, an expression that is held at 0: of t, parameters, inputs, coordinates, places "
+                "and velocities of markers; with velocities the constraint is nonholonomic and must be linear in them",
                 level=OUTPUT,
             ),
         },

@@ -111,7 +111,7 @@ def build(description: Description) -> Mechanism:
     own_events = build_events(reader, sections["events"])
     check_resets(reader, own_events, clocks, switched)
     events = (*own_events, *samplings, *events_of_switches(reader, switching, switched))
-    inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
+    inputs = add_rates(reader, inputs, lagrangian, given, constraints, switched, events, outputs)
     kinds = ("coordinate", "velocity", *(("state",) if declared or held or switching else ()))
     starts = _initial(reader, "initial", values.get("initial", {}), (*kinds, "output"))
     moving = set(reader.names.of(*kinds))

@@ -22,13 +22,14 @@ from .description import DescribedEntry, items
 from .element_states import states_of
 from .fields import CYLINDER
 from .marker_quantities import element_quantity
-from .mechanism import Body, JointSpec
+from .mechanism import TURNING, Body, JointSpec
 from .names import nearest
 from .read_shapes import read_shapes
 from .scope import ENERGIES, RATES
 from .values import Reader
 
 _LEVELS = ("coordinate", "velocity", "acceleration")  #: kinds of names of motions
+_OF_PARAMETERS = ("rate", "rate of rate")  #: those of Euler parameters
 _A = {"length": "a length", "angle": "an angle"}
 
 
@@ -364,11 +365,16 @@ class ElementEntry:
     def meaning(self, name: str) -> Meaning:
         kind, place = self.reader.names.kinds.get(name, ""), self.reader.quantities.get(name)
         if place is not None:
-            return Meaning("marker", place.level, "angle" if place.axis == 3 else "length")
+            turns = place.level in TURNING or (place.axis == 3 and place.level < 2)
+            return Meaning("marker", place.order, "angle" if turns else "length")
         if name in (f"{energy}()" for energy in ENERGIES):
             return Meaning("energy")
         if (asked := element_quantity(name)) is not None and asked.carried:
             return Meaning("reaction" if asked.part else "multiplier")
+        if asked is not None:  # whether a force moves with velocities is known once its law is
+            return Meaning("element", 1 if asked.name == "rate" else 0, "length")
+        if kind in _OF_PARAMETERS:
+            return Meaning(kind, _OF_PARAMETERS.index(kind) + 1, "angle")
         if kind not in _LEVELS:
             return Meaning(kind)
         level = _LEVELS.index(kind)

@@ -16,7 +16,7 @@ from ..graph.core import Expr, Graph
 from ..graph.differentiate import gradient, jvp
 from ..graph.substitute import symbols_of
 from .input_names import chains, rate_of, split_rate
-from .mechanism import Event, GivenEquations, Input, Lagrangian, Output
+from .mechanism import Event, GivenEquations, Input, Lagrangian, Output, Switched
 from .time_jumps import jumps_in_time
 from .values import Reader
 
@@ -33,6 +33,7 @@ def add_rates(
     lagrangian: Lagrangian | None,
     given: GivenEquations | None,
     constraints: Sequence[Constraint],
+    switched: Sequence[Switched],
     events: Sequence[Event],
     outputs: Sequence[Output],
 ) -> tuple[Input, ...]:
@@ -42,7 +43,7 @@ def add_rates(
     would need accelerations.
     """
     needed: dict[str, str] = {}
-    differentiated = _differentiated(reader, lagrangian, given, constraints, events, outputs)
+    differentiated = _differentiated(reader, lagrangian, given, constraints, switched, events, outputs)
     for expressions, _, why, place in differentiated:
         if place is not None and jumps_in_time(expressions):
             message = f"{why} must have a derivative by time, and a condition on t makes it jump"
@@ -76,12 +77,14 @@ def _differentiated(
     lagrangian: Lagrangian | None,
     given: GivenEquations | None,
     constraints: Sequence[Constraint],
+    switched: Sequence[Switched],
     events: Sequence[Event],
     outputs: Sequence[Output],
 ) -> list[tuple[list[Expr], int, str, str | None]]:
     """Expressions that the equations differentiate by time, how often, what they are, and where they stand.
 
-    The place is None for drivers, whose jumps are told by the runs that they lead.
+    The place is None for drivers, whose jumps are told by the runs that they lead, and for constraints that close for a
+    time, whose errors die away.
     """
     symbol = reader.graph.symbol
     found: list[tuple[list[Expr], int, str, str | None]] = []
@@ -102,12 +105,14 @@ def _differentiated(
         shown = not symbols_of([o.expression for o in outputs]).isdisjoint(seconds)
         if positions or shown:
             found.append((list(given.rates), 1, "q'' of the given rates", "equations.rates"))
-    for c in constraints:
+    for_a_time = [switch.constraint for switch in switched if switch.constraint is not None]
+    for c in (*constraints, *for_a_time):
         if isinstance(c, Driver):
             found.append(([c.value], 2, f"the driver {c.name!r}", None))
         elif isinstance(c, Equation):
             times = 2 if c.level == POSITION else 1
-            found.append(([c.expression], times, f"the constraint {c.name!r}", f"constraints.{c.name}"))
+            place = None if c in for_a_time else f"constraints.{c.name}"
+            found.append(([c.expression], times, f"the constraint {c.name!r}", place))
     hits = [e for e in events if e.restitution is not None]
     found += [([e.expression], 1, f"the gap {e.name!r}", f"events.{e.name}") for e in hits]
     return found

@@ -20,6 +20,7 @@ from ..graph.vectors import Mat3, Vec3
 from ..limits.runs import ATOL, RTOL
 from ..records import dataclass
 from .description import place_of
+from .names import ACCELERATIONS, VELOCITIES
 from .placement import TURNS, Columns
 from .requirements import Requirement
 
@@ -154,6 +155,13 @@ class Quantity:
     def dimension(self) -> dimensions.Dimension:
         """What it is measured in."""
         return dimension_of(self.level, self.axis)
+
+    @property
+    def order(self) -> int | None:
+        """How many times the place is differentiated in it: 0, 1 or 2; None of the mass, which does not move."""
+        if self.level == MASS:
+            return None
+        return 2 if self.level in ACCELERATIONS else 1 if self.level in VELOCITIES else 0
 
 
 def dimension_of(level: int, axis: int) -> dimensions.Dimension:

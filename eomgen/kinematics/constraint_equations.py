@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from ..constraints import Equation
+from ..constraints.constraint import VELOCITY, Condition
 from ..describe.mechanism import Mechanism
 from ..graph.core import Expr
 from ..graph.substitute import substitute, symbols_of
@@ -35,8 +37,16 @@ def couple(mechanism: Mechanism, motion: MarkerMotion) -> Coupled:
         flat = [*(c.expression for c in conditions), *positive, *(value for _, value in near)]
         mapping = motion.derived_symbols(mechanism, symbols_of(flat))
         values = iter(substitute(flat, mapping) if mapping else flat)
-        written = constraint.written
-        rows += [Row(f"{constraint.name}.{c.label}", next(values), c.kind, c.level, written) for c in conditions]
+        for c in conditions:
+            value = next(values)
+            level = _level(c, value, motion) if isinstance(constraint, Equation) else c.level
+            rows.append(Row(f"{constraint.name}.{c.label}", value, c.kind, level, constraint.written))
         aligned += [(constraint.name, next(values)) for _ in positive]
         hints += [(str(symbol.node[1]), next(values)) for symbol, _ in near]
     return Coupled(rows, aligned, hints)
+
+
+def _level(condition: Condition, value: Expr, motion: MarkerMotion) -> str:
+    """The level of an equation: forces of elements tell only in terms of the tree whether they move with velocities."""
+    used = symbols_of([value])
+    return VELOCITY if any(v.node[1] in used for v in motion.state.v) else condition.level

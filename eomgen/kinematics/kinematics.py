@@ -26,6 +26,7 @@ from .state import MotionSymbols, acceleration_name, lay_out
 from .topology import Topology, find_topology
 from .tree import Link, Poses, build_links, link_twists
 from .undefined_rows import find_undefined, refuse_rows_of_time
+from .written_equations import refuse_unusable
 
 
 @dataclass(frozen=True)
@@ -211,6 +212,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
     motion = MarkerMotion(poses, twists, state, coordinates, _turning(mechanism, topology))
     coupled = couple(mechanism, motion)
+    refuse_unusable(mechanism, motion, coupled.rows)
     length = length_scale(mechanism)
     constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, state, length)
     refuse_rows_of_time(mechanism, constraints)

@@ -25,7 +25,9 @@ from ..records import dataclass
 from .constraint_equations import couple
 from .kinematics import ForceTerms, Kinematics
 from .loops import differentiate_constraints
+from .undefined_rows import refuse_rows_of_time
 from .wrenches import JointWrenches, Row6
+from .written_equations import refuse_unusable
 
 #: Operations whose results are numbers whatever numbers they are given.
 FINITE = {"sym", "const", "add", "sub", "mul", "neg", "sin", "cos", "abs", "min", "max", "lt", "le", "eq", "select"}
@@ -66,7 +68,10 @@ def _of_one(kinematics: Kinematics, switch: Switched) -> tuple[list[SwitchedRow]
     graph, motion = kinematics.graph, kinematics.motion
     assert switch.constraint is not None
     mechanism = replace(kinematics.mechanism, constraints=(switch.constraint,))
-    found = differentiate_constraints(graph, couple(mechanism, motion).rows, [], motion.state, kinematics.length_scale)
+    coupled = couple(mechanism, motion).rows
+    refuse_unusable(mechanism, motion, coupled)
+    found = differentiate_constraints(graph, coupled, [], motion.state, kinematics.length_scale)
+    refuse_rows_of_time(mechanism, found, for_a_time=True)
     apart = replace(kinematics, mechanism=mechanism, constraints=found, coupled=found.labels)
     on_bodies = JointWrenches(apart).element_rows()
     rate = kinematics.resolve([switch.stabilisation])[0]

@@ -69,8 +69,11 @@ def _number(mechanism: Mechanism, value: Expr) -> float | None:
     return float(evaluate([value], declared)[0]) if symbols_of([value]) <= declared.keys() else None
 
 
-def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints) -> None:
-    """Refuse constraints in which only time, inputs and parameters stand: no coordinate can hold them.
+def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints, for_a_time: bool = False) -> None:
+    """Refuse constraints in which no coordinate stands: none can hold them.
+
+    A wrong number in place of a coordinate is told by assembly, with its size; where nothing is assembled it is told
+    here: in equations of velocities, and in all that hold ``for_a_time``, also where parameters stand in them.
 
     Raises
     ------
@@ -78,13 +81,22 @@ def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints) -> None:
         Names the constraints.
     """
     problems, clock = [], {"t", *(u.name for u in mechanism.inputs)}
-    free = [*constraints.values, *constraints.velocity[len(constraints.values) :]]
-    for label, row, left in zip(constraints.labels, constraints.jacobian, free, strict=True):
-        moving = sorted(symbols_of([left]) & clock)
-        if moving and all(x.is_zero for x in row):
+    m = len(constraints.values)
+    free = [*constraints.values, *constraints.velocity[m:]]
+    for k, (label, row, left) in enumerate(zip(constraints.labels, constraints.jacobian, free, strict=True)):
+        if not all(x.is_zero for x in row):
+            continue
+        used = symbols_of([left])
+        moving = sorted(used if for_a_time else used & clock)
+        if moving:
             what = f"{label} depends on {', '.join(moving)} but on no coordinate, so no motion can satisfy it"
-            remedy = "write a coordinate into it, or remove it"
-            problems.append(mechanism.problem(place_of(mechanism, label), what, remedy))
+        elif left.value and (for_a_time or k >= m):
+            rate = " moves it" if k >= m else " changes it"
+            what = f"{label} is always {left.value:.6g}, as no coordinate{rate}, so no motion can satisfy it"
+        else:
+            continue
+        remedy = "write a coordinate into it, or remove it"
+        problems.append(mechanism.problem(place_of(mechanism, label), what, remedy))
     if problems:
         raise ModelError(problems)
 

@@ -34,9 +34,10 @@ class Users(NamedTuple):
 
     @property
     def paths(self) -> list[str]:
-        """Places in the description, forces first."""
+        """Places in the description, forces first; constraints that close where nothing else speaks of reactions."""
         asked = [q.path for q in self.mechanism.reaction_quantities.values() if not q.path.startswith("forces.")]
-        return [*(f"forces.{name}" for name in self.forces), *dict.fromkeys(asked)]
+        held = [f"constraints.{s.constraint.name}" for s in self.mechanism.switched if s.constraint is not None]
+        return [*(f"forces.{name}" for name in self.forces), *dict.fromkeys(asked)] or held
 
     def verb(self, plural: str) -> str:
         """The verb as it stands behind :meth:`together`."""
@@ -84,19 +85,30 @@ def refuse_joints(kinematics: Kinematics) -> None:
 def require_inertia_of_tree(
     kinematics: Kinematics, mobility: Mobility, mass_matrix: Sequence[Sequence[Expr]], users: Users
 ) -> None:
-    """Refuse a tree that does not have inertia behind every coordinate, with which its reactions are found."""
+    """Refuse a tree that has inertia behind every coordinate at no configuration; its reactions are found with that.
+
+    Where there is none at single configurations only, as Euler angles make it, a run that gets there says so.
+    """
     values = {p.name: p.value for p in kinematics.mechanism.parameters}
     if mobility.assumed or any(value is None for value in values.values()):
         return
-    known = dict(zip(kinematics.names, mobility.q_reference, strict=True)) | values
     flat, n = [x for row in mass_matrix for x in row], len(kinematics.v)
     names = sorted(symbols_of(flat))
-    with np.errstate(all="ignore"):
-        M = np.reshape(compile_evaluator(flat, names)([float(known.get(name) or 0.0) for name in names]), (n, n))
-    M = np.where(np.triu(np.ones((n, n), dtype=bool)), M, M.T)  # M may be given by one of its triangles
-    sizes, directions = algebra.eigh(correlated(M))
-    if n and not sizes[0] > SINGULAR:
-        weights = np.abs(directions[:, 0])
+    evaluator = compile_evaluator(flat, names)
+    weights = None
+    for place in mobility.samples or (mobility.q_reference,):
+        known = dict(zip(kinematics.names, place, strict=True)) | values
+        with np.errstate(all="ignore"):
+            M = np.reshape(evaluator([float(known.get(name) or 0.0) for name in names]), (n, n))
+        M = np.where(np.triu(np.ones((n, n), dtype=bool)), M, M.T)  # M may be given by one of its triangles
+        if not np.isfinite(M).all():
+            continue
+        sizes, directions = algebra.eigh(correlated(M))
+        if not n or sizes[0] > SINGULAR:
+            return
+        if weights is None:
+            weights = np.abs(directions[:, 0])
+    if weights is not None:
         moved = [x for x, w in zip(kinematics.velocity_labels, weights, strict=True) if w > 0.1 * weights.max()]
         message = (
             f"{users.verb('depend')} on reactions, and moving {', '.join(moved)} without its loops meets no inertia"

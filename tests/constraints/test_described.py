@@ -197,6 +197,10 @@ BROKEN = [
     ("coordinates: {A: 1, beta: -n}", "coordinates: {A: 1, alpha: 2}", 19, "c1", "'alpha' is named twice", "sum"),
     ("- 0.01*t", "- beta_ddot", 20, "c2.equation", "the acceleration 'beta_ddot' cannot", "velocities"),
     ("- 0.01*t", "- ax(one)", 20, "c2.equation", "the acceleration 'ax(one)' cannot", "velocities"),
+    ("- 0.01*t", "- wz_dot(one)", 20, "c2.equation", "the acceleration 'wz_dot(one)' cannot", "velocities"),
+    ("- 0.01*t", "- wx(one)*wz(two)", 20, "c2.equation", "the equation is not linear in wx(one), wz(two)", "linear"),
+    ("- 0.01*t", "- abs(wx(one))", 20, "c2.equation", "the equation is not linear in wx(one)", "linear"),
+    ("s - r*sin(alpha) - 0.01*t", "total_mass - 1", 20, "c2.equation", "contains no coordinate", "alpha"),
     ("- 0.01*t", "- beta_dot**2", 20, "c2.equation", "the equation is not linear in beta_dot", "linear"),
     ("equation: s - r*sin(alpha) - 0.01*t", "equation: r - k", 20, "c2.equation", "contains no coordinate", "alpha"),
     ("- 0.01*t", "- kinetic_energy", 20, "c2.equation", "energy", "not energies"),
@@ -292,3 +296,71 @@ def test_coordinates_of_cut_joints_can_be_coupled() -> None:
     run = mod.simulate((0, 0.5), initial={"theta": 0.3, "theta_dot": 10})
     np.testing.assert_allclose(run["z"], 2 * run["s"] - 0.1, atol=1e-11)
     assert np.ptp(run["s"]) > 0.05
+
+
+def laws() -> eg.Model:
+    """Two sliders, a spring, a damper, and laws of an input and of states."""
+    m = eg.Model("laws")
+    a, b = m.body("a", mass=2, inertia={"zz": 1}), m.body("b", mass=1)
+    m.prismatic("x", m.ground, a, axis="x")
+    m.prismatic("y", m.ground, b, axis="x")
+    m.input("u", 1)
+    m.state("s", rate="-s", initial=1)
+    m.sampled("held", "0.5 + t", period=0.2)
+    m.joint_spring("K", "x", stiffness=3)
+    m.joint_damper("D", "x", damping=2)
+    m.output("slow", "2*s*x")
+    m.initial(x=1)
+    return m
+
+
+REFUSED = [
+    ("x - s", "the state 's' cannot be used here", "not states that change continuously"),
+    ("x_dot - s", "the state 's' cannot", "closes or opens"),
+    ("slow - 1", "the state 's' cannot", ""),
+    ("x - held", "the state 'held' cannot", "that only events and samples change"),
+    ("x - s_dot", "the rate of a state 's_dot' cannot", "not rates of states"),
+    ("power(D) - 1", "not linear in the velocities in the law of power(D)", "linear"),
+    ("wx(a) - 1", "c.equation is always -1, as no coordinate moves it", "write a coordinate into it"),
+    ("vy(a) - u", "c.equation depends on u but on no coordinate", "write a coordinate into it"),
+]
+
+
+@pytest.mark.parametrize(("equation", "message", "remedy"), REFUSED)
+@pytest.mark.parametrize("closes", [None, "1 - t"])
+def test_an_equation_that_cannot_be_held_is_refused(
+    equation: str, message: str, remedy: str, closes: str | None
+) -> None:
+    m = laws()
+    m.coupling("c", equation=equation, **({} if closes is None else {"closes": closes}))
+    if equation == "x - held" and closes:
+        assert m.derive()
+        return
+    with pytest.raises(eg.ModelError) as caught:
+        m.derive()
+    assert [(message in p.message, remedy in p.remedy) for p in caught.value.problems] == [(True, True)]
+    assert caught.value.problems[0].path.startswith("constraints.c")
+
+
+def test_the_law_of_an_element_in_an_equation() -> None:
+    """y' = -2 x', by the damper's force: 6 x'' + 2 x' + 3 x = 0; a held rate and length are those of the slider."""
+    m = laws()
+    m.coupling("c", equation="y_dot - force(D)")
+    run = m.compile(target="numpy").simulate(1.0, initial={"x": 1.0})
+    decay, w = 1 / 6, np.sqrt(17) / 6
+    x = np.exp(-decay * run.t) * (np.cos(w * run.t) + decay / w * np.sin(w * run.t))
+    assert run["x"] == pytest.approx(x, abs=1e-7)
+    assert run["y"] == pytest.approx(2 - 2 * x, abs=1e-7)
+    for equation, end in (("rate(D) - 1", 2.0), ("length(K) - 1", 1.0), ("force(D) + 2", 2.0)):
+        m = laws()
+        m.coupling("c", equation=equation)
+        speed = {} if "length" in equation else {"x_dot": 1.0}
+        assert m.compile(target="numpy").simulate(1.0, initial=speed)["x"][-1] == pytest.approx(end, abs=1e-9)
+
+
+def test_a_law_of_an_input_is_written_out_in_an_equation() -> None:
+    m = laws()
+    m.force("F", "a", ("u*x", 0, 0))
+    m.coupling("c", equation="y_dot - force(F, on=a).x")
+    with pytest.raises(eg.ModelError, match=r"the rate of the input 'u' in the law of .* is needed here and not known"):
+        m.derive()
