@@ -103,8 +103,9 @@ TYPES = table(
             "offset": Field("expression", "value of that sum, an expression of parameters", default=0),
             "equation": Field(
                 "expression",
-                "instead of coordinates, an expression that is held at 0: of t, parameters, inputs, coordinates, places "
-                "and velocities of markers; with velocities the constraint is nonholonomic and must be linear in them",
+                "instead of coordinates, an expression that is held at 0: of t, parameters, inputs, coordinates, "
+                "places and velocities of markers; with velocities the constraint is nonholonomic and must be linear "
+                "in them",
                 level=OUTPUT,
             ),
         },
