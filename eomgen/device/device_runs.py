@@ -88,7 +88,8 @@ def carry_out(
     if method not in methods:
         raise UsageError(f"no method {method!r} on a device; there are {', '.join(methods)}")
     step = check_method(method, step)
-    chosen = {name: declared[name] for name in ("rtol", "atol")} | {k: v for k, v in options.items() if v is not None}
+    own = {name: declared[name] for name in ("rtol", "atol", "max_step") if name in declared}
+    chosen = own | {k: v for k, v in options.items() if v is not None}
     if step is not None:
         chosen |= {"max_step": step, "first_step": step}
     chosen = check_tolerances(n, abs(end - start), chosen)

@@ -227,7 +227,8 @@ def _plan(
     if step is not None:
         require_steps("step", step, start, end)
         options = {**options, "max_step": step, "first_step": step}
-    chosen = {name: declared[name] for name in ("rtol", "atol")} | {k: v for k, v in options.items() if v is not None}
+    own = {name: declared[name] for name in ("rtol", "atol", "max_step") if name in declared}
+    chosen = own | {k: v for k, v in options.items() if v is not None}
     chosen = check_tolerances(module.n_x, abs(end - start), chosen)
     require_steps("max_step", float(chosen.get("max_step", np.inf)), start, end)
     times = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)

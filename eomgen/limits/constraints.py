@@ -84,5 +84,10 @@ ROUNDED = 1e-10
 #: may fall back to pivoting: accelerations keep eleven digits.
 KEPT = 1e-5
 
+# -- constraints that close and open ---------------------------------------------------------------------------------
+#: Steps of explicit methods, times the rate at which errors of a closed equation die away, beyond which what rounding
+#: moves off the equation grows within a step (DOP853 is stable up to 6, RK23 up to 2.5) and shows between its ends.
+HELD_STEP = 2.5
+
 # -- the same --------------------------------------------------------------------------------------------------------
 ALIKE = 1e-13  #: relative difference of two inputs that count as one: 500 eps

@@ -31,6 +31,7 @@ from .drawn import describe_picture
 from .event_terms import describe_events, find_translations, resets
 from .factor import has_long_paths
 from .given_multipliers import multiplier_values
+from .held_constraints import longest_step
 from .kept_rules import keep_rules
 from .rolling_discs import describe_discs
 from .soundness import flag_forces, not_finite_where
@@ -296,6 +297,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             "rtol": m.simulation.rtol,
             "atol": m.simulation.atol,
             **({} if m.simulation.step is None else {"step": m.simulation.step}),
+            **longest_step(kinematics),
         },
     }
 

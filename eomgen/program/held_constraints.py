@@ -11,8 +11,12 @@ from typing import NamedTuple
 
 from ..forces.branches import where
 from ..graph.core import Expr
+from ..graph.evaluate import compile_evaluator
+from ..graph.substitute import symbols_of
+from ..kinematics import Kinematics
 from ..kinematics.eliminate import Matrix, total
 from ..kinematics.switched import SwitchedRow
+from ..limits.constraints import HELD_STEP
 from ..limits.inertia import SINGULAR
 
 
@@ -40,6 +44,15 @@ def hold(found: LinearValues, rows: Sequence[SwitchedRow], count: int) -> Linear
     still = [_with(N, row[count:], first) for N, row in zip(found.still[:n], found.gain, strict=False)]
     gain = [[_with(row[j], row[count:], columns[j]) for j in range(count)] for row in found.gain[:n]]
     return LinearValues(still, gain)
+
+
+def longest_step(kinematics: Kinematics) -> dict[str, float]:
+    """``max_step`` (s) of runs of a model whose constraints close and open; empty without any."""
+    values = {p.name: p.value for p in kinematics.mechanism.parameters}
+    rates = kinematics.resolve([s.stabilisation for s in kinematics.mechanism.switched])
+    if not rates or any(values.get(name) is None for name in symbols_of(rates)):
+        return {}
+    return {"max_step": HELD_STEP / max(compile_evaluator(rates, tuple(values))(list(values.values())))}
 
 
 def closed(row: SwitchedRow) -> Expr:

@@ -77,9 +77,7 @@ class Fail:
     def __call__(self, name: str, status: int, t: float, x: Array, p: Own = None, u: Own = None) -> None:
         raise self.exception(name, status, t, x, p, u)
 
-    def exception(
-        self, name: str, status: int, t: float, x: Array, p: Own = None, u: Own = None
-    ) -> EvaluationError:
+    def exception(self, name: str, status: int, t: float, x: Array, p: Own = None, u: Own = None) -> EvaluationError:
         """The exception, not raised."""
         what, remedy = WORDS.get(status, (f"the kernel returned status {status}", "this is a defect of eomgen"))
         names = self._names(name)
@@ -99,7 +97,7 @@ class Fail:
             blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
         elif name == "resets" and (switched := self.layout.metadata.get("switched")):
             held = ", ".join(one for one in switched if x[self.layout.x.index(f"{one}_closed")] > 0.5)
-            blame = f": new values are no numbers, or contradict what is closed ({held or 'nothing'}), closes or holds always"
+            blame = f": values are no numbers, or contradict what is closed ({held or 'none'}), closes or holds always"
             remedy = "give new values that obey it, or open it first (releases)"
         elif status == 4 and not len(self.layout.independent):
             what = "the constraints are singular here, and the mechanism has no degree of freedom"

@@ -118,7 +118,8 @@ def sensitivities(
     columns = split_columns(layout, read_names("names", names), held)
     run = Variational(bound, forcing, columns)
     watched = Events(layout, events)
-    settings = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **options})
+    own = {k: v for k, v in bound.metadata.get("simulation", {}).items() if k == "max_step"}
+    settings = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **own, **options})
     require_steps("max_step", float(settings.get("max_step", np.inf)), start, stop)
     alone = None
     if watched:

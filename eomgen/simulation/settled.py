@@ -59,7 +59,7 @@ def _settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | 
     declared = declare(module)
     title = declared["method"] if method is None else method
     forcing = Forcing(module.layout, None)
-    if forcing.values or title == "RK4" or not can_run(module, title, forcing):
+    if forcing.values or title == "RK4" or "max_step" in declared or not can_run(module, title, forcing):
         return None
     forcing.attach(module)
     given = {"rtol": declared["rtol"] if rtol is None else rtol, "atol": declared["atol"] if atol is None else atol}

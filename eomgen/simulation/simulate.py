@@ -224,9 +224,9 @@ def simulate(
 
         solver = begin(run, solver, (start, end), x0)
     if usual is None:
-        given = (("rtol", rtol), ("atol", atol))
-        steps = {key: value for key, value in (("max_step", max_step), ("first_step", first_step)) if value is not None}
-        settings = {name: declared[name] if value is None else value for name, value in given} | steps | settings
+        given = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
+        own = {name: declared[name] for name in given if name in declared}
+        settings = own | {name: value for name, value in given.items() if value is not None} | settings
         if compiled or solver.__module__.startswith("scipy."):  # another's solver may take anything
             settings = check_tolerances(module.n_x, abs(end - start), settings)
             require_steps("max_step", float(settings.get("max_step", np.inf)), start, end)

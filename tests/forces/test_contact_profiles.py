@@ -62,19 +62,35 @@ def signed_distance(p: np.ndarray, line: np.ndarray) -> float:
     return float(away[k] * np.sign(p[1] - np.interp(p[0], line[:, 0], line[:, 1])))
 
 
-def test_depth_of_a_circle_against_brute_force() -> None:
-    """A small circle feels the nearest point of the outline alone; the force is the slope of the energy."""
+def energy_of_parts(p: np.ndarray, line: np.ndarray, radius: float) -> tuple[float, int]:
+    """Energy and number of the parts of the line that a circle holds: one begins at each of its nearest places.
+
+    Two grow together at each place that is farthest between them.
+    """
+    away = np.hypot(*(line - p).T)
+    low = (away[1:-1] < away[:-2]) & (away[1:-1] < away[2:])
+    high = (away[1:-1] > away[:-2]) & (away[1:-1] > away[2:])
+    energies = 2e4 * np.maximum(radius - away[1:-1], 0) ** 2.5 / 2.5
+    return float(energies[low].sum() - energies[high].sum()), int((energies[low] > 0).sum())
+
+
+@pytest.mark.parametrize(("radius", "bridges"), [(0.03, 1), (0.12, 5)])
+def test_depth_of_a_circle_against_brute_force(radius: float, bridges: int) -> None:
+    """It feels each wall of a valley that it bridges; the force is the slope of the energy."""
     m, (ball,) = scenes.planar("hills", 1, (0, 0, 0))
-    m.contacts("floor", {"shape": "circle", "on": ball, "radius": 0.03}, ground(m, HILLS), ELASTIC)
+    m.contacts("floor", {"shape": "circle", "on": ball, "radius": radius}, ground(m, HILLS), ELASTIC)
     mod = m.compile(target="numpy")
-    line, rng, met = outline(), np.random.default_rng(4), 0
+    line, rng, met, several = outline(), np.random.default_rng(4), 0, 0
+    line = line[np.append(True, np.diff(line[:, 0]) > 0)]
     for _ in range(150):
         px = rng.uniform(-0.7, 0.75)
-        p = np.array([px, np.interp(px, line[:, 0], line[:, 1]) + rng.uniform(-0.02, 0.04)])
-        depth = 0.03 - signed_distance(p, line)
+        p = np.array([px, np.interp(px, line[:, 0], line[:, 1]) + rng.uniform(-0.02, radius + 0.01)])
+        depth = radius - signed_distance(p, line)
         x = np.array([*p, 0.3, 0, 0, 0])
         energy = mod.energy(x)[1]
-        assert energy == pytest.approx(2e4 * max(depth, 0) ** 2.5 / 2.5, rel=1e-4, abs=1e-7)
+        one, (all_of_them, parts) = 2e4 * max(depth, 0) ** 2.5 / 2.5, energy_of_parts(p, line, radius)
+        several += depth < radius and parts > 1
+        assert energy == pytest.approx(one if depth > radius else all_of_them, rel=1e-4, abs=1e-7)
         if depth > 1e-3:
             met += 1
             h = 1e-6
@@ -85,6 +101,7 @@ def test_depth_of_a_circle_against_brute_force() -> None:
             np.testing.assert_allclose(force[:2], np.negative(slope), rtol=1e-3, atol=1e-3 * np.abs(force).max())
             assert abs(force[2]) <= 1e-9 * np.abs(force).max()
     assert met > 60
+    assert several >= bridges
 
 
 @pytest.mark.parametrize("points", [5, 9, 40])

@@ -106,9 +106,7 @@ def test_a_lock_keeps_its_coordinate_where_a_reset_puts_it() -> None:
 @pytest.mark.parametrize("target", TARGETS)
 def test_positions_that_a_closed_equation_does_not_have_are_refused(target: str) -> None:
     """Those onto which the mechanism would be moved are not told from those that the user wants."""
-    with pytest.raises(
-        SimulationError, match=r"at event kick: resets at t = 0\.5.*contradict what is closed \(c\)"
-    ):
+    with pytest.raises(SimulationError, match=r"at event kick: resets at t = 0\.5.*contradict what is closed \(c\)"):
         sliders({"s": 0.3}, False).compile(target=target).simulate(1.0)
     run = sliders({"s": 0.3, "r": 0.3, "s_dot": 1}, False).compile(target=target).simulate(1.0)
     assert run.x[:4, -1] == pytest.approx([0.55, 0.55, 0.5, 0.5], abs=1e-9)
