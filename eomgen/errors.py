@@ -32,7 +32,6 @@ import os
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from types import FrameType
 from typing import Any, NamedTuple
 
 from .texts import shortened, visible
@@ -47,10 +46,13 @@ _INSTALLED = re.compile(rf"[/\\](site|dist)-packages[/\\]|^{_HERE}|^<frozen")
 
 
 def calls_within() -> int:
-    """How many calls, this one's caller first, lie within the package: a warning's ``stacklevel`` is one more."""
-    package, calls = __name__.rpartition("errors")[0], 0
-    frame: FrameType | None = sys._getframe(1)
-    while frame is not None and str(frame.f_globals.get("__name__")).startswith(package):
+    """How many calls, this one's caller first, lie within the package, or in what calls it for the package.
+
+    A warning's ``stacklevel`` is one more.
+    """
+    within, calls = (__name__.rpartition("errors")[0], "numpy.", "scipy.", "functools"), 0
+    frame: Any = sys._getframe(1)
+    while frame is not None and str(frame.f_globals.get("__name__")).startswith(within):
         frame, calls = frame.f_back, calls + 1
     return calls
 

@@ -105,13 +105,15 @@ def equilibrium(
 def _states(module: BoundModel, guess: Any) -> Array:
     """First-order states where the search begins: of the guess, else declared, else 0."""
     layout = module.layout
-    if guess is None or isinstance(guess, Mapping):
-        given = {**layout.initial, **(guess or {})}
-        return np.array([read_number(name, given.get(name, 0.0)) for name in layout.states])
-    whole = np.array(read_numbers("guess", guess))
-    if whole.shape == (layout.n_x,):
-        return whole[layout.n_x - len(layout.states) :]
-    return np.array([layout.initial.get(name, 0.0) for name in layout.states])
+    given = {} if guess is None else guess if isinstance(guess, Mapping) else None
+    if given is None:
+        whole = np.array(read_numbers("guess", guess))
+        if whole.shape == (layout.n_x,):
+            return whole[layout.n_x - len(layout.states) :]
+        given = {}
+    declared = {name: x for name, x in layout.initial.items() if name in layout.states and name not in given}
+    values = {**Initial(module.kernels).used(declared), **given}
+    return np.array([read_number(name, values.get(name, 0.0)) for name in layout.states])
 
 
 def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) -> Array:

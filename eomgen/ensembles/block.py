@@ -176,7 +176,7 @@ def forcing_of(module: BoundModel, cases: Cases, plan: Plan, k: int) -> Forcing:
     """The inputs of run k."""
     forcing = find_forcing(module, plan)
     bound = module
-    with suppress(UsageError):  # where these parameters have no start, the run does not begin
+    with suppress(UsageError):  # where these parameters cannot be bound, the run does not begin
         bound = module.bind(**cases.column(k))
     forcing.attach(bound)
     forcing.unsettled = frozenset()
@@ -259,7 +259,11 @@ def _run_python(
     x, t = np.full((n, count), np.nan), np.full(count, plan.span[0])
     block = RunBlock(x, t, samples, status, failure, np.zeros(count), steps, rejected, evaluations, noted, notes)
     for k in range(count):
-        bound = module.bind(*(rows[name] if rows[name].ndim == 1 else rows[name][k] for name in ("p", "u")))
+        try:
+            bound = module.bind(*(rows[name] if rows[name].ndim == 1 else rows[name][k] for name in ("p", "u")))
+        except UsageError as error:
+            status[k], block.words[k] = BAD_PARAMETERS, str(error)
+            continue
         constants = {name: float(bound.u[module.u_names.index(name)]) for name in plan.constants}
         try:
             run = simulate(

@@ -17,8 +17,9 @@ from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.assembled import initial_of
 from ..runtime.given_start import last_state
-from ..runtime.late_start import late_values
+from ..runtime.late_start import fixed_told, late_values, tell_fixed
 from ..runtime.near_names import check_names, without_dots
+from ..runtime.refusals import require_switched
 from ..runtime.room import read_numbers, require_room
 from ..simulation.clocks import at_next_samples, require_agreement
 from ..simulation.run_arguments import find_state
@@ -120,6 +121,9 @@ def collect_cases(
         states = _columns("initial", last_state(initial, module.x_names), module.x_names, lengths)
     _require_one_length(lengths)
     k = next(iter(lengths.values()), 1)
+    if states is None:
+        declared = (*module.layout.initial, *module.layout.initial_outputs)
+        tell_fixed(module.layout, p, [name for name in declared if name not in values])
     require_room(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")
     if states is not None and states.ndim == 1:
         states = np.repeat(states[:, None], k, axis=1)
@@ -148,11 +152,12 @@ def assemble_states(
     words : list of str
         Why, for each of these in order.
     """
-    x, failed, words = _assemble_all(module, cases, t, forcing_of)
+    with fixed_told():  # for all runs, when their cases were collected
+        x, failed, words = _assemble_all(module, cases, t, forcing_of)
     if module.metadata.get("clocks"):
         for k in np.flatnonzero(~failed).tolist():
             x[:, k] = at_next_samples(module.bind(**cases.column(k)), t, x[:, k])
-    if module.metadata.get("held_rows") and cases.states is None:
+    if module.metadata.get("switched"):
         return _only_in_agreement(module, cases, t, x, failed, words)
     return x, failed, words
 
@@ -160,11 +165,14 @@ def assemble_states(
 def _only_in_agreement(
     module: BoundModel, cases: Cases, t: float, x: Array, failed: Mask, words: list[str]
 ) -> tuple[Array, Mask, list[str]]:
-    """The same without runs that start where a constraint declared closed does not hold."""
+    """The same without runs at whose start a constraint declared closed does not hold, or one is half closed."""
+    layout, by_name = module.layout, cases.states is None and bool(module.metadata.get("held_rows"))
     told = dict(zip(np.flatnonzero(failed).tolist(), words, strict=True))
     for k in np.flatnonzero(~failed).tolist():
         try:
-            require_agreement(module.bind(**cases.column(k)), t, x[:, k], cases.values)
+            require_switched(layout, x[layout.n_x - layout.n_states :, k])
+            if by_name:
+                require_agreement(module.bind(**cases.column(k)), t, x[:, k], cases.values)
         except UsageError as error:
             told[k], x[:, k] = str(error), np.nan
     return x, np.array([k in told for k in range(cases.count)], dtype=bool), [told[k] for k in sorted(told)]
@@ -182,9 +190,10 @@ def _assemble_all(
         return _assemble_each(module, cases, lambda k: _assemble_led(module, cases, k, t, forcing_of(k)))
     varying = cases.p.ndim > 1 or cases.u.ndim > 1 or any(np.ndim(x) for x in cases.values.values())
     if cases.states is None and (not varying or _is_free(module, cases, free)):
-        scalars = {name: float(x) for name, x in cases.values.items() if not np.ndim(x)}
+        late = {name: value for name, value in late_values(module.layout, cases.p).items() if np.ndim(value)}
+        scalars = {name: 0.0 if np.ndim(x) else float(x) for name, x in (late | cases.values).items()}
         x = np.repeat(module.x0(scalars, t=t, **_shared(cases))[:, None], cases.count, axis=1)
-        for name, value in (late_values(module.layout, cases.p) | cases.values).items():
+        for name, value in (late | cases.values).items():
             if np.ndim(value):
                 x[module.x_names.index(name)] = value
         for k in np.flatnonzero(~np.isfinite(x).all(axis=0)).tolist():  # of what follows from parameters

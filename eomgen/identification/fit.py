@@ -17,6 +17,7 @@ from ..limits.identification import MEASURED, ROUNDS
 from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array
 from ..runtime.allowed_parameters import bounds_of
+from ..runtime.late_start import fixed_told, tell_fixed
 from ..runtime.near_names import check_names, read_names, require, require_mapping, unknown
 from ..runtime.refusals import refuse_rigid
 from ..runtime.room import read_number
@@ -94,6 +95,7 @@ def fit(
         raise UsageError(f"derivatives must be {' or '.join(DERIVATIVES)}, not {derivatives!r}")
     experiments = read_experiments(module, data, initial, inputs)
     problem = _Problem(module, experiments, parameters, {"method": method, "rtol": rtol, "atol": atol})
+    problem.tell_fixed()
     limits = _bounds(problem, bounds)
     columns = list(dict.fromkeys(name for one in experiments for name in one.columns))
     known = read_sigma(sigma, columns)
@@ -149,6 +151,14 @@ class _Problem:
                 if one.inputs and name in one.inputs:
                     raise UsageError(f"input {name} is given, and cannot be found too; leave it out of one of them")
 
+    def tell_fixed(self) -> None:
+        """Warn, once for all runs, of initial values that are not given and cannot follow from the parameters."""
+        module, layout = self.module, self.module.layout
+        p = np.where([name in self.names for name in module.p_names], np.nan, module.p)  # whatever they will be
+        by_name = [one.initial or () for one in self.experiments if isinstance(one.initial, Mapping | None)]
+        declared = [name for name in (*layout.initial, *layout.initial_outputs) if name not in self.initial_names]
+        tell_fixed(layout, p, [name for name in declared if any(name not in given for given in by_name)])
+
     def _bound(self, name: str) -> float:
         """The value that holds now."""
         module = self.module
@@ -185,7 +195,8 @@ class _Problem:
         """The run of an experiment."""
         from ..simulation.simulate import simulate
 
-        return simulate(self.module, **self.arguments(values, one))
+        with fixed_told():
+            return simulate(self.module, **self.arguments(values, one))
 
     def residuals(self, values: Array, told: bool = False) -> Array:
         """(run - data) / sigma where something was measured; infinite where there is no run, unless that is told."""
@@ -215,10 +226,11 @@ class _Problem:
         parts = []
         for one in self.experiments:
             arguments = self.arguments(values, one)
-            slopes = run_slopes(self.module, self.names, tuple(one.columns), arguments)
-            if slopes is None:
-                found = sensitivities(self.module, self.names, **arguments)
-                slopes = {name: np.array([found[name, of] for of in self.names]).T for name in one.columns}
+            with fixed_told():
+                slopes = run_slopes(self.module, self.names, tuple(one.columns), arguments)
+                if slopes is None:
+                    found = sensitivities(self.module, self.names, **arguments)
+                    slopes = {name: np.array([found[name, of] for of in self.names]).T for name in one.columns}
             for name, measured in one.columns.items():
                 parts.append(slopes[name][np.isfinite(measured)] / self.sigma[name])
         return np.vstack(parts)

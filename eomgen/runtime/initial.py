@@ -89,17 +89,20 @@ class Initial:
             raise AssemblyError("the axes of a joint flipped on the path there")
         return q
 
-    def reference(self) -> Array:
-        """The reference position, closed again for these parameters and this time."""
-        if (later := self.later()) is not None:
+    def reference(self, given: Iterable[str] = (), rough: bool = True) -> Array:
+        """The reference position, closed again for these parameters and this time.
+
+        Declared values lead there but those to be `given`; unless ``rough``, it warns where they leave its branch.
+        """
+        if (later := self.later(given, rough)) is not None:
             return later
         declared = self.sort(self.layout.initial).positions
         try:
-            return self._closed(self.layout.q_reference, declared, restarts=2)
+            return self.close_near(self.layout.q_reference, declared, restarts=2)
         except AssemblyError:
             return self.system.close(self.layout.q_reference, {}).q
 
-    def _closed(self, start: Array, held: Mapping[str, float], restarts: int = RESTARTS) -> Array:
+    def close_near(self, start: Array, held: Mapping[str, float], restarts: int = RESTARTS) -> Array:
         """The closed position near a start, also where Newton's steps halve the distance only, as at a change point."""
         found = self.system.close(start, held, restarts)
         if found.residual > SETTLED:
@@ -109,30 +112,22 @@ class Initial:
                 return where_lost(self.system.closure(held), found.q)
         return found.q
 
-    def later(self) -> Array | None:
-        """Where drivers by this time, or later parameters, bring the reference position; None without, or if blocked.
+    def used(self, declared: dict[str, float]) -> dict[str, float]:
+        """Declared values of which a start is made; refuses one that is no number with the parameters bound."""
+        return declared if self.layout.late is None else self.layout.late.used(declared)
 
-        Initial values that follow from parameters are followed from those at the declared ones; where these do not
-        close the loops of now, from the closed position nearest to them.
-        """
+    def later(self, given: Iterable[str], rough: bool) -> Array | None:
+        """Where drivers by this time, or later parameters, bring the reference position; None without, or blocked."""
         if not self.t or largest(self.scales.residual(self.system.position(self.layout.q_reference)[0])) <= SETTLED:
-            if "start_terms" in self.layout.metadata:
-                from .late_start import first_values  # in a slim package only where it is needed
-
-                layout = self.layout
-                before, now = self.sort(first_values(layout)).positions, self.sort(layout.initial).positions
-                for held in (before, {}) if before != now else ():
-                    with suppress(AssemblyError):
-                        return self.follow(self.system.close(layout.q_reference, held).q, now)
-            return None
-        first = Initial(self.kernels).reference()
+            return None if self.layout.late is None else self.layout.late.follow(self, given, rough)
+        first = Initial(self.kernels).reference(given, rough)
         try:
             return follow(self.system.at(0.0), first, {}, self.t)
         except AssemblyError as error:
-            self._tell_branch(f"the position at t = {self.t:.6g} s", error)
+            self.tell_branch(f"the position at t = {self.t:.6g} s", error)
             return None
 
-    def _tell_branch(self, what: str, error: AssemblyError | None) -> None:
+    def tell_branch(self, what: str, error: AssemblyError | None) -> None:
         """Warn that a position was found by closing the loops anew."""
         warnings.warn(
             f"{what} cannot be reached from the reference position on the same branch: {error}.  The loops are closed "
@@ -147,19 +142,18 @@ class Initial:
         Warns where that leaves the branch of the reference position, unless the values are a ``rough`` guess.
         """
         layout = self.layout
-        declared = self.sort(layout.initial).positions
+        declared = {name: x for name, x in self.sort(layout.initial).positions.items() if name not in given}
         if not layout.n_h and not any(name in self.system.cut.names for name in (*declared, *given)):
-            return self.system.with_values(self.system.with_values(layout.q_reference, declared), given)
+            return self.system.with_values(layout.q_reference, {**self.used(declared), **given})
         if not given:
-            if (later := self.later()) is None:
-                return self._closed(layout.q_reference, declared)
-            return self.follow(later, self.compatible(later, {}, declared))
-        rest = {name: value for name, value in declared.items() if name not in given}
+            if (later := self.later((), rough)) is None:
+                return self.close_near(layout.q_reference, self.used(declared))
+            return self.follow(later, self.used(self.compatible(later, {}, declared)))
         try:
-            start = self.reference()
+            start = self.reference(given, rough)
         except AssemblyError:
-            return self._closed(layout.q_reference, given)  # these parameters close somewhere else, if anywhere
-        soft = self.compatible(start, given, rest)
+            return self.close_near(layout.q_reference, given)  # these parameters close somewhere else, if anywhere
+        soft = self.used(self.compatible(start, given, declared))
         blocked = None
         for held in ({**given, **soft}, given):
             try:
@@ -167,14 +161,14 @@ class Initial:
             except AssemblyError as error:
                 blocked = error
         try:
-            found = self._closed(start, {**given, **soft}, restarts=4 if soft else RESTARTS)
+            found = self.close_near(start, {**given, **soft}, restarts=4 if soft else RESTARTS)
         except AssemblyError:
             if not soft:
                 raise
-            found = self._closed(start, given)
+            found = self.close_near(start, given)
         # where they stand still at the reference, it is on no branch of theirs
         if not rough and len(self.compatible(start, (), given)) == len(given):
-            self._tell_branch(place(tuple(given), np.array(list(given.values()))).removeprefix(", "), blocked)
+            self.tell_branch(place(tuple(given), np.array(list(given.values()))).removeprefix(", "), blocked)
         return found
 
     def from_guess(self, guess: Mapping[str, float]) -> Array:
@@ -190,8 +184,9 @@ class Initial:
         from ..numeric.nearest_branch import close_nearest  # not in a slim package
 
         declared = {**self.sort(layout.guess).positions, **self.sort(layout.initial).positions}
-        start = self.system.with_values(self.system.with_values(layout.q_reference, declared), guess)
-        soft = self.compatible(start, {}, {**ordered, **{k: v for k, v in declared.items() if k not in guess}})
+        declared = self.used({k: v for k, v in declared.items() if k not in guess})
+        start = self.system.with_values(layout.q_reference, {**declared, **guess})
+        soft = self.compatible(start, {}, {**ordered, **declared})
         for held in (soft, {k: v for k, v in soft.items() if k in guess}):
             found = close_nearest(self.system, start, held, guess)
             if found is not None:
@@ -243,12 +238,11 @@ class Initial:
         """
         if self.layout.n_c:
             require_rank(self.kernels, self.scales.jacobian(self._C_q(q, t=self.t)))
-        declared = self.sort(self.layout.initial).rates
-        held: Mapping[str, float | Array] = declared
+        declared = {name: x for name, x in self.sort(self.layout.initial).rates.items() if name not in (given or {})}
         if given is not None:
             self._require_motion(q, given)
-            rest = {name: value for name, value in declared.items() if name not in given}
-            held = {**given, **(self.compatible(q, given, rest, positions=False) if rest else {})}
+            declared = self.compatible(q, given, declared, positions=False) if declared else {}
+        held: dict[str, float | Array] = {**(given or {}), **self.used(declared)}
         return self.on_branch(q, self._solve_rates(q, held), list(held))
 
     def on_branch(self, q: Array, v: Array, names: Sequence[str]) -> Array:
@@ -337,10 +331,8 @@ class Initial:
         layout, scales = self.layout, self.place if positions else self.scales
         C_q = self.system.position(q)[1][: self.layout.n_h] if positions else self._C_q(q, t=self.t)
         rows = [*scales.jacobian(C_q), *(row for name in given for row in self.gradients(q, name))]
-        basis: Array = np.empty((0, len(scales.q)))
-        if rows:
-            stacked = np.array(rows)
-            basis = algebra.svd(stacked)[2][: rank(stacked).rank]
+        stacked = np.reshape(rows, (len(rows), len(scales.q)))
+        basis = algebra.svd(stacked)[2][: rank(stacked).rank] if rows else stacked
         kept = {}
         for name, value in rest.items():
             added = basis

@@ -29,6 +29,8 @@ class Layout:
         The JSON text of model.json, or what it holds.
     """
 
+    late: Any = None  #: a LateStart where initial values follow from parameters bound later
+
     def __init__(self, metadata: str | Mapping[str, Any]) -> None:
         data: dict[str, Any] = json.loads(metadata) if isinstance(metadata, str) else dict(metadata)
         if data.get("abi") != ABI:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import PartitionError, UsageError
 from ..numeric.scales import Array
 from .argument_names import both_names
+from .refusals import require_switched
 from .room import read_number, read_numbers
 from .tree_motion import STEP, DependentMotion
 
@@ -91,6 +92,7 @@ class Minimal:
     def x0(self, values: Mapping[str, float] | None = None, /, *, t: float = 0.0, **named: float) -> Array:
         """Assembled initial state (n_x,), from the same named values as ``Module.x0``; calls :meth:`reset`."""
         x = self._module.x0(values, t=t, **named)
+        require_switched(self._layout, x[self._layout.n_x - self._layout.n_states :])
         self.reset(x[: self._layout.n_q])
         return self.reduce(x)
 

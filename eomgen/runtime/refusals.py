@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..errors import UnavailableError
+from ..errors import UnavailableError, UsageError
 
 if TYPE_CHECKING:
     from ..numeric.scales import Array
@@ -73,13 +73,29 @@ def refuse_sampled(layout: Layout, what: str) -> None:
         )
 
 
+def require_switched(layout: Layout, states: Array) -> None:
+    """Refuse first-order states (n_s,) that are neither 0 nor 1 where they say whether a constraint is closed.
+
+    Raises
+    ------
+    UsageError
+    """
+    given = dict(zip(layout.states, states, strict=True))
+    for name in layout.metadata.get("switched", ()):
+        if (value := given[f"{name}_closed"]) not in (0.0, 1.0):
+            raise UsageError(f"{name}_closed is 1 while {name} is closed and 0 while it is open, not {value:g}")
+
+
 def refuse_closed(layout: Layout, states: Array, what: str) -> None:
     """Refuse first-order states (n_s,) with which constraints that close and open are closed.
 
     Raises
     ------
     UnavailableError
+    UsageError
+        Such a state is neither 0 nor 1.
     """
+    require_switched(layout, states)
     given = dict(zip(layout.states, states, strict=True))
     names = [name for name in layout.metadata.get("switched", ()) if given[f"{name}_closed"] > 0.5]
     if names:

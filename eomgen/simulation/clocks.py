@@ -15,6 +15,7 @@ from ..errors import UsageError
 from ..limits.constraints import MEASURED
 from ..limits.runs import WHOLE
 from ..numeric.scales import Array
+from ..runtime.refusals import require_switched
 from .events import instant
 
 if TYPE_CHECKING:
@@ -107,9 +108,7 @@ def require_agreement(module: BoundModel, t: float, x: Array, initial: Any) -> N
         Tells the equation, its error and how much of one is allowed.
     """
     layout = module.layout
-    for name in module.metadata.get("switched", ()):
-        if (value := x[layout.x.index(f"{name}_closed")]) not in (0.0, 1.0):
-            raise UsageError(f"{name}_closed is 1 while {name} is closed and 0 while it is open, not {value:g}")
+    require_switched(layout, x[layout.n_x - layout.n_states :])
     rows: list[tuple[str, str, str]] = module.metadata.get("held_rows", [])
     if (
         not rows

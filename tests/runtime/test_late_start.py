@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -188,12 +189,141 @@ def test_values_that_are_no_numbers_are_named() -> None:
     m.initial(q="sqrt(a)")
     module = m.compile(target="numpy")
     with pytest.raises(UsageError, match=r"initial\.q is no number with a = -1"):
-        module.bind({"a": -1.0})
+        module.bind({"a": -1.0}).x0()
     with pytest.raises(UsageError, match=r"initial\.q is no number with a = -1"):
         module.simulate(1.0, parameters={"a": -1.0})
     m.initial(q="sqrt(-a)")
     with pytest.raises(ModelError, match=r"initial\.q: is no number at the declared parameters"):
         m.compile(target="numpy")
+
+
+def root() -> eg.Model:
+    """A free slider that starts at sqrt(a) with the speed 1/a."""
+    m = eg.Model("root", gravity=(0, 0, 0))
+    m.parameter("a", 0.25)
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="q")
+    m.initial(q="sqrt(a)", q_dot="1/a")
+    return m
+
+
+def test_a_start_that_is_given_needs_no_declared_one() -> None:
+    module = root().compile(target="numpy")
+    late = module.bind({"a": -1.0})
+    assert late.rhs(0.0, [1.0, 2.0]) == pytest.approx([2.0, 0.0])
+    assert late.x0({"q": 1.0}) == pytest.approx([1.0, -1.0])
+    assert module.simulate(0.5, {"q": 1.0}, parameters={"a": -1.0}).x[:, -1] == pytest.approx([0.5, -1.0])
+    assert module.simulate(0.5, [1.0, 2.0], parameters={"a": -1.0}).x[:, -1] == pytest.approx([2.0, 2.0])
+    assert late.simulate_many(0.5, parameters={"a": [1.0, 4.0]}).x == pytest.approx(
+        np.array([[1.5, 2.125], [1.0, 0.25]])
+    )
+    assert module.sensitivities(["q"], 0.5, {"q": 1.0}, parameters={"a": -1.0})["q", "q"][-1] == pytest.approx(1.0)
+    for given in ({}, {"q_dot": 3.0}):
+        with pytest.raises(UsageError, match=r"initial\.q is no number with a = -1: look for"):
+            late.x0(given)
+    with pytest.raises(UsageError, match=r"initial\.q_dot is no number with a = 0"):
+        module.simulate(0.5, {"q": 1.0}, parameters={"a": 0.0})
+
+
+def test_a_loop_or_a_rotation_that_is_given_needs_no_declared_start() -> None:
+    m = crank()
+    m.parameter("a", 0.16)
+    m.initial(theta="sqrt(a)", theta_dot="speed")
+    late = m.compile(target="numpy").bind({"a": -1.0})
+    x = late.x0({"theta": 2.0})
+    assert x[:1] == pytest.approx([2.0])
+    assert late.x0({"s": 0.6})[list(late.q_names).index("s")] == pytest.approx(0.6)  # which leaves theta no room
+    assert late.branch(x) == 1
+    for call in (late.x0, late.assemble, late.branches):
+        with pytest.raises(UsageError, match=r"initial\.theta is no number with start = "):
+            call()
+    turned = eg.Model("turned", gravity=(0, 0, 0))
+    turned.parameter("a", 0.5)
+    body = turned.body("body", mass=1.0, inertia={"xx": 1.0, "yy": 2.0, "zz": 3.0})
+    turned.spherical("S", turned.ground, body, rotation="euler_parameters")
+    turned.initial(S_e0="sqrt(1 - a**2)", S_e3="a")
+    late = turned.compile(target="numpy").bind({"a": 2.0})
+    assert late.x0({"S_e0": 0.6, "S_e1": 0.8})[:4] == pytest.approx([0.6, 0.8, 0.0, 0.0])
+    with pytest.raises(UsageError, match=r"initial\.S_e0 is no number with a = 2"):
+        late.x0()
+
+
+def test_a_guess_is_refused_where_it_is_used() -> None:
+    m = crank()
+    m.parameter("a", 0.4225)
+    m.guess(phi=-0.2, s="sqrt(a)")
+    late = m.compile(target="numpy").bind({"a": -1.0})
+    assert late.x0({"theta": 0.5})[0] == pytest.approx(0.5)
+    with pytest.raises(UsageError, match=r"guess\.s is no number with .*a = -1"):
+        late.assemble({"phi": -0.3})
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("method", ["DOP853", "LSODA"])
+@pytest.mark.parametrize("q", [1.0, [1.0, 2.0]])
+def test_runs_that_are_given_a_start_run(target: str, method: str, q: Any) -> None:
+    given = {"q": q, "q_dot": 0.5}
+    runs = root().compile(target=target).simulate_many(0.1, given, {"a": [-1.0, 4.0]}, method=method)
+    assert runs.status.tolist() == [0, 0]
+    assert runs.x[0] == pytest.approx(np.broadcast_to(q, 2) + 0.05, abs=1e-9)
+    alike = (
+        root().compile(target=target).simulate_many(0.1, {"q": [1.0, 2.0], "q_dot": 0.5}, {"a": -1.0}, method=method)
+    )
+    assert alike.x[0] == pytest.approx([1.05, 2.05], abs=1e-9)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_parameters_that_cannot_be_bound_fail_their_own_run(target: str) -> None:
+    m = eg.Model("weight", gravity=(0, -10, 0))
+    m.parameter("m", 1.0)
+    m.prismatic("J", m.ground, m.body("b", mass="1/(2.5 - m)"), axis="y", coordinate="q")
+    runs = m.compile(target=target).simulate_many(0.1, {"q": 1.0}, {"m": [2.5, 2.0]})
+    assert (runs.status != 0).tolist() == [True, False]
+    assert runs.x[:, 1] == pytest.approx([0.95, -1.0])
+
+
+def rocker(start: float = 1.2) -> eg.Model:
+    """A crank-rocker that starts at an angle of the rocker: those above and those below 0 are on two circuits."""
+    m = eg.Model("rocker", gravity=(0, 0, 0))
+    m.parameter("start", start)
+    a, b, c = (m.body(name, mass=1.0, inertia={"zz": 0.1}) for name in "abc")
+    m.revolute("A", m.ground, a, coordinate="rock")
+    m.revolute("B", a.at(0.8, 0, 0), b, coordinate="be")
+    m.revolute("D", m.ground.at(1.0, 0, 0), c, coordinate="cr")
+    m.revolute("C", b.at(1.0, 0, 0), c.at(0.3, 0, 0))
+    m.guess(be=-1.2, cr=1.0)
+    m.initial(rock="start")
+    m.independent = ["rock"]
+    return m
+
+
+def heard(call: Any) -> tuple[Any, list[tuple[str, str]]]:
+    """What a call gives, and the warnings with their files."""
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        value = call()
+    return value, [(str(one.message), one.filename) for one in found]
+
+
+@pytest.mark.parametrize("angle", [1.0, -1.2])
+def test_a_start_that_the_branch_does_not_reach_is_told_as_if_given(angle: float) -> None:
+    """The rocker of length 0.8 about (0, 0), the crank of length 0.3 about (1, 0): each circuit lies on one side."""
+    module = rocker().compile(target="numpy")
+    expected, words = heard(lambda: module.x0({"rock": angle}))
+    assert len(words) == (angle < 0.0)
+    for call in (
+        lambda: module.bind({"start": angle}).x0(),
+        lambda: module.x0(p={"start": angle}),
+        lambda: module.simulate(1e-9, parameters={"start": angle}).x[:, 0],
+        lambda: module.simulate_many(1e-9, parameters={"start": [angle]}).x[:, 0],
+    ):
+        found, told = heard(call)
+        assert found == pytest.approx(expected, abs=1e-7)
+        assert told == words
+    for text, file in words:
+        assert text.startswith("rock = -1.2 cannot be reached from the reference position on the same branch: ")
+        assert file == __file__
+    assert heard(lambda: module.bind({"start": angle}).x0({"rock": 1.1}))[1] == []  # from the declared branch
+    assert module.bind({"start": angle}).x0({"rock": 1.1}) == pytest.approx(module.x0({"rock": 1.1}), abs=1e-9)
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -220,3 +350,27 @@ def test_tables_stay_and_it_is_said() -> None:
     assert module.bind({"b": 3.0}).x0() == pytest.approx([1.0, 6.0])
     with pytest.warns(UserWarning, match="initial value of q calls a table or a function of the model.*follow a"):
         assert module.bind({"a": 2.0}).x0() == pytest.approx([1.0, 2.0])
+    late = module.bind({"a": 2.0})
+    once = [
+        late.x0,
+        lambda: module.simulate(0.1, parameters={"a": 2.0}),
+        lambda: module.simulate(0.1, {"q_dot": 1.0}, parameters={"a": 2.0}),
+        lambda: module.simulate_many(0.1, None, {"a": [2.0, 3.0]}),
+        lambda: module.simulate_many(0.1, {"q_dot": [1.0, 2.0]}, {"a": [2.0, 3.0]}),
+        lambda: module.sensitivities(["b"], 0.1, parameters={"a": 2.0}),
+        lambda: module.fit({"t": [0.0, 0.1, 0.2], "q": [1.0, 1.2, 1.4]}, ["a", "b"]),
+    ]
+    for call in once:
+        _, told = heard(call)
+        assert [(text.split(" calls ")[0], file) for text, file in told] == [("the initial value of q", __file__)]
+    silent = [
+        lambda: module.bind({"a": 2.0}).bind(u={}),
+        lambda: late.x0({"q": 3.0}),
+        lambda: late.simulate(0.1, [1.0, 2.0]),
+        lambda: module.simulate(0.1, {"q": 3.0}, parameters={"a": 2.0}),
+        lambda: module.simulate_many(0.1, {"q": 3.0}, {"a": [2.0, 3.0]}),
+        lambda: module.simulate_many(0.1, None, {"b": [2.0, 3.0]}),
+        lambda: module.fit({"t": [0.0, 0.1, 0.2], "q": [1.0, 1.2, 1.4]}, ["b"]),
+    ]
+    for call in silent:
+        assert heard(call)[1] == []

@@ -172,6 +172,16 @@ def test_states_of_constraints_are_0_or_1() -> None:
     m.lock("brake", "A", opens="0.2 - t")
     with pytest.raises(UsageError, match="brake_closed is 1 while brake is closed and 0 while it is open, not 0.5"):
         m.compile(target="numpy").simulate(0.1, {"brake_closed": 0.5})
+    module = m.compile(target="numpy")
+    for start in (module.minimal.x0, module.equilibrium):
+        with pytest.raises(UsageError, match="brake_closed is 1 while brake is closed and 0 while it is open, not 0.3"):
+            start({"brake_closed": 0.3})
+        start({"brake_closed": 0})
+    for initial in ({"s_dot": 1.0, "brake_closed": [0.5, 1.0, 0.0]}, [[0.0] * 3, [1.0] * 3, [0.5, 1.0, 0.0]]):
+        runs = module.simulate_many(0.1, initial)
+        assert (runs.status != 0).tolist() == [True, False, False]
+        assert np.isnan(runs.x[:, 0]).all()
+        assert "brake_closed is 1 while brake is closed" in runs.failures()[0].message
     m.event("kick", "t - 0.1", reset={"brake_closed": 0.5})
     with pytest.raises(ModelError, match=r"events.kick.reset.brake_closed.*give 1 to close the constraint, 0 to open"):
         m.compile(target="numpy")
