@@ -173,3 +173,28 @@ def test_fast_bodies_stop_at_thin_walls_while_others_land() -> None:
     for phase in np.linspace(0.0, 0.02, 23):
         start = {"a_x": 0.1 + phase, "a_y": 1.0, "a_x_dot": 20.0, "b_x": -1.0, "b_y": 0.1 + 0.0189, "b_y_dot": -1.0}
         assert module.simulate(0.04, start, method="moreau", step=1e-3)["a_x"].max() < 0.5
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_what_lands_elsewhere_in_the_same_step_changes_nothing(target: str) -> None:
+    """Balls beside each other fall from many heights, as each does alone."""
+
+    def balls(count: int) -> Any:
+        m = eg.Model("balls", gravity=(0, -9.81, 0))
+        bodies = [m.body(f"b{k}", mass=1.0, inertia={"zz": 0.01}) for k in range(count)]
+        for k, body in enumerate(bodies):
+            m.planar(f"j{k}", m.ground, body)
+        shapes = [{"shape": "circle", "on": body, "radius": 0.1} for body in bodies]
+        law = {"normal_law": "rigid", "friction": 0.3}
+        m.contacts("c", shapes, {"shape": "half_plane", "on": m.ground}, law)
+        return m.compile(target=target)
+
+    heights = 0.12 + np.random.default_rng(1).uniform(0, 0.004, 8)
+    start = {f"j{k}_y": y for k, y in enumerate(heights)} | {f"j{k}_x": float(k) for k in range(8)}
+    together, alone = balls(8).simulate(0.12, start, method="moreau", step=1e-3), balls(1)
+    landed = 0
+    for k, y in enumerate(heights):
+        one = alone.simulate(0.12, {"j0_y": y}, method="moreau", step=1e-3)
+        assert together[f"j{k}_y"] == pytest.approx(one["j0_y"], abs=1e-9)
+        landed += abs(one["j0_y"][-1] - 0.1) < 1e-9
+    assert landed == 8

@@ -258,3 +258,28 @@ def test_slopes_by_what_a_closed_constraint_forbids_are_refused() -> None:
         moved({"s": "s + k"}).sensitivities(["k"], 1.0, {"s_dot": 1.0, "r_dot": 1.0})
     both = moved({"s": "s + k", "r": "r + k"}).sensitivities(["k"], 1.0, {"s_dot": 1.0, "r_dot": 1.0})
     assert both.dx[:2, 0, -1] == pytest.approx([1.0, 1.0], abs=1e-6)
+
+
+def row_of_cranks(count: int, **clutch: str) -> eg.Model:
+    """Slider-cranks whose cranks turn alike, and a slider that the first one drags along."""
+    m = dragged(count, {"theta0_dot": "theta0_dot + 3"}, **clutch)
+    for k in range(1, count):
+        m.coupling(f"alike{k}", equation=f"theta{k}_dot - theta{k - 1}_dot")
+    return m
+
+
+def test_a_kick_is_brought_onto_a_long_row_of_loops() -> None:
+    """Of 14 cranks, 55 equations: as with the clutch for good."""
+    mine, judge = (row_of_cranks(14, **one).compile(target="numpy") for one in ({"opens": "100 - t"}, {}))
+    x = judge.x0()
+    start = dict(zip(judge.x_names, x.tolist(), strict=True))
+    found, right = (one.simulate(0.3, start) for one in (mine, judge))
+    for name in ("r", "r_dot", "theta0_dot", "theta13_dot"):
+        assert found[name][-1] == pytest.approx(right[name][-1], abs=1e-6)
+
+
+def test_a_failed_reset_names_the_event_and_what_is_closed_then() -> None:
+    m = sliders({"s_dot": "sqrt(0.1 - t)"}, False)
+    m.coupling("other", {"s": 1, "r": -1}, closes="t - 100")
+    with pytest.raises(SimulationError, match=r"at event kick: .*contradict what is closed \(c\), closes"):
+        m.compile(target="numpy").simulate(1.0)
