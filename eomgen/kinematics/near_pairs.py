@@ -7,11 +7,14 @@ section 4.3.1).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+from ..forces.force import Force
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
+from ..graph.substitute import symbols_of
 from .kinematics import Kinematics
 
 
@@ -38,7 +41,8 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
 
     ``lists`` has name, numbers and shapes of each contact; ``moved_by`` the last velocity that moves each shape, -1 for
     ground; ``parents`` the velocity before each towards ground; ``bodies`` the body of each shape.  ``rigid_only``
-    names contacts without a law of force.
+    names contacts without a law of force; ``rigid_by_motion`` those whose friction or restitution as rigid bodies
+    depends on velocities or first-order states, and on which.
     """
     forces = [force for force in kinematics.mechanism.forces if force.near(kinematics.motion)]
     if not forces:
@@ -61,8 +65,16 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
             "parents": parents,
             "bodies": [_name(kinematics, body) for force in forces for body in force.met_bodies],
         },
+        **({"rigid_by_motion": moving} if (moving := _by_motion(kinematics, forces)) else {}),
         **({"rigid_only": rigid} if (rigid := [force.name for force in forces if force.is_rigid]) else {}),
     }
+
+
+def _by_motion(kinematics: Kinematics, forces: Sequence[Force]) -> dict[str, list[str]]:
+    """Velocities and states on which what is near depends, by contact."""
+    moving = (*kinematics.velocity_names, *kinematics.state_names)
+    used = {force.name: symbols_of(kinematics.resolve(list(force.near(kinematics.motion)))) for force in forces}
+    return {name: found for name, of in used.items() if (found := [one for one in moving if one in of])}
 
 
 def _name(kinematics: Kinematics, body: int) -> str:

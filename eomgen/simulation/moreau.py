@@ -164,6 +164,11 @@ def _require_no_others(module: BoundModel, events: Any) -> None:
     if module.layout.reaction_laws:
         names = ", ".join(module.layout.reaction_laws)
         raise UsageError(f"method moreau has no friction by reactions of joints (here {names}); use another method")
+    for name, of in module.metadata.get("rigid_by_motion", {}).items():
+        raise UsageError(
+            f"friction or restitution of contact {name!r} depends on {', '.join(of)}; by method moreau it may "
+            "depend on time, coordinates, parameters and inputs"
+        )
     if Events(module.layout, None).resets:
         raise UsageError(f"{module.name} has events that reset its state, which method moreau does not watch")
     if ends := [event["name"] for event in module.metadata.get("events", []) if event["terminal"]]:

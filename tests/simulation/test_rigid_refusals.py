@@ -96,3 +96,16 @@ def test_forces_of_rigid_contacts_as_outputs(asked: str) -> None:
         assert {"normal(c)", "friction(c)"} <= set(run.columns.names)
     assert "run.contact_forces.on(BODY)" in str(told.value)
     assert run.contact_forces.on("b").shape == (6, len(run))
+
+
+@pytest.mark.parametrize(("mu", "of"), [("0.3 + 0.1*z", "z"), ("0.3 + 0.1*j_x_dot", "j_x_dot"), ("0.3 + vx(b)", "j_x")])
+@pytest.mark.parametrize("rigid_only", [True, False])
+def test_friction_that_depends_on_the_motion(mu: str, of: str, rigid_only: bool) -> None:
+    m = eg.Model("slowing", gravity=(4, -9, 0))
+    m.state("z", "1 - z")
+    body = m.body("b", mass=1.0, inertia={"zz": 0.01})
+    m.planar("j", m.ground, body)
+    law = rigid(friction=mu) if rigid_only else {"stiffness": 1e5, "friction": mu, "smoothing": 1e-3}
+    m.contacts("c", {**SHAPES["circle"], "on": body}, {"shape": "half_plane", "on": m.ground}, law)
+    with pytest.raises(UsageError, match=rf"contact 'c' depends on {of}.*time, coordinates, parameters and inputs"):
+        m.compile(target="numpy").simulate(0.01, {"j_y": 0.5}, method="moreau", step=1e-3)
