@@ -75,8 +75,10 @@ class Mobility:
     driven: bool = False  #: whether a constraint depends on time
 
 
-def initial_values(kinematics: Kinematics, values: Mapping[str, float], which: str = "initial") -> dict[str, float]:
-    """Declared initial values (or guesses) as numbers, by name."""
+def initial_values(
+    kinematics: Kinematics, values: Mapping[str, float | None], which: str = "initial"
+) -> dict[str, float]:
+    """Declared initial values (or guesses) as numbers, by name, with those of parameters."""
     given: Mapping[str, Expr] = getattr(kinematics.mechanism, which)
     numbers = compile_evaluator(list(given.values()), tuple(values))(list(values.values())) if given else []
     return {name: float(x) for name, x in zip(given, numbers, strict=True)}

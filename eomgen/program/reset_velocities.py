@@ -23,9 +23,8 @@ from ..kinematics.switched import SwitchedRow
 from ..limits.constraints import MEASURED
 from .held_constraints import closed, solve_switched, switched_matrix
 
-MOST = (
-    120  #: equations of a mechanism onto which velocities are brought together with closed ones; more are judged only
-)
+#: Equations of a mechanism onto which velocities are brought together with closed ones; of more they are judged only.
+MOST = 120
 
 
 class RowAfter(NamedTuple):

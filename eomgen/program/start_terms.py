@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
 from ..errors import TO_BE_FINITE, ModelError
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
-from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import symbols_of
 from ..graph.tape import record_tape
 from ..graph.traverse import reachable
 from ..kinematics import Kinematics
+from ..kinematics.mobility import initial_values
 from ..operations import OPERATIONS
 
 
@@ -29,7 +28,9 @@ def describe_start(kinematics: Kinematics) -> dict[str, Any]:
     given = {"initial": m.initial, "initial_outputs": m.initial_outputs, "guess": m.guess}
     values = {p.name: p.value for p in m.parameters}
     found: dict[str, Any] = {
-        key: _numbers(terms, values) for key, terms in given.items() if terms or key != "initial_outputs"
+        key: initial_values(kinematics, values, key)
+        for key, terms in given.items()
+        if terms or key != "initial_outputs"
     }
     if bad := [(key, name) for key, of in found.items() for name, x in of.items() if not isfinite(x)]:
         what = "is no number at the declared parameters"
@@ -59,9 +60,3 @@ def describe_start(kinematics: Kinematics) -> dict[str, Any]:
 def _is_of_operations(x: Expr) -> bool:
     """Whether a tape can play it."""
     return {x.graph.nodes[i][0] for i in reachable(x.graph, [x.id])} <= {"sym", "const", *OPERATIONS}
-
-
-def _numbers(given: Mapping[str, Expr], values: Mapping[str, float | None]) -> dict[str, float]:
-    """Initial values or guesses at the declared parameters, each of which has a value in a model that is generated."""
-    numbers = compile_evaluator(list(given.values()), tuple(values))(list(values.values())) if given else []
-    return {name: float(x) for name, x in zip(given, numbers, strict=True)}

@@ -186,17 +186,17 @@ class Events:
         after = np.array(x, dtype=float)
         for i in fired:
             if self.model[i].action == RESET:
-                self.last = f" at event {self.names[i]}"
                 after = self.renewed(module, forcing, t, after, i)
                 after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
+            self.last = f" at event {', '.join(self.names[i] for i in gaps)}"
             after = self._strike(module, t, after, self.declared, gaps, forcing)
         return after
 
     def renewed(self, module: BoundModel, forcing: Forcing, t: float, x: Array, event: int) -> Array:
         """The state x with the new values that the model gives at an event."""
-        after, resets = x.copy(), self.layout.metadata["resets"]
+        after, resets, self.last = x.copy(), self.layout.metadata["resets"], f" at event {self.names[event]}"
         own = [k for k, (index, _) in enumerate(resets) if index == event]
         after[[resets[k][1] for k in own]] = module.kernels.rows("resets", own, t, after, forcing(t, after))
         return after
