@@ -223,8 +223,7 @@ class BlockMaker:
             "event_slopes": lambda: derivatives(terms, terms.events, (*terms.q, *terms.v)),
             "event_derivatives": lambda: by_everything(terms, [*terms.events, *terms.resets]),
             "strike_derivatives": lambda: by_everything(
-                terms,
-                strike_rows(terms, *(self._symbols(self.port(of).symbols) for of in ("impulses", "held_impulses"))),
+                terms, strike_rows(terms, self.port("impulses").symbols, self.port("held_impulses").symbols)
             ),
             "assembly_jacobian": lambda: assembly_jacobian(terms, self.sizes.n_loop_coordinates),
             "output_derivatives": lambda: output_derivatives(terms),

@@ -32,11 +32,12 @@ def output_derivatives(terms: SystemTerms) -> list[Expr]:
     return derivatives(terms, terms.outputs, (*terms.q, *terms.v, *terms.a, *terms.u, *terms.p))
 
 
-def strike_rows(terms: SystemTerms, impulses: Sequence[Expr], of_held: Sequence[Expr]) -> list[Expr]:
+def strike_rows(terms: SystemTerms, impulses: Sequence[str], of_held: Sequence[str]) -> list[Expr]:
     """What rules velocities at an instant, a being their change.
 
     The momentum balance with impulses l of constraints, g of gaps with normals n, and those of constraints that close
-    and open; the least scaled change; constraints of velocities; the events' rates; those of what is closed.
+    and open; the least scaled change; constraints of velocities; the events' rates; those of what is closed.  Impulses
+    are given by their symbols.
     """
     graph = terms.graph
     v, a, l = ([graph.symbol(name) for name in names] for names in (terms.v, terms.a, terms.multipliers))
@@ -50,11 +51,11 @@ def strike_rows(terms: SystemTerms, impulses: Sequence[Expr], of_held: Sequence[
     for row, one in zip(terms.constraint_jacobian, l, strict=True):
         change = [x + c * one for x, c in zip(change, row, strict=True)]
         least = [x + c * one for x, c in zip(least, row, strict=True)]
-    for i, g in enumerate(impulses):
+    for i, g in enumerate(map(graph.symbol, impulses)):
         change = [x - normals.get((i, k), graph.zero) * g for k, x in enumerate(change)]
     held = terms.held_errors[1::2]
     by_held = jacobian(held, v[: terms.n_v - terms.n_states])
     for (i, k), slope in by_held.items():
-        change[k] = change[k] + slope * of_held[i]
+        change[k] = change[k] + slope * graph.symbol(of_held[i])
     moved = [x + y for x, y in zip(rates, drift, strict=True)]
     return [*change, *least, *terms.velocity_constraints, *moved, *held]
