@@ -22,7 +22,7 @@ from ..runtime.signals import Forcing, Signal
 from ..simulation.clocks import require_forward
 from ..simulation.compiled import can_run
 from ..simulation.progress import Progress, wanted
-from ..simulation.run_arguments import check_method, declare, find_span, ordered_times, own_step
+from ..simulation.run_arguments import check_method, declare, find_span, longest_step, ordered_times, own_step
 from ..simulation.tolerances import check_tolerances
 from .block import LOST, Plan, find_events
 from .case_grid import grid_axes, spread_grid
@@ -227,7 +227,7 @@ def _plan(
     if step is not None:
         require_steps("step", step, start, end)
         options = {**options, "max_step": step, "first_step": step}
-    own = {name: declared[name] for name in ("rtol", "atol", "max_step") if name in declared}
+    own = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method)
     chosen = own | {k: v for k, v in options.items() if v is not None}
     chosen = check_tolerances(module.n_x, abs(end - start), chosen)
     require_steps("max_step", float(chosen.get("max_step", np.inf)), start, end)

@@ -104,7 +104,8 @@ class NotchRound(ProfilePiece):
     def share(self, view: View) -> Expr:
         x, y, _ = self._place(view)
         cosine, sine, width, _ = self.sizes
-        both = part(sine * (x * cosine + y * sine), width) * part(sine * (x * cosine - y * sine), width)
+        first, second = part(sine * (x * cosine + y * sine), width), part(sine * (x * cosine - y * sine), width)
+        both = view.graph.apply("max", 0.0, first + second - 1.0)  # what the edges have more than one, flat ones too
         return where(view.graph.apply("lt", 0.0, cosine), -both, 0.0)
 
     def touch(self, view: View) -> Touch:

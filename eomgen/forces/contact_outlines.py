@@ -39,7 +39,7 @@ def straight_pieces(points: Sequence[Point]) -> list[ProfilePart]:
     width = SHARED * length(minus(points[-1], points[0]))
     edges = [minus(b, a) for a, b in itertools.pairwise(points)]
     ways = [unit(one) for one in edges]
-    sides = [None, *ways, None]
+    sides = [None, *edges, None]
     found = [edge(points[k], one, sides[k], sides[k + 2], width, walls=True) for k, one in enumerate(edges)]
     return found + [notch(points[k], ways[k - 1], ways[k], width) for k in range(1, len(edges))]
 
@@ -80,7 +80,7 @@ def straight_ring(points: Sequence[Point]) -> list[ProfilePart]:
     edges = [minus(b, a) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
     ways = [unit(one) for one in edges]
     n = len(points)
-    found = [edge(points[k], edges[k], ways[k - 1], ways[(k + 1) % n], width, walls=True) for k in range(n)]
+    found = [edge(points[k], edges[k], edges[k - 1], edges[(k + 1) % n], width, walls=True) for k in range(n)]
     return found + [notch(points[k], ways[k - 1], ways[k], width) for k in range(n)]
 
 

@@ -48,7 +48,7 @@ class ProfilePart(NamedTuple):
 def edge(
     start: Point, reach: Point, before: Point | None, after: Point | None, width: Expr, walls: bool = False
 ) -> ProfilePart:
-    """A straight piece between neighbours of two directions.
+    """A straight piece between neighbours, straight ones given by their ways from end to end.
 
     Sizes: half of its length; at the left and the right end x and y of the bisector and 1, or 0 without an end; 1 if it
     is felt beside its neighbours where these turn towards it (``walls``), else 0; the width over which neighbours share
@@ -57,12 +57,13 @@ def edge(
     graph, way, half = width.graph, unit(reach), 0.5 * length(reach)
     ends: list[Expr] = []
     passes: list[Expr] = []
-    for other, inward in ((before, 1.0), (after, -1.0)):
-        turned = None if other is None or not walls else (dot(way, other), -inward * cross(way, other))
-        passes += hollow(graph.zero, turned)
-        if other is None:
+    for run, inward in ((before, 1.0), (after, -1.0)):
+        if run is None:
+            passes += hollow(graph.zero, None)
             ends += [graph.zero, graph.one, graph.zero]
             continue
+        other = unit(run)
+        passes += hollow(graph.zero, (dot(way, other), -inward * cross(way, other)) if walls else None, length(run))
         bisector = unit((-way[1] - other[1], way[0] + other[0]))  # the sum of both normals
         ends += [inward * dot(bisector, way), way[0] * bisector[1] - way[1] * bisector[0], graph.one]
     middle = (start[0] + 0.5 * reach[0], start[1] + 0.5 * reach[1])
@@ -70,15 +71,18 @@ def edge(
     return ProfilePart("edge", middle, way, sizes, half, before is None or after is None)
 
 
-def hollow(radius: Expr, turned: Point | None) -> tuple[Expr, Expr, Expr]:
-    """What is hollow between an end of a piece and the next piece: cosine and sine of the angle of both, and a radius.
+def hollow(radius: Expr, turned: Point | None, run: Expr | None = None) -> tuple[Expr, Expr, Expr, Expr]:
+    """What is hollow between an end of a piece and the next: cosine and sine of the angle of both, radius, length.
 
-    It is the corner itself, of radius 0, or a hollow arc; where the outline turns the other way all three are 0.
+    It is the corner itself, of radius 0, before a piece of a length, or a hollow arc, of length 0; where the outline
+    turns the other way all four are 0.
     """
+    zero = radius.graph.zero
     if turned is None:
-        return radius.graph.zero, radius.graph.zero, radius.graph.zero
+        return zero, zero, zero, zero
     inwards = radius.graph.apply("lt", 0.0, turned[1])
-    return where(inwards, turned[0], 0.0), where(inwards, turned[1], 0.0), where(inwards, radius, 0.0)
+    cosine, sine, size, reach = (where(inwards, x, 0.0) for x in (*turned, radius, zero if run is None else run))
+    return cosine, sine, size, reach
 
 
 def biarcs(a: Point, b: Point, s: Point, t: Point, width: Expr) -> tuple[ProfilePart, ProfilePart]:
@@ -122,7 +126,7 @@ def arc(start: Point, end: Point, at_start: Point | None, width: Expr, at_end: P
         cosine, sine = dot(at_end, c), c[0] * at_end[1] - c[1] * at_end[0]
     rise = half * sine / (1.0 + cosine)
     middle = (start[0] + half * c[0] + rise * c[1], start[1] + half * c[1] - rise * c[0])
-    sizes = (sine / half, half, rise, cosine, sine, width, *[width.graph.zero] * 6)
+    sizes = (sine / half, half, rise, cosine, sine, width, *[width.graph.zero] * 8)
     return ProfilePart("arc", middle, c, sizes, sqrt(half * half + rise * rise), False)
 
 
@@ -130,14 +134,14 @@ def beside_bowls(ring: Sequence[ProfilePart]) -> list[ProfilePart]:
     """The pieces of a smooth ring, with the hollow arcs that lie beyond their ends."""
     found = []
     for k, one in enumerate(ring):
-        passes = list(one.sizes[-6:])
-        for place, other in ((0, ring[k - 1]), (3, ring[(k + 1) % len(ring)])):
+        passes = list(one.sizes[-8:])
+        for place, other in ((0, ring[k - 1]), (4, ring[(k + 1) % len(ring)])):
             if other.kind == "arc":
                 bend, _, _, cosine, sine = other.sizes[:5]
                 inwards = bend.graph.apply("lt", 0.0, bend)
                 turned = (cosine * cosine - sine * sine, where(inwards, 2.0 * sine * cosine, 0.0))
-                passes[place : place + 3] = hollow(1.0 / where(inwards, bend, 1.0), turned)
-        found.append(one._replace(sizes=(*one.sizes[:-6], *passes)))
+                passes[place : place + 4] = hollow(1.0 / where(inwards, bend, 1.0), turned)
+        found.append(one._replace(sizes=(*one.sizes[:-8], *passes)))
     return found
 
 
@@ -237,14 +241,14 @@ class SurfaceRound(ProfilePiece):
         graph = view.graph
         if self.normal_law.elastic(graph.one).is_zero:
             return None
-        *passes, thick = self.sizes[-7:]
+        *passes, thick = self.sizes[-9:]
         if all(number.is_zero for number in passes):
             return None
         x, y, _ = self._place(view)
         ends, less = self._ends(x, y), graph.zero
-        for (along, up), (far, _), (c, s, radius) in (
-            (ends[0], ends[1], passes[:3]),
-            (ends[1], ends[0], passes[3:]),
+        for (along, up), (far, _), (c, s, radius, run) in (
+            (ends[0], ends[1], passes[:4]),
+            (ends[1], ends[0], passes[4:]),
         ):
             high, inwards = up - radius, graph.apply("max", 0.0, along)
             beyond = graph.apply("max", 0.0, high * s - along * c)  # how far over the piece beyond the hollow
@@ -255,7 +259,12 @@ class SurfaceRound(ProfilePiece):
             weight = beyond / where(graph.apply("lt", 0.0, both), both, 1.0)
             on = graph.apply("lt", 0.0, far)  # towards its other end the piece hands the circle over to the next
             room = where(on, graph.apply("min", 1.0, 2.0 * far / where(on, far + inwards, 1.0)), 0.0)
-            less = less + weight * room * graph.apply("max", 0.0, self.radius - away)
+            straight = graph.apply("lt", 0.0, run)  # then both take off the whole together
+            next_room = graph.apply("min", 1.0, graph.apply("max", 0.0, 2.0 - 2.0 * beyond / where(straight, run, 1.0)))
+            own, next_one = weight * room, (1.0 - weight) * next_room
+            known = graph.apply("lt", 0.0, own + next_one)
+            whole = where(known, own / where(known, own + next_one, 1.0), weight)
+            less = less + where(straight, whole, own) * graph.apply("max", 0.0, self.radius - away)
         depth = self.touch(view)[1]
         meets = graph.apply("lt", 0.0, depth)
         inside = graph.apply("min", 1.0, graph.apply("max", 0.0, 1.0 + (self.radius - depth) / thick))

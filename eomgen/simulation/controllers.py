@@ -93,7 +93,7 @@ class ControlledEvents(Events):
             for control in self.controllers[i]:
                 after[control.place] = control(t, after)
             after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
-        return super().reset(module, forcing, t, after, gaps) if gaps else after
+        return super().reset(module, forcing, t, after, gaps)
 
 
 def _by_event(layout: Layout, given: Any) -> dict[int, list[Controller]]:

@@ -110,7 +110,7 @@ class Events:
     def __init__(self, layout: Layout, given: Any) -> None:
         self.layout = layout
         self.declared: list[dict[str, Any]] = layout.metadata.get("events") or []
-        self.names, self.last = list[str](), ""  #: last: the reset that came last, as messages name it
+        self.names, self.last = list[str](), ""  #: last: the event whose new state is asked for, as messages name it
         self.model: list[RunEvent] = []
         self.formulas: list[tuple[RunEvent, Formula]] = []
         self.functions: list[RunEvent] = []
@@ -192,6 +192,7 @@ class Events:
         if gaps:
             self.last = f" at event {', '.join(self.names[i] for i in gaps)}"
             after = self._strike(module, t, after, self.declared, gaps, forcing)
+        self.last = ""
         return after
 
     def renewed(self, module: BoundModel, forcing: Forcing, t: float, x: Array, event: int) -> Array:

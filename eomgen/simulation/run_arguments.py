@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
 PLAIN = frozenset((float, int))
+STIFF = ("Radau", "BDF", "LSODA")  #: implicit methods
 HUGE = 1e300  #: less than the largest number
 DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
 
@@ -51,6 +52,12 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
 def declare(module: BoundModel) -> dict[str, Any]:
     """What holds for a run where nothing is said: what the model says, or the defaults."""
     return {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
+
+
+def longest_step(module: BoundModel, method: Any) -> dict[str, float]:
+    """The model's own ``max_step`` (s), which implicit methods do not need; empty without."""
+    own = module.metadata.get("simulation", {}).get("max_step")
+    return {} if own is None or (isinstance(method, str) and method in STIFF) else {"max_step": own}
 
 
 def own_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:

@@ -31,7 +31,7 @@ from .integrate import Solution, choose_solver, integrate, require_end
 from .lost_branch import refuse_lost_branches
 from .meetings import limited
 from .recording import record
-from .run_arguments import DEFAULTS, find_span, find_state, ordered_times
+from .run_arguments import DEFAULTS, find_span, find_state, longest_step, ordered_times
 from .saltation import Saltation
 from .sensitivity_result import Sensitivities
 from .sensitivity_start import held_names, keep_consistent, split_columns, start_sensitivity
@@ -118,8 +118,8 @@ def sensitivities(
     columns = split_columns(layout, read_names("names", names), held)
     run = Variational(bound, forcing, columns)
     watched = Events(layout, events)
-    own = {k: v for k, v in bound.metadata.get("simulation", {}).items() if k == "max_step"}
-    settings = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **own, **options})
+    chosen = longest_step(bound, method) | {name: value for name, value in options.items() if value is not None}
+    settings = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **chosen})
     require_steps("max_step", float(settings.get("max_step", np.inf)), start, stop)
     alone = None
     if watched:

@@ -11,7 +11,7 @@ from ..errors import UsageError
 from ..runtime.signals import Forcing
 from .compiled import can_run
 from .events import Events
-from .run_arguments import declare, own_step
+from .run_arguments import declare, longest_step, own_step
 from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def _settle(module: BoundModel, method: Any, rtol: Any, atol: Any) -> Settled | 
     declared = declare(module)
     title = declared["method"] if method is None else method
     forcing = Forcing(module.layout, None)
-    if forcing.values or title == "RK4" or "max_step" in declared or not can_run(module, title, forcing):
+    if forcing.values or title == "RK4" or longest_step(module, title) or not can_run(module, title, forcing):
         return None
     forcing.attach(module)
     given = {"rtol": declared["rtol"] if rtol is None else rtol, "atol": declared["atol"] if atol is None else atol}

@@ -24,7 +24,7 @@ from .events import UNWATCHED, WAIT, Events, is_told_by_the_caller, warn_of_unkn
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .passed_limits import warn_of_limits
 from .recording import record
-from .run_arguments import check_method, declare, find_span, find_state, ordered_times, own_step
+from .run_arguments import check_method, declare, find_span, find_state, longest_step, ordered_times, own_step
 from .settled import settle
 from .stalled import Crawling
 from .tolerances import IMPLICIT, check_tolerances
@@ -225,7 +225,7 @@ def simulate(
         solver = begin(run, solver, (start, end), x0)
     if usual is None:
         given = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
-        own = {name: declared[name] for name in given if name in declared}
+        own = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method)
         settings = own | {name: value for name, value in given.items() if value is not None} | settings
         if compiled or solver.__module__.startswith("scipy."):  # another's solver may take anything
             settings = check_tolerances(module.n_x, abs(end - start), settings)
@@ -271,7 +271,8 @@ def simulate(
             lambda: record(bound, forcing, solution, title, settings, watched.names),
         ) from interrupt.__cause__
     except EvaluationError as error:  # of a reset
-        raise SimulationError(f"{title} stopped{watched.last}: {error}") from error
+        event, watched.last = watched.last, ""
+        raise SimulationError(f"{title} stopped{event}: {error}") from error
     except Crawling as crawl:
         raise run.gave_up(crawl, end, title, settings) from None
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:

@@ -261,3 +261,39 @@ def test_a_profile_is_verified_and_written_again(tmp_path: Any) -> None:
     assert np.array_equal(mod.rhs(0.0, x), again.rhs(0.0, x))
     report = mod.verify()
     assert report.ok, report
+
+
+@pytest.mark.parametrize(("radius", "offset"), [(0.1, 0.201), (0.29, 0.02), (0.3, 0.002)])
+def test_friction_and_damping_in_a_bowl_do_not_grow_with_its_points(radius: float, offset: float) -> None:
+    """Of a spinning disc that many short edges hold; a smooth bowl is the limit."""
+    found = {}
+    for kind, count in (("profile", 41), ("profile", 321), ("smooth_profile", 41)):
+        bowl = [(0.3 * np.sin(a), 0.3 - 0.3 * np.cos(a)) for a in np.linspace(-1.3, 1.3, count)]
+        mods = []
+        for keys in ({}, {"friction": 0.5, "smoothing": 1e-3}, {"dissipation": 1.0}):
+            m, (ball,) = scenes.planar("bowl", 1, (0, 0, 0))
+            law = {"stiffness": 1e4, "exponent": 1.5, **keys}
+            m.contacts("c", {"shape": "circle", "on": ball, "radius": radius}, ground(m, bowl, kind), law)
+            mods.append(m.compile(target="numpy"))
+        x = np.array([offset * np.sin(0.1), 0.3 - offset * np.cos(0.1), 0, 0, 0, 3.0])
+        y = np.array([*x[:3], 0.1 * np.sin(0.1), -0.1 * np.cos(0.1), 0])
+        push, rough, damped = (mod.bias(0.0, of) for mod, of in zip(mods, (x, x, y), strict=True))
+        elastic = np.hypot(*push[:2])
+        found[kind, count] = rough[2] / (0.5 * elastic * radius), np.hypot(*damped[:2]) / elastic - 1
+    assert found["smooth_profile", 41] == pytest.approx((1.0, 0.1), rel=0.03)
+    for count in (41, 321):
+        friction, damping = found["profile", count]
+        assert 0.75 < friction < 1.1
+        assert 0.05 < damping < 0.11
+
+
+@pytest.mark.parametrize("bend", [0.0, 3e-9, 1e-8, 1e-7, 1e-5])
+def test_over_a_bend_that_is_hardly_one_the_force_is_that_of_a_line(bend: float) -> None:
+    m, (ball,) = scenes.planar("bend", 1, (0, 0, 0))
+    m.parameter("h", bend)
+    law = {"stiffness": 1e4, "exponent": 1}
+    m.contacts("c", {"shape": "circle", "on": ball, "radius": 0.1}, ground(m, [(-1, "h"), (0, 0), (1, "h")]), law)
+    mod = m.compile(target="numpy")
+    for x in (0.0, 1e-7, 1e-3):
+        force = -mod.bias(0.0, np.array([x, 0.1 - 1e-3 + bend * abs(x), 0, 0, 0, 0]))
+        assert force[1] == pytest.approx(10.0, rel=1e-3)

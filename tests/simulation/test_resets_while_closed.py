@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen.errors import ModelError, NoDerivativeError, SimulationError, UsageError
+from eomgen.errors import EvaluationError, ModelError, NoDerivativeError, SimulationError, UsageError
 
 TARGETS = ("numpy", "cython")
 
@@ -283,3 +283,15 @@ def test_a_failed_reset_names_the_event_and_what_is_closed_then() -> None:
     m.coupling("other", {"s": 1, "r": -1}, closes="t - 100")
     with pytest.raises(SimulationError, match=r"at event kick: .*contradict what is closed \(c\), closes"):
         m.compile(target="numpy").simulate(1.0)
+
+
+def test_a_failure_after_a_reset_is_not_put_down_to_it() -> None:
+    def late(t: float, x: np.ndarray) -> float:
+        if t > 0.7:
+            raise EvaluationError("this function fails")
+        return 1.0
+
+    module = sliders({"s_dot": 0.5, "r_dot": 0.5}, False).compile(target="numpy")
+    with pytest.raises((SimulationError, EvaluationError), match="this function fails") as told:
+        module.simulate(1.0, events=late)
+    assert "kick" not in str(told.value)

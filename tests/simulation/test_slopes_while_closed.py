@@ -64,3 +64,7 @@ def test_what_is_closed_holds_between_steps(target: str, rate: float) -> None:
     assert slopes["jb_dot", "T"] == pytest.approx(1.3 / 0.2 * (1 - np.exp(-c * times)), abs=1e-6)
     steps, free = (np.diff(module.simulate(20.0, start, rtol=1e-6, **one).t) for one in ({}, {"max_step": 5.0}))
     assert steps.max() <= 2.5 / rate * (1 + 1e-9) < free.max()
+    implicit = module.simulate(20.0, start, method="LSODA", rtol=1e-6)
+    assert np.diff(implicit.t).max() > 2.5 / rate
+    own = (module.sensitivities(["T"], 20.0, start, **one).t for one in ({}, {"max_step": None}))
+    assert np.array_equal(*own)
