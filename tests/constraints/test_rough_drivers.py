@@ -30,7 +30,9 @@ def test_smooth_motions_are_not_noted() -> None:
 
 def test_a_motion_that_ends_is_told_as_such() -> None:
     mod = driven("sqrt(1 - t)").compile(target="numpy")
-    with pytest.raises(SimulationError, match=r"at t = 1 s .*motor has no finite value: look for a division by zero, or a root"):
+    with pytest.raises(
+        SimulationError, match=r"at t = 1 s .*motor has no finite value: look for a division by zero, or a root"
+    ):
         mod.simulate((0, 2))
 
 
