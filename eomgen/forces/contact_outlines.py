@@ -40,7 +40,11 @@ def straight_pieces(points: Sequence[Point]) -> list[ProfilePart]:
     edges = [minus(b, a) for a, b in itertools.pairwise(points)]
     ways = [unit(one) for one in edges]
     sides = [None, *edges, None]
-    found = [edge(points[k], one, sides[k], sides[k + 2], width, walls=True) for k, one in enumerate(edges)]
+    last = len(edges) - 1
+    found = [
+        edge(points[k], one, sides[k], sides[k + 2], width, walls=True, endless=(k == 1, k == last - 1))
+        for k, one in enumerate(edges)
+    ]
     return found + [notch(points[k], ways[k - 1], ways[k], width) for k in range(1, len(edges))]
 
 

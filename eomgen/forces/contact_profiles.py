@@ -46,9 +46,15 @@ class ProfilePart(NamedTuple):
 
 
 def edge(
-    start: Point, reach: Point, before: Point | None, after: Point | None, width: Expr, walls: bool = False
+    start: Point,
+    reach: Point,
+    before: Point | None,
+    after: Point | None,
+    width: Expr,
+    walls: bool = False,
+    endless: tuple[bool, bool] = (False, False),
 ) -> ProfilePart:
-    """A straight piece between neighbours, straight ones given by their ways from end to end.
+    """A straight piece between neighbours, straight ones given by their ways from end to end, if they have both.
 
     Sizes: half of its length; at the left and the right end x and y of the bisector and 1, or 0 without an end; 1 if it
     is felt beside its neighbours where these turn towards it (``walls``), else 0; the width over which neighbours share
@@ -57,13 +63,14 @@ def edge(
     graph, way, half = width.graph, unit(reach), 0.5 * length(reach)
     ends: list[Expr] = []
     passes: list[Expr] = []
-    for run, inward in ((before, 1.0), (after, -1.0)):
+    for run, inward, on in ((before, 1.0, endless[0]), (after, -1.0, endless[1])):
         if run is None:
             passes += hollow(graph.zero, None)
             ends += [graph.zero, graph.one, graph.zero]
             continue
         other = unit(run)
-        passes += hollow(graph.zero, (dot(way, other), -inward * cross(way, other)) if walls else None, length(run))
+        turned = (dot(way, other), -inward * cross(way, other)) if walls else None
+        passes += hollow(graph.zero, turned, graph.zero if on else 1.0 / length(run))
         bisector = unit((-way[1] - other[1], way[0] + other[0]))  # the sum of both normals
         ends += [inward * dot(bisector, way), way[0] * bisector[1] - way[1] * bisector[0], graph.one]
     middle = (start[0] + 0.5 * reach[0], start[1] + 0.5 * reach[1])
@@ -71,18 +78,20 @@ def edge(
     return ProfilePart("edge", middle, way, sizes, half, before is None or after is None)
 
 
-def hollow(radius: Expr, turned: Point | None, run: Expr | None = None) -> tuple[Expr, Expr, Expr, Expr]:
-    """What is hollow between an end of a piece and the next: cosine and sine of the angle of both, radius, length.
+def hollow(radius: Expr, turned: Point | None, short: Expr | None = None) -> tuple[Expr, Expr, Expr, Expr]:
+    """What is hollow between an end of a piece and the next: cosine and sine of their angle, radius, 1 / length.
 
-    It is the corner itself, of radius 0, before a piece of a length, or a hollow arc, of length 0; where the outline
-    turns the other way all four are 0.
+    It is the corner itself, of radius 0, before a piece of a length, or a hollow arc; where the outline turns the
+    other way all four are 0.
     """
     zero = radius.graph.zero
     if turned is None:
         return zero, zero, zero, zero
     inwards = radius.graph.apply("lt", 0.0, turned[1])
-    cosine, sine, size, reach = (where(inwards, x, 0.0) for x in (*turned, radius, zero if run is None else run))
-    return cosine, sine, size, reach
+    cosine, sine, size, per_length = (
+        where(inwards, x, 0.0) for x in (*turned, radius, zero if short is None else short)
+    )
+    return cosine, sine, size, per_length
 
 
 def biarcs(a: Point, b: Point, s: Point, t: Point, width: Expr) -> tuple[ProfilePart, ProfilePart]:
@@ -246,7 +255,7 @@ class SurfaceRound(ProfilePiece):
             return None
         x, y, _ = self._place(view)
         ends, less = self._ends(x, y), graph.zero
-        for (along, up), (far, _), (c, s, radius, run) in (
+        for (along, up), (far, _), (c, s, radius, short) in (
             (ends[0], ends[1], passes[:4]),
             (ends[1], ends[0], passes[4:]),
         ):
@@ -259,12 +268,12 @@ class SurfaceRound(ProfilePiece):
             weight = beyond / where(graph.apply("lt", 0.0, both), both, 1.0)
             on = graph.apply("lt", 0.0, far)  # towards its other end the piece hands the circle over to the next
             room = where(on, graph.apply("min", 1.0, 2.0 * far / where(on, far + inwards, 1.0)), 0.0)
-            straight = graph.apply("lt", 0.0, run)  # then both take off the whole together
-            next_room = graph.apply("min", 1.0, graph.apply("max", 0.0, 2.0 - 2.0 * beyond / where(straight, run, 1.0)))
+            next_room = graph.apply("min", 1.0, graph.apply("max", 0.0, 2.0 - 2.0 * beyond * short))
             own, next_one = weight * room, (1.0 - weight) * next_room
             known = graph.apply("lt", 0.0, own + next_one)
             whole = where(known, own / where(known, own + next_one, 1.0), weight)
-            less = less + where(straight, whole, own) * graph.apply("max", 0.0, self.radius - away)
+            taken = where(graph.apply("lt", 0.0, radius), own, whole)  # at a corner both take off the whole together
+            less = less + taken * graph.apply("max", 0.0, self.radius - away)
         depth = self.touch(view)[1]
         meets = graph.apply("lt", 0.0, depth)
         inside = graph.apply("min", 1.0, graph.apply("max", 0.0, 1.0 + (self.radius - depth) / thick))
@@ -285,8 +294,10 @@ class EdgeRound(SurfaceRound):
         return (1.0 - left * (1.0 - first)) * (1.0 - right * (1.0 - second))
 
     def _ends(self, x: Expr, y: Expr) -> tuple[Point, Point]:
-        half = self.sizes[0]
-        return (x + half, y), (half - x, y)
+        half, left, right = self.sizes[0], self.sizes[3], self.sizes[6]
+        far = half + x.graph.apply("abs", x)  # from an end that there is not
+        closed = [x.graph.apply("lt", 0.0, end) for end in (left, right)]
+        return (where(closed[0], x + half, far), y), (where(closed[1], half - x, far), y)
 
     def touch(self, view: View) -> Touch:
         graph = view.graph

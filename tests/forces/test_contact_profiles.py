@@ -297,3 +297,19 @@ def test_over_a_bend_that_is_hardly_one_the_force_is_that_of_a_line(bend: float)
     for x in (0.0, 1e-7, 1e-3):
         force = -mod.bias(0.0, np.array([x, 0.1 - 1e-3 + bend * abs(x), 0, 0, 0, 0]))
         assert force[1] == pytest.approx(10.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("keys", [{}, {"friction": 0.5, "smoothing": 1e-3}, {"dissipation": 1.0}])
+def test_a_valley_is_one_however_its_endless_sides_are_drawn(keys: dict[str, float]) -> None:
+    """With short or long sides and with points in line; the circle holds the corner and both walls."""
+    found = []
+    lines: list[Any] = [[(-1, 1), (0, 0), (1, 1)], [(-0.02, 0.02), (0, 0), (1, 1)], [(-1, 1), (0, 0), (0.02, 0.02)]]
+    for points in (*lines, [(-2, 2), (-0.3, 0.3), (0, 0), (0.4, 0.4), (1, 1)]):
+        m, (ball,) = scenes.planar("valley", 1, (0, 0, 0))
+        law = {"stiffness": 1e4, "exponent": 1, **keys}
+        floor = ground(m, points, depth=0.5)
+        m.contacts("c", {"shape": "circle", "on": ball, "radius": 0.15}, floor, law)
+        found.append(m.compile(target="numpy").bias(0.0, np.array([0.003, 0.13, 0.2, 0.1, -0.2, 2.0])))
+    assert np.abs(found[0][:2]).min() > 10
+    for one in found[1:]:
+        assert one == pytest.approx(found[0], rel=1e-9, abs=1e-9)
