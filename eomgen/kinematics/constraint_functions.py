@@ -38,7 +38,7 @@ class ConstraintFunctions:
         self._position = position = self._split(c.values, c.jacobian)
         if kinematics.given_rates:  # positions do not move with velocities
             place = Scales.of_kinds(kinematics.kinds, sizes[: self.h], self.length_scale)
-            position = self._split(c.values, c.slopes)
+            position = self._split(c.values, c.slopes, len(kinematics.names))
         sizes_of_loops = np.array([self.length_scale if kind == "length" else 1.0 for kind in loop.kinds])
         cut = CutJoints(loop.names, loop.kinds, sizes_of_loops, self._split(loop.values, loop.jacobian))
         aligned = self._compile(list(c.aligned)) if c.aligned else None
@@ -54,10 +54,10 @@ class ConstraintFunctions:
         return call
 
     def _split(
-        self, values: Sequence[Expr], slopes: Sequence[Sequence[Expr]]
+        self, values: Sequence[Expr], slopes: Sequence[Sequence[Expr]], width: int | None = None
     ) -> Callable[[Array, float], tuple[Array, Array]]:
-        """Functions and their slopes in one evaluation; slopes that vanish identically are not evaluated."""
-        zero, k, shape = self.kinematics.graph.zero.id, len(values), (len(slopes), len(slopes[0]) if slopes else self.n)
+        """Functions and their slopes (n_v wide by default) in one evaluation; those that vanish are not evaluated."""
+        zero, k, shape = self.kinematics.graph.zero.id, len(values), (len(slopes), self.n if width is None else width)
         held = [(i, j, e) for i, row in enumerate(slopes) for j, e in enumerate(row) if e.id != zero]
         rows, columns = [i for i, _, _ in held], [j for _, j, _ in held]
         evaluate = self._compile([*values, *(e for _, _, e in held)])
