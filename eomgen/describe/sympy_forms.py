@@ -30,6 +30,7 @@ class Forms:
     potential: Any
     multipliers: list[str] = field(default_factory=list)  #: SymPy's own names
     noncontributing: list[Any] = field(default_factory=list)  #: equations of auxiliary speeds, each = 0
+    masses: list[Any] = field(default_factory=list)  #: symbols of the masses of the bodies
 
 
 def read_forms(method: Any) -> Forms:
@@ -83,7 +84,7 @@ def _read_lagrange(method: Any) -> Forms:
 
 
 def _read_kane(method: Any) -> Forms:
-    from sympy import S
+    from sympy import S, sympify
     from sympy.physics.mechanics import dynamicsymbols
 
     if method._fr is None or method._frstar is None:
@@ -110,6 +111,7 @@ def _read_kane(method: Any) -> Forms:
         kinetic=kinetic.xreplace(rates).xreplace(auxiliary),
         potential=potential,
         noncontributing=list(method.auxiliary_eqs.xreplace(auxiliary)) if len(method._uaux) else [],
+        masses=[symbol for body in bodies for symbol in sympify(body.mass).free_symbols],
     )
 
 

@@ -9,6 +9,7 @@ from ..errors import ModelError, Problem, UsageError
 from .description import Description
 from .names import nearest
 from .scope import RATES
+from .sympy_auxiliary import put, solve_auxiliary
 from .sympy_face import function_name, is_sympy, name_of
 from .sympy_forms import Forms, read_forms
 
@@ -35,7 +36,10 @@ def describe_method(
     given_parameters = {name_of(key): value for key, value in (parameters or {}).items()}
     listed = dict(inputs) if isinstance(inputs, Mapping) else dict.fromkeys(inputs, 0.0)
     given_inputs = {name_of(key): value for key, value in listed.items()}
-    contents = [*_contents(forms), *extra.values()]
+    forces = solve_auxiliary(forms, {*known.motion, *given_inputs}, given_parameters)
+    extra = {name: put(expression, forces) for name, expression in extra.items()}
+    noncontributing = {str(name_of(force)): value for force, value in forces.items()}
+    contents = [*_contents(forms), *extra.values(), *noncontributing.values()]
     constants, functions = known.sort(contents, given_inputs)
     problems = known.problems
     for key in given_parameters:
@@ -72,7 +76,7 @@ def describe_method(
         description.add("parameters", constant, {} if value is None else {"value": value})
     for function in functions:
         description.add("inputs", function, {"value": given_inputs.get(function, 0.0)})
-    for output, expression in {**_noncontributing(forms, taken), **extra}.items():
+    for output, expression in {**noncontributing, **extra}.items():
         description.add("outputs", output, {"expression": expression})
     for key, values in (("initial", initial), ("guess", guess)):
         if values:
@@ -142,25 +146,12 @@ class _Known:
 
 def _specify(forms: Forms, outputs: dict[str, Any], specified: Mapping[Any, Any]) -> None:
     """Replace functions of time by expressions, their derivatives by those of the expressions."""
-    import sympy
-
     for key in specified:
         if not is_sympy(key) or function_name(key) is None:
             raise UsageError(f"specified takes functions of time f(t), not {key!r}")
 
-    def put(expression: Any) -> Any:
-        if not is_sympy(expression) or not expression.has(*specified):
-            return expression
-        given = {d: d.subs(specified).doit() for d in expression.atoms(sympy.Derivative) if d.has(*specified)}
-        return expression.xreplace(given).xreplace(dict(specified))
-
-    forms.rates = {dq: put(rate) for dq, rate in forms.rates.items()}
-    forms.mass_matrix = [[put(x) for x in row] for row in forms.mass_matrix]
-    forms.forcing, forms.configuration, forms.motion, forms.noncontributing = (
-        [put(x) for x in part] for part in (forms.forcing, forms.configuration, forms.motion, forms.noncontributing)
-    )
-    forms.kinetic, forms.potential = put(forms.kinetic), put(forms.potential)
-    outputs.update({name: put(expression) for name, expression in outputs.items()})
+    vars(forms).update(put(vars(forms), specified))
+    outputs.update(put(outputs, specified))
 
 
 def _independent_rows(
@@ -176,22 +167,3 @@ def _independent_rows(
         return [], [], True
     kept, independent = independent_rows(forms, constants, functions)
     return forms.configuration, [forms.motion[k] for k in kept], independent
-
-
-def _noncontributing(forms: Forms, taken: set[str]) -> dict[str, Any]:
-    """Forces that only the equations of auxiliary speeds know, solved from them."""
-    if not forms.noncontributing:
-        return {}
-    import sympy
-    from sympy.core.function import AppliedUndef
-
-    unknown: dict[str, Any] = {}
-    for equation in forms.noncontributing:
-        for part in equation.atoms(sympy.Symbol, AppliedUndef):
-            name = name_of(part)
-            if isinstance(name, str) and name not in taken and name != "t":
-                unknown.setdefault(name, part)
-    if len(unknown) != len(forms.noncontributing):
-        return {}
-    matrix, right = sympy.linear_eq_to_matrix(forms.noncontributing, list(unknown.values()))
-    return dict(zip(unknown, matrix.LUsolve(right), strict=True))
