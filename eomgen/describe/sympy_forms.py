@@ -60,6 +60,7 @@ def read_forms(method: Any) -> Forms:
 
 def _read_lagrange(method: Any) -> Forms:
     """SymPy forms M q'' = f + lam_coeffs^T lam, lam_coeffs = -d(constraints')/dq'."""
+    from sympy import Matrix, S
     from sympy.physics.mechanics import dynamicsymbols
 
     if method.eom is None:
@@ -68,16 +69,20 @@ def _read_lagrange(method: Any) -> Forms:
     v = [x.diff(dynamicsymbols._t) for x in q]
     n, holonomic = len(q), list(method._hol_coneqs)
     lagrangian = method._L[0]  # there is no public name for it
-    at_rest = lagrangian.xreplace(dict.fromkeys(v, 0))
+    still = dict.fromkeys(v, S.Zero)
+    at_rest = lagrangian.xreplace(still)
+    mass, kinetic = method.mass_matrix[:, :n], lagrangian - at_rest
+    if not all(lagrangian.diff(x).xreplace(still).is_zero for x in v):  # terms linear in v are no energy
+        kinetic = (Matrix(v).T * mass * Matrix(v))[0] / 2
     return Forms(
         q=q,
         v=v,
         rates=dict(zip(v, v, strict=True)),
-        mass_matrix=method.mass_matrix[:, :n].tolist(),
+        mass_matrix=mass.tolist(),
         forcing=list(method.forcing),
         configuration=holonomic,
         motion=list(method.coneqs)[len(holonomic) :],
-        kinetic=lagrangian - at_rest,
+        kinetic=kinetic,
         potential=-at_rest,
         multipliers=[x.func.__name__ for x in method.lam_vec],
     )
