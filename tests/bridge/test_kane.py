@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy
 from bicycle_matrix import state_matrix
-from sympy.physics.mechanics import KanesMethod, Particle, Point, ReferenceFrame, dynamicsymbols
+from sympy.physics.mechanics import KanesMethod, Particle, Point, ReferenceFrame, RigidBody, dynamicsymbols, inertia
 from sympy_systems import double_pendulum, pulled_pendulum, rolling_disc
 
 import eomgen as eg
@@ -226,3 +226,30 @@ def test_constants_of_auxiliary_equations_stay_parameters() -> None:
     assert dict(zip(mod.y_names, mod.outputs(0.0, [0.1, 0.0]), strict=True)) == pytest.approx(
         {"N": 19.62, "twice": 39.24}
     )
+
+
+def test_euler_parameters_whose_kinematics_are_written_implicitly() -> None:
+    """Angular velocity as given, e . e' = 0 and the norm as configuration constraint: Euler's equations."""
+    e, w = dynamicsymbols("e0:4"), dynamicsymbols("w1:4")
+    i1, i2, i3, m = sympy.symbols("i1:4 m")
+    ground, turned, point = ReferenceFrame("A"), ReferenceFrame("B"), Point("O")
+    turned.orient_quaternion(ground, e)
+    point.set_vel(ground, 0)
+    spin, given = turned.ang_vel_in(ground), sum(x * axis for x, axis in zip(w, turned, strict=True))
+    turned.set_ang_vel(ground, given)
+    kinematics = [*((spin - given).dot(axis) for axis in turned), sum(x * x.diff() for x in e)]
+    kane = KanesMethod(
+        ground, q_ind=e[1:], q_dependent=e[:1], u_ind=w, kd_eqs=kinematics, explicit_kinematics=False,
+        configuration_constraints=[sum(x**2 for x in e) - 1],
+    )  # fmt: skip
+    kane.kanes_equations([RigidBody("b", point, turned, m, (inertia(turned, i1, i2, i3), point))], [])
+    model = eg.from_sympy(kane, "spin", parameters={i1: 1.0, i2: 2.0, i3: 3.0}, guess={"e0": 1.0})
+    mod = model.compile(target="numpy")
+    random = np.random.default_rng(3)
+    for _ in range(3):
+        (a, b, c, d), (p, q, r) = random.normal(size=4), random.normal(size=3)
+        a, b, c, d = np.array([a, b, c, d]) / np.linalg.norm([a, b, c, d])
+        state = dict(zip(mod.x_names, mod.rhs(0.0, [b, c, d, a, p, q, r]), strict=True))
+        half = np.array([[-b, -c, -d], [a, -d, c], [d, a, -b], [-c, b, a]]) @ [p, q, r] / 2
+        expected = [*half, -q * r, p * r, -p * q / 3]
+        assert [state[n] for n in ("e0", "e1", "e2", "e3", "w1", "w2", "w3")] == pytest.approx(expected, abs=1e-12)
