@@ -49,7 +49,6 @@ def solve_auxiliary(forms: Forms, given: Collection[str], constants: Collection[
         The forces do not follow from the equations.
     """
     import sympy
-    from sympy.physics.mechanics import dynamicsymbols
     from sympy.solvers.solveset import NonlinearError
 
     unknown = _unknown_forces(forms, given, constants)
@@ -65,7 +64,7 @@ def solve_auxiliary(forms: Forms, given: Collection[str], constants: Collection[
 
     if len(rows) != len(unknown):
         raise refuse(f"their number is {len(unknown)}, and {len(rows)} auxiliary equations contain them")
-    rates = [v.diff(dynamicsymbols._t) for v in forms.v]
+    rates = [v.diff(*v.args) for v in forms.v]
     try:
         A, right = sympy.linear_eq_to_matrix(rows, unknown)
         B, right = sympy.linear_eq_to_matrix([-x for x in right], rates)

@@ -8,10 +8,12 @@ from typing import Any
 from ..errors import ModelError, Problem, UsageError
 from .description import Description
 from .names import nearest
+from .printed_names import give_latex
 from .scope import RATES
 from .sympy_auxiliary import put, solve_auxiliary
 from .sympy_face import function_name, is_sympy, name_of
 from .sympy_forms import Forms, read_forms
+from .sympy_names import SympyNames
 
 
 def describe_method(
@@ -27,6 +29,10 @@ def describe_method(
 ) -> Description:
     """The description behind :func:`from_sympy`, which see."""
     forms = read_forms(method)
+    told = (parameters or {}, inputs, outputs or {}, initial or {}, specified or {}, potential_energy, guess or {})
+    renamed = SympyNames([vars(forms), *told], forms.q)
+    vars(forms).update(renamed.put(vars(forms)))
+    parameters, inputs, outputs, initial, specified, potential_energy, guess = (renamed.put(x) for x in told)
     if potential_energy is not None:
         forms.potential = potential_energy
     extra = dict(outputs or {})
@@ -64,13 +70,17 @@ def describe_method(
     description = Description(values={"name": name, "equations": equations})
     if rows:
         equations["constraints"] = rows
-    if rows and independent:
-        names = forms.multipliers or [f"lam{k + 1}" for k in range(len(rows))]
-        if len(names) == len(rows) and taken.isdisjoint(names):
-            equations["multipliers"] = names
-            for multiplier in names:
-                if multiplier not in extra:
-                    extra[multiplier] = multiplier
+    names = forms.multipliers or [f"lam{k + 1}" for k in range(len(rows))]
+    if not independent or len(names) != len(rows):
+        description.notes.append(
+            "multipliers are no outputs: the constraints are redundant, or their rank cannot be judged"
+        )
+    elif not taken.isdisjoint(names):
+        clash = ", ".join(sorted(taken.intersection(names)))
+        description.notes.append(f"multipliers are no outputs: the equations use the names {clash}")
+    elif rows:
+        equations["multipliers"] = names
+        extra |= {name: name for name in names if name not in extra}
     for constant in constants:
         value = given_parameters.get(constant)
         description.add("parameters", constant, {} if value is None else {"value": value})
@@ -81,7 +91,8 @@ def describe_method(
     for key, values in (("initial", initial), ("guess", guess)):
         if values:
             description.values[key] = {name_of(name): value for name, value in values.items()}
-    return description
+    give_latex(description, "equations", renamed.latex())
+    return renamed.noted(description)
 
 
 def _contents(forms: Forms) -> list[Any]:
