@@ -167,7 +167,7 @@ KERNELS: tuple[Kernel, ...] = (
         late="reactions",
     ),
     Kernel("inertial_terms", ("q", "v", "a"), lambda s: ((s.n_wrenches > 0) * s.n_bodies, 22), INERTIAL, late=True),
-    Kernel("canonical", ("q", "v"), lambda s: (2, s.n_momenta), "momenta dT/dv, and their rates -dH/dq + Q", late=True),
+    Kernel("canonical", ("q", "v"), lambda s: (2, s.n_momenta), "momenta dL/dv, and their rates -dH/dq + Q", late=True),
     Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
     Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
     Kernel("meeting_time", ("q", "v", "a"), lambda s: (5,), "s until shapes may meet; depth, thickness, deepest pair"),

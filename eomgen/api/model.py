@@ -142,7 +142,8 @@ def from_sympy(
     velocities are kept as constraints, so that the module projects states, assembles initial values and takes any
     independent coordinates; constraints of velocities that are derivatives of others are left out.  The multipliers of
     the constraints become outputs ``lam1``, ``lam2``, ... in the order of the model's constraints, which is SymPy's:
-    M v' + C_q^T lam = f.  Noncontributing forces of auxiliary speeds become outputs too.
+    M v' + C_q^T lam = f.  Noncontributing forces of auxiliary speeds are solved for wherever they act, and become
+    outputs too.
 
     Parameters
     ----------

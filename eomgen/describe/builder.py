@@ -75,10 +75,11 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
     ) -> Self:
         """Make a model from a Lagrangian; see :func:`eomgen.describe.lagrangian.describe_lagrangian`."""
         from .lagrangian import describe_lagrangian
+        from .sympy_names import SympyNames
 
-        return cls.from_description(
-            describe_lagrangian(name, L, coordinates, forces, dissipation, constraints, parameters, inputs, latex)
-        )
+        given = [L, coordinates, forces, dissipation, constraints, parameters, inputs]
+        names = SympyNames(given, coordinates)
+        return cls.from_description(names.noted(describe_lagrangian(name, *names.put(given), names.latex(latex))))
 
     @classmethod
     def from_equations(
@@ -86,9 +87,14 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
     ) -> Self:
         """Make a model from equations M v' = f; see :func:`eomgen.describe.given_equations.describe_equations`."""
         from .given_equations import describe_equations
+        from .sympy_names import SympyNames
 
         check_keywords("from_equations", further, keywords_of(describe_equations))
-        return cls.from_description(describe_equations(name, coordinates, mass_matrix, forcing, **further))
+        names = SympyNames([coordinates, mass_matrix, forcing, further], coordinates)
+        further = names.put(further) | {"latex": names.latex(further.get("latex"))}
+        return cls.from_description(
+            names.noted(describe_equations(name, *names.put([coordinates, mass_matrix, forcing]), **further))
+        )
 
     # -- quantities -----------------------------------------------------------------------------------------------
     def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "", latex: str = "") -> Any:
@@ -304,7 +310,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
 
     @property
     def renamed(self) -> dict[str, dict[str, str]]:
-        """Names that an import changed: section -> name in the file -> name in the model."""
+        """Names that an import changed: section -> name in the file, or in SymPy -> name in the model."""
         return self._description.renamed
 
     def mechanism(self) -> Mechanism:

@@ -71,7 +71,7 @@ class Description:
     notes : list of str
         What an import left out or changed.
     renamed : dict
-        Section -> name in an imported file -> name in the model, where they differ.
+        Section -> name in an imported file, or in SymPy -> name in the model, where they differ.
     instances : dict of str to str
         Name of an instance of a component -> what stands before its names: ``leg1`` -> ``leg1_``.
     origins : dict of str to Origin
@@ -96,6 +96,12 @@ class Description:
         entry = DescribedEntry(name, values, f"{section}.{shortened(name)}")
         self.sections[section].append(entry)
         return entry
+
+    def note_renamed(self, renamed: dict[str, dict[str, str]]) -> None:
+        """Keep the names that an import changed, and note them."""
+        self.renamed = renamed
+        for section, names in renamed.items():
+            self.notes.append(f"renamed {section}: " + ", ".join(f"{old!r} is {new}" for old, new in names.items()))
 
     def place(self, path: str) -> tuple[str, int]:
         """File and line of a dotted path; ``("", 0)`` if the model comes from no file."""

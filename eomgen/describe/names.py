@@ -73,6 +73,7 @@ _NEEDED = frozenset(("numpy", "scipy", "pandas", "matplotlib", "sympy", "cython"
 _NEEDED |= {"errors", "limits", "numeric", "runtime"}
 #: Headers in quotes in what Cython writes, in lower case: some systems do not tell it from upper case in file names.
 _HEADERS = frozenset(("python", "pythread", "structmember", "frameobject"))
+_STRANGE = re.compile(r"[^A-Za-z0-9_]")
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z", re.ASCII)
 LONGEST = 64  #: characters of a name
 
@@ -115,6 +116,14 @@ def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
         if name in function_words():
             return f"{name!r} is a built-in function", f"choose another name, e.g. {name}_"
     return None
+
+
+def clean_name(name: str, kind: str) -> str:
+    """An identifier as near to a name as can be."""
+    result = _STRANGE.sub("_", name)
+    if not result[:1].isalpha():
+        result = f"{kind}_{result.lstrip('_')}"
+    return f"{result}_" if fault_of_name(result[:LONGEST], symbol=True) else result
 
 
 def fault_of_model_name(name: object) -> tuple[str, str] | None:

@@ -30,6 +30,7 @@ class Forms:
     potential: Any
     multipliers: list[str] = field(default_factory=list)  #: SymPy's own names
     noncontributing: list[Any] = field(default_factory=list)  #: equations of auxiliary speeds, each = 0
+    masses: list[Any] = field(default_factory=list)  #: symbols of the masses of the bodies
 
 
 def read_forms(method: Any) -> Forms:
@@ -59,32 +60,35 @@ def read_forms(method: Any) -> Forms:
 
 def _read_lagrange(method: Any) -> Forms:
     """SymPy forms M q'' = f + lam_coeffs^T lam, lam_coeffs = -d(constraints')/dq'."""
-    from sympy.physics.mechanics import dynamicsymbols
+    from sympy import Matrix, S
 
     if method.eom is None:
         raise UsageError("the LagrangesMethod has no equations yet; call form_lagranges_equations() on it first")
     q = list(method.q)
-    v = [x.diff(dynamicsymbols._t) for x in q]
+    v = list(method._qdots)
     n, holonomic = len(q), list(method._hol_coneqs)
     lagrangian = method._L[0]  # there is no public name for it
-    at_rest = lagrangian.xreplace(dict.fromkeys(v, 0))
+    still = dict.fromkeys(v, S.Zero)
+    at_rest = lagrangian.xreplace(still)
+    mass, kinetic = method.mass_matrix[:, :n], lagrangian - at_rest
+    if not all(lagrangian.diff(x).xreplace(still).is_zero for x in v):  # terms linear in v are no energy
+        kinetic = (Matrix(v).T * mass * Matrix(v))[0] / 2
     return Forms(
         q=q,
         v=v,
         rates=dict(zip(v, v, strict=True)),
-        mass_matrix=method.mass_matrix[:, :n].tolist(),
+        mass_matrix=mass.tolist(),
         forcing=list(method.forcing),
         configuration=holonomic,
         motion=list(method.coneqs)[len(holonomic) :],
-        kinetic=lagrangian - at_rest,
+        kinetic=kinetic,
         potential=-at_rest,
         multipliers=[x.func.__name__ for x in method.lam_vec],
     )
 
 
 def _read_kane(method: Any) -> Forms:
-    from sympy import S
-    from sympy.physics.mechanics import dynamicsymbols
+    from sympy import S, sympify
 
     if method._fr is None or method._frstar is None:
         raise UsageError("the KanesMethod has no equations yet; call kanes_equations(bodies, loads) on it first")
@@ -93,11 +97,11 @@ def _read_kane(method: Any) -> Forms:
     if len(method._udep) or not method._k_kqdot_implicit.is_diagonal():
         whole = _of_all_speeds(method)
     rates = whole.kindiffdict()
-    auxiliary = dict.fromkeys([*method._uaux, *method._uaux.diff(dynamicsymbols._t)], S.Zero)
+    auxiliary = dict.fromkeys([*method._uaux, *(x.diff(*x.args) for x in method._uaux)], S.Zero)
     bodies = list(method.bodies)
     kinetic = sum((body.kinetic_energy(method._inertial) for body in bodies), S.Zero)
     potential = sum((body.potential_energy for body in bodies), S.Zero)
-    order = _paired(q, v, rates)
+    order = _paired(method._qdot, v, rates)
     matrix, forcing = whole.mass_matrix.xreplace(auxiliary), whole.forcing.xreplace(auxiliary)
     return Forms(
         q=q,
@@ -110,6 +114,7 @@ def _read_kane(method: Any) -> Forms:
         kinetic=kinetic.xreplace(rates).xreplace(auxiliary),
         potential=potential,
         noncontributing=list(method.auxiliary_eqs.xreplace(auxiliary)) if len(method._uaux) else [],
+        masses=[symbol for body in bodies for symbol in sympify(body.mass).free_symbols],
     )
 
 
@@ -152,9 +157,7 @@ def _solve_blocks(left: Any, right: Any) -> Any:
     return result
 
 
-def _paired(q: Sequence[Any], v: Sequence[Any], rates: dict[Any, Any]) -> list[int]:
+def _paired(q_dot: Sequence[Any], v: Sequence[Any], rates: dict[Any, Any]) -> list[int]:
     """Places of the speeds in the order of the coordinates whose rates they are; their own unless all are rates."""
-    from sympy.physics.mechanics import dynamicsymbols
-
-    first = [v.index(rate) for rate in (rates[x.diff(dynamicsymbols._t)] for x in q) if rate in v]
+    first = [v.index(rate) for rate in (rates[x] for x in q_dot) if rate in v]
     return first if sorted(first) == list(range(len(v))) else list(range(len(v)))

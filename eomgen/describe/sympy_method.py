@@ -8,9 +8,12 @@ from typing import Any
 from ..errors import ModelError, Problem, UsageError
 from .description import Description
 from .names import nearest
+from .printed_names import give_latex
 from .scope import RATES
+from .sympy_auxiliary import put, solve_auxiliary
 from .sympy_face import function_name, is_sympy, name_of
 from .sympy_forms import Forms, read_forms
+from .sympy_names import SympyNames
 
 
 def describe_method(
@@ -26,6 +29,10 @@ def describe_method(
 ) -> Description:
     """The description behind :func:`from_sympy`, which see."""
     forms = read_forms(method)
+    told = (parameters or {}, inputs, outputs or {}, initial or {}, specified or {}, potential_energy, guess or {})
+    renamed = SympyNames([vars(forms), *told], forms.q)
+    vars(forms).update(renamed.put(vars(forms)))
+    parameters, inputs, outputs, initial, specified, potential_energy, guess = (renamed.put(x) for x in told)
     if potential_energy is not None:
         forms.potential = potential_energy
     extra = dict(outputs or {})
@@ -35,7 +42,10 @@ def describe_method(
     given_parameters = {name_of(key): value for key, value in (parameters or {}).items()}
     listed = dict(inputs) if isinstance(inputs, Mapping) else dict.fromkeys(inputs, 0.0)
     given_inputs = {name_of(key): value for key, value in listed.items()}
-    contents = [*_contents(forms), *extra.values()]
+    forces = solve_auxiliary(forms, {*known.motion, *given_inputs}, given_parameters)
+    extra = {name: put(expression, forces) for name, expression in extra.items()}
+    noncontributing = {str(name_of(force)): value for force, value in forces.items()}
+    contents = [*_contents(forms), *extra.values(), *noncontributing.values()]
     constants, functions = known.sort(contents, given_inputs)
     problems = known.problems
     for key in given_parameters:
@@ -60,24 +70,29 @@ def describe_method(
     description = Description(values={"name": name, "equations": equations})
     if rows:
         equations["constraints"] = rows
-    if rows and independent:
-        names = forms.multipliers or [f"lam{k + 1}" for k in range(len(rows))]
-        if len(names) == len(rows) and taken.isdisjoint(names):
-            equations["multipliers"] = names
-            for multiplier in names:
-                if multiplier not in extra:
-                    extra[multiplier] = multiplier
+    names = forms.multipliers or [f"lam{k + 1}" for k in range(len(rows))]
+    if not independent or len(names) != len(rows):
+        description.notes.append(
+            "multipliers are no outputs: the constraints are redundant, or their rank cannot be judged"
+        )
+    elif not taken.isdisjoint(names):
+        clash = ", ".join(sorted(taken.intersection(names)))
+        description.notes.append(f"multipliers are no outputs: the equations use the names {clash}")
+    elif rows:
+        equations["multipliers"] = names
+        extra |= {name: name for name in names if name not in extra}
     for constant in constants:
         value = given_parameters.get(constant)
         description.add("parameters", constant, {} if value is None else {"value": value})
     for function in functions:
         description.add("inputs", function, {"value": given_inputs.get(function, 0.0)})
-    for output, expression in {**_noncontributing(forms, taken), **extra}.items():
+    for output, expression in {**noncontributing, **extra}.items():
         description.add("outputs", output, {"expression": expression})
     for key, values in (("initial", initial), ("guess", guess)):
         if values:
             description.values[key] = {name_of(name): value for name, value in values.items()}
-    return description
+    give_latex(description, "equations", renamed.latex())
+    return renamed.noted(description)
 
 
 def _contents(forms: Forms) -> list[Any]:
@@ -142,25 +157,12 @@ class _Known:
 
 def _specify(forms: Forms, outputs: dict[str, Any], specified: Mapping[Any, Any]) -> None:
     """Replace functions of time by expressions, their derivatives by those of the expressions."""
-    import sympy
-
     for key in specified:
         if not is_sympy(key) or function_name(key) is None:
             raise UsageError(f"specified takes functions of time f(t), not {key!r}")
 
-    def put(expression: Any) -> Any:
-        if not is_sympy(expression) or not expression.has(*specified):
-            return expression
-        given = {d: d.subs(specified).doit() for d in expression.atoms(sympy.Derivative) if d.has(*specified)}
-        return expression.xreplace(given).xreplace(dict(specified))
-
-    forms.rates = {dq: put(rate) for dq, rate in forms.rates.items()}
-    forms.mass_matrix = [[put(x) for x in row] for row in forms.mass_matrix]
-    forms.forcing, forms.configuration, forms.motion, forms.noncontributing = (
-        [put(x) for x in part] for part in (forms.forcing, forms.configuration, forms.motion, forms.noncontributing)
-    )
-    forms.kinetic, forms.potential = put(forms.kinetic), put(forms.potential)
-    outputs.update({name: put(expression) for name, expression in outputs.items()})
+    vars(forms).update(put(vars(forms), specified))
+    outputs.update(put(outputs, specified))
 
 
 def _independent_rows(
@@ -176,22 +178,3 @@ def _independent_rows(
         return [], [], True
     kept, independent = independent_rows(forms, constants, functions)
     return forms.configuration, [forms.motion[k] for k in kept], independent
-
-
-def _noncontributing(forms: Forms, taken: set[str]) -> dict[str, Any]:
-    """Forces that only the equations of auxiliary speeds know, solved from them."""
-    if not forms.noncontributing:
-        return {}
-    import sympy
-    from sympy.core.function import AppliedUndef
-
-    unknown: dict[str, Any] = {}
-    for equation in forms.noncontributing:
-        for part in equation.atoms(sympy.Symbol, AppliedUndef):
-            name = name_of(part)
-            if isinstance(name, str) and name not in taken and name != "t":
-                unknown.setdefault(name, part)
-    if len(unknown) != len(forms.noncontributing):
-        return {}
-    matrix, right = sympy.linear_eq_to_matrix(forms.noncontributing, list(unknown.values()))
-    return dict(zip(unknown, matrix.LUsolve(right), strict=True))

@@ -73,7 +73,7 @@ def describe_calls(program: Program) -> list[Call]:
         Call("canonical.rhs(t, z)", _shape(s.n_x), "z' of z = [q; p] by Hamilton's equations"),
         Call("canonical.of(x)", _shape(s.n_x), "z = [q; p] of a state x"),
         Call("canonical.expand(z)", _shape(s.n_x), "x = [q; v] of z"),
-        Call("canonical.hamiltonian(z)", "number", "H = p v - T + V (J)"),
+        Call("canonical.hamiltonian(z)", "number", "H = p v - L (J)"),
         Call("bind(p=None, u=None)", "Module", "the same calls with other parameters and inputs"),
         Call("simulate(span, initial=None)", "Trajectory", "a run; needs SciPy"),
         Call("linearize(x=None, t=0.0)", "Linearization", "A, B, C, D along the constraints, eigenvalues"),

@@ -8,22 +8,32 @@ from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.count import count
-from ..graph.differentiate import gradient, vjp
+from ..graph.differentiate import gradient, jvp, vjp
+from ..graph.rounding_bounds import vanishing
 from ..graph.substitute import substitute
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
 
 
 def form_energies(kinematics: Kinematics, differentiated: bool = False) -> tuple[Expr, Expr]:
-    """T and V; of a bare Lagrangian V = -L(v = 0) and T = L + V.
+    """T and V; of a bare Lagrangian its terms of second degree in the velocities, and V = -L(v = 0).
+
+    T + V is then the energy v . dL/dv - L, in which terms linear in the velocities cancel.
 
     ``differentiated``: without the potentials of elements whose forces enter by virtual power instead.
     """
     bare = kinematics.mechanism.lagrangian
     graph = kinematics.graph
     if bare is not None:
-        at_rest = substitute([bare.expression], dict.fromkeys(kinematics.v, graph.zero))[0]
-        return bare.expression - at_rest, -at_rest
+        v = list(kinematics.v)
+        momenta = gradient(bare.expression, v)
+        at_rest, *linear = substitute([bare.expression, *momenta], dict.fromkeys(v, graph.zero))
+        quadratic = bare.expression - at_rest
+        if not all(vanishing(linear)):
+            quadratic = graph.zero
+            for rate, inertial in zip(v, jvp(momenta, dict(zip(v, v, strict=True))), strict=True):  # M v
+                quadratic = quadratic + 0.5 * (rate * inertial)
+        return quadratic, -at_rest
     kinetic, potential = graph.zero, graph.zero
     # g . r of each link's origin and g in link axes, outwards from ground, so that no ground pose is needed
     heights: list[tuple[Expr, Vec3]] = []
@@ -42,6 +52,12 @@ def form_energies(kinematics: Kinematics, differentiated: bool = False) -> tuple
         if force.potential is not None and not (differentiated and force.force.by_power):
             potential = potential + force.potential
     return 0.5 * kinetic, potential
+
+
+def velocity_terms(kinematics: Kinematics, kinetic: Expr) -> Expr:
+    """What the momenta are derivatives of: T, or L less L(v = 0) of a bare Lagrangian, which may have linear terms."""
+    bare = kinematics.mechanism.lagrangian
+    return kinetic if bare is None else bare.expression + form_energies(kinematics)[1]
 
 
 def _velocity(kinematics: Kinematics, k: int) -> Vec3:

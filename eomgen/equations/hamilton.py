@@ -1,7 +1,7 @@
 """Stage equations: Kinematics -> TreeEquations by Hamilton's canonical equations.
 
 q' = dH/dp, p' = -dH/dq + Q with H(q, p, t) = (p - b) . M^-1 (p - b) / 2 - T_0 + V, where T = v . M v / 2 + b . v + T_0
-(Shabana, Computational Dynamics, sec. 4.11; Goldstein, Classical Mechanics, 3rd ed., sec. 8.1).  Momenta are dT/dv.
+(Shabana, Computational Dynamics, sec. 4.11; Goldstein, Classical Mechanics, 3rd ed., sec. 8.1).  Momenta are dL/dv.
 -dH/dq at constant p is taken as dL/dq at constant v, which Legendre's transformation says it is, and dp/dt = p' is
 solved for v': M^-1 inside of H would square what rounding is blown up by, and M of a tree whose constraints are to be
 embedded may have no inverse.  Where q' = N v, for Euler parameters, the momenta of angular velocities w obey
@@ -17,7 +17,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import gradient, jacobian, jvp, vjp
 from ..kinematics import Kinematics
 from ..kinematics.loads import drive_inertias
-from .analytical import form_energies, generalized_forces
+from .analytical import form_energies, generalized_forces, velocity_terms
 from .tree_equations import TreeEquations
 
 
@@ -32,11 +32,12 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         loop = kinematics.loop_coordinates
         rate = loop.rates[loop.names.index(name)]
         kinetic = kinetic + 0.5 * inertia * (rate * rate)
-    momenta = gradient(kinetic, v)
+    moving = velocity_terms(kinematics, kinetic)
+    momenta = gradient(moving, v)
     entries = jacobian(momenta, v)
     mass = tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n))
     forces = generalized_forces(kinematics)
-    slopes = gradient(kinetic - form_energies(kinematics, differentiated=True)[1], list(kinematics.q))
+    slopes = gradient(moving - form_energies(kinematics, differentiated=True)[1], list(kinematics.q))
     rates = [s + f for s, f in zip(_turned(kinematics, slopes, momenta), forces, strict=True)]
     drift = jvp(momenta, kinematics.flow | kinematics.clock)
     total = kinematics.total_derivative(momenta)

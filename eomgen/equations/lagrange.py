@@ -12,7 +12,7 @@ from __future__ import annotations
 from ..graph import vectors as vec
 from ..graph.differentiate import gradient, jacobian, jvp, vjp
 from ..kinematics import Kinematics
-from .analytical import form_energies, generalized_forces
+from .analytical import form_energies, generalized_forces, velocity_terms
 from .tree_equations import TreeEquations
 
 
@@ -21,10 +21,11 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     graph = kinematics.graph
     q, v = list(kinematics.q), list(kinematics.v)
     kinetic, potential = form_energies(kinematics)
-    momentum = gradient(kinetic, v)
+    moving = velocity_terms(kinematics, kinetic)
+    momentum = gradient(moving, v)
     drift = jvp(momentum, kinematics.flow | kinematics.clock)
     total = kinematics.total_derivative(momentum)
-    slope = gradient(kinetic - form_energies(kinematics, differentiated=True)[1], q)
+    slope = gradient(moving - form_energies(kinematics, differentiated=True)[1], q)
     if kinematics.quaternion_slots:
         slope = vjp(list(kinematics.rates), slope, v)
     for _, j in kinematics.quaternion_slots:

@@ -24,7 +24,12 @@ def energies(author: Author) -> Section | None:
         return None
     T, V = author.letter("T"), author.letter("V")
     pieces = [
-        Sentence(f"Kinetic energy ${T}$ and potential energy ${V}$ of gravity and springs (J):"),
+        Sentence(
+            f"Kinetic energy ${T}$ and potential energy ${V}$ of gravity and springs (J):"
+            if author.mechanism.lagrangian is None
+            else f"${T}$ holds the terms of the Lagrangian of second degree in the velocities, ${V}$ those of degree 0 "
+            "with the other sign (J):"
+        ),
         *author.quantity(T, "T"),
         *author.quantity(V, "V"),
     ]
@@ -73,24 +78,25 @@ def _right_side(author: Author) -> list[Piece]:
 
 def _lagrange(author: Author) -> list[Piece]:
     k = author.equations.kinematics
-    T, V = author.letter("T"), author.letter("V")
+    T, L, V = map(author.letter, "TLV")
+    bare = k.mechanism.lagrangian is not None
+    T, rest = (L, "") if bare else (T, f" + \\frac{{\\partial {V}}}{{\\partial q}}")
     pieces: list[Piece] = [
         Sentence(
             "Lagrange's equations, one for each coordinate $q$ of the tree: $\\frac{d}{d\\,t} "
-            f"\\frac{{\\partial {T}}}{{\\partial\\dot{{q}}}} - \\frac{{\\partial {T}}}{{\\partial q}} + "
-            f"\\frac{{\\partial {V}}}{{\\partial q}} = "
+            f"\\frac{{\\partial {T}}}{{\\partial\\dot{{q}}}} - \\frac{{\\partial {T}}}{{\\partial q}}{rest} = "
             "Q_q$, where $Q_q$ holds the forces without a potential"
             + (" and those of the constraints." if author.equations.constraint_names else ".")
         )
     ]
-    if k.mechanism.lagrangian is not None:
-        pieces += author.quantity(author.letter("L"), "lagrangian")
+    if bare:
+        pieces += author.quantity(L, "lagrangian")
     for j, name in enumerate(k.names):
         if k.velocity_names[j : j + 1] != (f"{name}_dot",):
             pieces.append(Sentence("Coordinates that are no angles or lengths follow from their angular velocities."))
             break
         q = author.symbol(name)
-        for left, choose in _derivatives(q, j, T, V):
+        for left, choose in _derivatives(q, j, T, None if bare else V):
             named, (value,) = author.form("derivatives of energies", choose, "d_")
             pieces += author.formulas(left, value, named)
     if k.velocity_names and author.equations.constraint_names:
@@ -99,14 +105,18 @@ def _lagrange(author: Author) -> list[Piece]:
     return pieces
 
 
-def _derivatives(q: str, j: int, T: str, V: str) -> list[tuple[str, Callable[[Quantities], Sequence[Expr]]]]:
-    """Left sides and values of the derivatives of the energies by coordinate j."""
+def _derivatives(q: str, j: int, T: str, V: str | None) -> list[tuple[str, Callable[[Quantities], Sequence[Expr]]]]:
+    """Left sides and values of the derivatives of the energies by coordinate j; without V of the Lagrangian T."""
     partial_rate = rf"\frac{{\partial {T}}}{{\partial{dotted(q, 1)}}}"
+
+    def slope(letter: str, of: Callable[[Quantities], Expr]) -> tuple[str, Callable[[Quantities], Sequence[Expr]]]:
+        return rf"\frac{{\partial {letter}}}{{\partial {q}}}", lambda s: gradient(of(s), [s.kinematics.q[j]])
+
     return [
         (partial_rate, lambda s: [s.momenta[j]]),
         (rf"\frac{{d}}{{d\,t}} {partial_rate}", lambda s: s.kinematics.total_derivative([s.momenta[j]])),
-        (rf"\frac{{\partial {T}}}{{\partial {q}}}", lambda s: gradient(s.kinetic_energy, [s.kinematics.q[j]])),
-        (rf"\frac{{\partial {V}}}{{\partial {q}}}", lambda s: gradient(s.potential_energy, [s.kinematics.q[j]])),
+        slope(T, lambda s: s.kinetic_energy if V else s.lagrangian),
+        *([slope(V, lambda s: s.potential_energy)] if V else []),
     ]
 
 
@@ -191,9 +201,9 @@ def _gibbs_appell(author: Author) -> list[Piece]:
 def _hamilton(author: Author) -> list[Piece]:
     eqs = author.equations
     symbols = ", ".join(f"${author.symbol(str(p))}$" for p in eqs.momentum_symbols)
-    T, L, H = map(author.letter, "TLH")
+    L, H = map(author.letter, "LH")
     return [
-        Sentence(f"The momenta {symbols} are the derivatives of ${T}$ by the velocities:"),
+        Sentence(f"The momenta {symbols} are the derivatives of ${L}$ by the velocities:"),
         *author.quantity(r"\mathbf{p}", "momenta"),
         Sentence(
             f"The Hamiltonian is ${H} = \\mathbf{{p}}^T \\dot{{\\mathbf{{q}}}} - {L}$, in coordinates and momenta:"

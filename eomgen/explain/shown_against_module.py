@@ -121,7 +121,6 @@ COMPARED: dict[str, Callable[[StateNumbers], Wanted]] = {
     "V": _energy(1),
     "mass_matrix": lambda s: (s.module.embedded_mass_matrix(s.q, t=s.t).ravel(), 0.0),
     "force": _force,
-    "momenta": lambda s: (s.module.mass_matrix(s.q, t=s.t) @ s.v, 0.0),
     "constraints": lambda s: (s.module.constraints(s.q, t=s.t), 1.0),
     "velocity_constraints": _velocity_constraints,
     "constraint_jacobian": lambda s: (s.module.constraint_jacobian(s.q, t=s.t).ravel(), 0.0),
@@ -203,13 +202,21 @@ def _compare_velocities(found: dict[str, float], equations: Any, s: StateNumbers
     _note(found, "velocities", np.array([T]), *_energy(0)(s))
 
 
+def _compare_momenta(found: dict[str, float], equations: Any, s: StateNumbers) -> Any:
+    """p = M v + b, where b is p at rest."""
+    still = dict(s.values) | dict.fromkeys(map(str, equations.v), 0.0)
+    p, b = (_number(equations, "momenta", None, values) for values in (s.values, still))
+    _note(found, "momenta", p - b, s.module.mass_matrix(s.q, t=s.t) @ s.v, float(np.abs(b).max(initial=0.0)))
+    return p, b
+
+
 def _compare_hamiltonian(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
-    """H is p . v - T + V at the momenta p = dT/dv."""
-    p = _number(equations, "momenta", None, s.values)
-    T, V = s.module.energy(s.x, t=s.t)
+    """H is (p - b) . v / 2 - T(v = 0) + V."""
+    p, b = _compare_momenta(found, equations, s)
+    V, T = s.module.energy(s.x, t=s.t)[1], s.module.energy(np.concatenate([s.q, 0.0 * s.v]), t=s.t)[0]
     values = dict(s.values) | dict(zip(map(str, equations.momentum_symbols), p, strict=True))
-    size = float(np.abs(p * s.v).sum()) + abs(T) + abs(V)
-    _note(found, "hamiltonian", _number(equations, "hamiltonian", None, values), np.array([p @ s.v - T + V]), size)
+    H, size = 0.5 * (p - b) @ s.v - T + V, float(np.abs(p * s.v).sum()) + abs(T) + abs(V)
+    _note(found, "hamiltonian", _number(equations, "hamiltonian", None, values), np.array([H]), size)
 
 
 def _compare_gibbs_function(found: dict[str, float], equations: Any, s: StateNumbers) -> None:
@@ -280,6 +287,7 @@ SUMS: dict[str, Callable[[dict[str, float], Any, StateNumbers], None]] = {
     "generalized_forces": _compare_forces,
     "velocity_transformation": _compare_transformation,
     "velocities": _compare_velocities,
+    "momenta": _compare_momenta,
     "hamiltonian": _compare_hamiltonian,
     "gibbs_function": _compare_gibbs_function,
     "block_system": _compare_block_system,

@@ -16,6 +16,8 @@ from .kinematics import Kinematics
 from .undefined_rows import place_of
 
 IDLE = "holds nothing"  #: what is said of rows without slopes
+#: Directions in which rows are evaluated, and how far (scaled): beyond the root of what counts as closed.
+TRIES, AWAY = 12, 1e-4
 
 
 def require_finite(functions: ConstraintFunctions, q: Array) -> None:
@@ -43,11 +45,37 @@ def require_finite(functions: ConstraintFunctions, q: Array) -> None:
     raise AssemblyError(f"{what}; give another configuration in initial or guess", bad)
 
 
+def refuse_squares(functions: ConstraintFunctions, q: Array) -> None:
+    """Refuse written constraints that are least or greatest where they hold, as |r|^2 = 0 of two points is.
+
+    Raises
+    ------
+    ModelError
+        Names the constraints.
+    """
+    k, scales = functions.kinematics, functions.system.scales
+    least = np.array(k.constraints.written[: functions.h], dtype=bool)
+    side = np.zeros(functions.h)
+    for step in np.random.default_rng(5).normal(size=(TRIES, len(scales.q))) * AWAY:
+        for away in (step, -step):
+            higher = np.sign(functions.position(scales.move(q, away))[0] - functions.position(q)[0])
+            side = np.where(side == 0, higher, side)
+            least &= (higher == side) & (side != 0)
+        if not least.any():
+            return
+    what = (
+        "is 0 only where it is least or greatest, as a sum of squares: its slopes vanish there, so it can hold nothing"
+    )
+    remedy = "write each component as a constraint: x1 - x2 and y1 - y2 for (x1 - x2)**2 + (y1 - y2)**2"
+    labels = (k.constraints.labels[i] for i in np.flatnonzero(least))
+    raise ModelError([k.mechanism.problem(place_of(k.mechanism, x), f"{x} {what}", remedy) for x in labels])
+
+
 def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> None:
     """Refuse constraints of which no slope is found at any position, where they are all there is.
 
-    Such are a relation whose factors cancel, one that nothing proves to be an identity, and one that is a square.  Rows
-    of joints whose slopes vanish identically with the given parameters are no fault: a body may be held twice.
+    Such are a relation whose factors cancel, and one that nothing proves to be an identity.  Rows of joints whose
+    slopes vanish identically with the given parameters are no fault: a body may be held twice.
 
     Parameters
     ----------

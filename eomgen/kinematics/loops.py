@@ -139,6 +139,9 @@ def differentiate_constraints(
     open_conditions = [(joint, e) for joint, e in aligned if e.value is None or e.value <= 0]
     along = {**dict(zip(state.q, state.rates, strict=True)), **state.clock}
     velocity = jvp(values, along)
+    if not state.in_order:  # q' may keep a constraint by itself, as that of Euler parameters keeps their norm
+        kept_by_rates = zip(velocity, kept, vanishing(velocity), strict=False)
+        velocity = [graph.zero if row.written and zero else x for x, row, zero in kept_by_rates]
     entries = state.slopes(values, velocity)
     m = len(values)
     entries |= {(m + i, j): e for (i, j), e in jacobian(nonholonomic, list(state.v)).items()}

@@ -19,7 +19,7 @@ from ..suggestions import hint, joined
 from .candidates import rate_candidates
 from .constraint_functions import Array, ConstraintFunctions
 from .driving import close_driven, follow_drivers
-from .idle_rows import refuse_idle_rows, require_finite
+from .idle_rows import refuse_idle_rows, refuse_squares, require_finite
 from .kinematics import Kinematics
 
 PROBES = 4  #: further assembled configurations at which the rank is judged
@@ -205,6 +205,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     judged = [SparseRows(J) for J in jacobians if np.isfinite(J).all()]
     ranks = tuple(rows.rank for rows in judged)
     r = max(ranks)
+    refuse_squares(functions, q)
     if functions.m and not r:
         refuse_idle_rows(kinematics, functions.values)
     n_dof = n - r

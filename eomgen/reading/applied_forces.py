@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..equations.analytical import form_energies
+from ..equations.analytical import form_energies, velocity_terms
 from ..forces import CoordinateLoad, MarkerLoad
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -93,12 +93,11 @@ def _virtual_power(
 
 
 def without_forces(kinematics: Kinematics) -> Kinematics:
-    """The same motion with no gravity and no force element; of a bare Lagrangian, of L the kinetic energy alone."""
+    """The same motion with no gravity and no force element; of a bare Lagrangian, L without V."""
     mechanism, graph = kinematics.mechanism, kinematics.graph
     bare = mechanism.lagrangian
     if bare is not None:
-        kinetic, _ = form_energies(kinematics)
         still = tuple(graph.zero for _ in bare.forces)
-        bare = replace(bare, expression=kinetic, forces=still, dissipation=graph.zero)
+        bare = replace(bare, expression=velocity_terms(kinematics, graph.zero), forces=still, dissipation=graph.zero)
     alone = replace(mechanism, gravity=vec.zero(graph), forces=(), lagrangian=bare)
     return replace(kinematics, mechanism=alone, forces=())

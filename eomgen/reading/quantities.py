@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from ..equations import METHODS
+from ..equations.analytical import velocity_terms
 from ..equations.reduction import LoopNames, VelocityTransformation, transform_velocities
 from ..equations.tree_equations import TreeEquations
 from ..errors import UnavailableError
@@ -102,9 +103,9 @@ class Quantities:
 
     @cached_property
     def momenta(self) -> Row:
-        """p = dT/dv (n_v,)."""
+        """p = dL/dv (n_v,)."""
         self._require_energy("the momentum", ("kinetic_energy",))
-        return tuple(gradient(self.kinetic_energy, list(self.kinematics.v)))
+        return tuple(gradient(velocity_terms(self.kinematics, self.kinetic_energy), list(self.kinematics.v)))
 
     # -- equations of motion ------------------------------------------------------------------------------------------
     @cached_property

@@ -75,9 +75,7 @@ class _Writer:
         self._mimics()
         self._drives()
         self._note_data()
-        for section, names in self.names.renamed.items():
-            self.out.notes.append(f"renamed {section}: " + ", ".join(f"{old!r} is {new}" for old, new in names.items()))
-        self.out.renamed = self.names.renamed
+        self.out.note_renamed(self.names.renamed)
         return self.out
 
     def _bound(self, freedoms: int) -> None:

@@ -7,13 +7,10 @@ is then not unique gets a number.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
-from ..describe.names import LONGEST, fault_of_model_name, fault_of_name
+from ..describe.names import LONGEST, clean_name, fault_of_model_name
 from ..describe.scope import RATES
-
-_STRANGE = re.compile(r"[^A-Za-z0-9_]")
 
 
 class RobotNames:
@@ -57,14 +54,6 @@ class RobotNames:
                 self.taken["symbol"].update(rates)
                 return given
             count += 1
-
-
-def clean_name(name: str, kind: str) -> str:
-    """An identifier as near to a name as can be."""
-    result = _STRANGE.sub("_", name)
-    if not result[:1].isalpha():
-        result = f"{kind}_{result.lstrip('_')}"
-    return f"{result}_" if fault_of_name(result[:LONGEST], symbol=True) else result
 
 
 def clean_model_name(name: str) -> str:

@@ -121,7 +121,8 @@ class Canonical:
         return np.concatenate([layout.scales.rates(q, v), rates])
 
     def hamiltonian(self, z: ArrayLike, t: float = 0.0) -> float:
-        """H = p v - T + V (J), which is the energy T + V where nothing is driven in time."""
-        x = self.expand(z, t)
-        kinetic, potential = self._module.energy(x, t=t)
-        return float(self.momenta(x, t) @ x[self._module.n_q :] - kinetic + potential)
+        """H = p v - L (J), which is the energy T + V where nothing is driven in time."""
+        x, n = self.expand(z, t), self._module.n_q
+        still = np.concatenate([x[:n], np.zeros(len(x) - n)])
+        moving = self.momenta(x, t) - self.momenta(still, t)  # M v: T may have linear terms, L of a Lagrangian others
+        return float(0.5 * moving @ x[n:] - self._module.energy(still, t=t)[0] + self._module.energy(x, t=t)[1])

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 from bicycle_matrix import state_matrix
+from sympy.physics.mechanics import KanesMethod, Particle, Point, ReferenceFrame, RigidBody, dynamicsymbols, inertia
 from sympy_systems import double_pendulum, pulled_pendulum, rolling_disc
 
 import eomgen as eg
@@ -167,3 +169,87 @@ def test_auxiliary_speeds_and_inputs() -> None:
     assert run["pull"] == pytest.approx(2.0 * (9.81 * np.cos(theta) + 0.8 * omega**2), rel=1e-9)
     expected = -9.81 / 0.8 * np.sin(theta) + np.sin(run.t) / (2.0 * 0.8**2)
     assert run["omega_dot"] == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+def sliding_bead(vertical: bool, push_up: bool = False) -> KanesMethod:
+    """A bead with friction mu N on the parabola y = c x^2/2; an auxiliary speed along its normal, or vertical."""
+    m, g, mu, c = sympy.symbols("m g mu c")
+    x, u, w, N, F = dynamicsymbols("x u w N F", positive=True)
+    frame, origin, bead = ReferenceFrame("A"), Point("O"), Point("P")
+    origin.set_vel(frame, 0)
+    bead.set_pos(origin, x * frame.x + c * x**2 / 2 * frame.y)
+    length = sympy.sqrt(1 + c**2 * x**2)
+    along, across = (frame.x + c * x * frame.y) / length, (frame.y - c * x * frame.x) / length
+    bead.set_vel(frame, u * length * along + w * (frame.y if vertical else across))
+    kane = KanesMethod(frame, [x], [u], [x.diff() - u], u_auxiliary=[w])
+    push = F * frame.x + (F * frame.y if push_up else 0 * frame.y)
+    loads = [(bead, -m * g * frame.y), (bead, N * across - mu * N * along), (bead, push)]
+    kane.kanes_equations([Particle("bead", bead, m)], loads)
+    return kane
+
+
+@pytest.mark.parametrize("vertical", [False, True])
+def test_a_force_of_an_auxiliary_speed_acts_in_the_equations_of_motion(vertical: bool) -> None:
+    m, g, mu, c = 2.0, 9.81, 0.3, 0.7
+    model = eg.from_sympy(sliding_bead(vertical), "bead", {"m": m, "g": g, "mu": mu, "c": c}, inputs=["F"])
+    mod = model.compile(target="numpy")
+    assert (mod.u_names, mod.y_names, set(mod.p_names)) == (("F",), ("N",), {"m", "g", "mu", "c"})
+    for x, u, F in ((0.0, 1.0, 20.0), (0.4, 1.7, 3.0), (-0.8, 0.5, -1.0)):
+        t = np.array([1.0, c * x]) / np.hypot(1.0, c * x)
+        n = np.array([-t[1], t[0]])
+        # Newton: m (x'' (1, c x) + u^2 (0, c)) = N (n - mu t) + (F, -m g)
+        left = np.column_stack([m * np.array([1.0, c * x]), -(n - mu * t)])
+        expected = np.linalg.solve(left, [F, -m * g - m * c * u**2])
+        assert mod.rhs(0.0, [x, u], u=[F])[1] == pytest.approx(expected[0], rel=1e-12)
+        assert mod.outputs(0.0, [x, u], u=[F])[0] == pytest.approx(expected[1], rel=1e-12)
+
+
+def test_forces_of_auxiliary_speeds_that_do_not_follow_are_named() -> None:
+    kane = sliding_bead(vertical=False, push_up=True)
+    with pytest.raises(eg.ModelError, match=r"the forces F, N of the auxiliary speeds .* 2, and 1 .*inputs="):
+        eg.from_sympy(kane, "bead")
+    values = {"m": 1.0, "g": 9.81, "mu": 0.1, "c": 0.5}
+    assert eg.from_sympy(kane, "bead", values, inputs=["F"]).compile(target="numpy").u_names == ("F",)
+
+
+def test_constants_of_auxiliary_equations_stay_parameters() -> None:
+    m, g, k = sympy.symbols("m g k")
+    q, u, w, N = dynamicsymbols("q u w N")
+    frame, origin, point = ReferenceFrame("A"), Point("O"), Point("P")
+    origin.set_vel(frame, 0)
+    point.set_vel(frame, u * frame.x + w * frame.y)
+    kane = KanesMethod(frame, [q], [u], [q.diff() - u], u_auxiliary=[w])
+    kane.kanes_equations([Particle("b", point, m)], [(point, -k * q * frame.x + (N - m * g) * frame.y)])
+    model = eg.from_sympy(kane, "block", {"m": 2.0, "g": 9.81, "k": 3.0}, outputs={"twice": 2 * N})
+    mod = model.compile(target="numpy")
+    assert set(mod.p_names) == {"m", "g", "k"}
+    assert dict(zip(mod.y_names, mod.outputs(0.0, [0.1, 0.0]), strict=True)) == pytest.approx(
+        {"N": 19.62, "twice": 39.24}
+    )
+
+
+def test_euler_parameters_whose_kinematics_are_written_implicitly() -> None:
+    """Angular velocity as given, e . e' = 0 and the norm as configuration constraint: Euler's equations."""
+    e, w = dynamicsymbols("e0:4"), dynamicsymbols("w1:4")
+    i1, i2, i3, m = sympy.symbols("i1:4 m")
+    ground, turned, point = ReferenceFrame("A"), ReferenceFrame("B"), Point("O")
+    turned.orient_quaternion(ground, e)
+    point.set_vel(ground, 0)
+    spin, given = turned.ang_vel_in(ground), sum(x * axis for x, axis in zip(w, turned, strict=True))
+    turned.set_ang_vel(ground, given)
+    kinematics = [*((spin - given).dot(axis) for axis in turned), sum(x * x.diff() for x in e)]
+    kane = KanesMethod(
+        ground, q_ind=e[1:], q_dependent=e[:1], u_ind=w, kd_eqs=kinematics, explicit_kinematics=False,
+        configuration_constraints=[sum(x**2 for x in e) - 1],
+    )  # fmt: skip
+    kane.kanes_equations([RigidBody("b", point, turned, m, (inertia(turned, i1, i2, i3), point))], [])
+    model = eg.from_sympy(kane, "spin", parameters={i1: 1.0, i2: 2.0, i3: 3.0}, guess={"e0": 1.0})
+    mod = model.compile(target="numpy")
+    random = np.random.default_rng(3)
+    for _ in range(3):
+        (a, b, c, d), (p, q, r) = random.normal(size=4), random.normal(size=3)
+        a, b, c, d = np.array([a, b, c, d]) / np.linalg.norm([a, b, c, d])
+        state = dict(zip(mod.x_names, mod.rhs(0.0, [b, c, d, a, p, q, r]), strict=True))
+        half = np.array([[-b, -c, -d], [a, -d, c], [d, a, -b], [-c, b, a]]) @ [p, q, r] / 2
+        expected = [*half, -q * r, p * r, -p * q / 3]
+        assert [state[n] for n in ("e0", "e1", "e2", "e3", "w1", "w2", "w3")] == pytest.approx(expected, abs=1e-12)

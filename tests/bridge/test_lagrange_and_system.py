@@ -250,3 +250,69 @@ def test_a_method_that_needs_bodies_is_refused() -> None:
     with pytest.raises(eg.UsageError, match="for given equations there are: auto, given"):
         model.derive("embedding")
     assert model.derive("given").method == "given"
+
+
+@pytest.mark.parametrize(
+    ("given", "name", "latex"),
+    [
+        (r"\theta_1", "theta_1", r"\ddot{\theta}_1"), (r"\varphi_{max}", "varphi_max", r"\ddot{\varphi}_{max}"),
+        ("θ", "theta", r"\ddot{\theta}"), ("lambda", "lambda_", r"\ddot{\lambda}"), ("q.1", "q_1", r"\ddot{q}_1"),
+        ("pi", "pi_", r"\ddot{\pi}"), ("int", "int_", r"\ddot{\mathrm{int}}"), ("q_dot", "q_dot", ""),
+    ],
+)  # fmt: skip
+def test_names_that_sympy_allows_are_taken(given: str, name: str, latex: str) -> None:
+    """A name that a model cannot use is changed, which is noted; symbols as keys and LaTeX go on as before."""
+    q, (m, g, l) = dynamicsymbols(given), symbols(r"m \gamma l")
+    method = lagrange(m * l**2 * q.diff() ** 2 / 2 + m * g * l * sympy.cos(q), [q])
+    told = {"parameters": {m: 2, l: 0.7, r"\gamma": 9.81}, "initial": {q: 0.5, q.diff(): 0.3}}
+    model = eg.from_sympy(method, "p", **told, outputs={"twice": 2 * q})
+    assert ("twice", model.renamed.get("coordinates")) == ("twice", {given: name} if given != name else None)
+    assert model.renamed["parameters"] == {r"\gamma": "gamma"}
+    assert sum(repr(given) in note for note in model.notes) == (given != name)
+    equations = model.derive()
+    assert latex in equations._repr_latex_()
+    mod = equations.compile(target="numpy")
+    assert (mod.q_names, mod.v_names) == ((name,), (f"{name}_dot",))
+    x = mod.x0()
+    assert mod.rhs(0.0, x) == pytest.approx([0.3, -9.81 / 0.7 * np.sin(0.5)], rel=1e-14)
+    assert mod.outputs(0.0, x) == pytest.approx([1.0])
+
+
+def test_names_that_clash_once_they_are_changed_are_told_apart() -> None:
+    x, y = dynamicsymbols(r"\theta theta")
+    mod = eg.from_sympy(lagrange(x.diff() ** 2 / 2 + y.diff() ** 2 - x, [x, y])).compile(target="numpy")
+    assert mod.q_names == ("theta_2", "theta")
+    assert mod.rhs(0.0, np.zeros(4))[2:] == pytest.approx([-1.0, 0.0])
+
+
+def test_the_time_may_have_another_name() -> None:
+    before, tau, t = dynamicsymbols._t, sympy.Symbol("tau"), sympy.Symbol("t")
+    dynamicsymbols._t = tau
+    try:
+        q = dynamicsymbols("q")
+        method = lagrange(t * q.diff(tau) ** 2 / 2 - q * sympy.sin(tau), [q])
+    finally:
+        dynamicsymbols._t = before
+    model = eg.from_sympy(method, parameters={t: 2.0})
+    assert model.renamed == {"parameters": {"t": "t_"}}
+    assert model.compile(target="numpy").rhs(0.3, [0.5, 0.1]) == pytest.approx([0.1, -np.sin(0.3) / 2.0])
+
+
+def test_symbols_of_a_lagrangian_and_of_equations_are_taken_too() -> None:
+    angle, rate, k, mu = symbols(r"\theta \theta_dot lambda µ")
+    values = {k: 2.0, mu: 4.0}
+    one = eg.Model.from_lagrangian("one", mu * rate**2 / 2 - k * angle**2 / 2, [angle], parameters=values)
+    two = eg.Model.from_equations("two", [angle], [[mu]], [-k * angle - 0 * rate], parameters=values)
+    for model in (one, two):
+        assert model.renamed == {"coordinates": {r"\theta": "theta"}, "parameters": {"lambda": "lambda_", "µ": "mu"}}
+        assert model.compile(target="numpy").rhs(0.0, [3.0, 0.5]) == pytest.approx([0.5, -1.5])
+
+
+def test_multipliers_that_are_no_outputs_are_noted() -> None:
+    x, y = dynamicsymbols("x y")
+    kinetic = (x.diff() ** 2 + y.diff() ** 2) / 2
+    twice = eg.from_sympy(lagrange(kinetic - y, [x, y], hol_coneqs=[x - y, 2 * x - 2 * y]))
+    assert any("multipliers are no outputs: the constraints are redundant" in note for note in twice.notes)
+    assert twice.compile(target="numpy").y_names == ()
+    once = eg.from_sympy(lagrange(kinetic - sympy.Symbol("lam1") * y, [x, y], hol_coneqs=[x - y]))
+    assert any("lam1" in note for note in once.notes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import sympy
 
 import eomgen as eg
 from eomgen.pipeline import OF_LAGRANGIANS
@@ -75,3 +76,53 @@ def test_a_constraint_that_an_input_moves(method: str) -> None:
     x = np.concatenate([r * along, slide * along + r * rate * across])
     expected = (-9.81 * np.sin(a)) * along + (2 * slide * rate + r * bend) * across
     assert mod.rhs(0.0, x, u=[a, rate, bend])[2:] == pytest.approx(expected, rel=1e-11)
+
+
+def in_rotating_axes() -> tuple[eg.Model, sympy.Expr, list[sympy.Symbol], dict[str, float]]:
+    """A charge on a spring in rotating axes and in a magnetic field: terms linear in the velocities of both kinds."""
+    x, y, x_dot, y_dot, m, b, w, k = sympy.symbols("x y x_dot y_dot m b w k")
+    L = m * ((x_dot - w * y) ** 2 + (y_dot + w * x) ** 2) / 2 - k * (x**2 + y**2) / 2 + b * (x * y_dot - y * x_dot) / 2
+    values = {"m": 1.3, "b": 2.0, "w": 0.7, "k": 5.0}
+    return eg.Model.from_lagrangian("charge", L, [x, y], parameters=values), L, [x_dot, y_dot], values
+
+
+@pytest.mark.parametrize("method", ["lagrange", "hamilton", "augmented"])
+def test_terms_linear_in_the_velocities_are_no_energy(method: str) -> None:
+    """T + V is v . dL/dv - L, which is kept; p is dL/dv all the same."""
+    model, L, rates, values = in_rotating_axes()
+    eqs = model.derive(method)
+    momenta = [L.diff(rate) for rate in rates]
+    assert [sympy.simplify(p - q) for p, q in zip(eqs.momenta, momenta, strict=True)] == [0, 0]
+    assert sympy.simplify(eqs.lagrangian - L) == 0
+    mod = eqs.compile(target="numpy")
+    run = mod.simulate((0, 3), initial={"x": 0.3, "y": 0.2, "x_dot": 0.5, "y_dot": 0.4}, rtol=1e-10, atol=1e-12)
+    energy = sum(v * p for v, p in zip(rates, momenta, strict=True)) - L
+    start = dict(zip(mod.x_names, run.x[:, 0], strict=True)) | values
+    assert run["energy"][0] == pytest.approx(float(energy.subs(start)), rel=1e-14)
+    assert run["T"][0] == pytest.approx(1.3 * 0.41 / 2, rel=1e-14)
+    assert np.ptp(run["energy"]) < 1e-8
+    explanation = eqs.explain()
+    assert "of second degree in the velocities" in explanation.markdown
+    assert explanation.difference < 1e-12
+    if method == "hamilton":
+        z = mod.canonical.of(run.x[:, 0])
+        assert z[2:] == pytest.approx([float(p.subs(start)) for p in momenta])
+        assert mod.canonical.hamiltonian(z) == pytest.approx(run["energy"][0])
+        p_values = dict(zip(map(str, eqs.momentum_symbols), z[2:], strict=True))
+        assert float(eqs.hamiltonian.subs(start | p_values)) == pytest.approx(run["energy"][0])
+
+
+def test_the_energy_of_a_lagrangian_that_sympy_forms() -> None:
+    from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
+
+    _, L, _, values = in_rotating_axes()
+    x, y = dynamicsymbols("x y")
+    L = L.subs({"x_dot": x.diff(), "y_dot": y.diff()}).subs({"x": x, "y": y})
+    method = LagrangesMethod(L, [x, y])
+    method.form_lagranges_equations()
+    state = [0.3, 0.2, 0.5, 0.4]
+    energies = [
+        model.compile(target="numpy").energy(state)
+        for model in (in_rotating_axes()[0], eg.from_sympy(method, "charge", parameters=values))
+    ]
+    assert energies[1] == pytest.approx(energies[0], rel=1e-14)

@@ -111,3 +111,32 @@ def test_rows_of_time_or_inputs_alone_are_refused(row: sp.Expr, what: str) -> No
     )
     with pytest.raises(ModelError, match=f"{what} but on no coordinate, so no motion can satisfy it"):
         m.check()
+
+
+@pytest.mark.parametrize("start", [{}, {"x_1": 1.0, "y_2": 0.5}])
+@pytest.mark.parametrize("distance", ["(x_1 - x_2)**2 + (y_1 - y_2)**2", "x_1**2 - 2*x_1*x_2 + x_2**2"])
+def test_a_constraint_that_is_a_square_is_named(distance: str, start: dict[str, float]) -> None:
+    """Of coincident points |r|^2 is least where it is 0: it is no change point, and its components hold."""
+    names = ["x_1", "x_2", "y_1", "y_2"]
+    kinetic = " + ".join(f"{name}_dot**2/2" for name in names)
+    model = eg.Model.from_lagrangian("points", kinetic, names, constraints=[distance])
+    model.initial(**start)
+    with pytest.raises(eg.ModelError, match=r"constraint_1 is 0 only where it is least.*write each component"):
+        model.check()
+    components = eg.Model.from_lagrangian("points", kinetic, names, constraints=["x_1 - x_2", "y_1 - y_2"])
+    assert components.check().degrees_of_freedom == 2
+
+
+def test_an_equation_between_bodies_that_is_a_square_is_named() -> None:
+    model = eg.Model("points")
+    for name in "ab":
+        model.translational(f"T{name}", model.ground, model.body(name, mass=1))
+    model.coupling("c", equation="(x(a) - x(b))**2 + (y(a) - y(b))**2 + (z(a) - z(b))**2")
+    with pytest.raises(eg.ModelError, match=r"constraints\.c: c\.equation is 0 only where it is least"):
+        model.check()
+
+
+def test_a_small_circle_is_no_square() -> None:
+    model = eg.Model.from_lagrangian("bead", "x_dot**2 + y_dot**2", ["x", "y"], constraints=["x**2 + y**2 - 1e-6"])
+    model.initial(x=1e-3)
+    assert model.check().degrees_of_freedom == 1

@@ -143,8 +143,8 @@ FAULTS = (
     ),
     Fault(
         "hamilton-potential", "eomgen/equations/hamilton.py",
-        "slopes = gradient(kinetic - form_energies(kinematics, differentiated=True)[1], list(kinematics.q))",
-        "slopes = gradient(kinetic + form_energies(kinematics, differentiated=True)[1], list(kinematics.q))",
+        "slopes = gradient(moving - form_energies(kinematics, differentiated=True)[1], list(kinematics.q))",
+        "slopes = gradient(moving + form_energies(kinematics, differentiated=True)[1], list(kinematics.q))",
         "-dH/dq: the potential has the wrong sign",
         ("tests/forms/test_canonical.py::test_the_spherical_pendulum_of_the_textbooks",),
     ),
