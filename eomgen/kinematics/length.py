@@ -10,7 +10,7 @@ from ..graph.core import Expr
 from ..graph.rounding_bounds import settled_vector, size_of
 from ..graph.vectors import Vec3
 from ..joints.rods import Distance, RevoluteSpherical
-from ..limits.descriptions import NO_LENGTH
+from ..limits.descriptions import HAIR, NO_LENGTH
 
 PAIRS = 12  #: joints of a body up to which all distances between them count, beyond it those from the first to all
 
@@ -18,7 +18,8 @@ PAIRS = 12  #: joints of a body up to which all distances between them count, be
 def length_scale(mechanism: Mechanism) -> Expr:
     """Root mean square of the lengths of rods and of the distances between joints on one body.
 
-    Where there is none, of the distances from joints to centres of mass; 1 if there is none of these either.
+    Where there is none, of the distances from joints to centres of mass; 1 if there is none of these either.  A length
+    that is nothing beside the radius of gyration of the bodies, as what rounding in a file leaves of a 0, is none.
     Minimum-norm corrections compare lengths with angles; measured in this length, neither units nor frames of bodies
     matter.
     """
@@ -43,8 +44,16 @@ def length_scale(mechanism: Mechanism) -> Expr:
     total = graph.zero
     for square in squares:
         total = total + square
-    size = graph.apply("sqrt", total / float(len(squares)))
-    return graph.apply("select", graph.apply("lt", size, NO_LENGTH), 1.0, size)  # parameters may make all of them 0
+    square = total / float(len(squares))
+    size = graph.apply("sqrt", square)
+    mass = inertia = graph.zero
+    for body in mechanism.bodies:
+        mass, inertia = mass + body.mass, inertia + (body.inertia[0][0] + body.inertia[1][1] + body.inertia[2][2])
+    none = graph.apply("lt", size, NO_LENGTH)  # parameters may make all of them 0
+    if not mass.is_zero and not inertia.is_zero:
+        hair = graph.apply("lt", square * mass, inertia * (0.5 * HAIR * HAIR))
+        none = graph.apply("or", none, graph.apply("and", graph.apply("lt", 0.0, mass), hair))
+    return graph.apply("select", none, 1.0, size)
 
 
 def _square(a: Vec3, b: Vec3) -> Expr:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
 from ..constraints import Driver
@@ -29,15 +31,15 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
         held = _few([*dict.fromkeys(label.partition(".")[0] for label in kinematics.constraints.labels)])
         notes.append(
             f"locked: the mechanism has no degree of freedom, and no driver moves it (held by {held}); "
-            "remove a constraint, or replace a joint by one with more freedom"
+            "if it should move, remove a constraint, or replace a joint by one with more freedom"
         )
     if mobility.redundant and not mobility.assumed:
-        owners = [*dict.fromkeys(label.partition(".")[0] for label in mobility.redundant)]
-        elements = {constraint.name for constraint in kinematics.mechanism.constraints}
+        redundant = Counter(label.partition(".")[0] for label in mobility.redundant)
+        rows = Counter(label.partition(".")[0] for label in kinematics.constraints.labels)
         remedies = []
-        if joints := [name for name in owners if name not in elements]:
-            remedies.append(f"give {_few(joints)} more freedom (a cylindrical or spherical joint)")
-        if spare := [name for name in owners if name in elements]:
+        if needed := [name for name, count in redundant.items() if count < rows[name]]:
+            remedies.append(f"release only these rows of {_few(needed)}, whose other rows are needed")
+        if spare := [name for name in redundant if name not in needed]:
             remedies.append(f"leave {_few(spare)} out")
         notes.append(
             f"overconstrained: {_few(mobility.redundant)} follow{'s' if len(mobility.redundant) == 1 else ''} from the "

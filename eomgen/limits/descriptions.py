@@ -38,6 +38,9 @@ TENSOR, TENSOR_TERMS = 1e-9, 1e-12
 APART = 1e-12
 #: Length scale (m) below which a mechanism has none.
 NO_LENGTH = 1e-9
+#: The same as part of the bodies' radius of gyration: inertias of translations, measured in it, are compared with those
+#: of rotations to 1e-13 (`SINGULAR`), and its square must stay far above that.
+HAIR = 1e-5
 #: Imaginary part, relative to the value, below which a number is shown as real.
 SHOWN_COMPLEX = 1e-12
 #: By which powers of a dimension may differ: 1/3 + 1/3 + 1/3 misses 1 by less.

@@ -121,8 +121,7 @@ def refuse_redundant(mobility: Mobility, users: Users) -> None:
     """Refuse mechanisms whose reactions are not unique."""
     if not mobility.redundant:
         return
-    owners = dict.fromkeys(label.partition(".")[0] for label in mobility.redundant)
-    message = "depends on the reaction of a joint, and reactions are not unique: constraints of "
-    message += f"{', '.join(owners)} follow from the others"
-    remedy = "give the joints there more freedom (cylindrical, spherical), or take a law without reactions"
+    message = "depends on the reaction of a joint, and reactions are not unique: "
+    message += f"{', '.join(mobility.redundant)} follow from the other constraints"
+    remedy = "release only these rows by joints with more freedom, or take a law without reactions"
     raise ModelError([users.mechanism.problem(path, message, remedy) for path in users.paths])
