@@ -26,6 +26,7 @@ from .robot import Robot, RobotJoint, RobotLink, RobotOptions
 from .robot_frames import IDENTITY, Inertia, Placement, moved, numbers
 from .xml_text import XmlElement
 
+_SLEEP = 1 << 4  # mjtEnableBit
 _TYPES = ("free", "spherical", "prismatic", "revolute")  # mjtJoint
 
 
@@ -162,6 +163,8 @@ class _MjcfReader(Compiled):
             notes.append(f"left out: {m.nflex} deformable bodies (flex)")
         if (m.body_mocapid >= 0).any():
             notes.append("bodies moved by motion capture (mocap) stand still")
+        if m.opt.enableflags & _SLEEP:
+            notes.append("bodies at rest that MuJoCo lets sleep (sleep) move here")
         for key, (flag, what) in NOTED.items():
             if np.any(getattr(m, key, 0)) and not self.off(flag):
                 notes.append(f"left out: {what} ({key})")

@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from robots import mujoco_fields
 
 import eomgen as eg
 from eomgen.robots import mjcf_fields
@@ -217,9 +218,10 @@ KINDS = {"read", "noted", "data", "unused", "derived", "solver", "screen", "user
 @pytest.mark.parametrize(
     ("prefixes", "table"),
     [
-        (("jnt_", "dof_"), mjcf_fields.JOINT_FIELDS),
-        (("tendon_", "wrap_"), mjcf_fields.TENDON_FIELDS),
-        (("actuator_",), mjcf_fields.ACTUATOR_FIELDS),
+        (("jnt_", "dof_"), mujoco_fields.JOINT_FIELDS),
+        (("tendon_", "wrap_"), mujoco_fields.TENDON_FIELDS),
+        (("actuator_",), mujoco_fields.ACTUATOR_FIELDS),
+        (("eq_",), mujoco_fields.EQUALITY_FIELDS),
     ],
 )
 def test_every_field_of_a_compiled_model_has_its_place(prefixes: tuple[str, ...], table: dict[str, str]) -> None:
@@ -229,14 +231,16 @@ def test_every_field_of_a_compiled_model_has_its_place(prefixes: tuple[str, ...]
 
 
 def test_every_option_and_flag_has_its_place() -> None:
-    assert {name for name in vars(mujoco.MjOption) if not name.startswith("_")} == set(mjcf_fields.OPTION_FIELDS)
+    assert {name for name in vars(mujoco.MjOption) if not name.startswith("_")} == set(mujoco_fields.OPTION_FIELDS)
     flags = {name.removeprefix("mjDSBL_") for name in mujoco.mjtDisableBit.__members__ if name != "mjNDISABLE"}
-    assert flags == set(mjcf_fields.FLAGS)
-    assert set(mjcf_fields.OPTION_FIELDS.values()) | set(mjcf_fields.FLAGS.values()) <= KINDS
+    assert flags == set(mujoco_fields.FLAGS)
+    flags = {name.removeprefix("mjENBL_") for name in mujoco.mjtEnableBit.__members__ if name != "mjNENABLE"}
+    assert flags == set(mujoco_fields.ENABLED)
+    assert set(mujoco_fields.OPTION_FIELDS.values()) | set(mujoco_fields.FLAGS.values()) <= KINDS
 
 
 def test_what_is_noted_is_a_field_that_is_said_to_be() -> None:
-    tables = mjcf_fields.JOINT_FIELDS | mjcf_fields.TENDON_FIELDS | mjcf_fields.ACTUATOR_FIELDS
+    tables = mujoco_fields.JOINT_FIELDS | mujoco_fields.TENDON_FIELDS | mujoco_fields.ACTUATOR_FIELDS
     for name, (flag, _) in mjcf_fields.NOTED.items():
         assert tables[name] == "noted"
-        assert flag in mjcf_fields.FLAGS
+        assert flag in mujoco_fields.FLAGS
