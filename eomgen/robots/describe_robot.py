@@ -11,11 +11,11 @@ from ..describe.description import GROUND_NAME, Description, Values
 from ..describe.placement import TURNS
 from ..errors import ModelError, Problem
 from ..joints import JOINTS
-from ..limits.files import FREEDOMS, LAWS, TIES
+from ..limits.files import FREEDOMS, LARGEST, LAWS, TIES
 from ..numeric.rigid_inertia import EXCESS, fault_of_inertia
 from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from .link_names import RobotNames, clean_model_name
-from .link_tree import GROUND, Bodies, RobotBody, build_bodies, find_tied, weigh_bodies
+from .link_tree import GROUND, Bodies, RobotBody, build_bodies, find_tied, joints_around, weigh_bodies
 from .robot import Drive, Range, Robot, RobotJoint, RobotOptions
 from .robot_frames import Inertia, Placement, numbers
 from .ties import Sum, Tie, describe_tie
@@ -205,20 +205,19 @@ class _Writer:
         """
         joint = body.joint
         assert joint is not None
-        bounds = {
-            key: joint.limits[key] for key in ("lower", "upper") if math.isfinite(joint.limits.get(key, math.inf))
-        }
+        limits = joint.limits
+        bounds = {key: limits[key] for key in ("lower", "upper") if abs(limits.get(key, math.inf)) <= LARGEST}
         if not bounds or len(JOINTS[joint.type].coordinates) != 1:
             return
-        span = joint.limits.get("upper", math.inf) - joint.limits.get("lower", -math.inf)
+        span = bounds.get("upper", math.inf) - bounds.get("lower", -math.inf)
         if span <= 0.0:
             self.out.notes.append(f"{self.joints[joint.name]} gets no stops, because its limits leave it no range")
             return
         span = span if math.isfinite(span) else 1.0
-        effort = joint.limits.get("effort", 0.0)
+        effort = limits.get("effort", 0.0)
         if not 0.0 < effort < math.inf:
             effort = GRAVITY * self.carried[body.name].force(joint.type)
-        speed = joint.limits.get("velocity", 0.0)
+        speed = limits.get("velocity", 0.0)
         law = {
             "stiffness": effort / (GIVE * span) ** 1.5,
             "restitution": REBOUND,
@@ -250,13 +249,17 @@ class _Writer:
     # -- what ties joints together --------------------------------------------------------------------------------
     def _loops(self) -> None:
         for loop in self.robot.loops:
+            if not joints_around(loop, self.found):
+                self.out.notes.append(f"left out: {loop.name}, because no joint moves its two links against each other")
+                continue
             pair = []
             for link, frame in (loop.first, loop.second):
                 body, at = self.found.home[link]
                 pair.append((at @ frame).reference(self.bodies[body]))
             suffixes = [c.suffix for c in JOINTS[loop.type].coordinates]
             name = self.names.joint(loop.name, suffixes)
-            self._add("joints", name, {"type": loop.type, "between": pair}, loop.place)
+            axis = {"axis": _axis(loop.axis)} if JOINTS[loop.type].has_axis else {}
+            self._add("joints", name, {"type": loop.type, "between": pair, **axis}, loop.place)
 
     def _mimics(self) -> None:
         ties = list(self.robot.ties)

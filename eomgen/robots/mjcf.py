@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..describe.joint_data import limits_nothing
 from ..errors import UsageError
 from ..numeric.rotation_matrices import about, from_quaternion
 from .constructs import notes_of
@@ -122,7 +123,7 @@ class _MjcfReader(Compiled):
             joint,
             outer=joint.outer @ back,
             axis=(axis[0], axis[1], axis[2]),
-            limits=limits,
+            limits={key: value for key, value in limits.items() if not limits_nothing(key, value)},
             damping=0.0 if self.off("DAMPER") else float(m.dof_damping[dof]),
             dry_friction=0.0 if self.off("FRICTIONLOSS", "CONSTRAINT") else float(m.dof_frictionloss[dof]),
             armature=float(m.dof_armature[dof]),

@@ -1,4 +1,4 @@
-"""What becomes of each field of a compiled MuJoCo model that belongs to joints, tendons, equalities, actuators, options.
+"""What becomes of each field of a compiled MuJoCo model: of joints, tendons, equalities, actuators and options.
 
 A field that is not in these tables is one that a later MuJoCo has and nobody here has looked at.
 """
