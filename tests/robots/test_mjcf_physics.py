@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 from robots import mujoco_fields
+from robots.mujoco_judge import Judge
 
 import eomgen as eg
 from eomgen.robots import mjcf_fields
@@ -102,6 +103,64 @@ def test_disabled_friction_and_limits_are_no_data(flag: str, kept: bool, tmp_pat
     joint = model.mechanism().joints[0]
     assert (joint.dry_friction == 0.4) == kept == any(joint.limits)
     assert any("tendon_frictionloss" in note for note in model.notes) == kept
+
+
+TURNING = """<mujoco><option gravity="0 0 -9.81"><flag contact="disable"/></option><worldbody>
+<body name="a" pos="1 2 3" euler="20 30 40"><joint name="f" type="free" {f}/><geom type="box" size=".1 .2 .3"/>
+ <body name="b" pos=".3 0 .1" euler="10 -20 30"><joint name="b" type="ball" pos=".1 0 0" {b}/>
+  <geom type="box" size=".2 .1 .3" pos=".1 .1 0"/></body></body>
+<body name="c" pos="0 0 1" euler="10 20 30"><joint name="c" type="ball" {c}/>
+ <geom type="box" size=".1 .2 .3" pos=".1 0 .05"/></body></worldbody></mujoco>"""
+RESISTED = [
+    {"b": 'damping="2"', "c": 'damping="0.3" armature="0.4"'},
+    {"b": 'stiffness="3"', "c": 'stiffness="2"'},
+    {"f": 'damping="0.7"'},
+    {"f": 'stiffness="5"'},
+    {"f": 'stiffness="5" damping="1"', "b": 'stiffness="3" damping="2"', "c": 'stiffness="2" armature="1"'},
+]
+
+
+@pytest.mark.parametrize("rotation", ["euler_angles", "euler_parameters"])
+@pytest.mark.parametrize("given", RESISTED, ids=str)
+def test_balls_and_free_joints_are_damped_and_sprung(given: dict[str, str], rotation: str, tmp_path: Path) -> None:
+    """Accelerations as MuJoCo has them, at any turn and next to rest, where the Jacobian is the stiffness."""
+    path = tmp_path / "turning.xml"
+    path.write_text(TURNING.format(**dict.fromkeys("fbc", "") | given))
+    model = eg.load(path, rotation=rotation)
+    assert not any("left out" in note for note in model.notes)
+    equations = model.derive()
+    module, judge = equations.compile(target="numpy"), Judge(path, model, rotation)
+    for state in judge.states(equations.kinematics, 6, seed=3):
+        found = module.rhs(0.0, np.concatenate([state.q, state.v]))[module.n_q :]
+        assert np.abs(found - state.acceleration).max() < 1e-12 * np.abs(state.acceleration).max()
+    x = module.x0()
+    slope, step = module.jacobian(0.0, x), 1e-4 * np.ones(module.n_x)
+    if rotation == "euler_angles":
+        between = (module.rhs(0.0, x + step) - module.rhs(0.0, x - step)) / 2e-4
+        assert slope @ np.ones(module.n_x) == pytest.approx(between, abs=1e-4)
+
+
+LOST = [
+    ({"b": 'armature="1"'}, "joint.b.armature: armature on a ball joint of a parent that moves"),
+    ({"f": 'armature="1"'}, "joint.f.armature: armature on a free joint is not supported"),
+]
+
+
+@pytest.mark.parametrize(("given", "said"), LOST)
+def test_armature_that_belongs_to_no_body_is_refused(given: dict[str, str], said: str, tmp_path: Path) -> None:
+    path = tmp_path / "turning.xml"
+    path.write_text(TURNING.format(**dict.fromkeys("fbc", "") | given))
+    with pytest.raises(eg.ModelError, match=said):
+        eg.load(path)
+
+
+def test_limits_and_dry_friction_of_balls_are_noted(tmp_path: Path) -> None:
+    path = tmp_path / "turning.xml"
+    path.write_text(TURNING.format(f="", b='range="0 40"', c='frictionloss="1"'))
+    assert eg.load(path).notes == (
+        "left out: the limit of the spherical joint b",
+        "left out: the dry friction of the spherical joint c",
+    )
 
 
 NOTED = [
