@@ -5,6 +5,7 @@ Limits, dry friction and shapes travel with the model and enter no equation; the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,6 +17,11 @@ from .fields import DISPLAY, LIMITS
 from .values import Reader
 
 Limits = tuple[tuple[str, float], ...]  #: (key, value) of what is limited
+
+
+def limits_nothing(key: str, value: Any) -> bool:
+    """Whether a limit is the infinity that no value passes, as URDF and MJCF files write it."""
+    return isinstance(value, int | float) and value == (-math.inf if key == "lower" else math.inf)
 
 
 def read_limits(reader: Reader, path: str, given: Any, coordinates: Sequence[str]) -> tuple[Limits, ...]:
@@ -39,14 +45,14 @@ def read_limits(reader: Reader, path: str, given: Any, coordinates: Sequence[str
             continue
         for k, value in enumerate(values):
             place = f"{path}.{key}" if listed is None else f"{path}.{key}[{k}]"
-            number = None if value is None else reader.number(place, value)
+            number = None if value is None or limits_nothing(key, value) else reader.number(place, value)
             if number is not None and number < 0 and key in ("velocity", "effort"):
                 reader.faults.add(place, f"is {number:g}", "give the largest size, 0 or positive")
             elif number is not None:
                 result[k].append((key, number))
     for name, found in zip(coordinates, result, strict=True):
         limits = dict(found)
-        if limits.get("lower", 0.0) > limits.get("upper", limits.get("lower", 0.0)):
+        if limits.get("lower", -math.inf) > limits.get("upper", math.inf):
             message = f"lower {limits['lower']:g} is above upper {limits['upper']:g} for {name!r}"
             reader.faults.add(path, message, "exchange them")
     return tuple(tuple(found) for found in result)

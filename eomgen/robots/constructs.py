@@ -82,7 +82,7 @@ def notes_of(find: Find, met: Met) -> list[str]:
     left: dict[str, list[str]] = {}
     for (path, attribute), count in met.items():
         row, whole = find(path, attribute), find(path, "")
-        if (row is not None and row.fate != LEFT) or (attribute and (whole is None or whole is row)):
+        if (row is not None and row.fate != LEFT) or (attribute and (whole is None or whole == row)):
             continue  # all is well, or it was told of the element
         shown = f"<{path.rpartition('/')[2]}{' ' * bool(attribute)}{attribute}>" + (f" {count} times" * (count > 1))
         left.setdefault("what this reader does not know" if row is None else row.why, []).append(shown)

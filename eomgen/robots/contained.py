@@ -38,9 +38,7 @@ class Folder:
         """Whether a path without links is this folder or lies in it."""
         return path == self.path or path.startswith(os.path.join(self.path, ""))
 
-    def find(
-        self, element: XmlElement, name: str, bases: Iterable[Sequence[str]], needed: bool = True
-    ) -> str | Problem:
+    def find(self, element: XmlElement, name: str, bases: Iterable[Sequence[str]]) -> str | Problem:
         """Where a file is that an element names.
 
         Parameters
@@ -50,8 +48,6 @@ class Folder:
             As the element has it.
         bases : iterable of sequences of str
             Folders within folders that the name may start from, the first that has it counts.
-        needed : bool, optional
-            Whether it is a problem that there is no such file; else the path is empty.
 
         Returns
         -------
@@ -59,7 +55,7 @@ class Folder:
             A path without links inside the folder; a problem where it lies outside, or nowhere.
         """
         path, remedy = f"{element.tag}.file", "give its path from the model's folder"
-        if (needed and not name) or len(name) > NAME:
+        if not name or len(name) > NAME:
             message = "names no file" if not name else f"{name[:20]!r}... is too long for the name of a file"
             return element.problem(path, message, f"at most {NAME:,} characters" if name else remedy)
         for base in bases:
@@ -71,7 +67,7 @@ class Folder:
                 return element.problem(path, message, remedy)
             if os.path.isfile(place):
                 return place
-        return element.problem(path, f"{name!r} cannot be read: no plain file has that name", remedy) if needed else ""
+        return element.problem(path, f"{name!r} cannot be read: no plain file has that name", remedy)
 
     def read(self, element: XmlElement, path: str, most: int) -> bytes:
         """The bytes of a file that :meth:`find` found.

@@ -11,13 +11,14 @@ from ..describe.description import GROUND_NAME, Description, Values
 from ..describe.placement import TURNS
 from ..errors import ModelError, Problem
 from ..joints import JOINTS
-from ..limits.files import FREEDOMS, LAWS, TIES
+from ..limits.files import FREEDOMS, LARGEST, LAWS, TIES
 from ..numeric.rigid_inertia import EXCESS, fault_of_inertia
 from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from .link_names import RobotNames, clean_model_name
-from .link_tree import GROUND, Bodies, RobotBody, build_bodies, find_tied, weigh_bodies
+from .link_tree import GROUND, Bodies, RobotBody, build_bodies, find_tied, joints_around, weigh_bodies
+from .resisted_turns import turn_texts
 from .robot import Drive, Range, Robot, RobotJoint, RobotOptions
-from .robot_frames import Inertia, Placement, numbers
+from .robot_frames import IDENTITY, Inertia, Placement, numbers
 from .ties import Sum, Tie, describe_tie
 
 SHOWN = 8  #: joints that a note names
@@ -174,12 +175,15 @@ class _Writer:
         if joint.armature:
             values["armature"] = joint.armature
         self._add("joints", name, values, joint.place)
-        rubbing = {"viscous": joint.damping} if joint.damping else {}
+        single = len(kind.coordinates) == 1
+        if not single and (joint.damping or joint.stiffness):
+            self._resist(joint, between if home != GROUND else between[1:])
+        rubbing = {"viscous": joint.damping} if joint.damping and single else {}
         if self.options.smoothing and joint.dry_friction:
             rubbing |= {"coulomb": joint.dry_friction, "smoothing": self.options.smoothing}
         if rubbing:
             self._force("friction", joint, "friction" if "coulomb" in rubbing else "damping", rubbing)
-        if joint.stiffness:
+        if joint.stiffness and single:
             self._spring(joint)
         if self.options.limits == "stop":
             self._stop(body)
@@ -190,7 +194,7 @@ class _Writer:
             known = self.out.values.setdefault("guess" if joint.name in self.tied else "initial", {})
             known.update({n: x for n, x, rest in zip(names, start, reference, strict=True) if x != rest})
         chosen = self.options.actuate
-        if len(kind.coordinates) == 1 and (chosen is True or (chosen and joint.name in chosen)):
+        if single and (chosen is True or (chosen and joint.name in chosen)):
             force = self.names.symbol(f"tau_{name}")
             unit = "N" if joint.type == "prismatic" else "N*m"
             self._add("inputs", force, {"value": 0.0, "unit": unit}, joint.place)
@@ -203,20 +207,19 @@ class _Writer:
         """
         joint = body.joint
         assert joint is not None
-        bounds = {
-            key: joint.limits[key] for key in ("lower", "upper") if math.isfinite(joint.limits.get(key, math.inf))
-        }
+        limits = joint.limits
+        bounds = {key: limits[key] for key in ("lower", "upper") if abs(limits.get(key, math.inf)) <= LARGEST}
         if not bounds or len(JOINTS[joint.type].coordinates) != 1:
             return
-        span = joint.limits.get("upper", math.inf) - joint.limits.get("lower", -math.inf)
+        span = bounds.get("upper", math.inf) - bounds.get("lower", -math.inf)
         if span <= 0.0:
             self.out.notes.append(f"{self.joints[joint.name]} gets no stops, because its limits leave it no range")
             return
         span = span if math.isfinite(span) else 1.0
-        effort = joint.limits.get("effort", 0.0)
+        effort = limits.get("effort", 0.0)
         if not 0.0 < effort < math.inf:
             effort = GRAVITY * self.carried[body.name].force(joint.type)
-        speed = joint.limits.get("velocity", 0.0)
+        speed = limits.get("velocity", 0.0)
         law = {
             "stiffness": effort / (GIVE * span) ** 1.5,
             "restitution": REBOUND,
@@ -224,6 +227,26 @@ class _Writer:
             "formula": "flores",
         }
         self._force("stop", joint, "stop", {**bounds, **law})
+
+    def _resist(self, joint: RobotJoint, ends: list[Any]) -> None:
+        """Damping and stiffness of a ball or a free joint, on its child and on a parent that moves."""
+        name, d, k = self.joints[joint.name], joint.damping, joint.stiffness
+        rest = joint.start or IDENTITY
+        own, outer, turn = turn_texts(name, self._in_parameters(joint.type), rest.rotation)
+        for axis, place in zip("xyz" if joint.start else "", numbers(rest.position), strict=False):
+            on = f"{name}_{axis}"
+            for kind, law in (("damper", {"damping": d}), ("spring", {"stiffness": k, "rest": place})):
+                if d if kind == "damper" else k:
+                    given = {"type": f"joint_{kind}", "joint": on, **law}
+                    self._add("forces", self.names.made(f"{on}_{kind}"), given, joint.place)
+        for end, sign, rates in zip(reversed(ends), (-1.0, 1.0), (own, outer), strict=False):
+            # turned by the rotation about it, the rotation vector is itself: the same in the axes of both
+            torque = [
+                " + ".join([f"({sign * d!r})*({w})"] * bool(d) + [f"({sign * k!r})*{x}"] * bool(k))
+                for w, x in zip(rates, turn, strict=True)
+            ]
+            given = {"type": "torque", "body": end, "value": torque, "axes": "body"}
+            self._add("forces", self.names.made(f"{name}_resistance"), given, joint.place)
 
     def _start(self, pose: Placement) -> list[float]:
         """Coordinates of a free joint."""
@@ -248,13 +271,17 @@ class _Writer:
     # -- what ties joints together --------------------------------------------------------------------------------
     def _loops(self) -> None:
         for loop in self.robot.loops:
+            if not joints_around(loop, self.found):
+                self.out.notes.append(f"left out: {loop.name}, because no joint moves its two links against each other")
+                continue
             pair = []
             for link, frame in (loop.first, loop.second):
                 body, at = self.found.home[link]
                 pair.append((at @ frame).reference(self.bodies[body]))
             suffixes = [c.suffix for c in JOINTS[loop.type].coordinates]
             name = self.names.joint(loop.name, suffixes)
-            self._add("joints", name, {"type": loop.type, "between": pair}, loop.place)
+            axis = {"axis": _axis(loop.axis)} if JOINTS[loop.type].has_axis else {}
+            self._add("joints", name, {"type": loop.type, "between": pair, **axis}, loop.place)
 
     def _mimics(self) -> None:
         ties = list(self.robot.ties)

@@ -12,9 +12,10 @@ import numpy as np
 
 from ..describe.names import nearest
 from ..errors import ModelError
+from ..limits.inertia import SINGULAR
 from ..numeric.rigid_inertia import EXCESS, fault_of_inertia, inertia_scales, longest_within
 from ..numeric.rotation_matrices import about
-from .robot import Robot, RobotJoint, RobotLink, RobotOptions
+from .robot import Loop, Robot, RobotJoint, RobotLink, RobotOptions
 from .robot_frames import IDENTITY, Inertia, Placement, moved, sum_inertias
 
 GROUND = ""  #: the body that stands still
@@ -130,17 +131,20 @@ def weigh_bodies(found: Bodies) -> dict[str, Carried]:
 def find_tied(robot: Robot, found: Bodies) -> set[str]:
     """Joints that a loop or an equality of coordinates ties to others."""
     tied = {joint for tie in robot.ties for joint, _ in (*tie.left.parts, *tie.right.parts)}
-    for loop in robot.loops:
-        ends = []
-        for link, _ in (loop.first, loop.second):
-            chain: set[str] = set()
-            joint = found.bodies[found.home[link][0]].joint
-            while joint is not None:
-                chain.add(joint.name)
-                joint = found.bodies[found.home[joint.parent][0]].joint if joint.parent else None
-            ends.append(chain)
-        tied |= ends[0] ^ ends[1]  # those towards ground of both turn them alike
-    return tied
+    return tied.union(*(joints_around(loop, found) for loop in robot.loops))
+
+
+def joints_around(loop: Loop, found: Bodies) -> set[str]:
+    """Joints that move the two links of a loop against each other."""
+    ends = []
+    for link, _ in (loop.first, loop.second):
+        chain: set[str] = set()
+        joint = found.bodies[found.home[link][0]].joint
+        while joint is not None:
+            chain |= {joint.name} - {joint.name if joint.type == "weld" else ""}
+            joint = found.bodies[found.home[joint.parent][0]].joint if joint.parent else None
+        ends.append(chain)
+    return ends[0] ^ ends[1]  # those towards ground of both turn them alike
 
 
 def _lock(robot: Robot, options: RobotOptions) -> None:
@@ -170,6 +174,13 @@ def _lock(robot: Robot, options: RobotOptions) -> None:
 def _check_ends(robot: Robot) -> None:
     """Note joints whose links do not exist, and links that two joints carry."""
     carrier: dict[str, RobotJoint] = {}
+    if "world" not in robot.links and (held := [j for j in robot.joints.values() if j.parent == "world"]):
+        robot.links["world"] = RobotLink("world", held[0].place)
+        robot.notes.append("the link 'world' is not in the file; it stands for the ground")
+    for loop in robot.loops:
+        for link, _ in (loop.first, loop.second):
+            if link not in robot.links:
+                robot.problem(f"loop.{loop.name}", f"no link {link!r}", nearest(link, robot.links, "links"), loop.place)
     for joint in robot.joints.values():
         for end, link in (("parent", joint.parent), ("child", joint.child)):
             if link and link not in robot.links:
@@ -178,9 +189,11 @@ def _check_ends(robot: Robot) -> None:
         if joint.child and joint.child in carrier:
             other = carrier[joint.child].name
             message = f"the link {joint.child!r} is also the child of the joint {other!r}"
-            robot.problem(
-                f"joint.{joint.name}.child", message, "the links of a URDF file must form a tree", joint.place
+            remedy = (
+                "the joints of a URDF file form a tree; write one that closes a loop as <loop_joint name= type=> with "
+                "<axis xyz=/>, <link1 link= xyz= rpy=/> and <link2 link= xyz= rpy=/>"
             )
+            robot.problem(f"joint.{joint.name}.child", message, remedy, joint.place)
         carrier.setdefault(joint.child, joint)
 
 
@@ -188,7 +201,7 @@ def _root(robot: Robot) -> str:
     """The link that no joint carries; other than one are a fault."""
     children = {joint.child for joint in robot.joints.values()}
     roots = [link for link in robot.links.values() if link.name not in children]
-    if robot.links and not roots:
+    if robot.links and not roots and all(joint.parent in robot.links for joint in robot.joints.values()):
         robot.problem(
             "robot", "the joints form a ring: no link is the root", "connect the links as a tree", (robot.file, 1)
         )
@@ -247,6 +260,19 @@ def _check_inertias(robot: Robot, lenient: bool) -> None:
             robot.problem(f"link.{link.name}.inertial.inertia", *fault, link.place)
 
 
+def _has_no_lever(joint: RobotJoint, inertia: Inertia) -> bool:
+    """Whether the last body of a chain has mass or inertia, but none along the coordinate of its joint."""
+    if joint.type not in ("revolute", "prismatic") or joint.armature or inertia.is_nothing:
+        return False
+    if joint.type == "prismatic":
+        return inertia.mass == 0.0
+    own = inertia.seen(joint.inner.inverse())
+    axis = np.array(joint.axis) / max(map(abs, joint.axis))
+    axis /= np.linalg.norm(axis)
+    across, arm = float(axis @ own.tensor @ axis), np.cross(axis, own.com)
+    return across + own.mass * float(arm @ arm) <= SINGULAR * (own.tensor.trace() + own.mass * (own.com @ own.com))
+
+
 def _check_masses(robot: Robot, found: Bodies, check: str) -> None:
     """Note joints that move nothing, which no force could accelerate by a finite amount; with ``check`` as a fault.
 
@@ -254,6 +280,10 @@ def _check_masses(robot: Robot, found: Bodies, check: str) -> None:
     """
     heavy: set[str] = set()
     idle: list[RobotJoint] = []
+    tied = find_tied(robot, found) | {
+        name for j in robot.joints.values() if j.mimic for name in (j.name, j.mimic.joint)
+    }
+    carrying = {found.home[body.joint.parent][0] for body in found.bodies.values() if body.joint and body.joint.parent}
     for body in reversed(found.bodies.values()):  # children come after their parents
         inertia = body.inertia()
         if not inertia.is_nothing:
@@ -264,6 +294,8 @@ def _check_masses(robot: Robot, found: Bodies, check: str) -> None:
             heavy.add(found.home[body.joint.parent][0] if body.joint.parent else GROUND)
         elif body.joint.type != "weld" and not body.joint.armature:
             idle.append(body.joint)
+        if body.name not in carrying and body.joint.name not in tied and _has_no_lever(body.joint, inertia):
+            idle.append(body.joint)
     moving = [body for body in found.bodies.values() if body.joint is not None]
     found.massless = bool(moving) and all(b.inertia().is_nothing and not b.joint.armature for b in moving if b.joint)
     if found.massless and check == "error":
@@ -273,6 +305,8 @@ def _check_masses(robot: Robot, found: Bodies, check: str) -> None:
         robot.notes.append(f"for kinematics only, because these joints move no mass and no inertia: {names}")
     for joint in idle if check == "error" and not found.massless else ():
         message = f"the joint moves no mass: link {joint.child!r} and all links on it have none"
+        if found.home[joint.child][0] in heavy:
+            message = f"the joint moves no inertia: link {joint.child!r} has none about its axis (or no mass to slide)"
         remedy = (
             f"give that link an <inertial>, make the joint fixed, or lock it: lock={{{joint.name!r}: 0}}; for "
             "kinematics alone, check_inertia='note' (--check-inertia note)"

@@ -60,10 +60,10 @@ def describe_file(path: str | os.PathLike[str], **given: Any) -> Description:
 
         robot = read_mjcf(root, options)
     else:
-        problem = root.problem(
-            root.tag, "is not a robot", "a URDF file begins with <robot>, an MJCF file with <mujoco>"
-        )
-        raise ModelError([problem])
+        remedy = "a URDF file begins with <robot>, an MJCF file with <mujoco>"
+        if root.tag == "sdf":
+            remedy += "; convert SDF first: sdf2mjcf FILE.sdf FILE.xml (pip install sdformat-mjcf)"
+        raise ModelError([root.problem(root.tag, "is not a robot", remedy)])
     return describe_robot(robot, options)
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..describe.joint_data import limits_nothing
 from ..errors import UsageError
 from ..numeric.rotation_matrices import about, from_quaternion
 from .constructs import notes_of
@@ -22,10 +23,11 @@ from .mjcf_equalities import read_equalities
 from .mjcf_fields import NOTED
 from .mjcf_files import Scan
 from .mjcf_text import Text
-from .robot import Robot, RobotJoint, RobotLink, RobotOptions
-from .robot_frames import IDENTITY, Inertia, Placement, moved, numbers
+from .robot import Place, Robot, RobotJoint, RobotLink, RobotOptions
+from .robot_frames import IDENTITY, NOTHING, Inertia, Placement, moved, numbers
 from .xml_text import XmlElement
 
+_SLEEP = 1 << 4  # mjtEnableBit
 _TYPES = ("free", "spherical", "prismatic", "revolute")  # mjtJoint
 
 
@@ -75,18 +77,32 @@ class _MjcfReader(Compiled):
         tensor = rotation @ np.diag(m.body_inertia[k]) @ rotation.T
         inertia = Inertia(float(m.body_mass[k]), np.array(m.body_ipos[k]), (tensor + tensor.T) / 2)
         at = Placement(from_quaternion(*m.body_quat[k]), np.array(m.body_pos[k]))
+        inertia_of: dict[str, Inertia] = {}
         joints = range(m.body_jntadr[k], m.body_jntadr[k] + m.body_jntnum[k])
         if not joints:
             robot.joints[f"{name} weld"] = RobotJoint(f"{name} weld", "weld", parent, name, place, outer=at)
         for j in joints:
             last = j == joints[-1]
             child = name if last else f"{name}.{self.names['joint'][j]}"
+            if _TYPES[m.jnt_type[j]] == "spherical" and (rotor := float(m.dof_armature[m.jnt_dofadr[j]])):
+                own = inertia if last else NOTHING
+                inertia_of[child] = replace(own, tensor=own.tensor + rotor * np.eye(3))
+                self._judge_rotor(j, place, still=j == joints[0] and m.body_weldid[m.body_parentid[k]] == 0)
             if not last:
-                robot.links[child] = RobotLink(child, place)
+                robot.links[child] = RobotLink(child, place, inertia_of.get(child, NOTHING))
             joint = self._joint(j, parent, child, at if j == joints[0] else IDENTITY)
             robot.joints[joint.name] = joint
             parent = child
-        robot.links[name] = RobotLink(name, place, inertia)
+        robot.links[name] = RobotLink(name, place, inertia_of.get(name, inertia))
+
+    def _judge_rotor(self, j: int, place: Place, still: bool) -> None:
+        """The armature of a ball is inertia of its child where the parent stands still; else it belongs to no body."""
+        name = self.names["joint"][j]
+        if still:
+            self.robot.notes.append(f"the armature of the ball joint {name} is part of the inertia of its body")
+            return
+        message = "armature on a ball joint of a parent that moves is not supported: it belongs to no body"
+        self.robot.problem(f"joint.{name}.armature", message, 'set armature="0" there', place)
 
     def _joint(self, j: int, parent: str, child: str, at: Placement) -> RobotJoint:
         m, name = self.m, self.names["joint"][j]
@@ -97,12 +113,20 @@ class _MjcfReader(Compiled):
         joint = RobotJoint(name, kind, parent, child, place, outer=at @ anchor, inner=anchor)
         size = {"free": 6, "spherical": 3}.get(kind, 1)
         if size > 1:
-            if m.dof_armature[dof : dof + size].any():
-                message = f"armature on a {kind} joint is not supported: it adds inertia that belongs to no body"
+            if kind == "free" and m.dof_armature[dof]:
+                message = "armature on a free joint is not supported: it is mass without weight, which no body has"
                 self.robot.problem(f"joint.{name}.armature", message, 'set armature="0" there', place)
-            damped = m.dof_damping[dof : dof + size].any() and not self.off("DAMPER")
-            if damped or (m.jnt_stiffness[j] and not self.off("SPRING")):
-                self.robot.notes.append(f"left out: damping and stiffness of the {kind} joint {name}")
+            for what, acts in (
+                ("dry friction", m.dof_frictionloss[dof] and not self.off("FRICTIONLOSS", "CONSTRAINT")),
+                ("limit", m.jnt_limited[j] and not self.off("LIMIT", "CONSTRAINT")),
+            ):
+                if acts:
+                    self.robot.notes.append(f"left out: the {what} of the {kind} joint {name}")
+            joint = replace(
+                joint,
+                damping=0.0 if self.off("DAMPER") else float(m.dof_damping[dof]),
+                stiffness=0.0 if self.off("SPRING") else float(m.jnt_stiffness[j]),
+            )
             if kind == "spherical":
                 return joint
             pose = Placement(from_quaternion(*m.qpos0[start + 3 : start + 7]), m.qpos0[start : start + 3])
@@ -121,7 +145,7 @@ class _MjcfReader(Compiled):
             joint,
             outer=joint.outer @ back,
             axis=(axis[0], axis[1], axis[2]),
-            limits=limits,
+            limits={key: value for key, value in limits.items() if not limits_nothing(key, value)},
             damping=0.0 if self.off("DAMPER") else float(m.dof_damping[dof]),
             dry_friction=0.0 if self.off("FRICTIONLOSS", "CONSTRAINT") else float(m.dof_frictionloss[dof]),
             armature=float(m.dof_armature[dof]),
@@ -162,6 +186,8 @@ class _MjcfReader(Compiled):
             notes.append(f"left out: {m.nflex} deformable bodies (flex)")
         if (m.body_mocapid >= 0).any():
             notes.append("bodies moved by motion capture (mocap) stand still")
+        if m.opt.enableflags & _SLEEP:
+            notes.append("bodies at rest that MuJoCo lets sleep (sleep) move here")
         for key, (flag, what) in NOTED.items():
             if np.any(getattr(m, key, 0)) and not self.off(flag):
                 notes.append(f"left out: {what} ({key})")

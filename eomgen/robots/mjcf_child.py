@@ -81,7 +81,10 @@ def _numbers(mujoco: Any, compiled: Any, answer: dict[str, Any]) -> list[bytes]:
     import numpy as np
 
     arrays = {f"opt.{key}": np.asarray(getattr(compiled.opt, key)) for key in ("gravity", "density", "viscosity")}
-    arrays |= {f"opt.{key}": np.asarray(getattr(compiled.opt, key)) for key in ("disableflags", "disableactuator")}
+    arrays |= {
+        f"opt.{key}": np.asarray(getattr(compiled.opt, key))
+        for key in ("disableflags", "enableflags", "disableactuator")
+    }
     for key in dir(compiled):
         if key.partition("_")[0] in KINDS and isinstance(value := getattr(compiled, key), np.ndarray):
             arrays[key] = value

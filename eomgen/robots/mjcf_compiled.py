@@ -28,7 +28,8 @@ class Compiled:
 
     def off(self, *flags: str) -> bool:
         """Whether the file disables one of these parts of the physics, by the words of mjtDisableBit."""
-        return any(self.m.opt.disableflags & self.m.flags.get(flag, 0) for flag in flags)
+        passive = ("PASSIVE",) if "SPRING" in flags or "DAMPER" in flags else ()  # both in one, before MuJoCo 3.4
+        return any(self.m.opt.disableflags & self.m.flags.get(flag, 0) for flag in (*flags, *passive))
 
     def _check(self) -> None:
         """Refuse numbers that are not finite or far too large, which MuJoCo takes."""

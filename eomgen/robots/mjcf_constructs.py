@@ -20,7 +20,9 @@ _REASONS = {
     "mocap": (SEEN, "bodies moved by motion capture, which stand still"),
     "plugin": (LEFT, "plugins"),
     "states": (LEFT, "stored states"),
-    "solver": (HARMLESS, "numerics and softness of MuJoCo's solver; constraints hold exactly here"),
+    "asleep": (SEEN, "bodies at rest that MuJoCo lets sleep, which move here"),
+    "yield": (SEEN, "softness of constraints, which hold exactly here; a note names those that hardly hold in MuJoCo"),
+    "solver": (HARMLESS, "numerics of MuJoCo's solver, softness of limits and friction"),
     "looks": (HARMLESS, "what it looks like"),
     "measure": (HARMLESS, "sensors"),
     "user": (HARMLESS, "sizes of memory, data of users"),
@@ -40,12 +42,14 @@ MJCF = table_of(
     mujoco/option: measure magnetic
     mujoco/option: solver ccd_iterations ccd_tolerance cone impratio integrator iterations jacobian ls_iterations
     mujoco/option: solver ls_tolerance noslip_iterations noslip_tolerance o_friction o_margin o_solimp o_solref
-    mujoco/option: solver sdf_initpoints sdf_iterations sleep_tolerance solver timestep tolerance collision apirate
+    mujoco/option: solver sdf_initpoints sdf_iterations solver timestep tolerance collision apirate
     mujoco/option: solver mpr_iterations mpr_tolerance
+    mujoco/option: asleep sleep_tolerance
     option/flag: taken actuation clampctrl constraint damper equality frictionloss gravity limit spring passive
     option/flag: contact contact filterparent
     option/flag: solver autoreset diagexact energy eulerdamp fwdinv invdiscrete ipc island midphase multiccd nativeccd
-    option/flag: solver override refsafe sensor sleep speculative warmstart
+    option/flag: solver override refsafe sensor speculative warmstart
+    option/flag: asleep sleep
     mujoco/size: user **
     mujoco/statistic, mujoco/visual: looks **
     mujoco/default, default/default, mujoco/worldbody, mujoco/asset, mujoco/tendon, mujoco/equality: taken
@@ -60,7 +64,8 @@ MJCF = table_of(
     body/body: taken axisangle euler fuse pos quat xyaxes zaxis
     body/body: parts gravcomp
     body/body: mocap mocap
-    body/body: solver simple sleep
+    body/body: solver simple
+    body/body: asleep sleep
     body/frame: taken axisangle euler pos quat xyaxes zaxis
     body/replicate: taken count euler offset sep
     body/attach: taken body frame model prefix
@@ -89,12 +94,13 @@ MJCF = table_of(
     spatial/site, spatial/geom, spatial/pulley: parts **
     fixed/joint: taken coef joint
     equality/connect: taken active anchor body1 body2 site1 site2
-    equality/weld: taken active anchor body1 body2 relpose site1 site2
+    equality/weld: taken active anchor body1 body2 relpose site1 site2 torquescale
     equality/joint: taken active joint1 joint2 polycoef
     equality/tendon: taken active tendon1 tendon2 polycoef
     equality/flex, equality/flexstrain: soft active flex cell
-    equality/connect, equality/weld, equality/joint, equality/tendon, equality/flex: solver solimp solref torquescale
-    equality/flexstrain: solver solimp solref
+    equality/connect, equality/joint, equality/tendon, equality/flex: solver torquescale
+    equality/connect, equality/weld, equality/joint, equality/tendon, equality/flex, equality/flexstrain: yield solref
+    equality/connect, equality/weld, equality/joint, equality/tendon, equality/flex, equality/flexstrain: yield solimp
     {", ".join(f"actuator/{tag}" for tag in _DRIVES.split())}: drive *
     plugin/config: plugin **
     mujoco/sensor: measure **

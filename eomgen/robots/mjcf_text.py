@@ -19,7 +19,6 @@ from .xml_text import XmlElement
 
 #: Elements that say nothing of the motion, below the root or where they stand.
 _UNUSED = {"size", "statistic", "visual", "sensor", "keyframe", "custom"}
-_SKIN = "skin"
 _FOLDERS = ("assetdir", "meshdir", "texturedir", "strippath")
 #: The smallest picture and height field, and the keys that are kept of the user's.
 _SMALLEST = {
@@ -78,12 +77,10 @@ class Text:
 
     def _tree(self, root: XmlElement) -> str:
         base = os.path.dirname(os.path.realpath(root.file))
-        folder = {"mesh": "", "texture": ""}
-        bare = False
+        folder, bare = "", False  # of meshes; whether their names lose their folders
         for element in root.all("compiler"):
             given = element.attributes
-            for kind in folder:
-                folder[kind] = given.get(f"{kind}dir", given.get("assetdir", folder[kind]))
+            folder = given.get("meshdir", given.get("assetdir", folder))
             bare = given.get("strippath", "true" if bare else "") == "true"
         lines: list[str] = []
         waiting: list[tuple[XmlElement, str] | str] = [(root, "")]
@@ -94,10 +91,9 @@ class Text:
                 continue
             element, parent = step
             tag = element.tag
-            if tag == _SKIN or (tag in _UNUSED and parent == root.tag):
-                self._seen(element, base, folder["mesh"], bare)
+            if tag == "skin" or (tag in _UNUSED and parent == root.tag):
                 continue
-            given = self._attributes(element, base, folder["texture" if tag == "texture" else "mesh"], bare)
+            given = self._attributes(element, base, folder, bare)
             shown = "".join(f" {key}={quoteattr(value)}" for key, value in given.items())
             lines.append(f"<{tag}{shown}>")
             self.places.append((element.file, element.line))
@@ -115,7 +111,6 @@ class Text:
             kept.pop("content_type", None)
             return {**kept, "file": self.names[given["file"]]}
         if tag in _SMALLEST:
-            self._seen(element, base, folder, bare)
             keys, smallest = _SMALLEST[tag]
             kept = {key: kept[key] for key in ("name", *keys) if key in kept} | smallest
             return kept if "name" in kept or "file" not in given else {"name": stem(given["file"]), **kept}
@@ -125,24 +120,12 @@ class Text:
         unread = {key: "" for key in given if key.startswith("file")}  # which MuJoCo does not know
         return {**kept, **unread}
 
-    def _places(self, element: XmlElement, base: str, folder: str) -> list[tuple[str, str]]:
-        """Where the names of files start: at the model's folder, then at that of the file included."""
-        return [(base, folder), (os.path.dirname(os.path.realpath(element.file)), folder)]
-
-    def _seen(self, element: XmlElement, base: str, folder: str, bare: bool) -> None:
-        """Refuse files outside also where nothing reads them."""
-        for key, name in element.attributes.items():
-            if key.startswith("file"):
-                name = plain(name).rpartition("/")[2] if bare else name
-                found = self.folder.find(element, name, self._places(element, base, folder), needed=False)
-                if isinstance(found, Problem):
-                    self.problems.append(found)
-
     def _mesh(self, element: XmlElement, base: str, folder: str, bare: bool) -> str:
         """The name under which MuJoCo gets a mesh, which is read."""
         name = element.attributes["file"]
         name = plain(name).rpartition("/")[2] if bare else name
-        path = self.folder.find(element, name, self._places(element, base, folder))
+        included = os.path.dirname(os.path.realpath(element.file))  # the model's folder comes first
+        path = self.folder.find(element, name, [(base, folder), (included, folder)])
         if isinstance(path, Problem):
             self.problems.append(path)
             return ""

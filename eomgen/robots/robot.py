@@ -135,13 +135,14 @@ class RobotJoint:
 
 @dataclass(frozen=True)
 class Loop:
-    """A joint that closes a loop; it has no coordinate of interest."""
+    """A joint that closes a loop; it has no coordinate of interest.  ``axis`` is the same in both frames."""
 
     name: str
     type: str
     first: tuple[str, Placement]  #: link and frame in it
     second: tuple[str, Placement]
     place: Place
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from ..describe.joint_data import limits_nothing
 from ..errors import ModelError
 from ..limits.files import LARGEST
 from ..numeric.rigid_inertia import SWITCH
-from .robot import Mimic, Robot, RobotJoint, RobotLink, RobotOptions
+from .robot import Loop, Mimic, Robot, RobotJoint, RobotLink, RobotOptions
 from .robot_frames import IDENTITY, NOTHING, Inertia, Placement, placed
-from .urdf_constructs import note_urdf
+from .urdf_constructs import LOOPS, note_urdf
 from .xml_text import XmlElement
 
 #: Type of a joint in URDF -> eomgen's.
@@ -29,8 +30,16 @@ TYPES = {
     "floating": "free",
     "planar": "planar",
 }
+#: Those of joints that close loops: also balls, and none that leaves all six directions free.
+LOOP_TYPES = {**TYPES, "spherical": "spherical", "ball": "spherical"}
+del LOOP_TYPES["floating"]
+#: Elements of the two links of such a joint, first and second, in Drake's dialect and others; each may have its frame
+#: as its own attributes, or as those of an element named so with ``_origin``.
+ENDS = (("link1", "parent", "predecessor"), ("link2", "child", "successor"))
 LINKS = 5000  #: links of a robot
 
+#: Elements of xacro that stand for others; what else is left of it (a sensor, an argument) is noted.
+UNEXPANDED = {f"xacro:{word}" for word in ("include", "macro", "if", "unless", "insert_block", "element")}
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\Z", re.ASCII)
 _SPECIAL = {"inf", "-inf", "+inf", "infinity", "-infinity", "nan", "-nan"}
 
@@ -49,9 +58,10 @@ class _UrdfReader:
 
     def read(self) -> Robot:
         robot = self.robot
-        if any(element.tag.startswith("xacro:") for element in self.root.children):
-            problem = self.root.problem("robot", "is a xacro file", "expand it first: xacro FILE.xacro > FILE.urdf")
-            raise ModelError([problem])
+        for element in self.root.walk():
+            if element.tag in UNEXPANDED or any("${" in text for text in element.attributes.values()):
+                problem = element.problem("robot", "is a xacro file", "expand it first: xacro FILE.xacro > FILE.urdf")
+                raise ModelError([problem])
         if len(self.root.children) > 20 * LINKS:
             raise ModelError([self.root.problem("robot", "has too many elements", f"at most {20 * LINKS:,}")])
         for element in self.root.children:
@@ -59,6 +69,8 @@ class _UrdfReader:
                 self._link(element)
             elif element.tag == "joint":
                 self._joint(element)
+            elif element.tag in LOOPS:
+                self._loop(element)
         robot.notes += note_urdf(self.root)
         if not robot.links:
             robot.problems.append(self.root.problem("robot", "has no links", "a URDF file has <link> elements"))
@@ -215,11 +227,12 @@ class _UrdfReader:
             if not link:
                 self.fault(found or element, f"{path}.{end}", "is missing", f'give <{end} link="..."/>')
             ends[end] = link or ""
-        axis = element.find("axis")
-        direction = (1.0, 0.0, 0.0) if axis is None else self.triple(axis, "xyz", f"{path}.axis", (1.0, 0.0, 0.0))
-        if kind in ("revolute", "prismatic", "planar") and not any(direction):
-            self.fault(axis or element, f"{path}.axis", "the axis has no length", "give three numbers, not all zero")
-            direction = (1.0, 0.0, 0.0)
+        direction = self._axis(element, path, kind)
+        if kind == "planar" and (direction[:2] != (0.0, 0.0) or direction[2] < 0.0):
+            self.robot.notes.append(
+                f"{path}.axis: the joint moves in the plane across its axis, as URDF says, its coordinates along the x "
+                "and y axes of a frame whose z axis that is; Pinocchio moves it along x and y of the joint's own frame"
+            )
         one_degree = kind in ("revolute", "prismatic")
         if kind in ("planar", "free"):
             left = [tag for tag in ("dynamics", "mimic") if element.find(tag) is not None]
@@ -239,24 +252,58 @@ class _UrdfReader:
             mimic=self._mimic(element, path) if one_degree else None,
         )
 
+    def _axis(self, element: XmlElement, path: str, kind: str | None) -> tuple[float, float, float]:
+        axis, default = element.find("axis"), (1.0, 0.0, 0.0)
+        direction = default if axis is None else self.triple(axis, "xyz", f"{path}.axis", default)
+        if kind in ("revolute", "prismatic", "planar") and not any(direction):
+            self.fault(axis or element, f"{path}.axis", "the axis has no length", "give three numbers, not all zero")
+            return default
+        return direction
+
+    def _loop(self, element: XmlElement) -> None:
+        """A joint beside the tree; without a type it is a hinge, or, without an axis too, a ball."""
+        name = element.attributes.get("name") or f"loop_{len(self.robot.loops)}"
+        path = f"{element.tag}.{name}"
+        given = element.attributes.get("type")
+        plain = "spherical" if element.find("axis") is None and element.tag != "loop_joint" else "revolute"
+        if given is None:
+            self.robot.notes.append(f"{path}: names no type; taken as {plain}")
+        kind = LOOP_TYPES.get(given or plain)
+        if kind is None:
+            self.fault(element, f"{path}.type", f"no loop is closed by {given!r}", f"types: {', '.join(LOOP_TYPES)}")
+        ends = []
+        for words in ENDS:
+            end = next((found for word in words if (found := element.find(word)) is not None), None)
+            link = end.attributes.get("link", "") if end is not None else ""
+            if end is None or not link:
+                self.fault(element, f"{path}.{words[0]}", "is missing", f'give <{words[0]} link="..." xyz= rpy=/>')
+                return
+            at, o = element.find(f"{end.tag}_origin") or end, (0.0, 0.0, 0.0)
+            where = f"{path}.{at.tag}"
+            ends.append(
+                (link, placed(self.triple(at, "xyz", where, o), self.triple(at, "rpy", where, o), self.options.snap))
+            )
+        axis = self._axis(element, path, kind)
+        self.robot.loops.append(Loop(name, kind or "weld", ends[0], ends[1], (element.file, element.line), axis))
+
     def _limits(self, element: XmlElement, path: str, kind: str) -> dict[str, float]:
         limit = element.find("limit")
-        result: dict[str, float] = {}
-        for key in ("lower", "upper", "velocity", "effort") if limit is not None else ():
-            text = limit.attributes.get(key)  # type: ignore[union-attr]
-            if text is None or text.strip().lower() in _SPECIAL - {"nan", "-nan"}:
-                continue  # no limit
-            if key in ("lower", "upper") and kind == "continuous":
-                continue  # they mean nothing there
-            result[key] = self.number(limit, key, f"{path}.limit", most=math.inf)  # type: ignore[arg-type]
-        if kind in ("revolute", "prismatic") and limit is not None:
-            for key in ("lower", "upper"):
-                if key not in limit.attributes and any(k in limit.attributes for k in ("lower", "upper")):
-                    result[key] = 0.0  # the format's default
-        if result.get("lower", 0.0) > result.get("upper", math.inf):
-            lower, upper = result.pop("lower"), result.pop("upper")
-            self.robot.notes.append(f"{path}.limit: lower {lower:g} is above upper {upper:g}; these limits are ignored")
-        return result
+        if limit is None:
+            return {}
+        given = limit.attributes
+        sides = () if kind == "continuous" else ("lower", "upper")  # they mean nothing there
+        result = dict.fromkeys(sides, 0.0) if any(key in given for key in sides) else {}  # the format's default
+        for key in (*sides, "velocity", "effort"):
+            text = given.get(key, "").strip().lower()
+            if text.lstrip("+-") in ("inf", "infinity"):
+                result[key] = float(text)
+            elif key in given:
+                result[key] = self.number(limit, key, f"{path}.limit", most=math.inf)
+        lower, upper = result.get("lower", -math.inf), result.get("upper", math.inf)
+        if lower > upper or math.inf in (lower, -upper):
+            self.robot.notes.append(f"{path}.limit: no value lies between lower {lower:g} and upper {upper:g}; ignored")
+            result = {key: value for key, value in result.items() if key not in sides}
+        return {key: value for key, value in result.items() if not limits_nothing(key, value)}
 
     def _mimic(self, element: XmlElement, path: str) -> Mimic | None:
         mimic = element.find("mimic")

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from .constructs import DATA, HARMLESS, LEFT, TAKEN, ConstructRow, count_all, find_row, is_whole, notes_of, table_of
+from .constructs import (
+    DATA,
+    HARMLESS,
+    INSIDE,
+    LEFT,
+    TAKEN,
+    ConstructRow,
+    count_all,
+    find_row,
+    is_whole,
+    notes_of,
+    table_of,
+)
 from .xml_text import XmlElement
 
 _REASONS = {
@@ -14,6 +26,8 @@ _REASONS = {
     "contact": (LEFT, "shapes that touch, and contact"),
     "drives": (LEFT, "drives and their reductions (`actuate` gives inputs, `armature` the inertia of a rotor)"),
     "control": (LEFT, "limits and reference positions of controllers"),
+    "loop": (LEFT, "limits, friction and couplings of joints that close loops"),
+    "xacro": (LEFT, "elements of xacro that it did not expand"),
     "dialect": (LEFT, "words of other formats and simulators"),
     "soft": (LEFT, "soft bodies"),
     "looks": (HARMLESS, "what it looks like; shapes become `display`"),
@@ -21,8 +35,12 @@ _REASONS = {
     "label": (HARMLESS, "labels"),
 }
 
+#: Elements of joints that close loops: Drake's and Isaac Sim's, and those of others.
+LOOPS = ("loop_joint", "loop_constraint", "loop")
+_ENDS = "link1 link2 parent child predecessor successor"
+
 URDF = table_of(
-    """
+    f"""
     robot: taken name
     robot: label version
     link: taken name
@@ -43,6 +61,11 @@ URDF = table_of(
     joint/dynamics: dialect D K mu_coulomb mu_viscous spring_reference spring_stiffness
     joint/limit: limits lower upper velocity effort
     joint/limit: control command_effort current gear_velocity twist
+    {", ".join(LOOPS)}: taken name type
+    {", ".join(f"{loop}/axis" for loop in LOOPS)}: taken xyz
+    {", ".join(f"{loop}/{end}" for loop in LOOPS for end in _ENDS.split())}: taken link xyz rpy
+    {", ".join(f"{loop}/{end}_origin" for loop in LOOPS for end in _ENDS.split()[2:])}: taken xyz rpy
+    {", ".join(f"{loop}/{tag}" for loop in LOOPS for tag in ("limit", "dynamics", "mimic"))}: loop **
     joint/safety_controller, joint/calibration: control **
     link/collision, link/contact, link/surface, link/self_filter, link/collision_checking: contact **
     transmission, ros2_control: drives **
@@ -58,6 +81,8 @@ URDF = table_of(
 
 def find_urdf(path: str, attribute: str = "") -> ConstructRow | None:
     """What becomes of an attribute of an element, or of the element itself; None if it is not known."""
+    if path.rpartition("/")[2].startswith("xacro:"):
+        return ConstructRow(path, *_REASONS["xacro"][:1], (INSIDE,), _REASONS["xacro"][1])
     return find_row(URDF, path, attribute)
 
 
@@ -77,6 +102,17 @@ def walk_urdf(root: XmlElement) -> Iterator[tuple[str, XmlElement]]:
 def note_urdf(root: XmlElement) -> list[str]:
     """Notes on what a file has that the model has not."""
     notes = notes_of(find_urdf, count_all((path, element.attributes) for path, element in walk_urdf(root)))
+    for child in root.children:
+        for element in child.walk() if child.tag not in ("link", "joint", *LOOPS) else ():
+            pairs = (("parent", "child"), ("predecessor", "successor"))
+            if element.tag.endswith(("constraint", "equality")) or any(
+                element.find(a) is not None and element.find(b) is not None for a, b in pairs
+            ):
+                what = " ".join([f"<{element.tag}>", element.attributes.get("name", "")]).strip()
+                notes.append(
+                    f"left out: {what} in line {element.line}, which ties links or joints: the model may move more "
+                    "freely than the robot; <loop_joint> and <mimic> are read"
+                )
     for path, element in walk_urdf(root):
         if path not in ("robot", "link", "joint"):
             continue

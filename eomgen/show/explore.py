@@ -80,8 +80,8 @@ class Explorer:
 
     def _range(self, name: str, value: float) -> tuple[float, float]:
         """What a slider runs over: the limits of the joint, else a turn, or the size of the mechanism to both sides."""
-        limit = self.module.limits.get(name)
-        low, high = (None, None) if limit is None else (limit["lower"], limit["upper"])
+        limits = self.module.limits.get(name, {})
+        low, high = limits.get("lower"), limits.get("upper")
         reach = 0.5 * self._size if self.module.layout.unit(name) == "m" else np.pi
         return (value - reach if low is None else low), (value + reach if high is None else high)
 

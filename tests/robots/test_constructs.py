@@ -189,6 +189,8 @@ CASES = [
         {"tail": '<tendon><fixed name="t" range="-1 1" limited="true"><joint joint="j" coef="1"/></fixed></tendon>'},
         "tendon_limited",
     ),
+    ({"head": '<option><flag sleep="enable"/></option>', "b": 'sleep="init"'}, "bodies at rest that MuJoCo lets sleep"),
+    ({"b": 'sleep="init"'}, None),
     ({"tail": '<sensor><jointpos joint="j"/></sensor><custom><numeric name="n" data="1"/></custom>'}, None),
     ({"head": '<visual><global fovy="30"/></visual><size memory="1M"/><statistic extent="2"/>'}, None),
 ]

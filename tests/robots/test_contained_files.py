@@ -79,14 +79,28 @@ OUTSIDE = [
         for start in (
             *('<include file="..\\out\\x.xml"/>', '<Include file="../out/x.xml"/>', '<include file="link\\x.xml"/>'),
             '<asset><model name="p" file="..\\out\\x.xml"/></asset>',
-            '<asset><texture type="cube" fileup="..\\out\\x.png"/></asset>',
-            '<compiler texturedir="..\\out"/><asset><texture type="2d" file="x.png"/></asset>',
-            '<asset><hfield name="h" file="..\\out\\x.png" size="1 1 1 1"/></asset>',
-            '<asset><skin name="s" file="..\\out\\x.skn"/></asset>',
             '<worldbody><body name="f"><flexcomp name="f" type="mesh" file="..\\out\\x.stl"/></body></worldbody>',
         )
     ),
 ]
+
+
+UNREAD = [
+    '<asset><texture name="t" type="cube" fileup="..\\out\\x.png"/></asset>',
+    '<compiler texturedir="..\\out"/><asset><texture type="2d" file="x.png"/></asset>',
+    '<asset><texture type="2d" file="/nowhere/x.png"/></asset>',
+    '<asset><hfield name="h" file="..\\out\\x.png" size="1 1 1 1"/></asset>',
+    '<asset><skin name="s" file="..\\out\\x.skn"/></asset>',
+]
+
+
+@pytest.mark.parametrize("text", UNREAD)
+def test_what_is_never_read_may_be_anywhere(text: str, model: Any) -> None:
+    """Neither the name of the file nor a byte of it comes to MuJoCo."""
+    path = model(f"{text}{QUATERNION}")
+    assert eg.load(path).check().degrees_of_freedom > 0
+    given = _text(path)
+    assert "x." not in given.main + "".join(given.files)
 
 
 @pytest.mark.parametrize("text", OUTSIDE)

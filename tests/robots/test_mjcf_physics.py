@@ -8,6 +8,8 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from robots import mujoco_fields
+from robots.mujoco_judge import Judge
 
 import eomgen as eg
 from eomgen.robots import mjcf_fields
@@ -101,6 +103,64 @@ def test_disabled_friction_and_limits_are_no_data(flag: str, kept: bool, tmp_pat
     joint = model.mechanism().joints[0]
     assert (joint.dry_friction == 0.4) == kept == any(joint.limits)
     assert any("tendon_frictionloss" in note for note in model.notes) == kept
+
+
+TURNING = """<mujoco><option gravity="0 0 -9.81"><flag contact="disable"/></option><worldbody>
+<body name="a" pos="1 2 3" euler="20 30 40"><joint name="f" type="free" {f}/><geom type="box" size=".1 .2 .3"/>
+ <body name="b" pos=".3 0 .1" euler="10 -20 30"><joint name="b" type="ball" pos=".1 0 0" {b}/>
+  <geom type="box" size=".2 .1 .3" pos=".1 .1 0"/></body></body>
+<body name="c" pos="0 0 1" euler="10 20 30"><joint name="c" type="ball" {c}/>
+ <geom type="box" size=".1 .2 .3" pos=".1 0 .05"/></body></worldbody></mujoco>"""
+RESISTED = [
+    {"b": 'damping="2"', "c": 'damping="0.3" armature="0.4"'},
+    {"b": 'stiffness="3"', "c": 'stiffness="2"'},
+    {"f": 'damping="0.7"'},
+    {"f": 'stiffness="5"'},
+    {"f": 'stiffness="5" damping="1"', "b": 'stiffness="3" damping="2"', "c": 'stiffness="2" armature="1"'},
+]
+
+
+@pytest.mark.parametrize("rotation", ["euler_angles", "euler_parameters"])
+@pytest.mark.parametrize("given", RESISTED, ids=str)
+def test_balls_and_free_joints_are_damped_and_sprung(given: dict[str, str], rotation: str, tmp_path: Path) -> None:
+    """Accelerations as MuJoCo has them, at any turn and next to rest, where the Jacobian is the stiffness."""
+    path = tmp_path / "turning.xml"
+    path.write_text(TURNING.format(**dict.fromkeys("fbc", "") | given))
+    model = eg.load(path, rotation=rotation)
+    assert not any("left out" in note for note in model.notes)
+    equations = model.derive()
+    module, judge = equations.compile(target="numpy"), Judge(path, model, rotation)
+    for state in judge.states(equations.kinematics, 6, seed=3):
+        found = module.rhs(0.0, np.concatenate([state.q, state.v]))[module.n_q :]
+        assert np.abs(found - state.acceleration).max() < 1e-12 * np.abs(state.acceleration).max()
+    x = module.x0()
+    slope, step = module.jacobian(0.0, x), 1e-4 * np.ones(module.n_x)
+    if rotation == "euler_angles":
+        between = (module.rhs(0.0, x + step) - module.rhs(0.0, x - step)) / 2e-4
+        assert slope @ np.ones(module.n_x) == pytest.approx(between, abs=1e-4)
+
+
+LOST = [
+    ({"b": 'armature="1"'}, "joint.b.armature: armature on a ball joint of a parent that moves"),
+    ({"f": 'armature="1"'}, "joint.f.armature: armature on a free joint is not supported"),
+]
+
+
+@pytest.mark.parametrize(("given", "said"), LOST)
+def test_armature_that_belongs_to_no_body_is_refused(given: dict[str, str], said: str, tmp_path: Path) -> None:
+    path = tmp_path / "turning.xml"
+    path.write_text(TURNING.format(**dict.fromkeys("fbc", "") | given))
+    with pytest.raises(eg.ModelError, match=said):
+        eg.load(path)
+
+
+def test_limits_and_dry_friction_of_balls_are_noted(tmp_path: Path) -> None:
+    path = tmp_path / "turning.xml"
+    path.write_text(TURNING.format(f="", b='range="0 40"', c='frictionloss="1"'))
+    assert eg.load(path).notes == (
+        "left out: the limit of the spherical joint b",
+        "left out: the dry friction of the spherical joint c",
+    )
 
 
 NOTED = [
@@ -217,9 +277,10 @@ KINDS = {"read", "noted", "data", "unused", "derived", "solver", "screen", "user
 @pytest.mark.parametrize(
     ("prefixes", "table"),
     [
-        (("jnt_", "dof_"), mjcf_fields.JOINT_FIELDS),
-        (("tendon_", "wrap_"), mjcf_fields.TENDON_FIELDS),
-        (("actuator_",), mjcf_fields.ACTUATOR_FIELDS),
+        (("jnt_", "dof_"), mujoco_fields.JOINT_FIELDS),
+        (("tendon_", "wrap_"), mujoco_fields.TENDON_FIELDS),
+        (("actuator_",), mujoco_fields.ACTUATOR_FIELDS),
+        (("eq_",), mujoco_fields.EQUALITY_FIELDS),
     ],
 )
 def test_every_field_of_a_compiled_model_has_its_place(prefixes: tuple[str, ...], table: dict[str, str]) -> None:
@@ -229,14 +290,16 @@ def test_every_field_of_a_compiled_model_has_its_place(prefixes: tuple[str, ...]
 
 
 def test_every_option_and_flag_has_its_place() -> None:
-    assert {name for name in vars(mujoco.MjOption) if not name.startswith("_")} == set(mjcf_fields.OPTION_FIELDS)
+    assert {name for name in vars(mujoco.MjOption) if not name.startswith("_")} == set(mujoco_fields.OPTION_FIELDS)
     flags = {name.removeprefix("mjDSBL_") for name in mujoco.mjtDisableBit.__members__ if name != "mjNDISABLE"}
-    assert flags == set(mjcf_fields.FLAGS)
-    assert set(mjcf_fields.OPTION_FIELDS.values()) | set(mjcf_fields.FLAGS.values()) <= KINDS
+    assert flags == set(mujoco_fields.FLAGS)
+    flags = {name.removeprefix("mjENBL_") for name in mujoco.mjtEnableBit.__members__ if name != "mjNENABLE"}
+    assert flags == set(mujoco_fields.ENABLED)
+    assert set(mujoco_fields.OPTION_FIELDS.values()) | set(mujoco_fields.FLAGS.values()) <= KINDS
 
 
 def test_what_is_noted_is_a_field_that_is_said_to_be() -> None:
-    tables = mjcf_fields.JOINT_FIELDS | mjcf_fields.TENDON_FIELDS | mjcf_fields.ACTUATOR_FIELDS
+    tables = mujoco_fields.JOINT_FIELDS | mujoco_fields.TENDON_FIELDS | mujoco_fields.ACTUATOR_FIELDS
     for name, (flag, _) in mjcf_fields.NOTED.items():
         assert tables[name] == "noted"
-        assert flag in mjcf_fields.FLAGS
+        assert flag in mujoco_fields.FLAGS

@@ -80,3 +80,74 @@ def test_equalities_need_not_hold_where_the_file_places_the_bodies(weld: str, ro
     assert [x[name] for name in "kln"] == pytest.approx([y[name] for name in "kln"], abs=1e-6 if weld else 1e-12)
     if not weld:  # a free joint that nothing ties stays exactly where it is
         assert (x["f_x"], x["f_z"], y["f_x"], y["f_z"]) == (0.1, 1.0, 0.1, 1.0)
+
+
+HELD = """<mujoco><option gravity="0 0 0"><flag contact="disable"/></option><worldbody>
+<body name="wall" pos=".3 .1 0" euler="20 30 10"><site name="s" pos=".1 .2 .3" euler="5 10 40"/></body>
+<body name="arm" pos="0 0 1"><joint name="h" axis="0 1 0"/><geom size=".1" pos=".2 0 0"/>
+ <site name="r" pos=".3 0 .1"/></body>
+<body name="beam" pos="0 -1 0"><freejoint name="f"/><site name="t" pos="-.1 .2 .3" euler="50 10 40"/>
+ <geom type="box" size=".1 .2 .3"/></body></worldbody><equality><{}/></equality></mujoco>"""
+ATTRIBUTES = [
+    'weld body1="wall" body2="beam" torquescale="0" anchor="0 1 0"',
+    'weld body1="arm" body2="beam" torquescale="0" relpose=".1 .2 .3 1 1 0 0" anchor=".3 .1 0"',
+    'weld site1="s" site2="t" torquescale="0"',
+    'weld site1="r" site2="t" torquescale="-3"',
+    'weld body1="arm" body2="beam" relpose="0 0 0 0 0 0 0" anchor="1 1 1"',
+    'weld body1="beam" relpose="0 1 0 1 0 0 0"',
+    'weld body1="beam" relpose="0 1 0 1 0 0 0" torquescale="0"',
+    'weld body1="arm" body2="beam" solref="0.02 1" solimp="0 0 0" anchor="0 0 0"',
+    'connect body1="arm" body2="beam" anchor="1 -2 3" solref="-400 -40"',
+    'connect site1="r" site2="t"',
+    'joint joint1="h" polycoef="0 0 0 0 0"',
+    'joint joint1="h" polycoef="0.3 7 7 7 7"',
+    'connect body1="arm" body2="beam" anchor="0 0 0" active="false"',
+]
+
+
+@pytest.mark.parametrize("equality", ATTRIBUTES)
+def test_attributes_of_equalities_leave_the_motions_that_mujocos_rows_leave(equality: str, tmp_path: Path) -> None:
+    """Rows of MuJoCo and ours span the same space at states that satisfy both; MuJoCo sees no gap there."""
+    path = tmp_path / "held.xml"
+    path.write_text(HELD.format(equality))
+    module = eg.load(path, rotation="euler_parameters").compile(target="numpy")
+    mj = mujoco.MjModel.from_xml_path(str(path))
+    data, random = mujoco.MjData(mj), np.random.default_rng(5)
+    assert module.q_names[0] == "h"
+    for _ in range(3):
+        x = module.x0() + random.uniform(-0.05, 0.05, module.n_x)
+        x = module.project(x)
+        data.qpos[:], data.qvel[:] = x[: module.n_q], x[module.n_q :]
+        mujoco.mj_forward(mj, data)
+        rows = np.array(data.efc_J).reshape(-1, mj.nv)
+        ours = np.asarray(module.constraint_jacobian(x[: module.n_q])).reshape(-1, mj.nv)
+        rank = np.linalg.matrix_rank(rows, tol=1e-9) if len(rows) else 0
+        assert module.n_v - module.n_dof == rank == len(ours)
+        assert np.linalg.matrix_rank(np.vstack([rows, ours]), tol=1e-6) == rank
+        assert np.abs(data.efc_pos).max(initial=0.0) < 1e-9
+        assert np.abs(rows @ data.qvel).max(initial=0.0) < 1e-9
+
+
+YIELDING = [
+    ('weld name="e" body1="arm" body2="beam" torquescale="0.01"', "torquescale"),
+    ('connect name="e" body1="arm" body2="beam" anchor="0 0 0" solref="0 0"', "solref"),
+    ('weld name="e" body1="arm" body2="beam" solref="50 1" torquescale="1e-9"', "solref and torquescale"),
+    ('joint name="e" joint1="h" solref="0 -100"', "solref"),
+    ('joint name="e" joint1="h" solref="0 1" solimp="0 0 0"', ""),
+    ('connect name="e" body1="arm" body2="beam" anchor="0 0 0" solref="-2500 -100"', ""),
+]
+
+
+@pytest.mark.parametrize(("equality", "what"), YIELDING)
+def test_equalities_that_hardly_hold_in_mujoco_are_noted(equality: str, what: str, tmp_path: Path) -> None:
+    path = tmp_path / "soft.xml"
+    path.write_text(HELD.format(equality))
+    note = f"the equality e holds exactly here; MuJoCo lets it yield far ({what})"
+    assert eg.load(path).notes == ((note,) if what else ())
+    mj = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(mj)
+    data.qpos[:] = 0.1, 0.2, -1.1, 0.3, 1.0, 0.5, 0.1, 0.2
+    for _ in range(int(2 / mj.opt.timestep)):
+        mujoco.mj_step(mj, data)
+    scale = mj.eq_data[0][10] if what.endswith("torquescale") else 1.0
+    assert (np.abs(data.efc_pos).max() / abs(scale) > 0.05) == bool(what)

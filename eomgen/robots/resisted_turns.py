@@ -1,0 +1,74 @@
+"""Robots, balls and free joints: damping and stiffness of their rotation -> torques in the words of a model file.
+
+MuJoCo resists by -d w - k theta: w is the angular velocity, theta the rotation vector from the pose at rest, of at most
+half a turn, both in the axes of the child.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..rotations import euler_parameters_from_matrix
+
+_QUATERNION = ("_e0", "_e1", "_e2", "_e3")
+
+
+def turn_texts(name: str, in_parameters: bool, rest: np.ndarray) -> tuple[list[str], list[str], list[str]]:
+    """Angular velocity in the axes of the child and of the parent, and the rotation vector in those of the child.
+
+    Parameters
+    ----------
+    name : str
+        Of the joint, which its coordinates begin with.
+    in_parameters : bool
+        Whether these are Euler parameters; otherwise angles x-y'-z''.
+    rest : (3, 3) array
+        The rotation at rest.
+    """
+    if in_parameters:
+        raw = [name + suffix for suffix in _QUATERNION]
+        size = f"sqrt({' + '.join(f'{x}**2' for x in raw)})"  # 1, but for what an integrator makes of it
+        e = [f"({x}/{size})" for x in raw]
+        own = [f"{name}_w{axis}" for axis in "xyz"]
+        outer = [
+            f"(1 - 2*{e[j]}**2 - 2*{e[k]}**2)*{own[i - 1]} + 2*({e[i]}*{e[j]} - {e[0]}*{e[k]})*{own[j - 1]}"
+            f" + 2*({e[i]}*{e[k]} + {e[0]}*{e[j]})*{own[k - 1]}"
+            for i, j, k in ((1, 2, 3), (2, 3, 1), (3, 1, 2))
+        ]
+    else:
+        a, b, c = (f"{name}_{k}" for k in (1, 2, 3))
+        da, db, dc = (f"{q}_dot" for q in (a, b, c))
+        own = [
+            f"cos({b})*cos({c})*{da} + sin({c})*{db}",
+            f"cos({c})*{db} - cos({b})*sin({c})*{da}",
+            f"sin({b})*{da} + {dc}",
+        ]
+        outer = [
+            f"{da} + sin({b})*{dc}",
+            f"cos({a})*{db} - sin({a})*cos({b})*{dc}",
+            f"sin({a})*{db} + cos({a})*cos({b})*{dc}",
+        ]
+        (ca, cb, cc), (sa, sb, sc) = ([f"{f}({q}/2)" for q in (a, b, c)] for f in ("cos", "sin"))
+        e = [
+            f"({ca}*{cb}*{cc} - {sa}*{sb}*{sc})",
+            f"({sa}*{cb}*{cc} + {ca}*{sb}*{sc})",
+            f"({ca}*{sb}*{cc} - {sa}*{cb}*{sc})",
+            f"({ca}*{cb}*{sc} + {sa}*{sb}*{cc})",
+        ]
+    r0, r1, r2, r3 = (float(x) for x in euler_parameters_from_matrix(rest))
+    # the conjugate of the rest times e
+    p = [_sum((r0, r1, r2, r3), e)]
+    p += [_sum(row, e) for row in ((-r1, r0, r3, -r2), (-r2, -r3, r0, r1), (-r3, r2, -r1, r0))]
+    square = f"(1 - ({p[0]})**2)"  # sin(phi/2)^2; near 0 the series of phi / sin(phi/2)
+    series = f"2 + {square}/3 + 3*{square}**2/20 + 5*{square}**3/56"
+    exact = f"2*atan2(sqrt({square}), abs({p[0]}))/sqrt({square})"
+    factor = f"where({p[0]} < 0, -1, 1)*where({square} < 1e-3, {series}, {exact})"
+    return own, outer, [f"({x})*{factor}" for x in p[1:]]
+
+
+def _sum(factors: Sequence[float], terms: Sequence[str]) -> str:
+    """The sum of the terms whose factors are not zero."""
+    kept = [(f, x) for f, x in zip(factors, terms, strict=True) if f]
+    return " + ".join(x if f == 1.0 else f"({f!r})*{x}" for f, x in kept) or "0"
