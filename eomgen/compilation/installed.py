@@ -40,7 +40,7 @@ def find_installed(key: str) -> Installed | None:
         files, facts = manifest["files"], dict(manifest["facts"])
         if manifest["key"] != key or any(digest((directory / name).read_bytes()) != files[name] for name in files):
             return None
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
     return Installed(directory, facts)
 

@@ -84,9 +84,9 @@ def _earlier_files(folder: Path) -> set[str] | None:
     try:
         with open_plain(folder / MANIFEST) as file:
             listed: Any = json.load(file)
-        if "abi" not in listed:
+        if not isinstance(listed, dict) or "abi" not in listed:
             raise ValueError
-    except (OSError, ValueError, TypeError, RecursionError, UsageError):
+    except (OSError, ValueError, RecursionError, UsageError):
         message = f"{folder} exists and is not a generated package; choose another --out or remove it"
         raise UsageError(message) from None
     files = listed.get("files")

@@ -164,7 +164,7 @@ def simulate_many(
         store_of = None if store is None else _open_store(store, module, cases, plan, reduce, parts)
         kept: dict[int, Kept] = {}
         if store_of is not None:
-            found = {index: store_of.load(index, stop - start) for index, (start, stop) in enumerate(parts)}
+            found = {index: store_of.load(index) for index in range(len(parts))}
             kept = {index: value for index, value in found.items() if value is not None}
         missing = [index for index in range(len(parts)) if index not in kept]
         look = None if watch is None else watch.look

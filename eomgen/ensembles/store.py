@@ -12,11 +12,10 @@ from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.reading import open_plain
 from ..files.writing import remove_parts, write_whole
-from ..runtime.arrays import BROKEN, read_arrays
-from .run_blocks import LARGEST, RUNS
+from ..runtime.arrays import BROKEN, read_arrays, sealed
+from .run_blocks import LARGEST
 
 FORMAT = "eomgen ensemble 1"
-RUNS_KEPT = tuple(f"runs_{name}" for name in RUNS)
 
 
 class Store:
@@ -38,7 +37,8 @@ class Store:
     def __init__(self, folder: str | Path, identity: dict[str, Any]) -> None:
         self.folder = as_path("store", folder)
         manifest = self.folder / "manifest.json"
-        wanted = json.loads(json.dumps({"format": FORMAT, **identity}))
+        self._identity = json.dumps({"format": FORMAT, **identity})
+        wanted = json.loads(self._identity)
         if manifest.is_file():
             self._compare(manifest, wanted)
             return
@@ -65,26 +65,29 @@ class Store:
     def _path(self, index: int) -> Path:
         return self.folder / f"block_{index:06d}.npz"
 
+    def _key(self, index: int) -> str:
+        """What the seal of a block covers besides its numbers: one of another place or ensemble is none of these."""
+        return f"{index} {self._identity}"
+
     def save(self, index: int, arrays: dict[str, Any], words: dict[int, str]) -> None:
         """Keep the arrays of a block; complete or not there."""
         import io
 
         buffer = io.BytesIO()
-        np.savez(buffer, **arrays, words=np.array(json.dumps({str(k): text for k, text in words.items()})))
+        told = np.array(json.dumps({str(k): text for k, text in words.items()}))
+        np.savez(buffer, **sealed({**arrays, "words": told}, self._key(index)))
         write_whole(self._path(index), buffer.getvalue())
 
-    def load(self, index: int, count: int) -> tuple[dict[str, Any], dict[int, str]] | None:
-        """The arrays of a block of so many runs, or None if it was not finished."""
+    def load(self, index: int) -> tuple[dict[str, Any], dict[int, str]] | None:
+        """The arrays of a block, or None if it was not finished."""
         remove_parts(self._path(index))
         try:
-            arrays = read_arrays(self._path(index), compressed=False)
+            arrays = read_arrays(self._path(index), compressed=False, key=self._key(index))
             words = json.loads(str(arrays.pop("words")))
-            if any(len(arrays[name]) != count for name in RUNS_KEPT):
-                raise ValueError("the numbers of another count of runs")
             return arrays, {int(k): str(text) for k, text in words.items()}
         except FileNotFoundError:
             return None
-        except (*BROKEN, RecursionError) as error:
+        except BROKEN as error:
             raise self.damaged(index, error) from None
 
     def damaged(self, index: int, why: object) -> UsageError:

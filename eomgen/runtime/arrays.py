@@ -1,16 +1,18 @@
-"""Stage runtime: an .npz file from anywhere -> its arrays, or a refusal: no pickles, bounded memory.
+"""Stage runtime: arrays <-> an .npz file, which comes from anywhere: no pickles, bounded memory, nothing changed since.
 
-Every member is read whole, so that its check sum is compared; the shape it claims is compared with its bytes before
-anything is made of that size.
+A seal, the SHA-256 of all arrays with their names, types and shapes, is written beside them, so that a file whose
+arrays were renamed, cut or changed is refused as a whole.  The shape that a member claims is compared with its bytes
+before anything is made of that size.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
-import zlib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-from zipfile import ZIP_STORED, BadZipFile, ZipFile, ZipInfo
+from typing import Any, BinaryIO
+from zipfile import ZIP_STORED, ZipFile, ZipInfo
 
 import numpy as np
 from numpy.lib import format as npy
@@ -20,32 +22,56 @@ from ..files.reading import open_plain
 #: Bytes that any file may unfold to, and how many for each of its own: columns of zeros shrink a lot, these do not.
 SMALL, UNFOLDED = 2**28, 100
 #: What reading a file that is none of ours may raise.
-BROKEN = (
-    BadZipFile, zlib.error, ValueError, KeyError, TypeError, AttributeError, OSError, EOFError, RuntimeError,
-    MemoryError, OverflowError,
-)  # fmt: skip
+BROKEN = (ValueError, LookupError, TypeError, AttributeError, OSError, RuntimeError)
+SEAL = "seal"  #: name of the seal among the arrays
 
 
-def read_arrays(path: Path, compressed: bool = True) -> dict[str, Any]:
-    """All arrays of an .npz file.
+def sealed(arrays: Mapping[str, Any], key: str = "") -> dict[str, Any]:
+    """Arrays with their seal, for :func:`read_arrays` with the same key."""
+    return {**arrays, SEAL: np.array(_seal(arrays, key))}
+
+
+def _seal(arrays: Mapping[str, Any], key: str) -> str:
+    found = hashlib.sha256(key.encode())
+    for name in sorted(arrays):
+        array = np.asarray(arrays[name])
+        found.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode("utf-8", "surrogatepass"))
+        found.update(array.tobytes())
+    return found.hexdigest()
+
+
+def read_arrays(path: Path, compressed: bool = True, key: str = "") -> dict[str, Any]:
+    """All arrays of a sealed .npz file.
 
     Parameters
     ----------
     path : Path
     compressed : bool
         Whether its members may be; without, they take no more memory than the file has bytes.
+    key : str
+        What it was sealed with.
 
     Raises
     ------
     FileNotFoundError
     UsageError
         It is not a plain file.
-    ValueError and others of :data:`BROKEN`
-        It is damaged, or holds what is no array of numbers or of text.
+    ValueError
+        It is damaged, or is none of ours.
     """
-    with open_plain(path) as file, ZipFile(file) as archive:
+    with open_plain(path) as file:
+        try:
+            found = _read(file, path.stat().st_size, compressed)
+        except Exception as error:  # whatever zipfile, zlib and NumPy's parser of headers raise
+            raise ValueError(str(error) or type(error).__name__) from None
+    if str(found.pop(SEAL, "")) != _seal(found, key):
+        raise ValueError("its arrays are not those that eomgen sealed it with")
+    return found
+
+
+def _read(file: BinaryIO, own: int, compressed: bool) -> dict[str, Any]:
+    with ZipFile(file) as archive:
         members = archive.infolist()
-        own = path.stat().st_size
         allowed = max(SMALL, UNFOLDED * own) if compressed else own
         if sum(member.file_size for member in members) > allowed:
             raise ValueError(f"its arrays would take more than {allowed} bytes")

@@ -8,7 +8,6 @@ from pathlib import Path
 from ..errors import UsageError
 from ..files.path_names import as_path
 from .arrays import BROKEN, read_arrays
-from .run_parts import Residuals
 from .storage import FORMAT, RUNS, Stored
 from .trajectory import Trajectory
 
@@ -40,21 +39,13 @@ def load_trajectory(path: str | Path) -> Trajectory:
         if header.pop("format") != FORMAT:
             raise ValueError("another format")
         names, x, t = tuple(header.pop("names")), arrays["x"], arrays["t"]
-        if x.shape != (len(header["x_names"]), *t.shape) or arrays["columns"].shape != (len(names), *t.shape):
-            raise ValueError("columns that do not fit each other")
-        Residuals(**header["residuals"])
+        count = sum(name.startswith("t_events_") for name in arrays)
+        events = [[arrays[f"{part}_events_{k}"] for k in range(count)] for part in "tx"]
+        columns = Stored(names, arrays["columns"], arrays.get("energies"))
     except FileNotFoundError:
         raise
-    except (*BROKEN, RecursionError) as error:
+    except BROKEN as error:
         told = f"a {source.suffix} is for other programs; load the .npz of the run"
         told = told if source.suffix in RUNS[1:] else str(error)
         raise UsageError(f"{source} is not a trajectory saved by eomgen: {told}") from None
-    count = sum(key.startswith("t_events_") for key in arrays)
-    return Trajectory(
-        arrays["t"],
-        arrays["x"],
-        Stored(names, arrays["columns"], arrays.get("energies")),
-        header,
-        [arrays[f"t_events_{k}"] for k in range(count)],
-        [arrays[f"x_events_{k}"] for k in range(count)],
-    )
+    return Trajectory(t, x, columns, header, *events)

@@ -14,6 +14,7 @@ from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..numeric.scales import Array
+from .arrays import sealed
 from .near_names import require
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def save(trajectory: TrajectoryLike, path: str | Path) -> Path:
     for k, (t, x) in enumerate(zip(trajectory.t_events, trajectory.x_events, strict=True)):
         arrays[f"t_events_{k}"], arrays[f"x_events_{k}"] = t, x
     with whole_file(target) as file:
-        np.savez_compressed(file, **arrays)
+        np.savez_compressed(file, **sealed(arrays))
     return target
 
 

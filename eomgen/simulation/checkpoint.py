@@ -17,7 +17,7 @@ from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
-from ..runtime.arrays import BROKEN, read_arrays
+from ..runtime.arrays import BROKEN, read_arrays, sealed
 from ..runtime.identity import code_digest, differences, digest
 from ..runtime.input_kinds import Expressed
 from ..runtime.room import read_number
@@ -87,7 +87,7 @@ class Checkpoint:
             if self.resume:
                 raise UsageError(f"there is no checkpoint {self.file} to resume from") from None
             return
-        except (*BROKEN, RecursionError) as error:
+        except BROKEN as error:
             raise self.damaged(error) from None
         names = differences(self.identity, header)
         if names:
@@ -109,7 +109,7 @@ class Checkpoint:
         header = np.frombuffer(json.dumps(self.identity).encode(), dtype=np.uint8)
         try:
             with whole_file(self.file) as file:
-                np.savez(file, header=header, **arrays)
+                np.savez(file, **sealed({"header": header, **arrays}))
         except OSError as error:
             if not self.warned:
                 warnings.warn(f"the run goes on, but its checkpoint cannot be written: {error}", stacklevel=2)

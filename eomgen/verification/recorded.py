@@ -34,7 +34,7 @@ def recorded_findings(module: BoundModel, file: Path | None = None) -> list[Find
         if data["name"] != module.name:
             return [_unusable(f"{FILE} belongs to the model {str(data['name'])[:80]!r}")]
         found = [_compare(module, name, figures, data["states"]) for name, figures in data["kernels"].items()]
-    except (EomgenError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+    except (EomgenError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RuntimeError) as error:
         return [_unusable(f"{FILE} is damaged ({type(error).__name__}: {str(error)[:80]})")]
     return found or [Finding.skipped("recorded figures", f"{FILE} has no figures, because all kernels call code in C")]
 

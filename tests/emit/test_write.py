@@ -36,7 +36,7 @@ def test_a_file_of_the_user_is_never_overwritten(tmp_path):
     assert (folder / "Makefile").read_text() == "mine"
 
 
-@pytest.mark.parametrize("held", ["{}", "not json", None])
+@pytest.mark.parametrize("held", ["{}", "not json", '"abi"', '["abi"]', "[" * 99999, None])
 def test_a_folder_of_someone_else_is_refused(tmp_path, held):
     (tmp_path / ("other.txt" if held is None else "model.json")).write_text(held or "")
     with pytest.raises(EomgenError, match="not a generated package"):

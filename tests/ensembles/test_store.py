@@ -82,13 +82,18 @@ def test_hostile_stores_are_refused(pendulum: Any, tmp_path: Path) -> None:
     good, text = block.read_bytes(), manifest.read_text()
     with np.load(block) as data:
         arrays = {name: data[name] for name in data.files}
-    for change, words in (
-        ({"runs_t": arrays["runs_t"][:3]}, "another count of runs"), ({"x": arrays["x"][:1]}, "do not belong together"),
-        ({"words": np.array("[1, 2]")}, "cannot be read"), ({"words": np.array("[" * 99999)}, "cannot be read"),
-    ):  # fmt: skip
-        np.savez(block, **(arrays | change))
-        with pytest.raises(eg.UsageError, match=words):
+    changes: tuple[dict[str, Any], ...] = (
+        {"runs_t": arrays["runs_t"][:3]}, {"x": arrays["x"][:1]}, {"x": arrays["x"] + 1.0}, {"more": np.zeros(3)},
+        {"words": np.array("[1, 2]")}, {"words": np.array("[" * 99999)},
+    )  # fmt: skip
+    files = [{("old" if name == one else name): x for name, x in arrays.items()} for one in arrays]
+    for damaged in (*files, *(arrays | change for change in changes)):
+        np.savez(block, **damaged)
+        with pytest.raises(eg.UsageError, match=r"block_000000\.npz cannot be read: its arrays are not those"):
             pendulum.simulate_many(1, angles(20), store=folder)
+    block.write_bytes((folder / "block_000001.npz").read_bytes())  # that of other runs
+    with pytest.raises(eg.UsageError, match=r"block_000000\.npz cannot be read"):
+        pendulum.simulate_many(1, angles(20), store=folder)
     block.write_bytes(good)
     for other in (
         "[1]",

@@ -16,7 +16,7 @@ import pytest
 
 import eomgen as eg
 from eomgen.runtime import arrays
-from eomgen.runtime.arrays import BROKEN, read_arrays
+from eomgen.runtime.arrays import BROKEN, read_arrays, sealed
 
 
 def npz(**arrays: Any) -> bytes:
@@ -56,6 +56,8 @@ HOSTILE = {
     "no array": members([("a.npy", b"x" * 40)]),
     "twice": members([("a.npy", claim("(0,)")), ("a", claim("(0,)"))]),
     "bomb": members([("a.npy", claim("(250000,)", b"\0" * 2_000_000))], zipfile.ZIP_DEFLATED),
+    "half a head": members([("a.npy", claim("(1,", b"1" * 8))]),
+    "head of another type": members([("a.npy", claim("(1,)", b"1" * 8).replace(b"'descr'", b"b'desc'"))]),
     "cut": npz(a=np.arange(100.0))[:500],
     "turned": npz(a=np.arange(100.0)).replace(np.array([50.0]).tobytes(), np.array([51.0]).tobytes()),
 }
@@ -90,6 +92,25 @@ def test_every_cut_of_a_trajectory_is_refused_or_whole(tmp_path: Path) -> None:
             assert len(eg.load_trajectory(file)) > 1  # what was turned is not read
 
 
+def test_a_trajectory_with_other_arrays_is_refused_by_name(tmp_path: Path) -> None:
+    module = eg.load(files("eomgen.examples") / "pendulum.yaml").compile(target="numpy")
+    file = module.simulate(0.1, events=[lambda t, x: x[0] - 0.3]).save(tmp_path / "run.npz")
+    with np.load(file) as data:
+        arrays = {name: data[name] for name in data.files}
+    header = str(arrays["header"])
+    damaged = [{("old" if name == one else name): x for name, x in arrays.items()} for one in arrays]
+    damaged += [{**arrays, name: x} for one in "tx" for name, x in ((one, arrays[one][..., :-1]), (one, np.array("1")))]
+    damaged += [{**arrays, "x": arrays["x"].astype(complex)}, {**arrays, "t_events_1": arrays["t"]}]
+    for text in (header[:-9], "3", "[]", "null", header.replace("x_names", "names"), header.replace("0.1", "0.2")):
+        damaged.append({**arrays, "header": np.array(text)})
+    for changed in damaged:
+        np.savez(file, **changed)
+        with pytest.raises(eg.UsageError, match=r"run\.npz is not a trajectory saved by eomgen"):
+            eg.load_trajectory(file)
+    np.savez(file, **arrays)  # as another program would write the same arrays
+    assert eg.load_trajectory(file).t_events[0].shape == arrays["t_events_0"].shape
+
+
 def test_what_numpy_writes_is_read(tmp_path: Path) -> None:
     given: dict[str, Any] = {
         "a": np.arange(6.0).reshape(2, 3), "f": np.asfortranarray(np.arange(6.0).reshape(2, 3)), "e": np.empty((0, 3)),
@@ -97,7 +118,7 @@ def test_what_numpy_writes_is_read(tmp_path: Path) -> None:
     }  # fmt: skip
     save: Callable[..., None]
     for save in (np.savez, np.savez_compressed):
-        save(tmp_path / "a.npz", **given)
+        save(tmp_path / "a.npz", **sealed(given))
         found = read_arrays(tmp_path / "a.npz")
         assert found.keys() == given.keys()
         for name, value in given.items():

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
+from eomgen.runtime.arrays import read_arrays, sealed
 from eomgen.simulation.checkpoint import Checkpoint
 
 EXAMPLES = files("eomgen.examples")
@@ -306,11 +307,10 @@ def test_a_full_disk_does_not_end_the_run(pendulum: Any, tmp_path: Path, monkeyp
 
 
 def rewritten(file: Path, **changes: Any) -> bytes:
-    """A checkpoint with some arrays replaced, or left out where they are None."""
-    with np.load(file) as data:
-        arrays = {name: data[name] for name in data.files} | changes
+    """A checkpoint with some arrays replaced, or left out where they are None, under a seal of its own."""
+    arrays = {name: value for name, value in (read_arrays(file) | changes).items() if value is not None}
     out = io.BytesIO()
-    np.savez(out, **{name: value for name, value in arrays.items() if value is not None})
+    np.savez(out, **sealed(arrays))
     return out.getvalue()
 
 

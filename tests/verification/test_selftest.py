@@ -82,6 +82,9 @@ def test_unknown_arguments_are_refused(package: Path) -> None:
      b'{"name": "four_bar", "states": [{}], "kernels": {"bias": [{"values": [1], "bound": 0}]}}',
      (b'{"name": "four_bar", "states": [{"t": 0, "q": [1], "v": [], "p": [], "u": []}],'
      b' "kernels": {"bias": [{"values": [1], "bound": 0}]}}'),
+     (b'{"name": "four_bar", "states": [{"q": [1' + b"0" * 400 + b"]}],"
+      b' "kernels": {"bias": [{"values": [1], "bound": 0}]}}'),
+     b"[" * 99999,
      b'{"name": "four_bar", "states": 1, "kernels": {"nonsense": 3}}'],
 )  # fmt: skip
 def test_damaged_figures_are_one_breach_without_a_traceback(module: eg.Module, tmp_path: Path, content: bytes) -> None:
