@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from importlib import import_module
 from time import time
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # as in typing, which takes longer to import than all of this
 if TYPE_CHECKING:
+    from typing import Any
+
     from . import errors as errors
     from .api.model import Model as Model
     from .api.model import from_sympy as from_sympy

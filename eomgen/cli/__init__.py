@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+
+TYPE_CHECKING = False  # what is imported before main() begins cannot be interrupted without a traceback
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -18,8 +21,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ------
     SystemExit
         Always: 0 fine; 1 the model is at fault; 2 usage or file not found; 3 compiler or package; 4 the integration;
-        5 a verification that failed.
+        5 a verification that failed; 130 and 143 ended by SIGINT (Ctrl-C) and SIGTERM.
     """
-    from .command import run_command
+    try:
+        import signal
 
-    sys.exit(run_command(arguments))
+        if arguments is None:  # the process is this command's
+            signal.signal(signal.SIGTERM, _leave)
+        from .command import run_command
+
+        code = run_command(arguments)
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted\n")
+        code = 130
+    if arguments is None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # Python's would print a traceback while the process ends
+    sys.exit(code)
+
+
+def _leave(number: int, _: object) -> None:
+    """Unwind, so that compilers and unfinished files go too."""
+    sys.exit(128 + number)

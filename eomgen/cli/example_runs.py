@@ -100,7 +100,13 @@ def _run_model(file: Path, target: str, seconds: dict[str, float], found: dict[s
 def _run_script(file: Path, seconds: dict[str, float]) -> tuple[int, str]:
     """Run a script by this Python in an empty folder; its exit code and the last line of what it complains of."""
     with _timed(seconds, "script"), TemporaryDirectory() as folder:
-        done = subprocess.run(
-            [sys.executable, str(file.resolve())], cwd=folder, capture_output=True, text=True, errors="replace"
-        )
-    return done.returncode, (done.stderr.strip().splitlines() or [""])[-1] if done.returncode else ""
+        command = [sys.executable, str(file.resolve())]
+        with subprocess.Popen(
+            command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace"
+        ) as process:
+            try:
+                _, said = process.communicate()
+            except BaseException:
+                process.terminate()  # it ends the compilers that it started
+                raise
+    return process.returncode, (said.strip().splitlines() or [""])[-1] if process.returncode else ""

@@ -26,6 +26,7 @@ from ..files.build_folder import MANIFEST, digest, read_entry, read_manifest, se
 from ..files.kept import Kept
 from ..files.locks import hold, locked
 from ..files.ownership import OTHERS_WRITE, make_private, require_trusted
+from .commands import unwound_by_sigterm
 
 #: Layout of keys, entries and manifests; part of every key.
 FORMAT = 2
@@ -165,7 +166,7 @@ class Cache:
         """A private directory to build in; removed at the end unless published, kept after a ToolchainError."""
         directory = self._open_attempt(key)
         try:
-            with hold(directory):  # so that no other process sweeps it
+            with unwound_by_sigterm(), hold(directory):  # so that no other process sweeps it
                 yield directory
         except ToolchainError:
             raise  # its message names files in here

@@ -1,7 +1,7 @@
 """Commands: words -> what a program said, within bounds of time and output.
 
 Each command runs in a process group of its own, which is killed with all that it started when its time is over, when
-it prints without end, and when the work is given up (Ctrl-C, another file that does not compile).
+it prints without end, and when the work is given up (Ctrl-C, SIGTERM, another file that does not compile).
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ import selectors
 import shlex
 import signal
 import subprocess
+import sys
 import threading
 import time
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
 
@@ -26,6 +27,23 @@ ANSWER, COMPILE, PER_BYTE = 15.0, 120.0, 1.5e-3
 SECONDS = "EOMGEN_COMPILER_SECONDS"
 OUTPUT = 16_000_000  #: bytes, of all that a command may print
 LINGER = 1.0  #: seconds in which what a finished command left running may still print
+
+
+@contextmanager
+def unwound_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM, which would end Python alone and at once, unwind what is in here and exit with 143.
+
+    Only in the main thread, where signals are handled, and where nobody else handles this one.
+    """
+    mine = threading.current_thread() is threading.main_thread()
+    if not mine or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 class Running:
@@ -40,6 +58,10 @@ class Running:
         self, command: Sequence[str], directory: Path | None = None, seconds: float = ANSWER
     ) -> subprocess.CompletedProcess[str]:
         """Run a command and collect what it says, in English; see :func:`run`."""
+        with unwound_by_sigterm():
+            return self._run(command, directory, seconds)
+
+    def _run(self, command: Sequence[str], directory: Path | None, seconds: float) -> subprocess.CompletedProcess[str]:
         seconds = _given() or seconds
         environment = {**os.environ, "LC_ALL": "C"}
         if directory is not None:

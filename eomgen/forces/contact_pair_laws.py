@@ -117,8 +117,6 @@ class PairLaw(NamedTuple):
     ) -> tuple[DryFriction | None, NormalLaw]:
         """The laws of a place of contact with its states."""
         held = None if friction is None else friction.holding(states[: self.axes], lateral)
-        if held is not None and self.slots > self.each:
-            held = held.sharing()
         return held, normal.holding(states[self.axes :])
 
     @property

@@ -32,10 +32,6 @@ class DryFriction(ABC):
         """The law with its states; in contacts of the plane ``lateral`` is the direction across the plane."""
         return self
 
-    def sharing(self) -> DryFriction:
-        """The law of one of several places of contact that have the same states."""
-        return self
-
     def drag(self, push: Expr, slip: Slip) -> Vec3:
         """The force on the second surface (N), across the normal, beside a normal force."""
         return vec.scale(-push, self.in_plane(slip))

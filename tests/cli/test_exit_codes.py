@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import signal
+import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
+from subprocess import PIPE
 
 import pytest
+from children import child
 
 from eomgen.cli.command import VERBS
 
@@ -185,3 +190,33 @@ def test_other_slips_of_usage_as_json(call: Call, words: tuple[str, ...], messag
     assert result.code == 2
     assert message in result.json["error"]["message"]
     assert call(*words).out == "" or not words  # without words: help
+
+
+COMMAND = """
+import signal, sys
+from eomgen.cli import main
+
+class Begun:
+    def find_spec(name, *_):
+        if name == "eomgen.cli.command":
+            print("begun", flush=True)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
+sys.meta_path.insert(0, Begun)
+main()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_command_without_a_traceback(number: signal.Signals) -> None:
+    """While it imports, reads and derives: with 130 and 143, as shells say of both signals."""
+    words = ["derive", str(EXAMPLES / "stewart_platform.yaml"), "--method", "lagrange"]
+    for after in (0.0, 0.01, 0.03, 0.06, 0.1, 0.2, 0.4):
+        with child([sys.executable, "-c", COMMAND, *words], stdout=PIPE, stderr=PIPE, text=True) as process:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "begun\n"
+            time.sleep(after)
+            process.send_signal(number)
+            _, said = process.communicate(timeout=60)
+        assert process.returncode == 128 + number, (after, said)
+        assert said.replace("interrupted\n", "").strip() == ""

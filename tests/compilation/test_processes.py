@@ -22,6 +22,7 @@ from children import child
 
 from eomgen.compilation import Cache, compile_c_library, compile_sources, load_core
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 BUILD = """
 import pathlib, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
@@ -204,6 +205,27 @@ def test_killed_build_leaves_only_something_to_sweep(
     assert fresh_cache.sweep() == 0  # too young
     assert fresh_cache.sweep(grace=0) == 1
     assert compile_c_library(sources, "pendulum").from_cache
+
+
+@pytest.mark.parametrize("by", ["library", "command"])
+def test_an_ended_build_leaves_no_compiler(
+    folder: Path, tmp_path: Path, wrapper: Callable[[str], str], fresh_cache: Cache, by: str
+) -> None:
+    """SIGTERM reaches one process alone; its compilers run in groups of their own."""
+    mark = tmp_path / "mark"
+    compiler = wrapper(f"echo $$ > {mark}.new; mv {mark}.new {mark}; exec sleep 60")
+    if by == "library":
+        running = start(folder, compiler)
+    else:
+        command = [sys.executable, "-m", "eomgen", "run", str(EXAMPLES / "pendulum.yaml")]
+        running = child(command, env={**os.environ, "CC": compiler}, stdout=subprocess.PIPE, text=True)
+    with running as builder:
+        wait_for(mark.exists)
+        os.kill(builder.pid, signal.SIGTERM)
+        builder.communicate(timeout=20)
+    assert builder.returncode == 143
+    wait_for(lambda: not Path("/proc", mark.read_text().strip()).exists())
+    assert list((fresh_cache.root / "attempts").iterdir()) == []
 
 
 def test_interrupted_build_cleans_up(

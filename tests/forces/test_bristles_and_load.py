@@ -147,6 +147,39 @@ def test_a_block_drifts_less_than_by_the_published_law_while_its_load_changes() 
     assert traj["j_x"][-1] == pytest.approx(0.0096, rel=0.05)
 
 
+GROUNDS: dict[str, dict[str, Any]] = {
+    "half_plane": {"shape": "half_plane"},
+    "profile": {"shape": "profile", "points": [[-1, 0], [0, 0], [0.3, 0], [2, 0]]},
+}
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("ground", list(GROUNDS))
+def test_a_bounce_takes_friction_times_the_impulse_of_the_normal_force(ground: str, target: str) -> None:
+    """A sliding body lands and lifts off; Coulomb's law, and N (s0 z + s1 z') (Canudas de Wit, Tsiotras), by hand."""
+    m = eg.Model("bounce", gravity=(0, 0, 0))
+    body = m.body("b", mass=2.0)
+    m.prismatic("x", m.ground, between := m.body("between", mass=0), axis="x")
+    m.prismatic("y", between, body, axis="y")
+    law = {**PLAIN, "stiffness": 1e6, "exponent": 1.5, "bristle_stiffness": 1e5, "bristle_damping": 300.0}
+    circle = {"shape": "circle", "on": body, "radius": 0.05}
+    m.contacts("touch", circle, {**GROUNDS[ground], "on": m.ground}, {**law, "lateral": False})
+    mod = m.compile(target=target)
+    start = {"y": 0.051, "x_dot": 1.5, "y_dot": -0.3}
+    traj = mod.simulate(0.06, initial=start, method="Radau", rtol=1e-8, atol=1e-11)
+
+    def by_hand(t: float, x: np.ndarray) -> list[float]:
+        y, v, w, z = x
+        push, change = 1e6 * max(0.05 - y, 0.0) ** 1.5, v - 1e5 * abs(v) / MU * z
+        return [w, -push * (1e5 * z + 300.0 * change) / 2.0, push / 2.0, change]
+
+    judge = solve_ivp(by_hand, (0, 0.06), [0.051, 1.5, -0.3, 0.0], method="Radau", rtol=1e-8, atol=1e-11).y[:, -1]
+    lost = MU * (traj["y_dot"][-1] + 0.3)
+    assert traj["y_dot"][-1] == pytest.approx(0.3, rel=1e-6)
+    assert 1.5 - judge[1] == pytest.approx(lost, rel=1e-3)
+    assert 1.5 - traj["x_dot"][-1] == pytest.approx(lost, rel=0.01)
+
+
 def test_what_a_smaller_load_holds() -> None:
     """After the load has fallen friction is at most that of the load, and the bristles keep their energy."""
     mod = slider(PLAIN).compile(target="numpy")

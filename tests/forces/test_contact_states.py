@@ -363,7 +363,7 @@ def test_numbers_of_states_are_those_of_the_parts() -> None:
     for force in mechanism.forces:
         function = force._function(force.name, range(-1, len(bodies)), _SharedData(0, mechanism.graph), False)
         pairs = len(force.states) // 2
-        assert function.states == 4 * pairs  # beside two states the decay by normal forces, and these
+        assert function.states == 5 * pairs  # beside two states: decay by normal forces, these, decay for damping
         taken = [k for k, bodies_of in enumerate(function.holders) if bodies_of]
         assert taken
         assert all(len(bodies_of) in (0, 2) for bodies_of in function.holders)
@@ -373,7 +373,7 @@ def test_numbers_of_states_are_those_of_the_parts() -> None:
                     if row[0] != other[0] and (kind.first != kind.second or i < j):
                         at = kind.held[0][i] + kind.held[1][j]
                         assert 0 <= at < function.states
-                        assert at % 4 == 0
+                        assert at % 5 == 0
                         assert {row[0], other[0]} == function.holders[at]
 
 

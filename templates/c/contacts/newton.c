@@ -78,7 +78,7 @@ static int newton(contacts *s, double *P, double tolerance, int most)
             return count;
         }
         if (newton_step(s, P)) {
-            for (int k = 0; k < s->n; k++) { P[k] = NAN; }
+            for (int k = 0; k < s->n; k++) { P[k] = (double)NAN; }
             return count;
         }
     }

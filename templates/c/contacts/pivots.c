@@ -155,7 +155,7 @@ static int pivot(edges *e, double *P, double tolerance, int most)
         int done = 0;
         e->own[k] = 0.0;
         while (!done && count < most) {
-            double whole, reach = INFINITY;
+            double whole, reach = (double)INFINITY;
             int first = -1;
             for (int a = 0; a < e->count; a++) { e->row[a] = between(e, k, s->order[a]); }
             enter(e, e->row);

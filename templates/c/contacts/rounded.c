@@ -64,7 +64,7 @@ static int follow(contacts *s, double *least, double tolerance, int most, double
 {
     double *const P = s->tried, speed = 0.0, rounding = 1.0, left = 0.0;
     int count = 0, still = 0;
-    double reached = INFINITY;
+    double reached = (double)INFINITY;
     for (int k = 0; k < s->n; k++) { P[k] = 0.0, speed = fmax(speed, fabs(s->given[k])); }
     while (reached > tolerance && count < most && rounding > RIGID_SHARP && still < RIGID_PATIENT) {
         soften(s, P, RIGID_SOFT);

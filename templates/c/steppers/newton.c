@@ -28,6 +28,11 @@ static newton_area newton_areas(const eomgen_run *run, int rows)
     return areas;
 }
 
+static int form_of(const newton_area *a)
+{
+    return (int)a->state[HALVED];
+}
+
 /* Whether the first half of J is [0 1]. */
 static int is_halved(int n, const double *J)
 {
@@ -57,7 +62,7 @@ static void newton_look_whole(const eomgen_run *run, const newton_area *a)
 {
     const int n = run->n, n_q = run->n_q, m = n - n_q;
     a->state[HALVED] = is_halved(n, a->J) ? HALF : WHOLE;
-    if (a->state[HALVED] == WHOLE && has_parts(run)) {
+    if (form_of(a) == WHOLE && has_parts(run)) {
         a->state[HALVED] = PARTS;
         a->state[DRIFT] = parts_products(n, n_q, a->J, a->real + m * m, a->re + m * m, a->im);
     }
@@ -120,7 +125,7 @@ static int newton_factor(eomgen_run *run, const newton_area *a, double g, double
     const int n = run->n, n_q = run->n_q;
     const double square = x * x + y * y;
     run->factorizations += 2;
-    if (a->state[HALVED] == SPARSE) {
+    if (form_of(a) == SPARSE) {
         const int filled = (int)a->state[FILLED];
         double *const room = a->im + filled;
         if (sparse_factor(n, filled, a->J, g, a->real, room) == 0 &&
@@ -129,13 +134,13 @@ static int newton_factor(eomgen_run *run, const newton_area *a, double g, double
         }
         newton_look_whole(run, a);
     }
-    if (a->state[HALVED] == PARTS && a->state[DRIFT] < RUNS_DRIFTING * fmin(fabs(g), sqrt(square))) {
+    if (form_of(a) == PARTS && a->state[DRIFT] < RUNS_DRIFTING * fmin(fabs(g), sqrt(square))) {
         const int m = n - n_q;
         parts_matrices(n, n_q, a->J, a->real + m * m, a->re + m * m, g, x / square, -y / square, a->real, a->re, a->im);
         return factor_real(m, a->real, a->order) || factor_complex(m, a->re, a->im, a->order_complex);
     }
-    a->state[HALVED] = a->state[HALVED] == HALF ? HALF : WHOLE;
-    const int halved = a->state[HALVED] == HALF, m = halved ? n / 2 : n;
+    a->state[HALVED] = form_of(a) == HALF ? HALF : WHOLE;
+    const int halved = form_of(a) == HALF, m = halved ? n / 2 : n;
     for (int i = 0; i < m; i++) {
         const double *const row = a->J + (halved ? m + i : i) * n;
         double *const plain = a->real + i * m, *const re = a->re + i * m, *const im = a->im + i * m;
@@ -153,11 +158,11 @@ static int newton_factor(eomgen_run *run, const newton_area *a, double g, double
 static void newton_solve(const eomgen_run *run, const newton_area *a, double g, double *restrict r)
 {
     const int n = run->n, m = n / 2;
-    if (a->state[HALVED] == SPARSE) {
+    if (form_of(a) == SPARSE) {
         sparse_solve(n, (int)a->state[FILLED], a->real, r, a->im + (int)a->state[FILLED]);
         return;
     }
-    if (a->state[HALVED] == PARTS) {
+    if (form_of(a) == PARTS) {
         const int n_q = run->n_q, n_v = n - n_q;
         double *const room = a->im + n_v * n_v;
         parts_carry(n, n_q, a->J, g, NULL, r, room);
@@ -166,7 +171,7 @@ static void newton_solve(const eomgen_run *run, const newton_area *a, double g, 
         parts_carry(n, n_q, a->J, g, r + n_q, r, room);
         return;
     }
-    if (a->state[HALVED] == WHOLE) {
+    if (form_of(a) == WHOLE) {
         solve_real(n, a->real, a->order, r);
         return;
     }
@@ -190,12 +195,12 @@ static void newton_solve_complex(const eomgen_run *run, const newton_area *a, do
 {
     const int n = run->n, m = n / 2;
     const double square = x * x + y * y, u = x / square, v = -y / square;
-    if (a->state[HALVED] == SPARSE) {
+    if (form_of(a) == SPARSE) {
         const int filled = (int)a->state[FILLED];
         sparse_solve_complex(n, filled, a->real, a->re, a->im, r, s, a->im + filled);
         return;
     }
-    if (a->state[HALVED] == PARTS) {
+    if (form_of(a) == PARTS) {
         const int n_q = run->n_q, n_v = n - n_q;
         double *const room = a->im + n_v * n_v;
         parts_carry_complex(n, n_q, a->J, u, v, NULL, NULL, r, s, room);
@@ -205,7 +210,7 @@ static void newton_solve_complex(const eomgen_run *run, const newton_area *a, do
         parts_carry_complex(n, n_q, a->J, u, v, r + n_q, s + n_q, r, s, room);
         return;
     }
-    if (a->state[HALVED] == WHOLE) {
+    if (form_of(a) == WHOLE) {
         solve_complex(n, a->re, a->im, a->order_complex, r, s);
         return;
     }
@@ -229,11 +234,11 @@ int eomgen_is_sound(const eomgen_method *method, const eomgen_run *run)
 {
     const int n = run->n;
     const newton_area a = newton_areas(run, method->rows_K);
-    if (a.state[HALVED] == SPARSE) { /* which has no use for the rows that others exchange */
+    if (form_of(&a) == SPARSE) { /* which has no use for the rows that others exchange */
         return n >= SPARSE_FROM && sparse_is_sound(n, a.state[FILLED], a.real, a.order);
     }
-    const int m = a.state[HALVED] == WHOLE ? n : a.state[HALVED] == HALF ? n / 2 : n - run->n_q;
-    int sound = a.state[HALVED] == WHOLE || a.state[HALVED] == HALF || (a.state[HALVED] == PARTS && has_parts(run));
+    const int m = form_of(&a) == WHOLE ? n : form_of(&a) == HALF ? n / 2 : n - run->n_q;
+    int sound = form_of(&a) == WHOLE || form_of(&a) == HALF || (form_of(&a) == PARTS && has_parts(run));
     for (int i = 0; i < 2 * n; i++) {
         sound = sound && a.order[i] >= 0 && a.order[i] < (m > 1 ? m : 1);
     }

@@ -151,7 +151,7 @@ static int sparse_look(int n, const double *restrict J, double dense, double *re
         return 0;
     }
     const long filled = sparse_eliminate(n, words, near, order, degree, &products);
-    if (2 * filled > (long)n * n || SPARSE_TIMES * (products + SPARSE_ROW * (double)n) > dense) {
+    if (2 * filled > (long)n * n || (double)SPARSE_TIMES * (products + (double)(SPARSE_ROW * n)) > dense) {
         return 0;
     }
     sparse_write(n, words, filled, near, order, degree, rows);
