@@ -119,7 +119,8 @@ def driver_files(program: Program) -> list[str]:
         else:
             needed = LOOPS[driver.name]
         files.update(dict.fromkeys(needed))
-    return list(files)
+    normal = ("correct_change", "normal") if program.given_rates and program.sizes.n_h else ()
+    return list(dict.fromkeys(file for name in files for file in (*(normal if name == "project" else ()), name)))
 
 
 def _passing_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
@@ -241,6 +242,8 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     if "mass_times" in names:
         lengths.append(("UNIT", n_q + 2 * n))  # q, a, M a
     if program.has_loops:
+        if program.given_rates:
+            lengths += [("GRADIENT", h * n_q), ("NORMAL", m * m), ("MENDED", n_q)]  # dC/dq, its products, a change of q
         lengths += [
             ("POSITION", h + m * n),  # C, C_q
             ("RATE", m),

@@ -126,6 +126,7 @@ def _context(program: Program, library: str, steps: int) -> dict[str, Any]:
         "independent_q": independent_q,
         "independent_names": [program.velocities[k] for k in program.preferred],
         "turned": space is not None,
+        "given_rates": program.given_rates,
         "n_states": program.n_states,
         "slots": [list(slot) for slot in program.quaternion_slots],
         "plain": [] if space is None else list(zip(space.plain_q.tolist(), space.plain_v.tolist(), strict=True)),

@@ -120,9 +120,7 @@ def random_state(module: Any, seed: int, t: float = 0.0, size: float = 0.1) -> n
     """A consistent state near the declared one, moving."""
     random = np.random.default_rng(seed)
     x = np.array(module.x0(t=t))
-    places = (
-        module.layout.place_scales.q[: module.layout.moving] if not module.layout.metadata["quaternion_slots"] else 1.0
-    )
+    places = 1.0 if module.layout.metadata["quaternion_slots"] else module.layout.place_scales.q[: module.n_q]
     x[: module.n_q] += size * places * random.uniform(-1, 1, module.n_q)
     x[module.n_q :] += module.layout.scales.q * random.uniform(-1, 1, module.layout.n_v)
     return np.array(module.project(x, t=t))

@@ -91,8 +91,10 @@ def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> No
     c, graph = kinematics.constraints, kinematics.graph
     known = {graph.symbol(name): graph.constant(numbers[name]) for name in kinematics.parameter_names}
     problems = []
-    for label, row, written in zip(c.labels, c.jacobian, c.written, strict=True):
+    for i, (label, row, written) in enumerate(zip(c.labels, c.jacobian, c.written, strict=True)):
         slopes = [x for x in row if not x.is_zero]
+        if kinematics.given_rates and i < len(c.slopes) and not all(vanishing(substitute(c.slopes[i], known))):
+            continue  # it holds coordinates that no velocity leaves, as the length of Euler parameters
         if (written and slopes) or not all(vanishing(substitute(slopes, known))):
             used = sorted(symbols_of(slopes) & set(kinematics.parameter_names))
             what = f"{label} {IDLE} at all positions that were tried: its slopes are 0"

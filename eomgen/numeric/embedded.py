@@ -16,7 +16,7 @@ from ..errors import NonFiniteError, SingularMassMatrixError
 from . import algebra
 from .definite import indefinite_factor, moves_inertia, safely_positive
 from .partitions import Partition, partition
-from .projection import minimum_norm, project, tangent_projector
+from .projection import beyond_velocities, minimum_norm, project, tangent_projector
 from .scales import Array, GivenRates, Indices, Position, Rate, Scales
 
 
@@ -199,10 +199,12 @@ def jacobian(
     if len(here.gamma):
         if given is None:
             turn = _project_directions(q, position(q), scales)
-        else:  # q and the step back N d, d the smallest with C_q d = -dC
+        else:  # q and the step back N d, d the smallest with C_q d = -dC, and what that leaves of C
             turn = np.eye(n_q)
             if h := len(position(q)[0]):
-                turn = turn - given.moved(q, minimum_norm(here.C_q[:h], given.slopes(q, turn), scales))
+                J, gradient = scales.jacobian(here.C_q[:h]), given.gradient(q)
+                d, further = beyond_velocities(J, gradient / scales.c[:h, None], gradient, scales)
+                turn = turn - given.moved(q, s[:, None] * d) - further
         dq = np.hstack([turn, np.zeros((n_q, n))])
         dv = np.hstack([-minimum_norm(here.C_q, r.r3_q @ turn, scales), tangent_projector(here.C_q, scales)])
     a_p = split.particular(-(r.r2_q @ dq + r.r2_v @ dv) / scales.c[:, None])

@@ -17,7 +17,7 @@ class GivenRates(NamedTuple):
     of: Callable[[Array, Array], Array]  #: (q, v) -> q' (n_q,)
     moved: Callable[[Array, Array], Array]  #: (q, dv) -> N dv, dv (n_v,) or (n_v, k)
     along: Callable[[Array, Array, Array, Array], Array]  #: (q, v, dq, dv) -> the change of q', (n_q, k)
-    slopes: Callable[[Array, Array], Array]  #: (q, dq) -> the change of the holonomic rows, (h, k)
+    gradient: Callable[[Array], Array]  #: q -> dC/dq of the holonomic rows, (h, n_q)
 
     def rates(self, q: Array, v: Array) -> Array:
         """q' (n_q,)."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import NonFiniteError, ProjectionError
-from ..limits.constraints import ACCEPTED, EXACT, GENTLE, HINDERED, NEAR, SETTLED, SHORT
+from ..limits.constraints import ACCEPTED, EXACT, GENTLE, HINDERED, NEAR, SETTLED, SHORT, TIKHONOV
 from ..limits.rounding import EPS, ROUNDED
 from .gram import gram_solver, least, smaller, weakness
 from .scales import Array, GivenRates, Position, Rate, Scales
@@ -75,21 +75,34 @@ def correct_position(
         if step == STEPS:
             break
         z = gram_solver(J, max(GENTLE, float(np.abs(e).mean())))(e)
-        dz = J.T @ z
+        dz, dq = J.T @ z, 0.0 * q
         if largest(e - J @ dz) > HINDERED * size and not within(e, EXACT, 0.0625 * rounded):
             weak = weakness(J, z)
             if size < NEAR * weak:
                 dz = J.T @ gram_solver(J, smaller(weak))(e)
-        longest = largest(dz)
+        left = e - J @ dz
+        if given is not None and largest(left) > HINDERED * size:
+            dq = beyond_velocities(J, e, given.gradient(q), scales)[1]
+        longest = max(largest(dz), largest(dq))
         # one step at least: near configurations where rows depend on each other a small residual is no small distance
-        last = longest <= SHORT and largest(e - J @ dz) <= EXACT
-        if longest > DAMPING:
-            dz *= DAMPING / longest
-        q = scales.move(q, -dz) if given is None else given.move(q, -scales.q * dz)
+        last = longest <= SHORT and largest(left) <= EXACT
+        part = DAMPING / longest if longest > DAMPING else 1.0
+        q = scales.move(q, -part * dz) if given is None else given.move(q, -part * scales.q * dz) - part * dq
         before = size
     if within(e, ACCEPTED, rounded):
         return q, C_q
     raise ProjectionError(f"the projection onto the constraints stopped at a scaled residual of {size:.1e}")
+
+
+def beyond_velocities(J: Array, y: Array, gradient: Array, scales: Scales) -> tuple[Array, Array]:
+    """The smallest scaled d that changes the scaled residual by y (h,) or (h, k), and the least dq for what d leaves.
+
+    No velocity changes the length of Euler parameters of which e^T e - 1 stands as a constraint.
+    """
+    d, solve, rows = least(J, y, J.T @ (0.0 * y), largest(y)), gram_solver(J), gradient / scales.c[: len(y), None]
+    for _ in range(2):  # it ends where something is left, of the size of its term
+        d = d + J.T @ solve(y - J @ d)
+    return d, np.asarray(rows.T @ gram_solver(rows, TIKHONOV)(y - J @ d))
 
 
 def correct_velocity(C_q: Array, C_t: Array, v: Array, scales: Scales) -> Array:

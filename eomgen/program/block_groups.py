@@ -10,7 +10,7 @@ from itertools import chain
 from .terms import Row
 
 COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h, C_q and gamma are put together from
-RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
+RATES = ("rates", "moved", "rates_along")  #: blocks of given q' = N v + b
 
 #: Blocks of the right-hand side of loops, and those that are tried before them where that pays.
 USUAL, REGULAR = ("closing", "dynamics"), ("regular_closing", "regular_dynamics")

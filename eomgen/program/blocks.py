@@ -267,7 +267,8 @@ class BlockMaker:
 
     def drivers_need(self, name: str) -> tuple[str, ...]:
         """Names of the blocks behind a public kernel that is not straight-line code."""
-        return (*self._behind(name), *(RATES if self.terms.given_rates else ()))
+        given = (*RATES, *(("coordinate_slopes",) if self.terms.coordinate_slopes else ()))
+        return (*self._behind(name), *(given if self.terms.given_rates else ()))
 
     def _behind(self, name: str) -> tuple[str, ...]:
         if name in ALONG:
@@ -367,10 +368,9 @@ class BlockMaker:
                 return self._internal(name, "q a", jvp(terms.inverse_dynamics, along))
             case "rates":  # q'
                 return self._internal(name, "q v", terms.rates)
-            case "moved" | "rates_along" | "slopes_along":  # N dv; dq' along (dq, dv); dC along dq
-                what = terms.constraints if name == "slopes_along" else terms.rates
+            case "moved" | "rates_along":  # N dv; dq' along (dq, dv)
                 held = dict.fromkeys(self._symbols(terms.q), terms.graph.zero) if name == "moved" else {}
-                return self._internal(name, "q v a multipliers dq dv", jvp(what, self._directions | held))
+                return self._internal(name, "q v a multipliers dq dv", jvp(terms.rates, self._directions | held))
             case "acceleration_tangent":  # dv' along (dq, dv)
                 accelerations, checks = self._accelerations
                 return self._internal(name, "q v dq dv", jvp(accelerations, self._directions), checks)

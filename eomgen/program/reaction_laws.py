@@ -30,7 +30,14 @@ from ..kinematics.wrenches import JointWrenches
 from .factor import factorize, solve
 from .held_constraints import LinearValues, hold
 from .law_pieces import pieces_of
-from .reaction_users import Users, refuse_joints, refuse_redundant, require_inertia_of_tree, too_many_pieces
+from .reaction_users import (
+    Users,
+    refuse_joints,
+    refuse_redundant,
+    refuse_without_inertia,
+    too_many_pieces,
+    without_inertia,
+)
 from .reset_velocities import AfterEvents
 from .solve_laws import laws_in, solve_laws
 from .undetermined_reactions import refuse_undetermined
@@ -153,18 +160,28 @@ def _motion(
     """[a; l] without the laws' forces, and what a unit of each of them changes: M a + h + C^T l = 0, C a = -gamma."""
     graph, constraints = kinematics.graph, kinematics.constraints
     tree = METHODS["embedding"](kinematics)
-    require_inertia_of_tree(kinematics, mobility, tree.mass_matrix, users)
     slopes, n = jacobian(list(tree.bias), list(forces)), len(kinematics.v)
     bias = substitute(list(tree.bias), dict.fromkeys(forces, graph.zero))
+    C = [constraints.jacobian[i] for i in mobility.independent_rows]
+    gamma = [constraints.gamma[i] for i in mobility.independent_rows]
+    mass_matrix, parent = tree.mass_matrix, kinematics.parent
+    still = without_inertia(kinematics, mobility, mass_matrix)
+    if still and C:
+        # massless bodies that loops move: (M + s C^T C) a + C^T l = -h - s C^T gamma has the same solution
+        s = total([mass_matrix[i][i] for i in range(n)]) / total([x * x for row in C for x in row])
+        columns = [list(column) for column in zip(*C, strict=True)]
+        pushed = [[s * dot(one, other) for other in columns] for one in columns]
+        mass_matrix = [[x + y for x, y in zip(*r, strict=True)] for r in zip(mass_matrix, pushed, strict=True)]
+        bias = [h + s * dot(column, gamma) for h, column in zip(bias, columns, strict=True)]
+        parent = tuple(range(-1, n - 1))
+        still = without_inertia(kinematics, mobility, mass_matrix)
+    refuse_without_inertia(still, users)
     right = [[-h for h in bias]]
     right += [[-slopes.get((i, j), graph.zero) for i in range(n)] for j in range(len(forces))]
-    factor = factorize(tree.mass_matrix, kinematics.parent)
+    factor = factorize(mass_matrix, parent)
     free = [solve(factor, column) for column in right]
-    rows = mobility.independent_rows
-    C = [constraints.jacobian[i] for i in rows]
     moved = [solve(factor, row) for row in C]
     schur = [[dot(row, y) for y in moved] for row in C]
-    gamma = [constraints.gamma[i] for i in rows]
     found = []
     for k, a in enumerate(free):
         gap = [dot(row, a) + (g if k == 0 else 0.0) for row, g in zip(C, gamma, strict=True)]

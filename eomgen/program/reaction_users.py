@@ -82,16 +82,14 @@ def refuse_joints(kinematics: Kinematics) -> None:
         raise ModelError(problems)
 
 
-def require_inertia_of_tree(
-    kinematics: Kinematics, mobility: Mobility, mass_matrix: Sequence[Sequence[Expr]], users: Users
-) -> None:
-    """Refuse a tree that has inertia behind every coordinate at no configuration; its reactions are found with that.
+def without_inertia(kinematics: Kinematics, mobility: Mobility, mass_matrix: Sequence[Sequence[Expr]]) -> list[str]:
+    """What moves, by name, in a motion behind which a matrix has inertia at no configuration; nothing if there is none.
 
     Where there is none at single configurations only, as Euler angles make it, a run that gets there says so.
     """
     values = {p.name: p.value for p in kinematics.mechanism.parameters}
     if mobility.assumed or any(value is None for value in values.values()):
-        return
+        return []
     flat, n = [x for row in mass_matrix for x in row], len(kinematics.v)
     names = sorted(symbols_of(flat))
     evaluator = compile_evaluator(flat, names)
@@ -105,16 +103,19 @@ def require_inertia_of_tree(
             continue
         sizes, directions = algebra.eigh(correlated(M))
         if not n or sizes[0] > SINGULAR:
-            return
+            return []
         if weights is None:
             weights = np.abs(directions[:, 0])
-    if weights is not None:
-        moved = [x for x, w in zip(kinematics.velocity_labels, weights, strict=True) if w > 0.1 * weights.max()]
-        message = (
-            f"{users.verb('depend')} on reactions, and moving {', '.join(moved)} without its loops meets no inertia"
-        )
-        remedy = "give every body mass, or inertia about its joint"
-        raise ModelError([users.together(message, remedy)])
+    if weights is None:
+        return []
+    return [x for x, w in zip(kinematics.velocity_labels, weights, strict=True) if w > 0.1 * weights.max()]
+
+
+def refuse_without_inertia(moved: Sequence[str], users: Users) -> None:
+    """Refuse a motion that loops leave, behind which there is no inertia."""
+    if moved:
+        message = f"{users.verb('depend')} on reactions, and moving {', '.join(moved)} meets no inertia"
+        raise ModelError([users.together(message, "give every body mass, or inertia about its joint")])
 
 
 def refuse_redundant(mobility: Mobility, users: Users) -> None:

@@ -17,7 +17,8 @@ def constraint_system(kernels: Kernels) -> ConstraintSystem:
     layout = kernels.layout
     C = kernels.state("constraints", nan=True)
     slopes = "coordinate_slopes" if layout.n_coordinate_slopes else "constraint_jacobian"
-    C_q = kernels.state(slopes, nan=True)
+    C_q, none = kernels.state(slopes, nan=True), np.zeros((0, layout.n_q))
+    places = layout.n_h or not layout.given_rates  # rows of given velocities alone say nothing of q
     y, y_q = kernels.motion("loop_coordinates"), kernels.state("loop_coordinate_jacobian", nan=True)
     alignment, zero = kernels.state("alignment", nan=True), np.zeros(layout.n_v)
 
@@ -27,4 +28,5 @@ def constraint_system(kernels: Kernels) -> ConstraintSystem:
     joints = CutJoints(layout.loops, layout.loop_kinds, layout.loop_scales, cut)
     aligned = (lambda q, t: alignment(q, t=t)) if layout.n_alignments else None
     named = layout.place_scales, layout.q, layout.coordinate_kinds, layout.constraint_labels
-    return ConstraintSystem(lambda q, t: (C(q, t=t), C_q(q, t=t)), *named, joints, aligned)
+    evaluate = (lambda q, t: (C(q, t=t), C_q(q, t=t))) if places else lambda q, t: (np.zeros(0), none)
+    return ConstraintSystem(evaluate, *named, joints, aligned)

@@ -173,7 +173,7 @@ class Drivers:
             lambda q, v: np.asarray(blocks["rates"](t, np.concatenate([q, v]), u, c), dtype=float),
             lambda q, dv: along("moved", q, np.zeros(n), np.zeros((n_q, *dv.shape[1:])), dv),
             partial(along, "rates_along"),
-            lambda q, dq: along("slopes_along", q, np.zeros(n), dq, np.zeros((n, *dq.shape[1:]))),
+            lambda q: np.asarray(blocks["coordinate_slopes"](t, q, u, c), dtype=float).reshape(layout.n_h, n_q),
         )
 
     # drivers

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
+from sympy.physics import mechanics as me
 
 import eomgen as eg
 from eomgen.describe import Description
@@ -107,6 +109,126 @@ def test_no_constraints_small_and_large(n: int, target: str) -> None:
     assert module.jacobian(t, x) == pytest.approx(slopes(lambda y: module.rhs(t, y), x), abs=1e-8)
     batch = np.column_stack([x, 0.5 * x])
     assert module.rhs(t, batch)[:, 1] == pytest.approx(module.rhs(t, 0.5 * x))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("blade", [False, True])
+@pytest.mark.parametrize(("n", "k"), [(3, 2), (1, 2), (2, 3), (7, 6)])
+def test_speeds_and_coordinates_that_differ_in_number(n: int, k: int, blade: bool, target: str) -> None:
+    q, v = [f"q{i}" for i in range(n)], [f"s{i}" for i in range(k)]
+    rates = {a: f"(1.5 + 0.3*sin(q{(i + 1) % n}))*s{i % k} + w*cos(t)" for i, a in enumerate(q)}
+    mass = [["2 + cos(q0)" if i == j else 0.1 for j in range(k)] for i in range(k)]
+    forcing = [f"-q{i % n} - 0.3*s{i}*s{(i + 1) % k}" for i in range(k)]
+    rows = [f"s{k - 1} - 0.5*s0*cos(q0)"] if blade else []
+    model = given(
+        "differ", coordinates=q, velocities=v, rates=rates, mass_matrix=mass, forcing=forcing, constraints=rows
+    )
+    module, t = model.compile(target=target), 0.4
+    x = module.project(np.random.default_rng(n).uniform(-1.0, 1.0, n + k), t=t)
+    p, s = x[:n], x[n:]
+    M = np.full((k, k), 0.1) + np.diag(np.full(k, 1.9 + np.cos(p[0])))
+    f = np.array([-p[i % n] - 0.3 * s[i] * s[(i + 1) % k] for i in range(k)])
+    q_dot = np.array([(1.5 + 0.3 * np.sin(p[(i + 1) % n])) * s[i % k] + 1.3 * np.cos(t) for i in range(n)])
+    a = np.linalg.solve(M, f)
+    if blade:
+        row = np.zeros(k)
+        row[-1], row[0] = 1.0, row[0] - 0.5 * np.cos(p[0])
+        push = np.linalg.solve(M, row)
+        a -= push * (row @ a + 0.5 * s[0] * np.sin(p[0]) * q_dot[0]) / (row @ push)
+    assert module.rhs(t, x) == pytest.approx(np.concatenate([q_dot, a]), abs=1e-12)
+    assert module.jacobian(t, x) == pytest.approx(slopes(lambda y: module.rhs(t, y), x), abs=1e-8)
+    assert len(module.branches(q0=0.2)) == 1
+    assert module.assemble(q0=0.2)[0] == 0.2
+    start = dict(zip(module.x_names, x, strict=True))
+    ends = [module.simulate(0.3, initial=start, method=m).x[:, -1] for m in ("DOP853", "Radau")]
+    assert ends[0] == pytest.approx(ends[1], abs=1e-6)
+    assert module.linearize(x).A.shape[0] == n + k - blade
+    if (n, target) == (3, "numpy"):
+        assert model.derive().explain().difference < 1e-9
+
+
+def test_sleigh_of_kane() -> None:
+    x, y, h, v, w = me.dynamicsymbols("x y h v w")
+    m, J, a = sympy.symbols("m J a")
+    ground, body = me.ReferenceFrame("A"), me.ReferenceFrame("B")
+    body.orient_axis(ground, ground.z, h)
+    body.set_ang_vel(ground, w * ground.z)
+    blade = me.Point("P")
+    blade.set_vel(ground, v * body.x)
+    center = blade.locatenew("C", a * body.x)
+    center.v2pt_theory(blade, ground, body)
+    known = [x.diff() - v * sympy.cos(h), y.diff() - v * sympy.sin(h), h.diff() - w]
+    kane = me.KanesMethod(ground, [x, y, h], [v, w], kd_eqs=known)
+    kane.kanes_equations([me.RigidBody("b", center, body, m, (me.inertia(body, 0, 0, J), center))], [])
+    module = eg.from_sympy(kane, "sleigh", parameters={m: 2.0, J: 0.3, a: 0.25}).compile(target="numpy")
+    x_dot = dict(zip(module.x_names, module.rhs(0.0, module.x0(h=0.4, v=0.9, w=-0.8)), strict=True))
+    assert (x_dot["x"], x_dot["y"], x_dot["h"]) == pytest.approx((0.9 * np.cos(0.4), 0.9 * np.sin(0.4), -0.8))
+    assert (x_dot["v"], x_dot["w"]) == pytest.approx((0.25 * 0.64, 2 * 0.25 * 0.72 / (0.3 + 2 * 0.25**2)))
+
+
+LENGTH = "e0**2 + e1**2 + e2**2 + e3**2 - 1"
+
+
+def turning(*rows: str, k: float | None = None) -> eg.Model:
+    """A body by Euler parameters and three speeds, and a slide; e^T e = 1 is no more than a constraint."""
+    turn = "-(e1*wx + e2*wy + e3*wz)/2", "(e0*wx + e2*wz - e3*wy)/2", "(e0*wy + e3*wx - e1*wz)/2"
+    names = ["e0", "e1", "e2", "e3", "z"]
+    model = given(
+        "turning",
+        coordinates=names,
+        velocities=["wx", "wy", "wz", "s"],
+        rates=dict(zip(names, (*turn, "(e0*wz + e1*wy - e2*wx)/2", "s"), strict=True)),
+        mass_matrix=[[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 3, 0], [0, 0, 0, "w"]],
+        forcing=["-wy*wz", "2*wx*wz", "-wx*wy", "-z"],
+        constraints=list(rows),
+    )
+    model.guess(e0=1.0, e1=0.1, e2=-0.2, e3=0.3)
+    if k is not None:
+        model.parameter("k", k)
+    return model
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize(
+    "rows",
+    [
+        (LENGTH,),
+        (LENGTH, "2*(e1*e3 - e0*e2) + 0.5*z - 0.1", "wz - 0.3*s*e0 - 0.05"),
+        (f"2*(e1*e3 - e0*e2) + 0.5*z - 0.1 + 3*({LENGTH})", "2*(e1*e3 - e0*e2) + 0.5*z - 0.1"),
+    ],
+    ids=["length", "all kinds of rows", "only together"],
+)
+def test_lengths_that_no_velocity_changes(rows: tuple[str, ...], target: str) -> None:
+    """States off a constraint that velocities cannot leave are brought onto it by the coordinates themselves."""
+    module = turning(*rows).compile(target=target)
+    x = module.project(module.x0(wx=0.3, wy=-0.4) + 0.05 * np.random.default_rng(3).normal(size=9))
+    exact = module.jacobian(0.2, x)
+    assert exact == pytest.approx(slopes(lambda y: module.rhs(0.2, y), x, 1e-5), abs=1e-6 if len(rows) == 2 else 1e-8)
+    for off in (1e-9, 1e-3, 0.2):
+        near = module.project(x + off * np.array([1.0, -0.5, 0.3, 0.2, 0.1, 0, 0, 0, 0]))
+        e0, e1, e2, e3, z = near[:5]
+        assert near[:4] @ near[:4] == pytest.approx(1.0, abs=1e-13)
+        assert len(rows) == 1 or 2 * (e1 * e3 - e0 * e2) + 0.5 * z == pytest.approx(0.1, abs=1e-13)
+        assert module.project(near) == pytest.approx(near, abs=1e-14)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_length_as_constraint_takes_the_steps_of_a_ball(target: str) -> None:
+    body = eg.Model("ball")
+    body.spherical("b", body.ground, body.body("b", mass=1, inertia=(1, 2, 3)), rotation="euler_parameters")
+    ball = body.compile(target="numpy").simulate(5.0, initial={"b_wx": 0.01, "b_wy": 2.0, "b_wz": 0.01})
+    run = turning(LENGTH).compile(target=target).simulate(5.0, initial={"e0": 1.0, "wx": 0.01, "wy": 2.0, "wz": 0.01})
+    assert len(run.t) <= 1.5 * len(ball.t)
+    assert [run[w][-1] for w in ("wx", "wy", "wz")] == pytest.approx([ball[f"b_w{a}"][-1] for a in "xyz"], abs=1e-6)
+
+
+@pytest.mark.parametrize("row", [f"sqrt({LENGTH} + 1) - 1", "k*e0**2 + k*e1**2 + k*e2**2 + k*e3**2 - k"])
+def test_length_written_otherwise(row: str) -> None:
+    """The slopes by velocities cancel to rounding only."""
+    module = turning(row, k=2.0 if "k*" in row else None).compile(target="numpy")
+    x = module.x0(wy=2.0)
+    assert module.n_dof == 4
+    assert module.project(np.r_[1.001 * x[:4], x[4:]]) == pytest.approx(x, abs=1e-14)
 
 
 @pytest.mark.slow

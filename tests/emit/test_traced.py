@@ -203,6 +203,45 @@ def test_minimal_form_of_loops(name: str) -> None:
     np.testing.assert_allclose(rates, expected, atol=1e-9 * max(1.0, np.abs(expected).max()))
 
 
+@pytest.mark.parametrize("library", ["casadi", "jax"])
+@pytest.mark.parametrize("blades", [1, 2])
+def test_rows_of_velocities_alone(blades: int, library: str) -> None:
+    """No row holds a position; the states of a sleigh and of one that pulls another."""
+    m = eg.Model("sleigh")
+    body = m.body("b", mass=2.0, com=(0.25, 0, 0), inertia={"zz": 0.3})
+    m.planar("J", m.ground, body)
+    m.knife_edge("k", body)
+    if blades == 2:
+        pulled = m.body("c", mass=1.0, inertia={"zz": 0.1})
+        m.revolute("R", body.at(0.5, 0, 0), pulled)
+        m.knife_edge("l", pulled)
+    m.output("a", "ax(b)")
+    module, functions = m.compile(target="numpy"), getattr(m.derive(), f"to_{library}")()
+    x = module.project(0.1 * np.arange(module.n_x)) + 0.01
+    for name in ("rhs", "project", "outputs"):
+        found = np.asarray(getattr(functions, name)(0.0, x, module.u, module.p)).ravel()
+        expected = module.project(x) if name == "project" else getattr(module, name)(0.0, x)
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("library", ["casadi", "jax"])
+@pytest.mark.parametrize("n", [29, 30])
+def test_given_rates_of_large_equations(n: int, library: str) -> None:
+    """q' is what was given, not the velocities, also where the mass matrix is solved by the library."""
+    q, v = [f"q{i}" for i in range(n)], [f"u{i}" for i in range(30)]
+    mass = [[3.0 if i == j else "0.3*cos(q0)" if abs(i - j) == 1 else 0 for j in range(30)] for i in range(30)]
+    rates = {a: f"(1.5 + sin({a}))*u{i}" for i, a in enumerate(q)}
+    model = eg.Model.from_equations(
+        "large", q, velocities=v, rates=rates, mass_matrix=mass, forcing=[f"-u{i}" for i in range(30)]
+    )
+    functions = getattr(model.derive(), f"to_{library}")()
+    x = np.random.default_rng(1).uniform(-1.0, 1.0, n + 30)
+    found = np.asarray(functions.rhs(0.0, x, np.zeros(0), np.zeros(0))).ravel()
+    M = 3.0 * np.eye(30) + 0.3 * np.cos(x[0]) * (np.eye(30, k=1) + np.eye(30, k=-1))
+    expected = np.r_[(1.5 + np.sin(x[:n])) * x[n : 2 * n], np.linalg.solve(M, -x[n:])]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
 def test_a_state_far_from_the_loops_is_no_number() -> None:
     equations = example("slider_crank")
     functions = equations.to_casadi()

@@ -510,17 +510,53 @@ def test_forces_out_of_the_plane_of_a_loop_are_refused():
         flat.check()
 
 
-def test_massless_links_are_refused():
+def massless_rod(mass: float, friction: float) -> eg.Model:
     m = eg.Model("engine", gravity=(0, -G, 0))
     crank = m.body("crank", mass=1.0, inertia={"zz": 0.01})
-    rod, piston = m.body("rod", mass=0.0), m.body("piston", mass=0.0)
+    rod, piston = m.body("rod", mass=mass, com=(0.15, 0, 0)), m.body("piston", mass=0.5)
     m.revolute("A", m.ground, crank, coordinate="theta")
     m.revolute("B", crank.at(0.1, 0, 0), rod)
     m.revolute("C", rod.at(0.3, 0, 0), piston)
     m.prismatic("S", m.ground, piston, axis="x", coordinate="s")
-    m.initial(theta=0.8)
-    m.friction("guide", joint="S", coefficient=0.1, smoothing=1e-2)
-    with pytest.raises(eg.ModelError, match="depend on reactions, and moving .* without its loops meets no inertia"):
+    m.initial(theta=0.8, theta_dot=3.0)
+    m.output("pin", "reaction(B).x")
+    m.output("guide", "reaction(S).y")
+    if friction:
+        m.friction("rubbing", joint="S", coefficient=friction, smoothing=1e-2)
+    return m
+
+
+@pytest.mark.parametrize("target", ["numpy", pytest.param("cython", marks=pytest.mark.slow)])
+def test_reactions_beside_a_massless_rod(target):
+    """A rod without mass pulls along itself; the guide carries the weight of the piston and its pull."""
+    mod = massless_rod(0.0, 0.0).compile(target=target)
+    x = mod.x0()
+    x_dot = dict(zip(mod.x_names, mod.rhs(0.0, x), strict=True))
+    pin, guide = mod.outputs(0.0, x)
+    slope = np.arcsin(0.1 * np.sin(0.8) / 0.3)  # of the rod, downwards
+    s_ddot = (
+        mod.loop_coordinates(x[:3], x[3:], mod.rhs(0.0, x)[3:])[2][0] if "s" in mod.layout.loops else x_dot["s_dot"]
+    )
+    assert abs(pin) == pytest.approx(abs(0.5 * s_ddot), abs=1e-12)
+    assert guide == pytest.approx(0.5 * G - np.tan(slope) * -0.5 * s_ddot, abs=1e-12)
+    # turning of the crank by the pull at its pin
+    moment = -0.5 * s_ddot * (-0.1 * np.sin(0.8) - 0.1 * np.cos(0.8) * np.tan(slope))
+    assert 0.01 * x_dot["theta_dot"] == pytest.approx(moment, abs=1e-12)
+
+
+def test_friction_beside_a_massless_rod():
+    found = []
+    for mass in (0.0, 1e-9):
+        mod = massless_rod(mass, 0.2).compile(target="numpy")
+        x = mod.x0()
+        found.append(np.r_[mod.outputs(0.0, x), mod.rhs(0.0, x)])
+    assert found[0] == pytest.approx(found[1], abs=1e-6)
+
+
+def test_massless_links_that_no_loop_moves_are_refused():
+    m = massless_rod(0.0, 0.2)
+    m.revolute("L", m.ground, m.body("leaf", mass=0.0))
+    with pytest.raises(eg.ModelError, match="meets no inertia"):
         m.check()
 
 

@@ -375,3 +375,23 @@ def test_four_bar_whose_masses_leave_its_plane(gravity: tuple[float, float, floa
         m.output("turned", f"reaction({joint}, in=c.tilted).mz")
         found = m.compile(target="numpy").outputs(0.0, x)
         assert found == pytest.approx([*expected[k, [0, 1, 5]], expected[k, 5]], abs=1e-9)
+
+
+def test_tension_of_a_rope_over_a_massless_pulley():
+    """Atwood's double machine: the multiplier of each rope is its force."""
+    m1, m2, m3, g = 4.0, 1.0, 2.5, 9.81
+    rope = np.linalg.solve(
+        [[m1, 0, 0, 2], [0, m2, 0, 1], [0, 0, m3, 1], [1, 0.5, 0.5, 0]], [m1 * g, m2 * g, m3 * g, 0]
+    )[3]
+    m = eg.Model("atwood", gravity=(0, -g, 0))
+    for i, (name, mass) in enumerate((("w1", m1), ("w2", m2), ("w3", m3), ("pulley", 0))):
+        m.prismatic(f"{name}_y", m.ground.at(0.5 * i, 0, 0), m.body(name, mass=mass), axis="-y")
+    m.coupling("rope1", {"w1_y": 1, "pulley_y": 1}, 2.0)
+    m.coupling("rope2", {"w2_y": 1, "w3_y": 1, "pulley_y": -2}, 1.0)
+    m.output("upper", "multiplier(rope1)")
+    m.output("lower", "multiplier(rope2)")
+    m.initial(w1_y=1.0, w2_y=1.2)
+    mod = m.compile(target="numpy")
+    x = mod.x0()
+    assert np.abs(mod.outputs(0.0, x)) == pytest.approx([2 * rope, rope], rel=1e-12)
+    assert mod.outputs(0.0, x) == pytest.approx(mod.multipliers(0.0, x), rel=1e-9)

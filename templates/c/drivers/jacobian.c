@@ -13,6 +13,9 @@ static int jacobian_by_partition(double t, const double *restrict x, const doubl
     if (status == 0 && MH < M) {
         status = factor_gram(MH, w + AT_J, CONSTRAINTS_GENTLE, w + AT_GH);
     }
+#ifdef NORMAL_STEPS
+    status = status == 0 ? form_normal(t, w + AT_X, u, c, w) : status;
+#endif
     if (status != 0) {
         return status;
     }

@@ -13,10 +13,18 @@ static int project_direction(double t, int column, const double *restrict u, con
     }
     if (column < NQ) {
         find_velocities(q, dq, dv);
+#ifdef NORMAL_STEPS
+        for (int i = 0; i < MH; i++) {
+            r[i] = w[AT_GRADIENT + i * NQ + column];
+        }
+#endif
         for (int k = 0; k < N; k++) {
             dv[k] /= s[k];
         }
         status = correct_change(MH, w + (MH < M ? AT_GH : AT_G), r, dv, w);
+#ifdef NORMAL_STEPS
+        add_left(w + (MH < M ? AT_GH : AT_G), r, dv, dq, w);
+#endif
         for (int k = 0; k < N; k++) {
             dv[k] *= s[k];
         }

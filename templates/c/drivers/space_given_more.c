@@ -17,16 +17,5 @@ static void add_moved(double t, const double *q, const double *d, const double *
 #define spread(q, d, dq) add_moved(t, q, d, u, c, dq, w)
 #define normalise(q) ((void)(q))
 
-/* No velocity stands for a change dq of q: what it changes of C goes to w + AT_RATE instead, from where the step back
-   onto the constraints follows. */
-static void find_residuals(double t, const double *restrict u, const double *restrict c, double *restrict d, double *w)
-{
-    (void)slopes_along_block(t, w + AT_X, u, c, w + AT_RATE, w);
-    for (int i = 0; i < MH; i++) {
-        w[AT_RATE + i] /= w[AT_SCALES + N + i];
-    }
-    for (int k = 0; k < N; k++) {
-        d[k] = 0.0;
-    }
-}
-#define find_velocities(q, dq, d) ((void)(q), (void)(dq), find_residuals(t, u, c, d, w))
+/* No velocity stands for a change dq of q: normal.c says what it changes of C, from where the step back follows. */
+#define find_velocities(q, dq, d) ((void)(q), (void)(dq), (void)memset(d, 0, N * sizeof *(d)))
