@@ -36,7 +36,8 @@ def series_files(program: Program) -> dict[str, str]:
     series = make_series(program)
     block = next(b for b in program.blocks if b.name == "rhs")
     printer = _SeriesPrinter(series, references(program, block.inputs))
-    used = sorted({t.kind for t in series.terms} & OPERATIONS.keys())
+    used = {t.kind for t in series.terms} & OPERATIONS.keys()
+    used |= {"absorb"} if used & {"sqrt", "hypot"} else set()
     context = {
         "name": program.name,
         "n": len(series.rates),
@@ -49,7 +50,7 @@ def series_files(program: Program) -> dict[str, str]:
         "n_work": printer.rows * ROW,
         "kept": printer.kept,
         "widths": [(width, tests) for width, (tests, _) in sorted(WIDTHS.items(), reverse=True) if tests],
-        "helpers": [text for k in used if (text := helper(OPERATIONS[k]))],
+        "helpers": [text for k in sorted(used) if (text := helper(OPERATIONS[k]))],
     }
     files = {f"{program.name}_series.{end}": render(f"c/series.{end}.j2", context) for end in ("h", "c")}
     return {"eomgen_series.h": read_template("c/eomgen_series.h"), **files}
@@ -193,6 +194,8 @@ class _SeriesPrinter:
         early, late = (p, q) if self._depth[p] <= self._depth[q] else (q, p)
         return f"{self._sum(p, q)} + {self._zero(late)}*b{early} + {self._zero(early)}*b{late}"
 
+    _absorb = _mul
+
     def _div(self, i: int, term: Term, p: int, q: int) -> str:
         inverse = self._reciprocal(q)
         if not self._changes(q):
@@ -204,7 +207,7 @@ class _SeriesPrinter:
         return f"(b{p} - {rest} - {last})*{inverse}" if late else f"(b{p} - ({rest} + {last}))*{inverse}"
 
     def _sqrt(self, i: int, term: Term, p: int) -> str:
-        return f"(b{p} - {self._sum(i, i)})*(0.5*{self._reciprocal(i)})"
+        return f"absorbing(b{p} - {self._sum(i, i)}, 0.5*{self._reciprocal(i)})"  # 0 where what is under it stays 0
 
     def _pow(self, i: int, term: Term, p: int, q: int) -> str:
         inverse, e = self._reciprocal(p), self._zero(q)
@@ -227,6 +230,8 @@ class _SeriesPrinter:
         elif last:
             ends.append((-1, f"inverse*{last[0][1]}"))
         text = _signed(ends)
+        if term.kind == "hypot":
+            return f"absorbing({text}, {inverse[1:]})"
         return f"({text}){inverse}" if inverse else text if turned > 0 else f"-({text})"
 
     # the statements

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from ..graph.pair_calls import PairCall, PairFunction, pair_call
 from ..graph.pair_kinds import PairPart
+from ..graph.slopes import square_under_root
 from ..graph.substitute import symbols_of
 from ..operations import CONDITION, OPERATIONS
 from ..program import Block, Program
@@ -17,7 +18,8 @@ from .straight import Pieces, PrintedFunction, cut, references
 
 
 class _NumpyPrinter:
-    def __init__(self, program: Program, references: dict[int, str]) -> None:
+    def __init__(self, program: Program, references: dict[int, str], traced: bool = False) -> None:
+        self._traced = traced  #: the library differentiates the text itself
         self._graph, self._nodes, self._calls = program.graph, program.graph.nodes, program.graph.calls
         self._fixed = references
         self._variables: dict[int, str] = {}
@@ -47,6 +49,12 @@ class _NumpyPrinter:
             function, orders = self._calls[node[0]]
             return f"call_{function.name}({', '.join([*map(self.operand, node[1:]), *map(str, orders)])})"
         row = OPERATIONS[node[0]]
+        if self._traced and square_under_root(self._graph, i):
+            a, *b = map(self.operand, node[1:])
+            if row.name == "hypot":
+                a = f"{a} * {a} + {b[0]} * {b[0]}"
+            function = f"lambda s: np.power(s, {b[0]})" if row.name == "pow" else "np.sqrt"
+            return f"of_squares({a}, {function})"
         if row.chooses:
             return row.numpy.format(self.condition(node[1], piece), *map(self.operand, node[2:]))
         return row.numpy.format(*map(self.operand, node[1:])) + " * 1.0" * (row.kind == CONDITION)
@@ -122,7 +130,7 @@ def print_block_of_lists(program: Program, block: Block, prefix: str = "") -> st
     The last is ``<prefix><name>(t, x, u, c)`` -> list; where there are checks the text calls ``checked(out, good)``.
     """
     pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
-    printer = _NumpyPrinter(program, references(program, block.inputs))
+    printer = _NumpyPrinter(program, references(program, block.inputs), traced=True)
     start = [f"out = [0.0] * {block.n_out}", *(["good = []"] if block.checks else [])]
     end = ["return checked(out, good)" if block.checks else "return out"]
     ports = " ".join(port.name for port in block.ports)

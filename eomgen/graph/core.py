@@ -17,6 +17,7 @@ from .nodes import Node, Nodes
 
 if TYPE_CHECKING:
     from .functions import Function
+    from .slopes import Roots
 
 Scalar = Union["Expr", float, int]
 
@@ -35,14 +36,17 @@ class Graph(Nodes):
     n_passes : int
     reached : dict
         What many roots were found to be made of: nodes never change, so neither does that.
+    roots : Roots, optional
+        What :mod:`.slopes` knows of its nodes.
     functions, calls : dict
         Functions that expressions may call, by name; what each operation that is a call means: (Function, orders).
     """
 
-    __slots__ = ("functions", "one", "zero")
+    __slots__ = ("functions", "one", "roots", "zero")
 
     def __init__(self) -> None:
         super().__init__()
+        self.roots: Roots | None = None
         self.functions: dict[str, Function] = {}
         self.zero = self.constant(0.0)
         self.one = self.constant(1.0)
@@ -52,6 +56,7 @@ class Graph(Nodes):
         twin = memo[id(self)] = Graph.__new__(Graph)
         twin.nodes, twin._ids = list(self.nodes), dict(self._ids)
         twin.marks, twin.n_passes, twin.reached = list(self.marks), self.n_passes, {}
+        twin.roots = None
         twin.calls, twin.functions = dict(self.calls), dict(self.functions)
         twin.zero, twin.one = Expr(twin, self.zero.id), Expr(twin, self.one.id)
         return twin

@@ -76,7 +76,7 @@ def count(outputs: Sequence[Expr]) -> Operations:
     found = _with_pairs(graph, found)
     bends, arithmetic = operations_with(lambda row: row.bends), operations_with(lambda row: row.kind == ARITHMETIC)
     return Operations(
-        multiplications=found["mul"],
+        multiplications=found["mul"] + found["absorb"],
         additions=found["add"] + found["sub"],
         divisions=found["div"],
         negations=found["neg"],

@@ -2,7 +2,8 @@
 
 Forward and reverse accumulation as in Griewank and Walther, *Evaluating Derivatives*, 2nd ed. (2008), chapters 3 and 7.
 Derivatives are those of the formula: ``abs`` has slope ``sign`` (0 at 0), ``sign`` and comparisons have slope 0,
-``min``, ``max`` and ``select`` have the slope of the branch taken (of the first operand where both are equal).
+``min``, ``max`` and ``select`` have the slope of the branch taken (of the first operand where both are equal).  Where a
+root vanishes, products with it have the derivatives that exist (:mod:`.slopes`).
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from ..operations import OPERATIONS, operations_with
 from .core import Expr, Graph
 from .pair_calls import is_pair_item, pair_call, push_pairs
-from .slopes import half_power_slope, partials
+from .slopes import half_power_slope, hides, multiply, partials, roots_in
 from .traverse import LEAVES, common_graph, marked_again, reachable
 
 
@@ -21,7 +22,7 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
 
     ``slopes`` keeps the slopes of functions of one operand from one sweep to the next.
     """
-    nodes = g.nodes
+    nodes, rooted = g.nodes, roots_in(g).of
     add, sub, mul = g.add, g.sub, g.mul
     zero, one = g.zero.id, g.one.id
     tangent = tangents.get
@@ -35,13 +36,15 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
                 dc = tangent(found[0])
                 if dc is None:
                     continue
-                d = mul(found[1], dc)
+                d = multiply(g, rooted, i, found[1], dc, found[0], found[0])
             elif da is None:
                 if db is None:
                     continue
-                d = mul(a, db)
+                d = multiply(g, rooted, i, a, db, b) if b in rooted else mul(a, db)
             elif db is None:
-                d = mul(da, b)
+                d = multiply(g, rooted, i, b, da, a) if a in rooted else mul(da, b)
+            elif a in rooted or b in rooted:
+                d = add(multiply(g, rooted, i, b, da, a), multiply(g, rooted, i, a, db, b))
             else:
                 d = add(mul(da, b), mul(a, db))
         elif operation == "add":
@@ -77,9 +80,12 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
                     continue
                 d = g.div(da, b) if nodes[b][0] == "const" else mul(g.div(one, b), da)
             elif da is None:
-                d = g.neg(mul(mul(i, g.div(one, b)), db))
+                d = g.neg(multiply(g, rooted, i, mul(i, g.div(one, b)), db, b, a))
             else:
-                d = mul(g.div(one, b), sub(da, mul(i, db)))
+                d = mul(g.div(one, b), sub(da, multiply(g, rooted, i, i, db, b, a)))
+        elif operation == "absorb":
+            a, b = node[1], node[2]
+            d = add(g.make("absorb", tangents.get(a, zero), b), g.make("absorb", a, tangents.get(b, zero)))
         elif (row := OPERATIONS.get(operation)) is not None and row.choice is not None:
             if all(k not in tangents for k in node[-2:]):
                 continue
@@ -98,22 +104,24 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
                 continue
             if i not in slopes:
                 slopes[i] = row.slopes[0](g, i, node[1])
-            d = mul(slopes[i], da)
+            d = multiply(g, rooted, i, slopes[i], da, node[1], node[1])
         else:
             parts = [tangent(k) for k in node[1:]]
             if all(p is None for p in parts):
                 continue
             d = zero
-            for slope, p in zip(partials(g, i, [p is not None for p in parts]), parts, strict=True):
+            flags = [p is not None for p in parts]
+            for slope, p, k in zip(partials(g, i, flags), parts, node[1:], strict=True):
                 if p is not None:
-                    d = add(d, mul(slope, p))
+                    d = add(d, multiply(g, rooted, i, slope, p, k, k))
         if d != zero:
             tangents[i] = d
 
 
 def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, int], branches: list[int]) -> None:
     """Reverse sweep over ``order`` (ascending); active branching nodes are not entered but listed in ``branches``."""
-    nodes = g.nodes
+    nodes, roots = g.nodes, roots_in(g)
+    rooted, exposed = roots.of, set[int]()  #: exposed: their adjoints may vanish where there is no derivative
     add, sub, mul = g.add, g.sub, g.mul
     zero = g.zero.id
     for i in reversed(order):
@@ -124,6 +132,8 @@ def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, 
         operation = node[0]
         if operation in LEAVES:
             continue
+        if rooted and (i in exposed or hides(g, rooted, i)):
+            exposed.update(k for k in node[1:] if k in rooted)
         if operation == "add":
             for k in node[1:]:
                 if k in active:
@@ -151,16 +161,23 @@ def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, 
         elif operation == "neg":
             a = node[1]
             adjoints[a] = sub(adjoints[a], w) if a in adjoints else g.neg(w)
-        elif is_pair_item(g, operation) or ((row := OPERATIONS.get(operation)) is not None and row.choice is not None):
+        elif (
+            operation == "absorb"
+            or is_pair_item(g, operation)
+            or ((row := OPERATIONS.get(operation)) is not None and row.choice is not None)
+        ):
             branches.append(i)
         elif operation == "div" and node[2] not in active and nodes[node[2]][0] == "const":
             a, d = node[1], g.div(w, node[2])
             adjoints[a] = add(adjoints[a], d) if a in adjoints else d
         else:
             flags = [k in active for k in node[1:]]
+            tame = i not in exposed and roots.vanishes(
+                g, i, w
+            )  # where its adjoint is 0 it has no part in the derivative
             for k, slope, flag in zip(node[1:], partials(g, i, flags), flags, strict=True):
                 if flag:
-                    d = mul(w, slope)
+                    d = g.make("absorb", w, slope) if tame else mul(w, slope)
                     adjoints[k] = add(adjoints[k], d) if k in adjoints else d
 
 
@@ -305,7 +322,7 @@ def _reverse_is_cheaper(g: Graph, roots: Sequence[int], wrt: Sequence[Expr]) -> 
     for row, i in enumerate(roots):
         if i in columns:
             rows[i] = rows.get(i, 0) | 1 << row
-    branching = operations_with(lambda row: row.choice is not None)
+    branching = operations_with(lambda row: row.choice is not None) | {"absorb"}
     forward = reverse = 0
     for i in reversed(order):
         if i not in rows:  # constant, or only behind something flat
@@ -353,10 +370,14 @@ def _reverse_jacobian(g: Graph, roots: Sequence[int], wrt: Sequence[Expr]) -> di
             continue
         adjoints = {root: g.one.id}
         order = [i for i in reachable(g, [root]) if i in active]
+        branches: list[int] = []
         for part in marked_again(g, order, backwards=True):
-            _pull(g, part, active, adjoints, [])
+            _pull(g, part, active, adjoints, branches)
+        slopes = _forward_jacobian(g, branches, wrt) if branches else {}
         for column, x in enumerate(wrt):
             d = adjoints.get(x.id, g.zero.id)
+            for k, branch in enumerate(branches):
+                d = g.add(d, g.mul(adjoints[branch], slopes.get((k, column), g.zero.id)))
             if d != g.zero.id:
                 entries[row, column] = d
     return entries

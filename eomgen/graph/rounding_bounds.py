@@ -188,7 +188,7 @@ def terms_of(x: Expr) -> Expr:
         operation, *operands = graph.nodes[i]
         if operation in ("add", "sub"):
             found[i] = found[operands[0]] + found[operands[1]]
-        elif operation == "mul":
+        elif operation in ("mul", "absorb"):
             found[i] = found[operands[0]] * found[operands[1]]
         elif operation == "div":
             found[i] = found[operands[0]] / graph.apply("abs", Expr(graph, operands[1]))

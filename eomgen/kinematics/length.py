@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from itertools import combinations
 
+import numpy as np
+
 from ..describe.mechanism import Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr
+from ..graph.evaluate import compile_evaluator
 from ..graph.rounding_bounds import settled_vector, size_of
 from ..graph.vectors import Vec3
 from ..joints.rods import Distance, RevoluteSpherical
@@ -44,16 +47,20 @@ def length_scale(mechanism: Mechanism) -> Expr:
     total = graph.zero
     for square in squares:
         total = total + square
-    square = total / float(len(squares))
-    size = graph.apply("sqrt", square)
-    mass = inertia = graph.zero
-    for body in mechanism.bodies:
-        mass, inertia = mass + body.mass, inertia + (body.inertia[0][0] + body.inertia[1][1] + body.inertia[2][2])
-    none = graph.apply("lt", size, NO_LENGTH)  # parameters may make all of them 0
-    if not mass.is_zero and not inertia.is_zero:
-        hair = graph.apply("lt", square * mass, inertia * (0.5 * HAIR * HAIR))
-        none = graph.apply("or", none, graph.apply("and", graph.apply("lt", 0.0, mass), hair))
-    return graph.apply("select", none, 1.0, size)
+    size = graph.apply("sqrt", total / float(len(squares)))
+    least = max(NO_LENGTH, HAIR * _radius_of_gyration(mechanism))
+    return graph.apply("select", graph.apply("lt", size, least), 1.0, size)  # parameters may make all of them 0
+
+
+def _radius_of_gyration(mechanism: Mechanism) -> float:
+    """That of all bodies with the declared parameters, each about its own centre; 0 without masses or values."""
+    names = [p.name for p in mechanism.parameters]
+    entries = [x for b in mechanism.bodies for x in (b.mass, b.inertia[0][0], b.inertia[1][1], b.inertia[2][2])]
+    if not entries or any(p.value is None for p in mechanism.parameters):
+        return 0.0
+    values = np.reshape(compile_evaluator(entries, names)([p.value for p in mechanism.parameters]), (-1, 4))
+    mass, inertia = values[:, 0].sum(), values[:, 1:].sum()
+    return float(np.sqrt(0.5 * inertia / mass)) if mass > 0.0 and 0.0 < inertia < np.inf else 0.0
 
 
 def _square(a: Vec3, b: Vec3) -> Expr:

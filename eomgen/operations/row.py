@@ -103,7 +103,7 @@ class Operation(NamedTuple):
     @property
     def takes_numbers(self) -> bool:
         """Whether in C a number may stand beside a ``real``: an operator between two operands."""
-        return self.arity == 2 and (self.kind == ARITHMETIC or self.jumps)
+        return self.arity == 2 and not self.body and (self.kind == ARITHMETIC or self.jumps)
 
     @property
     def plain_c(self) -> str:

@@ -40,6 +40,15 @@ def _chosen(g: Any, c: int, a: int, b: int) -> int | None:
     return (a if known[0] else b) if kind == "const" else a if a == b else None
 
 
+def _absorbing(g: Any, a: int, b: int) -> int | None:
+    first, second = g.nodes[a], g.nodes[b]
+    if first[0] == "neg" or second[0] == "neg":
+        minus = (first[0] == "neg") != (second[0] == "neg")
+        made = g.make("absorb", first[1] if first[0] == "neg" else a, second[1] if second[0] == "neg" else b)
+        return int(g.neg(made)) if minus else int(made)
+    return int(g.mul(a, b)) if "const" in (first[0], second[0]) else None
+
+
 def _one(g: Any, *ids: int) -> int:
     return int(g.one.id)
 
@@ -75,6 +84,14 @@ ROWS = (
         (lambda g, y, a, b: b, lambda g, y, a, b: a), (lambda y, a, b: abs(b), lambda y, a, b: abs(a)),
         error=lambda y, x, e: abs(x[0]) * e[1] + abs(x[1]) * e[0] + e[0] * e[1],
         rule=lambda g, a, b: g.mul(a, b), sympy=lambda s, a, b: a * b, commutative=True, analytic=True,
+        dimension="product",
+    ),
+    Operation(  # a b, and 0 where a (or its square, as under a root) is 0, whatever b is there: derivatives of roots
+        "absorb", ARITHMETIC, lambda a, b: 0.0 if a * a == 0.0 else a * b,
+        lambda a, b: np.where(a * a == 0.0, 0.0, a * b), "absorbing({}, {})",
+        "np.where(np.equal({0} * {0}, 0.0), 0.0, {0} * {1})", 2,
+        (lambda g, y, a, b: b, lambda g, y, a, b: a), (lambda y, a, b: abs(b), lambda y, a, b: abs(a)),
+        body="choose(a*a == 0.0, same(0.0), a*b)", rule=_absorbing, sympy=lambda s, a, b: a * b,
         dimension="product",
     ),
     Operation(
@@ -119,7 +136,7 @@ ROWS = (
     function(
         "pow", math.pow, np.power,
         (lambda g, y, a, b: g.mul(b, g.make("pow", a, g.sub(b, g.one.id))),
-         lambda g, y, a, b: g.mul(y, g.make("log", a))),
+         lambda g, y, a, b: g.make("absorb", y, g.make("log", a))),
         (lambda y, a, b: abs(b * np.power(a, b - 1.0)), lambda y, a, b: abs(y * np.log(abs(a)))),
         rounding=lambda y, a, b: (2.0 + abs(b)) * abs(y),  # repeated products where b is whole
         rule=lambda g, a, b: g.power(a, b), recurrence=None,

@@ -108,6 +108,8 @@ class Fail:
             else:
                 found = self.culprit(status, t, x, p, u)
             blame = f": {found}" if found else ""
+        if status == 1 and name == "jacobian" and not blame:
+            remedy += ", or a root of 0, which has no derivative"
         error = STATUS.get(status, EvaluationError)
         return error(f"{name} at t = {t:.6g}{place(names, x)}: {what}{blame}; {remedy}", t, x)
 

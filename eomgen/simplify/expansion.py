@@ -75,7 +75,7 @@ class Expansion:
             return self._sum(parts[0], parts[1], 1 if kind == "add" else -1)
         if kind == "neg":
             return scaled(parts[0], -1)
-        if kind == "mul":
+        if kind in ("mul", "absorb"):
             return self.times(*parts)
         if kind == "div":
             return self.quotient(*parts)

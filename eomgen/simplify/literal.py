@@ -41,7 +41,7 @@ class Literal:
             return add(parts[0], parts[1], 1 if kind == "add" else -1)
         if kind == "neg":
             return scaled(parts[0], -1)
-        if kind == "mul":
+        if kind in ("mul", "absorb"):
             product = multiply(self._one_term(parts[0]), self._one_term(parts[1]))
             product = dict(
                 self.atoms.over_roots(self.atoms.without_squared_signs(m, "factor"), x) for m, x in product.items()

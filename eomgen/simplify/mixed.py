@@ -53,7 +53,7 @@ class Mixed:
 
     def _parts(self, i: int) -> Parts:
         kind, *args = self.expansion.graph.nodes[i]
-        if kind not in ("add", "sub", "neg", "mul", "div"):
+        if kind not in ("add", "sub", "neg", "mul", "absorb", "div"):
             return Parts({}, self.expansion.expand(i))
         first, *rest = (self._of[k] for k in args)
         if kind == "neg":

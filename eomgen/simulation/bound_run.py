@@ -102,8 +102,12 @@ class Run:
         """The last failure of a kernel as an exception."""
         if self.last is None:
             return None
-        u = self.forcing(*self.last[2:]) if self.forcing else None
-        return self.module.kernels.fail.exception(*self.last, None, u)
+        name, status, t, x = self.last
+        u = self.forcing(t, x) if self.forcing else None
+        if name == "rhs":  # compiled steps do not say which call it was
+            name = "jacobian" if np.isfinite(self.kernel(t, x, u=u)).all() else name
+            self.kernel.failure = None
+        return self.module.kernels.fail.exception(name, status, t, x, None, u)
 
     def troubled(self, t: float, x: Array) -> bool:
         """Whether a state is at a singularity that can be named."""

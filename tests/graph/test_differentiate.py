@@ -23,7 +23,7 @@ SMOOTH = {
 BINARY = {
     "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
     "pow": lambda a, b: a**b, "atan2": sympy.atan2,
-    "hypot": lambda a, b: sympy.sqrt(a**2 + b**2), "min": sympy.Min, "max": sympy.Max,
+    "hypot": lambda a, b: sympy.sqrt(a**2 + b**2), "min": sympy.Min, "max": sympy.Max, "absorb": lambda a, b: a * b,
 }  # fmt: skip
 
 

@@ -18,7 +18,7 @@ UNARY = {
 }  # fmt: skip
 BINARY = {
     "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "pow": np.power, "atan2": np.arctan2,
-    "hypot": np.hypot,
+    "hypot": np.hypot, "absorb": lambda a, b: np.where(a * a == 0.0, 0.0, a * b),
     "min": np.minimum, "max": np.maximum, "lt": np.less, "le": np.less_equal, "eq": np.equal,
     "and": np.logical_and, "or": np.logical_or,
 }  # fmt: skip

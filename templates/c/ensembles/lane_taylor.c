@@ -81,7 +81,11 @@ static void begin_taylor(const eomgen_ensemble *e, lane_run *run)
     }
     real before, size;
     taylor_sizes(run, run->K, p, &before, &size);
-    const real reach = reach_of(before, size, p), first = same(e->first_step);
+    const real first = same(e->first_step);
+    real reach = reach_of(before, size, p);
+    if (any_of((reach != reach) & (begins | moved))) {
+        reach = taylor_straight(run, run->K, reach);
+    }
     const flag none = { 0 }, given = (run->steps == 0) & (first > 0.0) & (first < reach);
     run->size = choose(begins | moved, choose(given, first, reach), run->size); /* others try again, or have nothing to do */
     run->begins = none;

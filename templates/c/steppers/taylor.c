@@ -54,7 +54,8 @@ static int taylor_step(eomgen_run *run)
     taylor_sizes(run, rows, p, &before, &last);
     double h_abs = taylor_reach(before, last, p);
     if (isnan(h_abs)) {
-        eomgen_note(run, EOMGEN_NON_FINITE, run->t, run->y);
+        taylor_clear(run);
+        h_abs = taylor_straight(run, rows, h_abs);
     }
     h_abs = run->h_abs > 0.0 && run->h_abs < h_abs ? run->h_abs : h_abs;
     h_abs = h_abs > run->max_step ? run->max_step : h_abs >= 0.0 && too_small(run, h_abs) ? least_step(run) : h_abs;

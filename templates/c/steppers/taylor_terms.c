@@ -82,6 +82,17 @@ static void taylor_sizes(const RUN *run, const real *rows, int p, real *before, 
     *last = choose(most < 1e280, most, same(1e280)) + bad;
 }
 
+/* Where there is no reach, as coefficients do not exist where a root vanishes: the rate alone, over a step that the defect
+   judges, tried at eight times the length of the last. */
+static real taylor_straight(const RUN *run, real *rows, real reach)
+{
+    const real longer = 8.0 * abs_of(run->step);
+    for (int i = 2 * run->n; i < (run->order + 1) * run->n; i++) {
+        rows[i] = choose(reach == reach, rows[i], same(0.0));
+    }
+    return choose(reach == reach, reach, choose(longer > RUNS_FIRST, longer, same(RUNS_FIRST)));
+}
+
 /* Whether the defect at the end of a step of size h from y_old to y, where the polynomial's rate is f and x' is g, is small
    enough in all states: 0, else 2. */
 static real taylor_defect(const RUN *run, real h, const real *f, const real *g)
