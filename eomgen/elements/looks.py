@@ -67,12 +67,27 @@ class Drawn(NamedTuple):
         Without them a straight line over all stops.
     about : tuple of Points
         Lines in the plane across the axis, in sizes of a symbol.
+    walls : tuple of Expr
+        Values of a coordinate that is a length, at which there are walls across its axis (m).
     """
 
     stops: tuple[Marker | WrapCylinder, ...] = ()
     coordinate: str = ""
     along: tuple[Points, ...] = ()
     about: tuple[Points, ...] = ()
+    walls: tuple[Expr, ...] = ()
+
+
+class Pull(NamedTuple):
+    """A given force or torque at a marker: an arrow whose head is there, or a round one about its axis.
+
+    ``value`` (N or N m) in ground axes, or in those of the marker (``own``).
+    """
+
+    marker: Marker
+    value: tuple[Expr, Expr, Expr]
+    own: bool
+    turns: bool
 
 
 class Wheel(NamedTuple):
@@ -131,7 +146,7 @@ class LiftCurve(NamedTuple):
     phase: Expr
 
 
-Seen = Drawn | Wheel | PitchCircles | Contour | RackAndPinion | LiftCurve
+Seen = Drawn | Pull | Wheel | PitchCircles | Contour | RackAndPinion | LiftCurve
 
 
 def _arc(radius: float, start: float, end: float, steps: int) -> Points:
@@ -192,6 +207,8 @@ ROUND_ARROW: tuple[Points, ...] = (
     _arc(2.1, -60, 170, 20),
     ((-2.5, 0.95), (-2.07, 0.36), (-1.45, 0.75)),
 )
+#: stops about an axis
+STOP: tuple[Points, ...] = (((1.4, 1.0), (2.6, 1.9)), ((1.4, -1.0), (2.6, -1.9)), _arc(1.72, -35, 35, 8))
 #: a cross within a square, about an axis
 CROSS: tuple[Points, ...] = (
     ((-0.7, -0.7), (0.7, -0.7), (0.7, 0.7), (-0.7, 0.7), (-0.7, -0.7)),

@@ -8,7 +8,7 @@ from ..elements.dimensions import FORCE, PUSH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import LAW, Field
-from ..elements.looks import CYLINDER, ROUND_ARROW, Seen
+from ..elements.looks import CYLINDER, ROUND_ARROW, Pull, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -57,6 +57,9 @@ class PointForce(Force):
         force = _in_ground_axes(view, self.marker, self.value, self.axes)
         return [MarkerLoad(self.marker, force, vec.zero(view.graph))]
 
+    def drawn(self) -> list[Seen]:
+        return [Pull(self.marker, self.value, self.axes == "body", turns=False)]
+
 
 @dataclass(frozen=True)
 class BodyTorque(Force):
@@ -71,6 +74,9 @@ class BodyTorque(Force):
     def loads(self, view: View) -> list[Load]:
         torque = _in_ground_axes(view, self.marker, self.value, self.axes)
         return [MarkerLoad(self.marker, vec.zero(view.graph), torque)]
+
+    def drawn(self) -> list[Seen]:
+        return [Pull(self.marker, self.value, self.axes == "body", turns=True)]
 
 
 _AXES = Field("choice", "axes of the vector: ground, or the marker's own", default="ground", choices=("ground", "body"))

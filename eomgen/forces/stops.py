@@ -8,6 +8,7 @@ from ..elements.dimensions import REACH
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
+from ..elements.looks import STOP, Seen
 from ..graph.core import Expr
 from ..numeric.value_ranges import POSITIVE
 from ..records import dataclass
@@ -50,6 +51,10 @@ class JointStop(Force):
         for depth, change, sense in self._depths(value, rate):
             total = total + sense * self.law.force(depth, change)
         return total
+
+    def drawn(self) -> list[Seen]:
+        ends = tuple(x for x in (self.lower, self.upper) if x is not None)
+        return [self.path.drawn((), STOP)._replace(walls=ends)]
 
     def loads(self, view: View) -> list[Load]:
         return self.path.loads(view, self.along(*self.path.measure(view)))

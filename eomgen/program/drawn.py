@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..describe.mechanism import JointSpec, Mechanism
-from ..elements.looks import Contour, Drawn, LiftCurve, PitchCircles, RackAndPinion, Seen, Wheel
+from ..elements.looks import Contour, Drawn, LiftCurve, PitchCircles, Pull, RackAndPinion, Seen, Wheel
 from ..errors import UsageError
 from ..forces import Force
 from ..frames import Frame, Marker, WrapCylinder
@@ -175,7 +175,13 @@ def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, An
     if isinstance(seen, Drawn):
         stops = [_stop(n, stop) for stop in seen.stops]
         lines = {"along": seen.along, "about": seen.about}
+        if seen.walls:
+            lines |= {"walls": n.numbers([x for x in seen.walls if n.known([x])])}
         return {"kind": "lines", "stops": stops, "joint": owners.get(seen.coordinate), **lines}
+    if isinstance(seen, Pull):
+        # a component that is not known before the run counts as positive
+        way = [n.number(x) if n.known([x]) else 1.0 for x in seen.value]
+        return {"kind": "pull", "marker": n.marker(seen.marker), "way": way, "own": seen.own, "turns": seen.turns}
     if isinstance(seen, Wheel):
         return {"kind": "wheel", "marker": n.marker(seen.marker), "radius": n.number(seen.radius)}
     if isinstance(seen, PitchCircles):

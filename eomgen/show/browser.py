@@ -11,14 +11,17 @@ import numpy as np
 
 from .colors import color_of, style_of
 from .data import Array
+from .label_places import offsets_within
 from .optional import k3d
 from .plane import page_axes
 from .player import WIDE, player_html, player_script
-from .scene import ROLES, Item, Scene
+from .scene import Item, Scene
 from .shown_motion import ShownMotion
 from .solids import Triangles
 
 NAMES = "#222222"  #: colour of names
+GROUND = "background: rgba(255, 255, 255, 0.75); padding: 0 2px"  #: what they stand on, so that bars cut nothing off
+PAGE = 500.0  #: width of a planar mechanism in a window (points of type)
 LAYER = 0.15  #: by which roles of a planar mechanism stand before each other (sizes of a symbol)
 WIDE_ANGLE, NARROW_ANGLE = 35.0, 10.0  #: of the camera (degrees), in space and before a page, where no side shows
 FARTHER = float(np.tan(np.radians(WIDE_ANGLE / 2)) / np.tan(np.radians(NARROW_ANGLE / 2)))  #: it stands before a page
@@ -82,16 +85,13 @@ def _objects(viewer: Any, scene: Scene, times: list[float]) -> list[Any]:
         )
         if scene.view is not None and item.role == "joint" and item.faces is not None and item.follow is None:
             found.append(_rim(viewer, scene, item, times))
-    for label in scene.labels:
-        places = [
-            scene.frames[k, label.body, :3, :3] @ label.point + scene.frames[k, label.body, :3, 3]
-            for k in range(len(times))
-        ]
+    for label, offset in zip(scene.labels, _offsets(scene), strict=True):
         found.append(
             viewer.text(
-                escape(label.text),
+                f'<span style="{GROUND}">{escape(label.text)}</span>',
                 is_html=True,  # else underscores would be read as TeX
-                position=_over_time(times, places),
+                position=_over_time(times, [label.at(scene.frames[k]) + offset for k in range(len(times))]),
+                reference_point="cc",
                 color=_number(NAMES),  # the body's colour would be lost on the body
                 size=0.7,
                 label_box=False,
@@ -99,6 +99,17 @@ def _objects(viewer: Any, scene: Scene, times: list[float]) -> list[Any]:
             )
         )
     return found
+
+
+def _offsets(scene: Scene) -> list[Array]:
+    """From what is named to the middles of the names (m, ground axes): beside it, where the least is covered."""
+    if scene.view is None:
+        return [3.0 * scene.symbol * scene.up for _ in scene.labels]
+    across = scene.view[:2]
+    low, high = scene.low[:2], scene.high[:2]
+    scale = PAGE / max(high[0] - low[0], (high[1] - low[1]) / WIDE)
+    offsets = offsets_within(scene, lambda points: scale * points @ across.T, scale * low, scale * high)
+    return [offset @ across / scale for offset in offsets]
 
 
 def move_objects(plot: Any, scene: Scene) -> None:
@@ -133,7 +144,7 @@ def _layer(scene: Scene, item: Item) -> Array:
     if scene.view is None:
         return np.zeros(3)
     bodies = scene.frames.shape[1]
-    place = ROLES.index(item.role) + (item.body + 1) % bodies / bodies
+    place = item.layer + (item.body + 1) % bodies / bodies
     nearer: Array = LAYER * scene.symbol * place * scene.view[2]
     return nearer
 

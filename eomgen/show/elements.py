@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..elements.looks import ARROW, ROUND_ARROW
 from ..limits.pictures import NOTHING, ROUNDED, SAME
 from .cam_curves import contour_items, lift_items
 from .data import GROUND, Array, PictureData, PlacedFrame
@@ -16,6 +17,9 @@ from .scene import Item, attached, disc, placed
 
 TEETH = 24  #: of a pinion
 RACK = 14  #: those of its rack that are drawn
+WALL = 2.0  #: half the width of a stop, in sizes of a symbol
+FAR = 75.0  #: and the distance beyond which one is not drawn: the picture is about 50 wide
+LONG = 7.0  #: length of the arrow of a given force, in sizes of a symbol
 BESIDE = 2.4  #: distance of elements between the same points, in sizes of a symbol
 
 
@@ -34,6 +38,8 @@ def element_items(data: PictureData, view: Array | None, symbol: float, frames: 
                 aside = BESIDE * symbol * (met[way] - 0.5 * (counts[way] - 1))
                 met[way] += 1
             items += _lines(data, element, view, symbol, aside, poses)
+        elif kind == "pull":
+            items += _pull(element, view, symbol, poses)
         elif kind == "wheel":
             items += _wheel(name, element["marker"], float(element["radius"]), symbol)
         elif kind == "circles":
@@ -84,6 +90,11 @@ def _lines(
         lines = [np.column_stack([symbol * np.asarray(line), np.zeros(len(line))]) for line in element["about"]]
         points = move_frame(frames[0], _broken(lines))
         return [Item("force", name, frames[0].body, points)]
+    if element.get("walls"):
+        across, _ = _across(np.array([0.0, 0.0, 1.0]), None if view is None else view @ placed(poses, frames[0])[0])
+        near = [z for z in element["walls"] if abs(z) <= FAR * symbol] or [0.0]
+        lines = [np.array([[0.0, 0.0, z] + side * WALL * symbol * across for side in (1.0, -1.0)]) for z in near]
+        return [Item("force", name, frames[0].body, move_frame(frames[0], _broken(lines)))]
     if len(frames) < 2 or (element.get("joint") is not None and not element["along"]):
         return []
     if not element["along"]:
@@ -105,6 +116,26 @@ def _lines(
         return moved
 
     return [Item("force", name, GROUND, points_at(poses), None, points_at)]
+
+
+def _pull(element: dict[str, Any], view: Array | None, symbol: float, poses: Array) -> list[Item]:
+    """An arrow of a given force, whose head is where it acts, or a round one about the axis of a given torque."""
+    marker, way = element["marker"], np.array(element["way"], dtype=float)
+    size = float(np.linalg.norm(way))
+    if size == 0.0 or not np.isfinite(size):
+        return []
+    lines = ROUND_ARROW if element["turns"] else ARROW
+    shape = _broken([np.asarray(line) for line in lines])
+
+    def points_at(now: Array) -> Array:
+        rotation, place = placed(now, marker)
+        along = (rotation @ way if element["own"] else way) / size
+        across, other = _across(along, view)
+        if element["turns"]:  # counterclockwise, seen against the axis
+            return np.asarray(place + symbol * (shape[:, :1] * other + shape[:, 1:2] * np.cross(along, other)))
+        return np.asarray(place + symbol * (LONG * (shape[:, :1] - 1.0) * along + shape[:, 1:2] * across))
+
+    return [Item("force", element["name"], GROUND, points_at(poses), None, points_at)]
 
 
 def _across(along: Array, view: Array | None) -> tuple[Array, Array]:

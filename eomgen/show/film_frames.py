@@ -15,10 +15,12 @@ from .shown_motion import ShownMotion
 from .unit_panels import ShownColumn, by_unit, draw_curves
 
 DPI = 80  #: of the frames
+READABLE = 90.0  #: dots in an inch, below which letters are drawn larger, so that they can be read
 LETTER = 0.0836  #: width of a letter of a title (inch)
 TITLE_MARGIN = 4.0  #: beside a title (dots)
 LEAST_TITLE = 4.5  #: size of its letters (points)
 MOST_DOTS = 1200.0  #: in an inch
+TICKS = 8.0  #: size of the numbers at axes (points)
 BELOW = 1.7  #: height of a plot below (inch)
 SPACE = (6.4, 5.6)  #: of a spatial mechanism (inch)
 
@@ -83,8 +85,14 @@ class Frames:
         self.updates.append(update)
 
     def settle(self) -> None:
-        """Find the places of all axes, which then stay where they are."""
+        """Find the places of all axes, which then stay where they are, and letters that can be read."""
         self.show(0)
+        larger = max(1.0, READABLE / self.figure.dpi)
+        for ax in self.figure.axes:
+            ax.tick_params(labelsize=larger * TICKS)
+            legend = [] if ax.get_legend() is None else ax.get_legend().get_texts()
+            for text in (*ax.texts, *legend, ax.title, ax.xaxis.label, ax.yaxis.label):
+                text.set_fontsize(larger * text.get_fontsize())
         self.canvas.draw()
         self.figure.set_layout_engine("none")
         wide = self.canvas.get_width_height()[0]

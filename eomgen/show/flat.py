@@ -10,7 +10,7 @@ from ..limits.pictures import SAME
 from .colors import color_of, style_of
 from .data import Array
 from .label_places import NAME_STYLE, NAMES, name_offsets
-from .scene import ROLES, Item, Scene, passed
+from .scene import Item, Scene, passed
 from .solids import outline
 
 SPACE = 7.0  #: largest edge of a figure of its own (inch)
@@ -43,8 +43,8 @@ class Flat:
         self.scene, self.ax = scene, ax
         limits = joined_limits(ax, "xy", [(scene.low[k], scene.high[k]) for k in (0, 1)])
         self.artists: list[tuple[Item, Any]] = []
-        for item in sorted(scene.items, key=lambda item: ROLES.index(item.role)):
-            style, depth = style_of(item.role), 2 + ROLES.index(item.role)
+        for item in sorted(scene.items, key=lambda item: item.layer):
+            style, depth = style_of(item.role), 2 + item.layer
             color = color_of(item)
             if item.faces is None:
                 line = ax.plot([], [], color=color, linewidth=style.width, zorder=depth, solid_capstyle="round")[0]

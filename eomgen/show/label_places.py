@@ -42,21 +42,26 @@ def name_offsets(scene: Scene, ax: Any, page: Callable[[Array], Array]) -> list[
     page : callable
         Points (n, 3) in ground axes -> (n, 2) in data of the axes.
     """
-    if not scene.labels:
-        return []
-    poses, scale = scene.frames[0], 72.0 / ax.figure.dpi
+    scale = 72.0 / ax.figure.dpi
 
     def typed(points: Array) -> Array:
         there: Array = ax.transData.transform(page(points)) * scale
         return there
 
-    drawn = []
+    low, high = ax.transAxes.transform([(0.0, 0.0), (1.0, 1.0)]) * scale
+    return offsets_within(scene, typed, low, high)
+
+
+def offsets_within(scene: Scene, typed: Callable[[Array], Array], low: Array, high: Array) -> list[Array]:
+    """The same where points (n, 3) in ground axes are at ``typed`` (n, 2), between low and high (points of type)."""
+    if not scene.labels:
+        return []
+    poses, drawn = scene.frames[0], []
     for item in scene.items:
         if item.role != "trace":
             points = typed(item.at(poses))
             drawn.append(dots(points if item.faces is None else _closed(outline(points))))
     named = [typed(label.at(poses)[None])[0] for label in scene.labels]
-    low, high = ax.transAxes.transform([(0.0, 0.0), (1.0, 1.0)]) * scale
     return places(named, [label.text for label in scene.labels], SIZE, np.vstack(drawn), low, high)
 
 

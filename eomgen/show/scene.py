@@ -14,7 +14,7 @@ from ..limits.pictures import SAME
 from .data import GROUND, Array, JointData, PictureData, PlacedFrame
 from .hollow_plates import hollow_lines, hollow_plate
 from .mesh_files import mesh_of
-from .solids import ROUND, Mesh, Triangles, box, rounded, solid, sphere, turned
+from .solids import ROUND, Mesh, Triangles, rounded, solid, sphere, turned
 
 SYMBOL = 0.02  #: of the extent of a mechanism: the size of a symbol
 OF_LINK = 0.16  #: and of the middle link's length, at most
@@ -57,6 +57,11 @@ class Item(NamedTuple):
     follow: Callable[[Array], Array] | None = None
     path: Array | None = None
     convex: bool = True
+
+    @property
+    def layer(self) -> float:
+        """Its place in the order in which items lie over each other: lines on wheels and discs lie on these."""
+        return ROLES.index("shape") + 0.5 if self.role == "wheel" and self.faces is None else ROLES.index(self.role)
 
     def at(self, poses: Array, frame: int = 0) -> Array:
         """Points in ground axes (n, 3) at poses (n_bodies + 1, 4, 4) of a frame, the last of which is ground's."""
@@ -190,20 +195,35 @@ def _own_size(data: PictureData) -> float:
     return max((float(equivalent_box(data, k).max()) for k in range(len(data.bodies))), default=0.0)
 
 
-def equivalent_solid(data: PictureData, k: int, least: float) -> tuple[Mesh, float]:
-    """The uniform disc or box with the mass and moments of a body, no edge shorter than ``least``; and its size (m).
+def inertia_items(data: PictureData, k: int, least: float) -> tuple[list[Item], float]:
+    """The uniform disc or ellipsoid with the mass and moments of a body, and its size (m).
 
-    Of two equal moments and a greater third, a disc or cylinder: I = m r^2 / 2 about its axis.
+    Of two equal moments and a greater third, a disc or cylinder, no thinner than ``least``: I = m r^2 / 2 about its
+    axis.  An ellipsoid is shown by its three principal sections, which hide nothing.
     """
+    name, com = data.bodies[k], data.com[k]
     moments, edges = data.inertia[k], equivalent_box(data, k)
     order = np.argsort(moments)
     small, other, great = moments[order]
     if other - small < SAME * great < 0.5 * (great - other):
         radius = float(np.sqrt(2.0 * great / data.mass[k]))
         length = float(np.sqrt(max(12.0 * small / data.mass[k] - 3.0 * radius**2, 0.0)))
-        mesh = disc(radius, max(length, least))
-        return (mesh[0] @ TO_AXIS["xyz"[order[2]]].T, mesh[1]), 2.0 * radius
-    return box(np.maximum(edges, least).tolist()), float(edges.max())
+        frame = PlacedFrame(k, TO_AXIS["xyz"[order[2]]], com)
+        mesh = attached(frame, disc(radius, max(length, least)))
+        return [Item("shape", name, k, *mesh), *rim_mark(name, frame, radius, max(length, least))], 2.0 * radius
+    turn, (a, b, c) = np.linspace(0.0, 2.0 * np.pi, ROUND + 1), np.sqrt(5.0 / 12.0) * edges
+    x, y, zero, gap = np.cos(turn), np.sin(turn), np.zeros(ROUND + 1), np.full((1, 3), np.nan)
+    rings = [np.column_stack(ring) for ring in ((a * x, b * y, zero), (zero, b * x, c * y), (a * x, zero, c * y))]
+    return [Item("link", name, k, com + np.vstack([rings[0], gap, rings[1], gap, rings[2]]))], float(edges.max())
+
+
+def rim_mark(name: str, frame: PlacedFrame, radius: float, length: float) -> list[Item]:
+    """A line to the rim on both faces of a disc about z, so that its turning is seen; nothing on a long cylinder."""
+    if length > radius:
+        return []
+    ends = [[s * radius, 0.0, 0.5 * z * length] for z in (1.0, -1.0) for s in (0.6, 1.0)]
+    line = np.array([*ends[:2], [np.nan] * 3, *ends[2:]])
+    return [Item("wheel", name, frame.body, line @ frame.rotation.T + frame.position)]
 
 
 def equivalent_box(data: PictureData, k: int) -> Array:
@@ -262,6 +282,8 @@ def link_items(
             shaped.add(body)
             here = attached(shape["frame"], mesh)
             items.append(Item("shape", name, body, *here, convex=shape["kind"] != "mesh"))
+            if shape["kind"] == "cylinder":
+                items += rim_mark(name, shape["frame"], *shape["sizes"])
     hidden = data.hidden
     blocks = {joint.S.body for joint in data.joints if joint.pieces and joint.slides and _is_block(data, joint, symbol)}
     wheels = {element["marker"].body for element in data.elements if element["kind"] in ("wheel", "contour")}
@@ -293,9 +315,9 @@ def link_items(
             if bar is not None:
                 items.append(Item("link", name, k, *bar))
         elif k not in blocks and k not in wheels and data.mass[k] > 0.0:
-            mesh, size = equivalent_solid(data, k, symbol)
+            own_items, size = inertia_items(data, k, symbol)
             if 4.0 * symbol < size <= 2.0 * extent:
-                items.append(Item("shape", name, k, *_moved(mesh, com)))
+                items += own_items
             else:
                 items.append(Item("link", name, k, *_moved(sphere(1.6 * symbol), com)))
         if data.mass[k] > 0.0 and len(points[k]) >= 2 and len(own) >= 2:

@@ -196,7 +196,7 @@ def test_a_page_plays_and_its_slider_moves_it_without_a_network(run: Any, tmp_pa
         browser.click("#play")
         browser.wait_for(f"{time} > {there}")
         browser.wait_for(f"document.querySelector('#cursor').getBoundingClientRect().x > {cursor}")
-        shown = "[...document.querySelectorAll('div')].find(e => !e.children.length && e.textContent == 'rod')"
+        shown = "[...document.querySelectorAll('span')].find(e => e.textContent == 'rod')"
         assert browser.evaluate(f"{shown}.getBoundingClientRect().x") > 0  # names stand in the picture
         assert browser.complaints == []
         assert browser.requests == []
