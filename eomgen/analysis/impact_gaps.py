@@ -146,8 +146,9 @@ def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
     known = isinstance(value, Expressed) or (hasattr(value, "derivative") and value.derivative() is not None)
     if known and not isinstance(value, DeclaredSignal):
         rate = derive(name, dict(rate_pairs(forcing.layout)).get(name, f"d/dt {name}"), value)
-        return float((rate.function(forcing.parameters) if isinstance(rate, Expressed) else rate)(t, x))
-    f = forcing.varying[index]
+        rate = rate.function(forcing.parameters) if isinstance(rate, Expressed) else rate
+        return float(rate(t, x) if callable(rate) else rate)
+    f = lambda t, x: forcing(t, x)[index]  # noqa: E731
     if any(f(t, x + move) != f(t, x) for move in ELSEWHERE * np.eye(len(x))):
         raise UsageError(words)
     return float(drift(lambda time: np.array([f(time, x)]), t)[0])

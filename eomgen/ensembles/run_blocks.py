@@ -32,8 +32,8 @@ def keep(
     module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, block: RunBlock, words: dict[int, str]
 ) -> Kept:
     """What a reduction makes of a block, and the numbers of each run."""
-    kept = reduction.reduce(module, cases, plan, block)
-    return {**kept, **{f"runs_{name}": getattr(block, name) for name in RUNS}}, words
+    numbers = {f"runs_{name}": getattr(block, name).copy() for name in RUNS}  # a user's function may change the block
+    return {**reduction.reduce(module, cases, plan, block), **numbers}, words
 
 
 def choose_size(count: int, bytes_of_a_run: int, workers: int = 1) -> int:

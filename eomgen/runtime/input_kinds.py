@@ -97,20 +97,21 @@ class OfTime:
         return self.function(t)
 
     def derivative(self) -> Any:
-        """The rate, as the object says it."""
-        found = self.function.derivative()
-        return of_time(found) if callable(found) else found
+        """The rate, as the object says it; None where it says none."""
+        derivative = getattr(self.function, "derivative", None)
+        found = derivative() if callable(derivative) else None
+        return of_time(found, True) if callable(found) else found
 
 
-def of_time(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function itself, or as f(t, x) one with ``derivative()`` that takes the time alone.
+def of_time(function: Callable[..., Any], rate: bool = False) -> Callable[..., Any]:
+    """The function itself, or as f(t, x) one that takes the time alone and has ``derivative()`` or is itself a rate.
 
     So does one of one argument, or whose second has a number by default, as the splines of SciPy have the order of a
     derivative there.
     """
     from inspect import signature
 
-    if not callable(getattr(function, "derivative", None)):
+    if not rate and not callable(getattr(function, "derivative", None)):
         return function
     try:
         taken = [p for p in signature(function).parameters.values() if p.kind is not p.KEYWORD_ONLY]

@@ -281,7 +281,7 @@ def derive(name: str, rate: str, value: Any) -> Any:
     derivative = getattr(value, "derivative", None)
     found = derivative() if callable(derivative) else None
     if found is not None:
-        return of_time(found) if callable(found) else read_number(f"derivative of input {name}", found)
+        return of_time(found, True) if callable(found) else read_number(f"derivative of input {name}", found)
     raise UsageError(
         f"input {name}: the equations need its rate {rate}, and the rate of a function is not known; give {rate} too, "
         f"or {name} as text, table or Signal, or as an object with a method derivative()"

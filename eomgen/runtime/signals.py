@@ -306,7 +306,8 @@ class Forcing:
         for index, signal in self.varying.items():
             try:
                 inner = inside != t and isinstance(signal, Tabulated)
-                value = signal.beside(t, inside) if inner else signal(t, x)  # type: ignore[attr-defined]
+                seen = x.copy() if self.foreign else x  # a function may change what it is given
+                value = signal.beside(t, inside) if inner else signal(t, seen)  # type: ignore[attr-defined]
             except Exception as error:
                 error.add_note(f"raised by the function of input {self.names[index]}, called as f({t:.6g}, x)")
                 raise

@@ -69,7 +69,7 @@ class Run:
         """What ends the run where its steps lead nowhere, made when first looked at; a slim package has none."""
         check = find_stall_check()
         first, kept = self._first
-        return None if check is None else check(*first, partial(_troubled, self.module), kept)
+        return None if check is None else check(*first, partial(_troubled, self.module), self.watched(None), kept)
 
     def look(self, t: float, x: Array, steps: int = 1) -> None:
         """Take note of further steps."""

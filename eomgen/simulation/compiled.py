@@ -146,16 +146,20 @@ def integrate_compiled(
             raise checkpoint.damaged(error) from None
     if status == 0:
         status = journey.travel()
-    while status == WAITING and events is not None:
+    while status in (WAITING, RESET_FAILED) and events is not None:
+        k = next((k for k, node in enumerate(nodes[1:-1]) if (node - journey.t) * (end - start) >= 0.0), len(nodes) - 2)
+        forcing.enter(nodes[k], nodes[k + 1])  # as the compiled loop has it
         after = events.reset(module, forcing, journey.t, journey.state(), journey.fired())
+        if status == RESET_FAILED:  # in C; here it fails too as a rule, and tells why
+            break
         status = journey.jump(after) or journey.travel()
+    if forcing:
+        forcing.enter(start, end)  # who asks for inputs from here on asks for those of the whole run
     if checkpoint is not None and journey.raised is None and status in (ENDED, TERMINAL):
         checkpoint.save(journey.frozen(status))
     times, states, notes = journey.outcome()
     if events is not None and journey.raised is None:
         warn_of_unknown([events.names[i] for i in journey.unknown()])
-    if status == RESET_FAILED and events is not None:
-        events.reset(module, forcing, journey.t, journey.state(), journey.fired())  # fails too, and tells why
     if status == ZENO and events is not None:
         raise events.crowded(journey.t, journey.resets)
     t_events, x_events = [], []

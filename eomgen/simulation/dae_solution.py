@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import SimulationError, UsageError, calls_within
-from ..limits.runs import ATOL, ENDLESS, ENOUGH, RTOL
+from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from ..runtime.dae import DaeForm
 from ..runtime.given_start import Span, Start
@@ -22,12 +22,14 @@ from ..runtime.near_names import require
 from ..runtime.refusals import refuse_rigid
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
+from .bound_run import Run
 from .event_values import EventValues
 from .events import GO_ON, UNWATCHED, Events, instant, warn_of_unknown
 from .integrate import Solution, require_end
 from .recording import record
 from .resets import Resets
 from .run_arguments import find_span, find_state, ordered_times
+from .stalled import Crawling
 from .tolerances import check_step, check_tolerances
 
 if TYPE_CHECKING:
@@ -127,7 +129,11 @@ def integrate_dae(
             stacklevel=calls_within() + 1,
         )
     run = _DaeRun(bound, forcing, watched, (start, end), times, partial(ida.IDA, **tolerances), options)
-    run.travel(x0)
+    try:
+        run.travel(x0)
+    except Crawling as crawl:
+        raise run.run.gave_up(crawl, end, "IDA", dict(tolerances)) from None
+    forcing.enter(start, end)
     warn_of_unknown([event.name for event in run.listed if not event.known])
     solution = run.solution()
     require_end(solution, end)
@@ -157,12 +163,12 @@ class _DaeRun:
         rhs = module.kernels.timed("rhs")
         self.resets = Resets(self.listed, lambda t, x: rhs(t, x, u=forcing(t, x)), *span)
         self.make, self.options = make, options
+        self.run = Run(module, forcing)
         self.t: list[Array] = []
         self.x: list[Array] = []
         self.t_events: list[list[float]] = [[] for _ in self.listed]
         self.x_events: list[list[Array]] = [[] for _ in self.listed]
         self.counts = {"nfev": 0, "njev": 0}
-        self.calls = 0
         self.status, self.message, self.reached = 0, "", span[1]
 
     def travel(self, x: Array) -> None:
@@ -207,6 +213,8 @@ class _DaeRun:
         """Integrate to an event, or to the end of this part; the time and state there, and what happened."""
         form, forcing, n_x = DaeForm(self.module), self.forcing, self.module.n_x
         forcing.enter(t, end)
+        self.run = Run(self.module, forcing)
+        self.run.begin(t, self.span[1], x, float(self.options.get("max_step") or np.inf), 0)
         y, yp = form.initial(x, t, forcing(t, x))
         nodes = np.array([t, end])
         asked = np.empty(0)
@@ -249,15 +257,8 @@ class _DaeRun:
     def _solver(self, form: DaeForm) -> Any:
         forcing, n_x, listed = self.forcing, self.module.n_x, self.listed
 
-        start, end = self.span
-
         def residual(t: float, y: Array, yp: Array, res: Array) -> None:
-            self.calls += 1
-            if self.calls > 10 * ENOUGH and abs(end - t) * self.calls > 10 * ENDLESS * abs(t - start):
-                raise SimulationError(
-                    f"IDA has evaluated its equations {self.calls} times up to t = {t:.6g} s of {end:.6g} s, so it "
-                    "would not reach the end; give a shorter span, or looser tolerances"
-                )
+            self.run.look(t, y[:n_x])  # not of steps, but of what they are tried by
             form.residual(t, y, yp, res, forcing(t, y[:n_x]))
 
         def jacobian(t: float, y: Array, yp: Array, res: Array, cj: float, JJ: Array) -> None:

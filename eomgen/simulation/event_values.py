@@ -30,11 +30,11 @@ class EventValues:
             else:
                 self.together.setdefault(id(event.source[0]), (event.source[0], []))[1].append(i)
 
-    def __call__(self, t: float, x: Array) -> Array:
-        """The values (n,) of all events at a time and state."""
+    def __call__(self, t: float, x: Array, aside: bool = False) -> Array:
+        """The values (n,) of all events at a time and state, of the run or aside of it."""
         g = np.empty(len(self.events))
         for i in self.alone:
-            g[i] = self.events[i](t, x)
+            g[i] = self.events[i](t, x, aside)
         for together, places in self.together.values():
             values = together.values(t, x)
             for i in places:

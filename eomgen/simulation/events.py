@@ -75,10 +75,23 @@ class RunEvent:
         self.left: tuple[float, float] | None = None  #: time of the last reset, and the side of zero it led to
         self.known = False  #: whether it has had a value other than NaN
         self.source: tuple[Together, int] | None = None  #: what gives the values of several events, and its place there
+        self.users = False  #: whether the function is the user's, who must give a number wherever the run comes
 
-    def __call__(self, t: float, x: Array) -> float:
-        """The value at time t and state x; right after a reset, one on the side to which it led."""
-        return self.seen_value(t, float(self.function(t, x)))
+    def __call__(self, t: float, x: Array, aside: bool = False) -> float:
+        """The value at time t and state x; right after a reset, one on the side to which it led.
+
+        Raises
+        ------
+        UsageError
+            The user's function gives no finite number, unless it is asked ``aside`` of the run.
+        """
+        value = float(self.function(t, x.copy()))  # a function may change what it is given
+        if self.users and not aside and not isfinite(value):
+            raise UsageError(
+                f"event {self.name} is {value} at t = {t:.6g} s; its function must return a finite number at every "
+                "time and state of the run; an expression as a text may be undefined in parts of it"
+            )
+        return self.seen_value(t, value)
 
     def seen_value(self, t: float, value: float) -> float:
         """The same where the function's value is known."""
@@ -125,6 +138,7 @@ class Events:
                 self.formulas.append(_of_text(layout, one, name, self.formulas[0][1] if self.formulas else None))
             else:
                 self.functions.append(RunEvent(one, name or ""))
+                self.functions[-1].users = True
         self.model = [_of_model(event, event["name"] in chosen) for event in self.declared]
         taken: dict[str, int] = {}
         for name in (*known, *(event.name for event, _ in self.formulas), *(event.name for event in self.functions)):
@@ -154,7 +168,7 @@ class Events:
         return {
             "model": len(self.model),
             "tape": texts[0].tape_with(texts[1:]) if texts else None,
-            "outside": [event.function for event in self.functions],
+            "outside": self.functions,
             "direction": [event.direction for event in every],
             "most": [int(event.terminal) for event in every],
             "action": [event.action for event in every],

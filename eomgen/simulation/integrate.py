@@ -155,6 +155,9 @@ def integrate(
     except KeyboardInterrupt as interrupt:
         journey.status, journey.message = -1, MESSAGES[-1]
         raise Interrupted(journey.solution()) from interrupt
+    finally:
+        if enter is not None:
+            enter(nodes[0], nodes[-1])  # who asks for inputs from here on asks for those of the whole run
     return journey.solution()
 
 
@@ -256,7 +259,11 @@ class _Journey:
         options = dict(self.options)
         if options.get("first_step") is not None:
             options["first_step"] = min(options["first_step"], abs(end - self.t))
-        return self.solver(self.rhs, self.t, self.x, end, **options)
+        if callable(jac := options.get("jac")):
+            options["jac"] = lambda t, x: jac(
+                t, x.copy()
+            )  # a function may change what it is given, and so may a solver
+        return self.solver(self.rhs, self.t, self.x.copy(), end, **options)
 
     def _length(self, solver: Any) -> float:
         size = getattr(solver, "h_abs", None)

@@ -154,8 +154,9 @@ class Integrator:
 
     def _stall_check(self, t: float, end: float, x: Array) -> Callable[[float, Array, int], None]:
         """What watches the steps of a long call."""
-        troubled = Run(self.module, Forcing(self.module.layout, None)).troubled
-        return StallCheck(t, end, x, self.module.n_q, float(self._options.get("max_step", np.inf)), troubled).look
+        run = Run(self.module, Forcing(self.module.layout, None))
+        longest = float(self._options.get("max_step", np.inf))
+        return StallCheck(t, end, x, self.module.n_q, longest, run.troubled, run.watched(None)).look
 
     def _explain(
         self, trouble: tuple[int, float, Any, BaseException | None], x: Array, end: float, p: Any, u: Any

@@ -140,7 +140,7 @@ def sensitivities(
     longest = float(settings.get("max_step", np.inf))
     numbers = len(z0) if times is None else 0
     troubled = lambda t, z: fail.trouble(z[: layout.n_x], t) is not None  # noqa: E731
-    stall_check = StallCheck(start, stop, z0, layout.n_q, longest, troubled, numbers)
+    stall_check = StallCheck(start, stop, z0, layout.n_q, longest, troubled, run, numbers)
     try:
         with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
             solution = integrate(

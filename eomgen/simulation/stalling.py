@@ -19,6 +19,9 @@ from .stalled import Crawling
 
 WINDOW = 200  #: steps judged together
 MANY = 100_000  #: steps left that a run may take at any stall_check
+IN_PLACE = 1_000_000  #: steps left that it may take where it is held between two sides of a jump
+HALVED = 10  #: times that an interval is halved in which a rate jumps: a change that is not one shrinks to 1/1024
+HINDERED = 0.1  #: part of what its rate says up to which a state that moves is held
 REMEDY = (
     "look for a force that jumps (smooth it), a singular position, or very fast motions in a long run (try an "
     "implicit method, Radau)"
@@ -29,7 +32,8 @@ class StallCheck:
     """Watches how a run advances.
 
     A run crawls if its mean step would take more than ``MANY`` further steps and is less than ``SHORT`` of its span,
-    while either the state stands still or it is at a known singularity: a short impact moves the state.
+    while either the state stands still or it is at a known singularity: a short impact moves the state.  So it does if
+    it would take more than ``IN_PLACE`` and is held where a rate jumps, as in sliding modes.
 
     Parameters
     ----------
@@ -43,19 +47,21 @@ class StallCheck:
         The user's; steps that it keeps short are not a crawl.
     troubled : callable
         (t, x) -> whether the state is at a known singularity.
+    rhs : callable
+        f(t, x).
     kept : int
         Numbers that the run keeps of each step.
     """
 
     def __init__(
         self, start: float, end: float, x: Array, n_q: int, max_step: float, troubled: Callable[[float, Array], bool],
-        kept: int = 0,
+        rhs: Callable[[float, Array], Array], kept: int = 0,
     ) -> None:  # fmt: skip
         self.start, self.taken, self.kept = start, 0, kept
         self.end, self.parts = end, (slice(n_q), slice(n_q, None))
-        self.limit = min(SHORT * abs(end - start), 0.1 * max_step)
-        self.troubled = troubled
-        self.steps = 0
+        self.limit, self.asked = SHORT * abs(end - start), 0.1 * max_step
+        self.troubled, self.rhs = troubled, rhs
+        self.steps = self.slow = 0
         self.t, self.x = start, x
         self.largest: Array | None = None  #: magnitude of each state at the windows before
 
@@ -68,13 +74,18 @@ class StallCheck:
             return
         step, moved = abs(t - self.t) / self.steps, np.abs(x - self.x)
         largest = np.abs(self.x) if self.largest is None else self.largest
+        time = abs(t - self.t)
         self.t, self.x, self.steps = t, np.array(x), 0
         self.largest = np.fmax(largest, np.abs(self.x))
-        if step > self.limit or abs(self.end - t) < MANY * step:
+        if step > self.asked or abs(self.end - t) < MANY * step:
             return
-        still = all((moved[part] <= STILL * self.largest[part].max(initial=0.0)).all() for part in self.parts)
-        if still or self.troubled(t, self.x):
-            raise Crawling(t, self.x, step)
+        still = np.concatenate([moved[part] <= STILL * self.largest[part].max(initial=0.0) for part in self.parts])
+        crawl = Crawling(t, self.x, step)
+        if step <= self.limit and (still.all() or self.troubled(t, self.x)):
+            raise crawl
+        self.slow += abs(self.end - t) > IN_PLACE * step
+        if self.slow & -self.slow == self.slow > 0 and slides(self.rhs, crawl, moved, still, time):
+            raise crawl  # looked for at 1, 2, 4, 8 ... windows
 
     def _require_end(self, t: float) -> None:
         """Refuse to go on for ever, or to fill the memory."""
@@ -90,6 +101,46 @@ class StallCheck:
                 f"the run has taken {self.taken} steps up to t = {t:.6g} s and needs {more:.1e} more to reach "
                 f"t = {self.end:.6g} s, which would take too long; give a shorter span, or looser tolerances"
             )
+
+
+def slides(rhs: Callable[[float, Array], Array], crawl: Crawling, moved: Array, still: Array, time: float) -> bool:
+    """Whether a run is held where a rate jumps, so that all its states stand still or do not go as their rates say.
+
+    Parameters
+    ----------
+    rhs : callable
+        f(t, x).
+    crawl : Crawling
+        Time, state and mean step.
+    moved : (n_x,) array
+        What the states have changed in a while.
+    still : (n_x,) array of bool
+        Which of them that leaves where they are.
+    time : float
+        The while (s).
+    """
+    t, x = crawl.t, crawl.x
+    with np.errstate(all="ignore"):
+        f = np.array(rhs(t, x))
+        rates, jumped = np.abs(f), False
+        for j, size in enumerate(np.fmax(10.0 * crawl.step * np.abs(f), NOTICED * np.abs(x))):
+            low, high = x.copy(), x.copy()
+            low[j], high[j] = x[j] - size, x[j] + size
+            below, above = np.array(rhs(t, low)), np.array(rhs(t, high))
+            change = np.abs(above - below)
+            if not np.isfinite(change).all():
+                continue
+            rates = np.fmax(rates, np.fmax(np.abs(below), np.abs(above)))
+            i = int(np.argmax(change - NOTICED * rates))
+            for _ in range(HALVED):
+                middle = low + 0.5 * (high - low)
+                between = np.array(rhs(t, middle))
+                if abs(above[i] - between[i]) > abs(between[i] - below[i]):
+                    low, below = middle, between
+                else:
+                    high, above = middle, between
+            jumped = jumped or bool(abs(above[i] - below[i]) > 0.5 * change[i] > NOTICED * rates[i])
+    return jumped and bool((still | (moved <= HINDERED * time * rates)).all())
 
 
 def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple[str, ...], atol: Any) -> str:

@@ -67,7 +67,9 @@ def solver_class(core: Any, name: str) -> Any:
             known = jac is None or (isinstance(jac, rhs) and jac.name == "jacobian" and jac.context is fun.context)
             if isinstance(fun, rhs) and fun.name == "rhs" and known and options.get("jac_sparsity") is None:
                 return super().__new__(cls)
-            return own(fun, *args, **options)
+            if callable(jac):
+                options["jac"] = lambda t, x: jac(t, x.copy())
+            return own(lambda t, x: fun(t, x.copy()), *args, **options)  # a function may change what it is given
 
         def __init__(
             self,

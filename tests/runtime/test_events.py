@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import DOP853, solve_ivp
 
 import eomgen as eg
 
@@ -388,3 +388,77 @@ def test_an_input_that_jumps_over_an_event_against_the_motion_is_no_zeno(target:
     lever = eg.Signal([0.0, 0.5], [0.0, 1.0], "zero-order")
     run = m.compile(target=target).simulate(2.0, inputs={"lever": lever}, t_eval=[0.5, 1.0, 2.0], **TIGHT)
     np.testing.assert_allclose(run["s"], np.array([0.0, 0.125, 0.375]) + speed * run.t, atol=1e-9)
+
+
+def spring() -> eg.Model:
+    m = eg.Model("spring")
+    m.prismatic("slide", m.ground, m.body("bob", mass=2.0), axis="x", coordinate="q")
+    u = m.input("u")
+    m.torque("pull", "slide", u - 0.1 * m.coordinate("q_dot") - 3 * m.coordinate("q"))
+    m.initial(q=1)
+    m.sampled("given", period=0.25)
+    m.output("gap", "q + 5")
+    return m
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_functions_that_change_what_they_are_given_change_no_run(target: str) -> None:
+    mod = spring().compile(target=target)
+    truth = mod.simulate((0, 1), **TIGHT).x
+
+    def changing(t: float, x: Any) -> float:
+        x *= 0.9
+        return 1.0 + 0.0 * float(x[0])
+
+    def untouched(t: float, x: Any) -> float:
+        assert x[0] != 5.0  # by the one before
+        x[0] = 5.0
+        return 1.0
+
+    plain = {"u": lambda t, x: 1.0}
+    pushed = mod.simulate((0, 1), inputs=plain, **TIGHT).x[:, -1]
+    slopes = mod.simulate_impacts((0, 1), {"gap": 1.0}, inputs=plain).x[:, -1]
+    for method in ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA", type("Own", (DOP853,), {})):
+        loose = 1e-5 if method in ("BDF", "LSODA") else 1e-7
+        run = mod.simulate((0, 1), events=[untouched, untouched], method=method, **TIGHT)
+        np.testing.assert_allclose(run.x[:2, -1], truth[:2, -1], atol=loose, err_msg=str(method))
+        run = mod.simulate((0, 1), inputs={"u": changing}, method=method, **TIGHT)
+        np.testing.assert_allclose(run.x[:2, -1], pushed[:2], atol=loose, err_msg=str(method))
+    run = mod.simulate((0, 1), controllers={"given": changing}, **TIGHT)
+    np.testing.assert_allclose(run.x[:2, -1], truth[:2, -1], atol=1e-7)
+    assert run["given"][-1] == 1.0
+    run = mod.simulate_impacts((0, 1), {"gap": 1.0}, inputs={"u": changing})
+    np.testing.assert_allclose(run.x[:2, -1], slopes[:2], atol=1e-7)
+    jacobian = mod.jacobian
+
+    def changed(t: float, x: Any) -> Any:
+        found = jacobian(t, x)
+        x[:] = 0.0
+        return found
+
+    run = mod.simulate((0, 1), inputs=plain, method="BDF", jac=changed, **TIGHT)
+    np.testing.assert_allclose(run.x[:2, -1], pushed[:2], atol=1e-5)
+    held = mod.x0()
+    spoilt = solve_ivp(lambda t, x: (mod.rhs(t, x), x.fill(0.0))[0], (0, 1), held, method=mod.RK45, **TIGHT)
+    if target == "cython":  # where the class is ours
+        np.testing.assert_allclose(spoilt.y[:2, -1], truth[:2, -1], atol=1e-7)
+    block = mod.simulate_many(1, {"q": np.ones(2)}, t_eval=[1.0], reduce=lambda b: {"n": b.status.fill(-1) or [1]})
+    assert block.ok.all()
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_a_function_that_gives_no_number_is_refused_by_name(target: str) -> None:
+    """As an input is; one that is no number only beyond the end of the run, where rates are taken, is not."""
+    mod = spring().compile(target=target)
+
+    def broken(t: float, x: Any) -> float:
+        return np.nan if x[0] < 0.5 else x[0] - 0.4
+
+    methods = ("DOP853", "RK45", "RK23", "Radau", "LSODA")
+    for method in methods:
+        with pytest.raises(eg.UsageError, match=r"event broken is nan at t = [\d.]+ s; its function must return"):
+            mod.simulate((0, 1), events=[broken], method=method)
+        run = mod.simulate((0, 1), events=[lambda t, x: t - 0.75 if t <= 1 else np.nan], method=method)
+        assert run.t_events[-1] == pytest.approx([0.75], abs=1e-9)
+    with pytest.raises(eg.UsageError, match="event broken is nan"):
+        mod.dae.solve((0, 1), events=[broken])

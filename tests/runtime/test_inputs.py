@@ -204,3 +204,80 @@ def test_steps_of_one_size(cart: Any) -> None:
     np.testing.assert_allclose(pushed, [0.5 + 0.25, 2.0], rtol=1e-14)
     with pytest.raises(ValueError, match="out must be"):
         cart.step(0.0, [0.0, 1.0], 0.5, out=np.zeros(3))
+
+
+class Rising:
+    """An input 1 + 3 t that says its rate, as docs/inputs.md allows: a number, or a function."""
+
+    def __init__(self, rate: Any) -> None:
+        self.rate = rate
+
+    def __call__(self, t: float, x: Any) -> float:
+        return 1.0 + 3.0 * t
+
+    def derivative(self) -> Any:
+        return self.rate
+
+
+KNOTS, POINTS = np.array([0.0, 0.5, 1.0, 1.5, 2.0]), np.array([1.0, -2.0, 3.0, 5.0, 7.0])
+SPLINE = CubicSpline(KNOTS, POINTS)
+ASKED = np.array([0.1, 0.7, 1.2, 1.9])
+FORMS: dict[str, tuple[Any, Any]] = {
+    "number": (2.0, lambda t: 2.0 + 0.0 * t),
+    "pair": ((KNOTS, POINTS), lambda t: np.interp(t, KNOTS, POINTS)),
+    "held": (eg.Signal(KNOTS, POINTS, "zero-order"), lambda t: POINTS[np.searchsorted(KNOTS, t, side="right") - 1]),
+    "cubic": (eg.Signal(KNOTS, POINTS, "cubic"), SPLINE),
+    "text": ("1 + sin(3*t)", lambda t: 1 + np.sin(3 * t)),
+    "function": (lambda t, x: 1 + np.sin(3 * t), lambda t: 1 + np.sin(3 * t)),
+    "object": (Rising(3.0), lambda t: 1 + 3 * t),
+    "spline": (SPLINE, SPLINE),
+}
+CALLS: dict[str, Any] = {
+    "simulate": lambda m, u: m.simulate(2, inputs={"u": u}, t_eval=ASKED)["y"],
+    "Radau": lambda m, u: m.simulate(2, inputs={"u": u}, t_eval=ASKED, method="Radau")["y"],
+    "at": lambda m, u: m.simulate(2, inputs={"u": u}, dense_output=True).at(ASKED)["y"],
+    "sensitivities": lambda m, u: 2 * m.sensitivities(["k"], 2, inputs={"u": u}, t_eval=ASKED)["y", "k"],
+    "with an event": lambda m, u: (
+        2 * m.sensitivities(["k"], 2, inputs={"u": u}, t_eval=ASKED, events=["t - 0.3"])["y", "k"]
+    ),
+    "impacts": lambda m, u: m.simulate_impacts(2, {"wall": 0.5}, inputs={"u": u}).at(ASKED)["y"],
+    "dae": lambda m, u: m.dae.solve(2, inputs={"u": u}, t_eval=ASKED)["y"],
+    "ensemble": lambda m, u: m.simulate_many(2, {"s": np.zeros(1)}, inputs={"u": u}, t_eval=ASKED)["y"].ravel(),
+    "power": lambda m, u: 2 * (r := m.simulate(2, inputs={"u": u}, t_eval=ASKED))["power_in"] / r["s_dot"],
+}
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_every_form_of_an_input_means_the_same_in_every_call(target: str) -> None:
+    """y = k u: after a run each call must take the input of each time, not of the run's last part."""
+    m = eg.Model("cart")
+    m.prismatic("J", m.ground, m.body("cart", mass=1.0), axis="x", coordinate="s")
+    k, u = m.parameter("k", 2.0), m.input("u")
+    push = m.torque("push", "J", u)
+    m.output("y", k * u)
+    m.output("wall", "50 + k*u")  # a gap that moves with the input and stays open
+    m.output("power_in", push.power)
+    mod = m.compile(target=target)
+    for form, (given, value) in FORMS.items():
+        for name, call in CALLS.items():
+            if name == "ensemble" and callable(given) and not isinstance(given, eg.Signal):
+                continue  # which docs/ensembles.md leaves out
+            np.testing.assert_allclose(call(mod, given), 2 * value(ASKED), atol=1e-6, err_msg=f"{form}: {name}")
+        found = mod.fit({"t": ASKED, "y": 3.0 * value(ASKED)}, ["k"], inputs={"u": given}, initial={"s": 0, "s_dot": 0})
+        assert found.values["k"] == pytest.approx(3.0, rel=1e-6), form
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("rate", [1, 1.0, lambda t: 1.0, lambda t, x: 1.0])
+def test_impacts_on_a_floor_whose_object_says_its_rate(target: str, rate: Any) -> None:
+    """A ball meets a floor that rises by 1 m/s: 9.81/2 t^2 + t = 2; elastic, v+ = 2 - v-."""
+    m = eg.Model("floor", gravity=(0, -9.81, 0))
+    m.prismatic("J", m.ground, m.body("ball", mass=1.0), axis="y", coordinate="h")
+    m.input("u")
+    m.output("gap", "h - u")
+    up = Rising(rate)
+    up.__class__ = type("Up", (Rising,), {"__call__": lambda self, t, x: 1.0 + t})
+    run = m.compile(target=target).simulate_impacts((0, 0.7), {"gap": 1.0}, {"h": 3.0}, inputs={"u": up})
+    hit = (np.sqrt(1 + 4 * 9.81) - 1) / 9.81
+    assert run.impacts[0][0] == pytest.approx(hit, abs=1e-8)
+    assert run["h_dot"][-1] == pytest.approx(2 + 9.81 * hit - 9.81 * (0.7 - hit), abs=1e-7)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -50,6 +52,34 @@ def test_a_friction_that_jumps_is_named(method: str, target: str) -> None:
     assert "jumps (smooth it)" in words
 
 
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "Radau", "BDF", "LSODA", "IDA", "sensitivities", "integrator"])
+def test_a_sliding_mode_over_a_short_span_is_told_in_seconds(method: str, target: str) -> None:
+    """A spring that holds 1 N against 2 N of dry friction at rest: some 5e7 steps in 0.02 s."""
+    m = sliding("-3*s - 2*sign(s_dot)", s=1 / 3)
+    module = m.compile(target=target)
+    for asked in ({}, {"t_eval": [0, 0.02]}):
+        begun = time.perf_counter()
+        with pytest.raises(eg.SimulationError, match="no progress|would take too long|Required step size"):
+            if method == "IDA":
+                module.dae.solve(0.02, **asked)
+            elif method == "sensitivities":
+                module.sensitivities(["s"], 0.02, **asked)
+            elif method == "integrator":
+                module.integrator()(0.0, module.x0(s_dot=1e-9), 0.02)
+            else:
+                module.simulate(0.02, {"s_dot": 1e-9}, method=method, **asked)
+        assert time.perf_counter() - begun < 60  # alone, some 3 s
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_sticking_within_loose_tolerances_is_no_stall(target: str) -> None:
+    """Steps of sticking that end soon, and a body that slides on at a moving belt's speed: x = 1 s at 2 m/s."""
+    module = sliding("-10*sign(s_dot - 2)", s_dot=1.0).compile(target=target)
+    run = module.simulate(0.3, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(run["s"][-1], 0.15 + 2 * 0.2, atol=1e-3)  # 0.1 s up to the belt's speed
+
+
 @pytest.mark.parametrize(("method", "rtol"), [("DOP853", 1e-12), ("RK23", 1e-8), ("LSODA", 1e-10)])
 def test_hard_impacts_are_no_crawl(method: str, rtol: float) -> None:
     """A ball of 1 kg on a contact of 1e10 N/m: 31 us of touch (pi sqrt(m/k)) every 0.2 s, in a run of 20 s."""
@@ -64,7 +94,7 @@ def test_what_counts_as_a_crawl() -> None:
     def walk(
         step: float, slide: float, troubled: bool = False, max_step: float = np.inf, end: float = 1.0
     ) -> StallCheck:
-        check = StallCheck(0.0, end, np.array([1.0, 1.0]), 1, max_step, lambda t, x: troubled)
+        check = StallCheck(0.0, end, np.array([1.0, 1.0]), 1, max_step, lambda t, x: troubled, lambda t, x: 0.0 * x)
         for k in range(1, 3 * WINDOW):
             check.look(k * step, np.array([1.0, 1.0 + k * slide]))
         return check

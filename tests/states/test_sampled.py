@@ -383,3 +383,17 @@ def test_ida_samples_too(module: Any) -> None:
     pytest.importorskip("sksundae")
     run = module.dae.solve((0.0, 1.05), rtol=1e-9, atol=1e-11)
     assert np.abs(run.x[:4, -1] - by_hand(1.05, 0.1 * np.arange(11))).max() < 1e-6
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_a_held_input_beside_a_controller_has_the_value_of_its_own_time(target: str) -> None:
+    """Where the compiled loop asks Python for a new state, a law of its clock must not see the run's first part."""
+    m = eg.Model("mixed")
+    m.prismatic("slide", m.ground, m.body("sledge", mass=1.0), axis="x", coordinate="s")
+    u = m.input("u")
+    m.sampled("seen", u, 0.3, offset=0.05)
+    m.sampled("given", period=0.3, offset=0.05)
+    table = eg.Signal([0.0, 0.5, 1.0, 1.5], [1.0, -2.0, 3.0, 5.0], "zero-order")
+    asked = [0.1, 0.7, 1.0, 1.3, 1.9]
+    run = m.compile(target=target).simulate(2, inputs={"u": table}, controllers={"given": lambda t, x: t}, t_eval=asked)
+    np.testing.assert_array_equal(run["seen"], [1.0, -2.0, -2.0, 3.0, 5.0])  # renewed at 0.05, 0.65, 0.95, 1.25, 1.85
