@@ -9,4 +9,5 @@ from .latex_tree import NotationError as NotationError
 from .latex_tree import read_latex as read_latex
 from .notation import Notation as Notation
 from .notation import dotted as dotted
+from .notation import raised as raised
 from .notation import with_instance as with_instance

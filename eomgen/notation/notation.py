@@ -203,6 +203,11 @@ def dotted(latex: str, order: int) -> str:
     return f"{latex[: head.start]}\\{DOTS[order]}{{{latex[body.start : body.end]}}}{latex[head.end :]}"
 
 
+def raised(latex: str, exponent: str) -> str:
+    r"""LaTeX with an exponent; in braces where it has one or a prime, as TeX takes two of them for an error."""
+    return f"{{{latex}}}^{exponent}" if re.search("['^]", latex) else f"{latex}^{exponent}"
+
+
 def with_instance(latex: str, instance: str) -> str:
     r"""LaTeX with the name of an instance as a further subscript: ``m_{c}`` -> ``m_{c,\mathrm{leg1}}``.
 

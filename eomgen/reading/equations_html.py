@@ -13,7 +13,7 @@ from ..printing.formula_mathml import fenced, row, sum_line
 from ..printing.formula_of import ROUNDED
 from ..printing.formula_tree import Formula, MatrixOf, Name, is_group
 from ..texts import html_text
-from .printed_equations import SAMPLED, PrintedEntry, PrintedEquations
+from .printed_equations import SAMPLED, STILL, PrintedEntry, PrintedEquations
 from .printed_parts import PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
@@ -31,8 +31,7 @@ def equations_html(equations: Readable) -> str:
     """Formulas of the equations of motion."""
     printed = PrintedEquations(equations, ROUNDED)
     if equations.mobility.n_dof == 0:
-        still = "<p>Nothing is free to move: the position follows from the constraints and the time.</p>"
-        return "".join([still, *_states(printed)])
+        return "".join([f"<p>{STILL.capitalize()}.</p>", *_states(printed)])
     motion = parts_html(PrintedParts(printed)) if printed.is_long else [*_motion(printed), *_intermediates(printed)]
     told = f"<p {LEFT}>{printed.told}</p>" if printed.told else ""
     return "".join([*motion, *_states(printed), told])

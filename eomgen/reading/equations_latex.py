@@ -8,7 +8,7 @@ from ..notation.notation import Notation
 from ..printing import latex, sums_in_lines
 from ..printing.formula_of import DIGITS, ROUNDED
 from ..printing.formula_tree import Formula, MatrixOf, is_group
-from .printed_equations import SAMPLED, PrintedEquations
+from .printed_equations import SAMPLED, STILL, PrintedEquations
 from .printed_parts import PrintedGroup, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
@@ -16,7 +16,9 @@ from .readable import Readable
 def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
     """Each formula of the equations of motion, without dollars: M v' = f, what its names stand for, what was put in."""
     printed = PrintedEquations(equations, digits)
-    if printed.is_long:
+    if equations.mobility.n_dof == 0:
+        lines = [_text(STILL)]
+    elif printed.is_long:
         lines = [*_parts(PrintedParts(printed))]
     else:
         lines = [
@@ -25,10 +27,10 @@ def latex_lines(equations: Readable, digits: int = DIGITS) -> list[str]:
         ]
     lines += [_broken(printed.names, latex(rate, printed.names), x) for rate, x in printed.states]
     if printed.sampled:
-        lines.append(rf"\text{{{SAMPLED}}}")
+        lines.append(_text(SAMPLED))
         lines += [_broken(printed.names, latex(state, printed.names), x) for state, x in printed.sampled]
     if told := printed.told:
-        lines.append(rf"\text{{{told.replace('_', chr(92) + '_')}}}")
+        lines.append(_text(told))
     values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
     return [*lines, rf"\text{{with }} {values}"] if values else lines
 
@@ -41,14 +43,15 @@ def equations_latex(equations: Readable) -> str:
     return "\n\n".join(f"$$\n{line}\n$$" for line in lines)
 
 
+def _text(words: str) -> str:
+    return rf"\text{{{words.replace('_', chr(92) + '_')}}}"
+
+
 def _motion(printed: PrintedEquations) -> Iterator[str]:
     def shown(formula: Formula) -> str:
         return latex(formula, printed.names)
 
     rates = [shown(x) for x in printed.accelerations]
-    if not rates:
-        yield r"n = 0"
-        return
     if printed.is_one_equation and printed.fits:
         M, f = printed.mass_matrix[0][0], printed.force[0]
         factor = rf"\left({shown(M)}\right)" if is_group(M) else shown(M)
@@ -90,7 +93,7 @@ def _parts(parts: PrintedParts) -> Iterator[str]:
         return latex(formula, parts.names)
 
     def words(sentence: PrintedSentence) -> str:
-        return "".join(rf"\text{{{x}}}" if isinstance(x, str) else shown(x) for x in sentence.pieces)
+        return "".join(_text(x) if isinstance(x, str) else shown(x) for x in sentence.pieces)
 
     for item in parts.items():
         match item:

@@ -14,7 +14,7 @@ from ..printing.formula_of import ROUNDED
 from ..printing.formula_text import TIGHT
 from ..printing.formula_tree import MatrixOf, times
 from ..texts import visible
-from .printed_equations import SAMPLED, PrintedEntry, PrintedEquations, plain
+from .printed_equations import SAMPLED, STILL, PrintedEntry, PrintedEquations, plain
 from .printed_parts import SHORT, PrintedGroup, PrintedLine, PrintedParts, PrintedRow, PrintedSentence
 from .readable import Readable
 
@@ -51,7 +51,7 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
     found = [f"equations of motion of {name}", f"  {printed.title}"]
     found += [*_values(printed, columns), *_coordinates(printed, columns)]
     if equations.mobility.n_dof == 0:
-        found.append("  nothing is free to move: the position follows from constraints and time")
+        found.append(f"  {STILL}")
     else:
         shown = [*(_large(printed, columns) if printed.is_long else _equations(printed, columns))]
         found += ["", *shown[:lines]]

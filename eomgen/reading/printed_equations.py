@@ -92,6 +92,7 @@ def _names(x: Expr) -> set[str]:
     return set(symbols_of([x]))
 
 
+STILL = "nothing is free to move: the position follows from constraints and time"
 SAMPLED = "sampled states, held until the next time t, where they become one after the other"
 
 

@@ -15,7 +15,7 @@ import sympy
 
 from ..frames import GROUND
 from ..kinematics.state import acceleration_name
-from ..notation import dotted
+from ..notation import dotted, raised
 from ..notation.notation import Notation
 from ..printing import text
 from ..printing.formula_tree import Formula, Letter, MatrixOf, Name, NumberPart, Product, SumOf, Words
@@ -143,7 +143,7 @@ class PrintedParts:
         k = self._kinematics
         mass, force, C, gamma = (Letter(matrix.letter) for matrix in self._matrices)
         B, a, w = self._letter("B", "P"), self._letter("a", "b"), self._letter("v_t", "w_t")
-        transposed, rates = Letter(f"{B}^T"), Letter(dotted(w, 1))
+        transposed, rates = Letter(raised(B, "T")), Letter(dotted(w, 1))
         rest = SumOf(((False, force), (True, Product((mass, Letter(a))))))
         of_mass, of_force = Product((transposed, mass, Letter(B))), Product((transposed, rest))
         yield PrintedRow((PrintedLine(M, of_mass), PrintedLine(f, of_force)))
@@ -157,7 +157,10 @@ class PrintedParts:
             )
         )
         C_d, C_i, B_d, a_d = (Letter(f"{x}_{part}") for x, part in ((C.latex, "d"), (C.latex, "i"), (B, "d"), (a, "d")))
-        inverse, moved = Letter(f"{C_d.latex}^{{-1}}"), SumOf(((False, Product((Letter(B), v))), (False, Letter(a))))
+        inverse, moved = (
+            Letter(raised(C_d.latex, "{-1}")),
+            SumOf(((False, Product((Letter(B), v))), (False, Letter(a)))),
+        )
         solved = (PrintedLine(left, SumOf(((True, Product((inverse, x))),))) for left, x in ((B_d, C_i), (a_d, gamma)))
         yield PrintedRow((PrintedLine(rates, moved), *solved))
         of_free = ("where ", C_i, " holds the columns of ", C, " that belong to ", *_listed(free), ", and ", C_d)

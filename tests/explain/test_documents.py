@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from sweeps import OF_ALL_KINDS, part_of
+from tex_formulas import require_tex
 
 import eomgen as eg
 from eomgen.equations import METHODS
@@ -74,6 +75,7 @@ def check(document: Any) -> None:
     assert "http" not in re.sub(r"base64,[A-Za-z0-9+/=]*", "", document.html)
     assert not re.search(r"\\[a-zA-Z]", "".join(page.text)), "LaTeX that was not turned into MathML"
     assert document.markdown.count("$$") % 2 == 0
+    require_tex(document.markdown)
     latex = document.latex
     assert latex.count(r"\begin{") == latex.count(r"\end{")
     assert latex.isascii()
@@ -117,6 +119,7 @@ def test_rolling(method: str) -> None:
 @pytest.mark.parametrize("name", part_of(NAMES, OF_ALL_KINDS.__contains__))
 def test_every_example_in_short(name: str) -> None:
     check(explained(name, "auto", "short"))
+    require_tex(eg.load(EXAMPLES / f"{name}.yaml").derive()._repr_latex_() or "")
 
 
 #: Each example by two methods more, so that each method comes to ten of them.

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import sympy as sp
 from shown_numbers import evaluate, number, random_state, state_values
+from tex_formulas import require_tex
 
 import eomgen as eg
 from eomgen.equations import METHODS
@@ -110,6 +112,32 @@ def test_matrices_of_the_display_have_letters_of_their_own() -> None:
     assert r"K \begin{bmatrix}" in latex
     assert "b_{1} & =" in latex or "\nb_{1} =" in latex
     assert not re.search(r"^(\\begin\{aligned\})?[Mf](_\{\d+\})? (&)?=", latex, re.M)
+
+
+#: Besides a, b, c, J and B, which the six-bar has.
+TAKEN = ("M_t", "A_t", "f_t", "b_t", "P", "C", "v_t", "w_t", "gamma", "T", "V", "L", "H")
+
+
+@pytest.mark.parametrize("latex", ["", r"q^{\ast}", "q'"])
+def test_no_symbol_gets_a_second_superscript(latex: str) -> None:
+    """All letters of a loop's display are names, or names have superscripts and primes of their own."""
+    m = eg.load(Path(__file__).parents[2] / "examples" / "watt_six_bar.yaml")
+    for k, name in enumerate(TAKEN):
+        m.parameter(name, 1.0, latex=f"{latex}{k}" if latex else None)
+    m.torque("more", "O", "-" + " - ".join(f"{name}**2" for name in TAKEN))
+    equations = m.derive("embedding")
+    require_tex(equations._repr_latex_())
+    if latex == "q'":
+        require_tex(equations.explain("short").markdown)
+
+
+def test_a_model_without_freedoms_says_so() -> None:
+    m = eg.Model("shelf")
+    m.weld("screws", m.ground, m.body("board", mass=1.0))
+    equations = m.derive()
+    for text in (str(equations), equations._repr_latex_(), equations._equations_html):
+        assert "othing is free to move: the position follows from constraints and time" in text
+        assert "n = 0" not in text
 
 
 def test_intermediates_are_not_printed_as_names_of_the_model() -> None:
