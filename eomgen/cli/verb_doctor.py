@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import platform
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import metadata
+from importlib import import_module, metadata
 from tempfile import TemporaryDirectory, TemporaryFile
 from typing import NamedTuple
 
@@ -40,6 +41,9 @@ EXTRAS = {
     "compiler": ("a C compiler from pip", ("ziglang",)),
     "notebook": ("Jupyter notebooks", ("casadi", "jupyterlab", "ipywidgets", "matplotlib", "k3d", "pandas", "control")),
 }
+#: package -> what is imported, where that has another name
+MODULES = {"cython": "Cython", "scikit-sundae": "sksundae", "cuda-core": "cuda.core", "cuda-bindings": "cuda.bindings",
+           "nvidia-cuda-nvrtc": "cuda.bindings.nvrtc"}  # fmt: skip
 
 
 class Check(NamedTuple):
@@ -83,21 +87,26 @@ def _python() -> Iterator[Check]:
 
 def _packages() -> Iterator[Check]:
     for name in CORE:
-        version = _version(name)
-        yield Check(name, version is not None, version or "missing", f"pip install {name}")
+        yield Check(name, *_import(name), f"pip install --upgrade {name}")
     for extra, (purpose, packages) in EXTRAS.items():
-        versions = {name: _version(name) for name in packages}
-        missing = [name for name, version in versions.items() if version is None]
-        detail = f"without {', '.join(missing)}" if missing else ", ".join(f"{n} {v}" for n, v in versions.items())
-        remedy = f'pip install "eomgen[{extra}]"'
-        yield Check(f"[{extra}]", not missing, f"{purpose}: {detail}", remedy, needed=False)
+        found = {name: _import(name) for name in packages}
+        detail = ", ".join(f"{name} {detail}" for name, (_, detail) in found.items())
+        ok = all(ok for ok, _ in found.values())
+        yield Check(f"[{extra}]", ok, f"{purpose}: {detail}", f'pip install --upgrade "eomgen[{extra}]"', needed=False)
 
 
-def _version(name: str) -> str | None:
+def _import(name: str) -> tuple[bool, str]:
+    """Whether a package can be imported, and its version and what is wrong."""
     try:
-        return metadata.version(name)
+        version = metadata.version(name)
     except metadata.PackageNotFoundError:
-        return None
+        return False, "missing"
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            import_module(MODULES.get(name, name))
+    except Exception as error:  # whatever a package does that does not fit what is beside it
+        return False, f"{version} cannot be imported ({type(error).__name__}: {error})"
+    return True, version
 
 
 def _compiler() -> Iterator[Check]:
@@ -124,7 +133,7 @@ def _compiles() -> Check:
         with _fresh_cache():
             module = load(shipped("examples") / "pendulum.yaml").compile()
             acceleration = float(module.rhs(0.0, [0.5, 0.0])[1])
-    except (EomgenError, OSError) as error:
+    except Exception as error:  # a package that cannot be imported too
         what, _, rest = str(error).partition("\n")
         return Check("small model", False, what, rest)
     if abs(acceleration + 9.81 * sin(0.5)) > UNMOVED:

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -202,18 +207,34 @@ def test_doctor(call: Call) -> None:
 
 
 def test_doctor_tells_which_extras_are_there(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    from eomgen.cli import verb_doctor
+    def version(name: str) -> str:
+        if name == "mujoco":
+            raise metadata.PackageNotFoundError(name)
+        return "1.2"
 
-    def version(name: str) -> str | None:
-        return None if name == "mujoco" else "1.2"
-
-    monkeypatch.setattr(verb_doctor, "_version", version)
+    monkeypatch.setattr(metadata, "version", version)
     monkeypatch.setenv("CC", "no-such-compiler")  # quick
     checks = {check["name"]: check for check in call("doctor", "--json").json["checks"]}
     assert not checks["[robots]"]["ok"]
     assert not checks["[robots]"]["needed"]
-    assert checks["[robots]"]["remedy"] == 'pip install "eomgen[robots]"'
+    assert checks["[robots]"]["remedy"] == 'pip install --upgrade "eomgen[robots]"'
     assert checks["[mesh]"]["ok"]
+
+
+def test_doctor_tells_what_is_installed_and_cannot_be_imported(tmp_path: Path) -> None:
+    """As pint 0.24 beside a later flexparser: every run with a unit such as inch failed, and doctor was content."""
+    for name in ("pint", "trimesh"):
+        (tmp_path / f"{name}.py").write_text("raise TypeError('a frozen class from one that is not')")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "CC": "no-such-compiler"}
+    command = [sys.executable, "-m", "eomgen", "doctor", "--json"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 3
+    checks = {check["name"]: check for check in json.loads(done.stdout)["checks"]}
+    for name in ("pint", "[mesh]"):
+        assert not checks[name]["ok"]
+        assert "cannot be imported (TypeError: a frozen class from one that is not)" in checks[name]["detail"]
+    assert checks["pint"]["needed"]
+    assert checks["numpy"]["ok"]
 
 
 def test_every_extra_for_users_is_known_to_doctor() -> None:
