@@ -90,7 +90,8 @@ def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mo
     Parameters
     ----------
     kinematics : Kinematics
-    independent : names of coordinates that should be the independent ones; the model's own by default
+    independent : names of coordinates that should be independent ones; the model's own by default.  Where they are
+        fewer than the degrees of freedom, the best conditioned others join them.
 
     Raises
     ------
@@ -129,6 +130,8 @@ def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mo
 
 def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
     problems = []
+    if twice := [name for name in dict.fromkeys(wanted) if list(wanted).count(name) > 1]:
+        problems.append(kinematics.mechanism.problem("independent", f"{', '.join(twice)}: named twice", "name it once"))
     known = (*kinematics.velocity_labels, *kinematics.loop_coordinates.names)
     for name in wanted:
         if name in kinematics.velocity_labels:
@@ -219,7 +222,8 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     at_change_point = ranks[0] < r  # where nothing can be said of a choice: the samples may lie on other branches
     others = [rows.conditioning(chosen) for rows in judged[1:]] if wanted and not at_change_point else []
     if wanted and not at_change_point and max(quality, *others, 0.0) < CHOSEN:
-        message = f"{', '.join(wanted)} cannot move the mechanism on their own at the initial configuration"
+        means = "move the mechanism on their own" if len(wanted) == n_dof else "vary independently of each other"
+        message = f"{', '.join(wanted)} cannot {means} at the initial configuration"
         better = [names[j] for j in choose_independent(judged, r)]
         raise ModelError([kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can")])
     rows = independent_rows(judged[int(np.argmax(ranks))].J, r) if r else np.empty(0, dtype=int)
@@ -265,5 +269,7 @@ def _choose(kinematics: Kinematics, judged: Sequence[SparseRows], r: int, wanted
     named = {c for spec in kinematics.mechanism.joints if spec.named for c in spec.coordinates}
     if kinematics.hints and not named:  # the angle of a contact point is nobody's choice
         named = set(names) - {name for name, _ in kinematics.hints}
-    prefer = [*picked, *(j for j, name in enumerate(names) if name in named and j not in picked)]
-    return tuple(int(j) for j in choose_independent(judged, r, prefer))
+    prefer = [j for j, name in enumerate(names) if name in named and j not in picked]
+    if picked:  # they stay, and the others are chosen where these stand still
+        judged = [SparseRows(np.vstack([rows.J, np.eye(len(names))[picked]])) for rows in judged]
+    return tuple(sorted([*picked, *map(int, choose_independent(judged, r + len(picked), prefer))]))
