@@ -124,7 +124,9 @@ def test_coordinates_that_cannot_be_independent_together_are_refused() -> None:
     with pytest.raises(ModelError, match="q, s cannot vary independently of each other"):
         model.derive(independent=["q", "s"])
     with pytest.raises(ModelError, match="e: named twice"):
-        model.derive(independent=["e", "e"])
+        model.derive(independent=["e", "e_dot"])
+    model.independent("C_dot", "f")  # as linearize takes them
+    assert model.derive().independent == ("C", "e", "f")
 
 
 def test_rank_needs_no_parameter_values() -> None:
