@@ -84,8 +84,9 @@ def derive(
     method : str
         One of ``equations.METHODS``, or ``auto``: embedding or recursive, whichever has the right-hand side of fewer
         operations; lagrange of a bare Lagrangian.
-    independent : names of coordinates, optional
-        The independent ones of a mechanism with loops; the model's own by default, else the best conditioned.
+    independent : names of coordinates or velocities, optional
+        Independent ones of a mechanism with loops; the model's own by default.  The best conditioned others join them
+        where they are fewer than the degrees of freedom.
     baumgarte : (alpha, beta), optional
         Of the augmented form (1/s): C'' + 2 alpha C' + beta^2 C = 0 holds instead of C'' = 0, and the right-hand side
         does not project its states.

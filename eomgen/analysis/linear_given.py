@@ -60,7 +60,10 @@ def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequ
     slopes, at_rest, C_q = rows[:n_h, :n_q], rows[n_h : n_h + n_c, :n_q], rows[n_h : n_h + n_c, n_q : layout.n_x]
     J = layout.place_scales.jacobian(slopes)
     count = rank(J).rank
-    Z, positions = _basis(J, count, _chosen(layout.q, names, n_q - count), layout.place_scales.q)
+    places = _chosen(layout.q, names, n_q - count)
+    if places is None and layout.independent_places:  # as the model says
+        places = np.array(layout.independent_places, dtype=np.intp), False
+    Z, positions = _basis(J, count, places, layout.place_scales.q)
     velocities = _chosen(layout.v, names, layout.n_dof)
     preferred = (layout.independent, False) if velocities is None else velocities
     B, moving = _basis(layout.scales.jacobian(C_q), layout.rank, preferred, layout.scales.q)

@@ -323,7 +323,7 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
     result: list[str] = []
     for k, item in enumerate(listed):
         name = name_of(item)
-        if name not in known:
+        if name not in known and name not in rates:
             reader.faults.add(
                 f"independent[{k}]", f"no coordinate {quoted(name)}", nearest(shown(name), known, "coordinates")
             )

@@ -364,7 +364,9 @@ class Mechanism:
             self.problem(
                 f"parameters.{p.name}",
                 "has no value",
-                "give it a value in the model, or when you bind the module's parameters",
+                f"give it one where it is declared: parameters: {{{p.name}: VALUE}} in a file, "
+                f'm.parameter("{p.name}", VALUE) or parameters= in Python; or by --set {p.name}=VALUE, of verbs that '
+                "have --set",
             )
             for p in self.parameters
             if p.value is None

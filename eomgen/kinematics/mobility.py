@@ -73,6 +73,7 @@ class Mobility:
         tuple[str, float], ...
     ] = ()  #: coordinates that can be independent there, with their conditioning
     driven: bool = False  #: whether a constraint depends on time
+    places: tuple[str, ...] = ()  #: coordinates named as independent, where their rates are given
 
 
 def initial_values(
@@ -90,7 +91,8 @@ def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mo
     Parameters
     ----------
     kinematics : Kinematics
-    independent : names of coordinates that should be the independent ones; the model's own by default
+    independent : names of coordinates that should be independent ones; the model's own by default.  Where they are
+        fewer than the degrees of freedom, the best conditioned others join them.
 
     Raises
     ------
@@ -100,15 +102,14 @@ def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mo
         The chosen independent coordinates are too many, unknown or cannot move the mechanism.
     """
     mechanism = kinematics.mechanism
-    named = dict(zip(kinematics.velocity_names, kinematics.velocity_labels, strict=True)) if mechanism.given else {}
-    wanted = tuple(named.get(name, name) for name in tuple(independent) or mechanism.independent)
+    wanted, places = _wanted(kinematics, tuple(independent) or mechanism.independent)
     _check_names(kinematics, wanted)
     values = {p.name: p.value for p in mechanism.parameters} | {u.name: u.value for u in mechanism.inputs}
     missing = [n for n, x in values.items() if x is None]
     numbers = {n: float(x) if x is not None else 1.0 + 0.1 * missing.index(n) for n, x in values.items()}
     functions = ConstraintFunctions(kinematics, numbers)
     if missing:
-        return replace(_find_mobility_assumed(functions, wanted), assumed=True)
+        return replace(_find_mobility_assumed(functions, wanted), assumed=True, places=places)
     given = initial_values(kinematics, numbers)
     guess = initial_values(kinematics, numbers, "guess")
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
@@ -117,9 +118,11 @@ def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mo
     require_finite(functions, found.q)
     later = follow_drivers(functions, found.q)
     judged = _partition(functions, [found.q, *_probe(functions, found.q), *later], wanted)
+    _check_places(functions, found.q, places)
     rough = {name: value for name, value in guess.items() if name in known and name not in positions}
     return replace(
         judged,
+        places=places,
         residual=found.residual,
         restarts=found.restarts,
         guessed=differences(functions.system, found.q, rough),
@@ -127,18 +130,45 @@ def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mo
     )
 
 
+def _wanted(kinematics: Kinematics, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The labels of the velocities that are named, and the coordinates, where these do not move as velocities say."""
+    labels = dict(zip(kinematics.velocity_names, kinematics.velocity_labels, strict=True))
+    if not kinematics.given_rates:
+        labels |= {f"{name}_dot": name for name in kinematics.loop_coordinates.names}
+        return tuple(labels.get(name, name) for name in names), ()
+    places = tuple(name for name in names if name in kinematics.names)
+    speeds = tuple(labels.get(name, name) for name in names if name not in places)
+    return speeds or tuple(name for name in places if name in kinematics.velocity_labels), places
+
+
+def _check_places(functions: ConstraintFunctions, q: Array, places: Sequence[str]) -> None:
+    """Refuse coordinates of given rates that cannot be independent of each other."""
+    if not places:
+        return
+    mechanism, names, J = functions.kinematics.mechanism, functions.kinematics.names, functions.place_jacobian(q)
+    rank, held = SparseRows(J).rank, np.eye(len(names))[[names.index(name) for name in places]]
+    if len(places) > (n := len(names) - rank) or len({*places}) < len(places):
+        message = f"{', '.join(places)}: the positions have {n} degree{'s' * (n != 1)} of freedom"
+        raise ModelError(
+            [mechanism.problem("independent", message, f"choose {n} different ones of {', '.join(names)}")]
+        )
+    if SparseRows(np.vstack([J, held])).rank < rank + len(places):
+        message = f"{', '.join(places)} cannot vary independently of each other at the initial configuration"
+        raise ModelError([mechanism.problem("independent", message, f"choose others of {', '.join(names)}")])
+
+
 def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
     problems = []
-    known = (*kinematics.velocity_labels, *kinematics.loop_coordinates.names)
+    if twice := [name for name in dict.fromkeys(wanted) if list(wanted).count(name) > 1]:
+        problems.append(kinematics.mechanism.problem("independent", f"{', '.join(twice)}: named twice", "name it once"))
+    coordinates = kinematics.names if kinematics.given_rates else kinematics.loop_coordinates.names
+    known = (*dict.fromkeys((*kinematics.velocity_labels, *coordinates)),)
     for name in wanted:
         if name in kinematics.velocity_labels:
             continue
         if name in kinematics.names:
             message = f"{name!r} is an Euler parameter, which cannot vary on its own"
             remedy = f"choose the angular velocity instead, of {', '.join(kinematics.velocity_labels)}"
-            if kinematics.given_rates:
-                message = f"{name!r} cannot be independent, because its rate is given as a function of velocities"
-                remedy = f"choose of {', '.join(kinematics.velocity_labels)}"
             problems.append(kinematics.mechanism.problem("independent", message, remedy))
             continue
         if name in known:
@@ -209,6 +239,8 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     if functions.m and not r:
         refuse_idle_rows(kinematics, functions.values)
     n_dof = n - r
+    if len(wanted) > n_dof and kinematics.given_rates and set(wanted) <= set(kinematics.names):
+        wanted = ()  # coordinates, of which there may be more than velocities
     if len(wanted) > n_dof:
         has = f"{n_dof} degree{'s' * (n_dof != 1)} of freedom"
         message = f"{len(wanted)} coordinates are chosen ({', '.join(wanted)}), but the mechanism has {has}"
@@ -220,7 +252,8 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     at_change_point = ranks[0] < r  # where nothing can be said of a choice: the samples may lie on other branches
     others = [rows.conditioning(chosen) for rows in judged[1:]] if wanted and not at_change_point else []
     if wanted and not at_change_point and max(quality, *others, 0.0) < CHOSEN:
-        message = f"{', '.join(wanted)} cannot move the mechanism on their own at the initial configuration"
+        means = "move the mechanism on their own" if len(wanted) == n_dof else "vary independently of each other"
+        message = f"{', '.join(wanted)} cannot {means} at the initial configuration"
         better = [names[j] for j in choose_independent(judged, r)]
         raise ModelError([kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can")])
     rows = independent_rows(judged[int(np.argmax(ranks))].J, r) if r else np.empty(0, dtype=int)
@@ -266,5 +299,7 @@ def _choose(kinematics: Kinematics, judged: Sequence[SparseRows], r: int, wanted
     named = {c for spec in kinematics.mechanism.joints if spec.named for c in spec.coordinates}
     if kinematics.hints and not named:  # the angle of a contact point is nobody's choice
         named = set(names) - {name for name, _ in kinematics.hints}
-    prefer = [*picked, *(j for j, name in enumerate(names) if name in named and j not in picked)]
-    return tuple(int(j) for j in choose_independent(judged, r, prefer))
+    prefer = [j for j, name in enumerate(names) if name in named and j not in picked]
+    if picked:  # they stay, and the others are chosen where these stand still
+        judged = [SparseRows(np.vstack([rows.J, np.eye(len(names))[picked]])) for rows in judged]
+    return tuple(sorted([*picked, *map(int, choose_independent(judged, r + len(picked), prefer))]))

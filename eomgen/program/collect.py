@@ -246,6 +246,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "velocity_kinds": [*kinematics.velocity_kinds, *("state" for _ in states)],
         "quaternion_slots": [list(slot) for slot in kinematics.quaternion_slots],
         **({"coordinate_of": list(kinematics.coordinate_of)} if m.given is not None else {}),
+        **({"independent_places": list(mobility.places)} if mobility.places else {}),
         **({"energy_known": False} if m.given is not None and m.given.kinetic_energy.is_zero else {}),
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),

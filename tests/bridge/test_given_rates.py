@@ -79,10 +79,6 @@ def test_constraints_with_given_rates(target: str) -> None:
     assert off[0] ** 2 + off[1] - 0.3 * off[2] - 0.1 * t == pytest.approx(0.5, abs=1e-12)
     with pytest.raises(eg.UsageError, match="the rates of its coordinates are given as functions of velocities"):
         _ = module.minimal.names
-    with pytest.raises(
-        eg.ModelError, match="'a' cannot be independent, because its rate is given.*choose of r, v, s, z"
-    ):
-        tied().derive(independent=["a", "v"])
     with pytest.raises(eg.UsageError, match="'a_dot' follows from the velocities; give one of r, v, s, z instead"):
         module.x0(a_dot=1.0)
     with pytest.raises(eg.UsageError, match="p= gives the parameters; give the velocity 'p'"):
@@ -252,6 +248,26 @@ def test_an_exported_package_stands_alone(tmp_path: Path) -> None:
     module = tied().compile(target="numpy")
     x = module.x0(a=0.3, c=0.2, r=0.5)
     assert [float(word) for word in done.stdout.split()] == pytest.approx(module.rhs(0.0, x), rel=1e-13)
+
+
+@pytest.mark.parametrize("names", [("a", "v"), ("a", "c", "r", "s"), ("b",), ("z",), ("a", "b")])
+def test_independent_ones_as_linearize_takes_them(names: tuple[str, ...]) -> None:
+    """Coordinates and velocities are chosen apart, and completed."""
+    module = tied().compile(target="numpy", independent=names)
+    assert {name for name in names if name in module.v_names} <= {module.v_names[k] for k in module.layout.independent}
+    x = module.x0(a=0.3, c=0.2, r=0.5)
+    near = module.linearize(x)
+    assert set(names) <= set(near.states)
+    if len(names) == 4:
+        chosen_later = tied().compile(target="numpy").linearize(x, independent=names)
+        np.testing.assert_allclose(near.A, chosen_later.A, atol=1e-12)
+
+
+def test_independent_ones_that_depend_on_each_other_are_refused() -> None:
+    with pytest.raises(eg.ModelError, match="a, b, c: the positions have 2 degrees of freedom"):
+        tied().derive(independent=["a", "b", "c"])
+    with pytest.raises(eg.ModelError, match="'d'.*a, b, c"):
+        tied().derive(independent=["d"])
 
 
 def test_derivatives_by_inputs_and_parameters_are_refused() -> None:

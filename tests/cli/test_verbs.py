@@ -285,3 +285,39 @@ def test_messages_speak_of_options() -> None:
     assert lines_of(UsageError("method RK4 needs step=, the size")) == ["method RK4 needs --step, the size"]
     blocked = lines_of(AssemblyError("the way is blocked; give initial={...} nearer to the first point"))
     assert blocked == ["the way is blocked; give --set NAME=VALUE nearer to the first point"]
+
+
+TWO_FREEDOMS = """
+name: two
+bodies:
+  a: {mass: 1, com: [0.2, 0, 0], inertia: {zz: 0.1}, markers: {end: [0.1, 0, 0]}}
+  b: {mass: 1, inertia: {zz: 0.1}, markers: {end: [0.3, 0, 0]}}
+  c: {mass: 1}
+  w: {mass: m, inertia: {zz: 1}}
+parameters: {m: %s}
+joints:
+  A: {type: revolute, between: [ground, a], coordinate: q}
+  B: {type: revolute, between: [a.end, b]}
+  C: {type: revolute, between: [b.end, c]}
+  D: {type: prismatic, between: [ground, c], axis: x, coordinate: s}
+  E: {type: revolute, between: [ground, w], coordinate: e}
+initial: {q: 0.7}
+"""
+
+
+def test_a_named_coordinate_is_joined_by_others(call, model_file):
+    file = model_file(TWO_FREEDOMS % 1)
+    for name in ("q", "s"):
+        report = call("run", file, "--end", "0.01", "--independent", name, "--json").json["report"]
+        assert set(report["independent"]) == {name, "e"}
+
+
+def test_where_a_value_can_be_given_is_said(call, model_file):
+    """Each remedy that is named works."""
+    file = model_file(TWO_FREEDOMS % "{}")
+    for verb in ("check", "run", "generate", "verify"):
+        result = call(verb, file, *(("--out", "x") if verb == "generate" else ()))
+        assert result.code == 1
+        assert "parameters: {m: VALUE}" in result.err
+        assert "bind" not in result.err
+    assert call("run", file, "--end", "0.01", "--set", "m=1").code == 0

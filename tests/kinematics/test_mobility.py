@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,6 +88,45 @@ def test_bad_independent_coordinates_are_refused() -> None:
         four_bar().derive(independent=["thet"])
     with pytest.raises(ModelError, match="1 degree of freedom;"):
         four_bar().derive(independent=["theta", "phi"])
+
+
+def four_bar_and_wheel() -> eg.Model:
+    m = eg.Model("two", gravity=(0, -9.81, 0))
+    crank = m.body("a", mass=1, com=(0.2, 0, 0), inertia={"zz": 0.1})
+    coupler = m.body("b", mass=1, com=(0.55, 0, 0), inertia={"zz": 0.1})
+    rocker = m.body("c", mass=1, com=(0.4, 0, 0), inertia={"zz": 0.1})
+    m.revolute("A", m.ground, crank, coordinate="q")
+    m.revolute("B", crank.at(0.4, 0, 0), coupler, coordinate="s")
+    m.revolute("C", coupler.at(1.1, 0, 0), rocker.at(0.8, 0, 0))
+    m.revolute("D", m.ground.at(1.2, 0, 0), rocker, coordinate="r")
+    m.revolute("E", m.ground, m.body("w", mass=1, inertia={"zz": 0.3}), coordinate="e")
+    m.guess(q=0.6, s=-0.2, r=1.5)
+    m.initial(q=0.6)
+    return m
+
+
+@pytest.mark.parametrize("name", ["q", "s", "r", "e", "C"])
+def test_named_coordinates_are_kept_where_there_are_more_freedoms(name: str, tmp_path: Path) -> None:
+    model = four_bar_and_wheel()
+    called = model.compile(target="numpy", independent=[name]).minimal
+    model.independent(name)
+    (file := tmp_path / "two.yaml").write_text(model.to_yaml())
+    for minimal in (called, model.compile(target="numpy").minimal, eg.load(file).compile(target="numpy").minimal):
+        assert name in minimal.x_names[:2]
+        assert len(set(minimal.x_names)) == 4
+        z = minimal.x0()
+        assert np.isfinite(minimal.rhs(0.0, z)).all()
+
+
+def test_coordinates_that_cannot_be_independent_together_are_refused() -> None:
+    model = four_bar_and_wheel()
+    model.revolute("F", model.ground, model.body("x", mass=1, inertia={"zz": 0.3}), coordinate="f")
+    with pytest.raises(ModelError, match="q, s cannot vary independently of each other"):
+        model.derive(independent=["q", "s"])
+    with pytest.raises(ModelError, match="e: named twice"):
+        model.derive(independent=["e", "e_dot"])
+    model.independent("C_dot", "f")  # as linearize takes them
+    assert model.derive().independent == ("C", "e", "f")
 
 
 def test_rank_needs_no_parameter_values() -> None:
