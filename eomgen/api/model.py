@@ -11,6 +11,7 @@ from ..describe.sympy_face import name_of
 from ..describe.visit import copied
 from ..errors import UsageError
 from ..files.inline_pictures import picture_html, side_by_side
+from ..simulation.progress import waiting
 from .equations import Equations, derive
 
 if TYPE_CHECKING:
@@ -59,7 +60,8 @@ class Model(Builder):
         """A model from equations that SymPy's mechanics formed; see :func:`eomgen.from_sympy`, with its arguments."""
         from ..describe.sympy_method import describe_method
 
-        return cls.from_description(describe_method(method, name, **options))
+        with waiting(f"reading the equations of {type(method).__name__}"):
+            return cls.from_description(describe_method(method, name, **options))
 
     def check(self) -> MechanismReport:
         """Check all that can be checked before a simulation, assembly included; see ``eomgen.pipeline.check``."""
@@ -178,8 +180,7 @@ def from_sympy(
     ModelError
         Names that clash or are not those of anything in the equations.
     """
-    from ..describe.sympy_method import describe_method
-
-    return Model.from_description(
-        describe_method(method, name, parameters, inputs, outputs, initial, specified, potential_energy, guess)
-    )
+    return Model.from_sympy(
+        method, name, parameters=parameters, inputs=inputs, outputs=outputs, initial=initial, specified=specified,
+        potential_energy=potential_energy, guess=guess,
+    )  # fmt: skip

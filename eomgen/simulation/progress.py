@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Timer
 from time import perf_counter
 from typing import Any
 
@@ -86,6 +89,19 @@ class Progress:
         self.bar = Bar(console=Console(stderr=True), transient=True)
         self.task = self.bar.add_task("simulating", total=1.0)
         self.bar.start()
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """Say on stderr what a call does, once it has taken a while."""
+    timer = Timer(PATIENCE, lambda: print(f"eomgen: {what} ...", file=sys.stderr, flush=True))
+    timer.daemon = True
+    if wanted(None):
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 class _Bar:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -316,3 +317,25 @@ def test_multipliers_that_are_no_outputs_are_noted() -> None:
     assert twice.compile(target="numpy").y_names == ()
     once = eg.from_sympy(lagrange(kinetic - sympy.Symbol("lam1") * y, [x, y], hol_coneqs=[x - y]))
     assert any("lam1" in note for note in once.notes)
+
+
+def test_functions_of_coordinates_are_tables() -> None:
+    q, h = dynamicsymbols("q"), sympy.Function("h")
+    model = eg.from_sympy(lagrange(q.diff() ** 2 / 2 - h(q), [q]), "curve")
+    with pytest.raises(eg.ModelError, match=r"h\(q\(t\)\).*model\.table"):
+        model.check()
+    points = np.linspace(-2.0, 2.0, 41)
+    model.table("h", points, points**2)
+    assert model.compile(target="numpy").rhs(0.0, [0.5, 0.0])[1] == pytest.approx(-1.0, abs=1e-3)
+
+
+def test_what_takes_a_while_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    said = Terminal()
+    monkeypatch.setattr("sys.stderr", said)
+    monkeypatch.setattr("eomgen.simulation.progress.PATIENCE", 0.0)
+    eg.from_sympy(rolling_disc(), "disc")
+    assert said.getvalue() == "eomgen: reading the equations of KanesMethod ...\n"
