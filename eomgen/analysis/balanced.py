@@ -44,7 +44,7 @@ class Equilibrium:
         Generalized force (N, N m) that holds each held coordinate, where no unknowns balance it.
     eigenvalues : (n,) complex array
         Of the motion near it, held coordinates held (1/s).
-    stability : {'asymptotically stable', 'marginal', 'unstable', 'no freedom'}
+    stability : {'asymptotically stable', 'stable (undamped)', 'marginal', 'unstable', 'no freedom'}
         By their largest real part; 'marginal' where it vanishes.
     linear : Linearization or None
         About the equilibrium; None where supports hold it.

@@ -151,7 +151,8 @@ class Linearization:
     def stability(self) -> str:
         """By the largest real part of the eigenvalues: 'asymptotically stable', 'marginal' or 'unstable'.
 
-        'no freedom' where drivers and constraints hold everything.
+        'stable (undamped)' at a minimum of the potential energy that not all motions come to rest at; 'no freedom'
+        where drivers and constraints hold everything.
 
         'marginal' where rounding alone could move one of them to the imaginary axis, and none is beyond it: the linear
         equations do not decide.  Where the stiffness is symmetric and nothing drives the motion, the sign of the

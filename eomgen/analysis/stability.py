@@ -1,4 +1,4 @@
-"""Analysis: M z'' + C z' + K z = 0 and its first-order form -> 'asymptotically stable', 'marginal' or 'unstable'.
+"""Analysis: M z'' + C z' + K z = 0 and its first-order form -> its stability in a word.
 
 Of a rigid body that may turn freely, and of every other neutral motion, 0 is a double eigenvalue with one eigenvector:
 an error e of the matrix splits it by sqrt(e), so that its sign says nothing.  Where C has no negative part and K is
@@ -102,7 +102,7 @@ def verdict(
     if (squares <= bound).any():
         return "marginal"
     found = stability_of_matrix(A, own, error, errors)
-    return found if found == "asymptotically stable" else "marginal"
+    return found if found == "asymptotically stable" else "stable (undamped)"  # a least potential
 
 
 def _is_dissipative(second: SecondOrder) -> bool:
