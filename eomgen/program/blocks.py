@@ -250,7 +250,7 @@ class BlockMaker:
             outputs = trees[name]()
         elif name == "rhs" and self.unrolled:
             accelerations, checks = self._accelerations
-            outputs = [*(terms.rates or self._symbols(terms.v)), *accelerations]
+            outputs = [*terms.q_dot, *accelerations]
         elif name == "rhs_hessian_product":
             outputs, checks = self._rhs_hessian_product()
         elif (found := written_derivative(terms, self.slopes, name, self.unrolled, self._touching)) is not None:

@@ -38,7 +38,7 @@ class ClosedStep:
         self.J = loops.J[: loops.h]
         self.columns = transpose(self.J, self.terms.n_v)
         self.e = [x * i for x, i in zip(self.terms.constraints, loops.inverse, strict=False)]
-        self.rates = list(self.terms.rates or self.v)[: len(self.q)]
+        self.rates = list(self.terms.q_dot)
 
     def _symbols(self, names: Sequence[str]) -> list[Expr]:
         return [self.terms.graph.symbol(name) for name in names]

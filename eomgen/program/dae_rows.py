@@ -24,5 +24,5 @@ def dae_kinematics(terms: SystemTerms, rates: Sequence[str], corrections: Sequen
     for row, name in zip(terms.constraint_jacobian, corrections, strict=False):
         mu = graph.symbol(name)
         moved = [x - s * s * c * mu for x, s, c in zip(moved, terms.coordinate_scales, row, strict=True)]
-    flow = substitute(terms.rates or v, dict(zip(v, moved, strict=True)))
+    flow = substitute(terms.q_dot, dict(zip(v, moved, strict=True)))
     return [graph.symbol(name) - f for name, f in zip(rates, flow, strict=True)]

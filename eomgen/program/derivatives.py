@@ -42,7 +42,7 @@ def strike_rows(terms: SystemTerms, impulses: Sequence[str], of_held: Sequence[s
     graph = terms.graph
     v, a, l = ([graph.symbol(name) for name in names] for names in (terms.v, terms.a, terms.multipliers))
     q = [graph.symbol(name) for name in terms.q]
-    rates = jvp(terms.events, dict(zip(q, terms.rates or v, strict=True)))
+    rates = jvp(terms.events, dict(zip(q, terms.q_dot, strict=True)))
     moving = {graph.symbol(u): graph.symbol(rate) for u, rate in terms.input_rates}
     drift = jvp(terms.events, {graph.symbol(terms.t): graph.one} | moving)
     normals = jacobian(rates, v)

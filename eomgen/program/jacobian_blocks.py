@@ -137,7 +137,7 @@ def unrolled_jacobian(terms: SystemTerms, slopes: ResidualSlopes) -> tuple[list[
         found.append((slopes.by_formula_at(solved.accelerations), solved))
     if not found:
         return None
-    rates = jacobian(list(terms.rates or symbols[len(terms.q) :]), symbols)
+    rates = jacobian(list(terms.q_dot), symbols)
     made = [(_rows(terms, rates, entries, solved, len(symbols)), solved.checks) for entries, solved in found]
     rows, checks = min(made, key=lambda one: count([*one[0], *one[1]]).total)
     return (rows, checks) if count(rows).total <= slopes.limits.jacobian_nodes else None

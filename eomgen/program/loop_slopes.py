@@ -59,7 +59,7 @@ class LoopSlopes:
     def _positions(self) -> list[Expr]:
         """The change of the projected q; Euler parameters keep their part along themselves."""
         loops, terms = self.loops, self.terms
-        rates = list(terms.rates or self.v)
+        rates = list(terms.q_dot)
         N = jacobian(rates, self.v)
         z = [self.dq[k] if k >= 0 else terms.graph.zero for k in terms.coordinate_of]
         for i, j in terms.quaternion_slots:
@@ -106,7 +106,7 @@ class LoopSlopes:
         l = self._symbols(terms.multipliers)
         r1, r2 = force_residual(terms), acceleration_residual(terms)
         seeds = dict(zip((*self.q, *self.v), (*dq, *dv), strict=True))
-        changes = jvp([*(terms.rates or self.v), *r1, *r2], seeds)
+        changes = jvp([*terms.q_dot, *r1, *r2], seeds)
         n_q, n = len(self.q), terms.n_v
         da = self._changed(changes[n_q : n_q + n], changes[n_q + n :])
         multipliers = [x * i for x, i in zip(self.loops.multipliers, self.loops.inverse, strict=True)]

@@ -60,7 +60,7 @@ class TreeHessian:
     @property
     def _rates(self) -> list[Expr]:
         """q'"""
-        return list(self.terms.rates or self._symbols(self.terms.v))
+        return list(self.terms.q_dot)
 
     def by_accelerations(self) -> list[Expr]:
         """From the formula of v'."""

@@ -52,7 +52,7 @@ class LoopHessian:
         n_q, n = len(self.q), self.terms.n_v
         dynamics, checks = self.loops.dynamics()
         moved, accelerations, sound = dynamics[:n], dynamics[n : 2 * n], dynamics[2 * n]
-        rates = substitute(list(self.terms.rates or self.v), dict(zip(self.v, moved, strict=True)))
+        rates = substitute(list(self.terms.q_dot), dict(zip(self.v, moved, strict=True)))
         rows, z = [*rates, *accelerations], [*self.q, *self.v, *self.u]
         if not self.loops.h:
             return hessian_product(rows, self.weights, z, self.direction), [*checks, sound]

@@ -43,7 +43,7 @@ def with_states(terms: SystemTerms, names: Sequence[str], rates: Sequence[Expr])
         preferred=(*terms.preferred, *range(n, n + count)),
         parent=(*terms.parent, *(-1,) * count),
         motion_axes=(*terms.motion_axes, *[graph.zero] * (6 * count if terms.motion_axes else 0)),
-        rates=terms.rates or tuple(map(graph.symbol, terms.v)),
+        rates=terms.q_dot,
         centroidal=_centroidal(terms.centroidal, n, nothing),
         accelerations=None if terms.accelerations is None else (*terms.accelerations, *rates),
         pivots=(*terms.pivots, *(graph.one,) * count) if terms.accelerations is not None else (),

@@ -114,6 +114,11 @@ class SystemTerms:
         return tuple(-1 if k in turning else next(plain) for k in range(self.n_v))
 
     @property
+    def q_dot(self) -> Row:
+        """q', of (t, q, v)."""
+        return self.rates or tuple(map(self.graph.symbol, self.v[: self.n_v - self.n_states]))
+
+    @property
     def has_minimal_form(self) -> bool:
         """Whether positions follow from those of the independent velocities."""
         coordinates = self.coordinate_of

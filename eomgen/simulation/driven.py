@@ -205,9 +205,9 @@ class _DrivenRun:
                 last = ends if last is None else min(last, ends)
         kept = [np.array([s for s in places if last is None or s <= last]) for places in found]
         times = [self.start + self.sense * s for s in kept]
-        states_at = [np.array([self.state(float(s)) for s in places]).reshape(len(places), -1).T for places in kept]
         width = self.followed.driven.layout.n_x
-        return times, [x if x.size else np.empty((width, 0)) for x in states_at], last
+        states_at = [np.array([self.state(float(s)) for s in places]).reshape(-1, width).T for places in kept]
+        return times, states_at, last
 
     def keep(
         self, t: Array, s: Array, t_events: list[Array], x_events: list[Array], header: dict[str, Any]

@@ -70,7 +70,7 @@ class PreciseState:
         """q' at some values."""
         terms = self.system.terms
         if not terms.rates:
-            return [values[name] for name in terms.v]
+            return [values[name] for name in terms.v[: self.n - terms.n_states]]
         return self.system.evaluate("rates", lambda: terms.rates, values)
 
     @cached_property
@@ -124,7 +124,7 @@ class PreciseState:
         """q'' along q', v' = a."""
         terms = self.system.terms
         if not terms.rates:
-            return list(a)
+            return list(a)[: self.n - terms.n_states]
         h, rates = self.mp.mpf(FIRST), self.rates(self.values)
         ends = []
         for s in (h, -h):
