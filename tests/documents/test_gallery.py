@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from ruamel.yaml import YAML
 
 import eomgen as eg
 from eomgen.cli.verb_view import view
@@ -90,3 +92,38 @@ def test_the_script_makes_what_is_stored(name: str, tmp_path: Path, monkeypatch:
 def test_an_entry_without_a_command_is_told() -> None:
     with pytest.raises(ValueError, match="engine lacks a picture or its command"):
         SCRIPT.entries("### engine\n\n![x](pictures/gallery/engine.png)\n")
+
+
+#: What the description of an example says of its motion -> whether a run does so.
+CLAIMS: list[tuple[str, str, Callable[[Any], bool]]] = [
+    ("cart_pendulum", "falls over", lambda run: run["phi"].max() > np.pi / 2),
+    ("four_bar", "coasting", lambda run: run["theta_dot"].min() > 0),
+    ("gear_train", "lifts a load", lambda run: run["height"][-1] > 0.1),
+    ("kapitza_pendulum", "upside down, held there", lambda run: np.abs(run["theta"] - np.pi).max() < 0.3),
+    ("pendulum", "released from the horizontal", lambda run: abs(run["y"][0]) < 1e-12),
+    ("planetary_gear", "load that sinks", lambda run: run["height"][-1] < -0.1),
+    ("slider_crank", "that swings", lambda run: np.ptp(run["theta"]) < np.pi + 1),
+    ("slider_crank", "at 10 rad/s at first", lambda run: run["theta_dot"][0] == 10),
+    ("spherical_pendulum", "swinging round", lambda run: run["phi"][-1] > 2 * np.pi),
+    ("watt_six_bar", "output swings less", lambda run: np.ptp(run["swing_out"]) < np.ptp(run["swing_in"])),
+    ("wheelset", "dies away here", lambda run: abs(run["y"][-1]) < 1e-3 * run["y"][0]),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "does"), CLAIMS, ids=[f"{name}: {text}" for name, text, _ in CLAIMS])
+def test_examples_move_as_they_are_described(name: str, text: str, does: Callable[[Any], bool]) -> None:
+    model = eg.load_example(name)
+    assert text in str(load_yaml(name)["doc"])
+    assert does(model.compile(target="numpy").simulate())
+
+
+def test_the_winch_of_the_page_on_constraints_lifts_its_load(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "constraints.md").read_text(encoding="utf-8")
+    (tmp_path / "winch.yaml").write_text(text.partition("```yaml\n")[2].partition("```")[0])
+    module = eg.load(tmp_path / "winch.yaml").compile(target="numpy")
+    assert "lifts a load" in text
+    assert module.simulate(1.0)["height"][-1] > 0.5
+
+
+def load_yaml(name: str) -> Any:
+    return YAML(typ="safe").load(example_files()[name].read_text(encoding="utf-8"))
