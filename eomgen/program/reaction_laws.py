@@ -171,7 +171,9 @@ def _motion(
         s = total([mass_matrix[i][i] for i in range(n)]) / total([x * x for row in C for x in row])
         columns = [list(column) for column in zip(*C, strict=True)]
         pushed = [[s * dot(one, other) for other in columns] for one in columns]
-        mass_matrix = [[x + y for x, y in zip(*r, strict=True)] for r in zip(mass_matrix, pushed, strict=True)]
+        mass_matrix = tuple(
+            tuple(x + y for x, y in zip(*rows, strict=True)) for rows in zip(mass_matrix, pushed, strict=True)
+        )
         bias = [h + s * dot(column, gamma) for h, column in zip(bias, columns, strict=True)]
         parent = tuple(range(-1, n - 1))
         still = without_inertia(kinematics, mobility, mass_matrix)
