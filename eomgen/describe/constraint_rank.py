@@ -45,6 +45,8 @@ def independent_rows(forms: Forms, constants: Sequence[str], functions: Sequence
 
     rates: dict[str, Expr] = {}
     try:
+        for symbol, part in forms.intermediates.items():
+            names[symbol.name] = lower_sympy(graph, part, resolve)
         slopes = [lower_sympy(graph, rate, resolve) for rate in forms.rates.values()]
         for x, rate in zip(forms.q, slopes, strict=True):
             rates[f"{name_of(x)}_dot"] = rate

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import UsageError
+from .sympy_face import name_of
 
 KNOWN = "KanesMethod, LagrangesMethod, System, JointsMethod"
 
@@ -30,6 +31,7 @@ class Forms:
     potential: Any
     multipliers: list[str] = field(default_factory=list)  #: SymPy's own names
     noncontributing: list[Any] = field(default_factory=list)  #: equations of auxiliary speeds, each = 0
+    intermediates: dict[Any, Any] = field(default_factory=dict)  #: symbol -> part of the equations
     masses: list[Any] = field(default_factory=list)  #: symbols of the masses of the bodies
 
 
@@ -88,55 +90,80 @@ def _read_lagrange(method: Any) -> Forms:
 
 
 def _read_kane(method: Any) -> Forms:
-    from sympy import S, sympify
+    from sympy import S, Symbol, sympify
 
     if method._fr is None or method._frstar is None:
         raise UsageError("the KanesMethod has no equations yet; call kanes_equations(bodies, loads) on it first")
     q, v = list(method.q), list(method.u)
-    whole = method
+    whole, parts = method, dict[Any, Any]()
     if len(method._udep) or not method._k_kqdot_implicit.is_diagonal():
-        whole = _of_all_speeds(method)
+        whole, parts = _of_all_speeds(method)
     rates = whole.kindiffdict()
+    named = {x: Symbol(name_of(x)) for x in parts}
     auxiliary = dict.fromkeys([*method._uaux, *(x.diff(*x.args) for x in method._uaux)], S.Zero)
     bodies = list(method.bodies)
     kinetic = sum((body.kinetic_energy(method._inertial) for body in bodies), S.Zero)
     potential = sum((body.potential_energy for body in bodies), S.Zero)
     order = _paired(method._qdot, v, rates)
-    matrix, forcing = whole.mass_matrix.xreplace(auxiliary), whole.forcing.xreplace(auxiliary)
+    kinetic = kinetic.xreplace(rates).xreplace(auxiliary).xreplace(named)
+    rates = {dq: rate.xreplace(auxiliary).xreplace(named) for dq, rate in rates.items()}
+    matrix, forcing = (x.xreplace(auxiliary).xreplace(named) for x in (whole.mass_matrix, whole.forcing))
     return Forms(
         q=q,
         v=[v[k] for k in order],
-        rates={dq: rate.xreplace(auxiliary) for dq, rate in rates.items()},
+        rates=rates,
         mass_matrix=[[matrix[i, j] for j in order] for i in order],
         forcing=[forcing[k] for k in order],
         configuration=list(method._f_h),
-        motion=_constraints_of_speeds(method, rates, auxiliary),
-        kinetic=kinetic.xreplace(rates).xreplace(auxiliary),
+        motion=_constraints_of_speeds(method, auxiliary),
+        kinetic=kinetic,
         potential=potential,
         noncontributing=list(method.auxiliary_eqs.xreplace(auxiliary)) if len(method._uaux) else [],
+        intermediates={named[x]: part.xreplace(named) for x, part in parts.items()},
         masses=[symbol for body in bodies for symbol in sympify(body.mass).free_symbols],
     )
 
 
-def _of_all_speeds(method: Any) -> Any:
-    """The same system without its constraints, every speed independent."""
-    from sympy.physics.mechanics import KanesMethod
+def _of_all_speeds(method: Any) -> tuple[Any, dict[Any, Any]]:
+    """The same system without its constraints, every speed independent, and the parts of its q' = Z u + z.
+
+    Z = -W K_u, z = -W f of K q' + K_u u + f = 0, W = K^-1.  SymPy puts q' in everywhere, so what varies of W, Z, z and
+    their rates Z' = -W (K' Z + K_u'), z' = -W (K' z + f') are functions of time, whose values stand beside.
+    """
+    from sympy import Function, eye
+    from sympy.physics.mechanics import KanesMethod, dynamicsymbols
 
     left, right, rest = method._k_kqdot_implicit, method._k_ku_implicit, method._f_k_implicit
+    n, t, parts = len(method.q), dynamicsymbols._t, dict[Any, Any]()
+
+    def named(word: str, matrix: Any) -> Any:
+        result = matrix.copy()
+        for i, j in ((i, j) for i in range(matrix.rows) for j in range(matrix.cols)):
+            if not (value := matrix[i, j]).is_Atom and value.diff(t) != 0:
+                result[i, j] = Function(f"{word}_{i + 1}_{j + 1}")(t)
+                parts[result[i, j]] = value
+        return result
+
+    known = right.row_join(rest)
+    inverse = named("inverse", _solve_blocks(left, eye(n)))
+    forward = named("kinematics", -inverse * known)
+    changes = -inverse * (left.diff(t) * forward + known.diff(t))
+    parts |= {
+        forward[i, j].diff(t): changes[i, j] for i in range(n) for j in range(forward.cols) if forward[i, j] in parts
+    }
     whole = KanesMethod(
         method._inertial,
         q_ind=list(method.q),
         u_ind=list(method.u),
-        kd_eqs=list(left * method._qdot + right * method.u + rest),
+        kd_eqs=list(method._qdot - forward[:, :-1] * method.u - forward[:, -1]),
         u_auxiliary=list(method._uaux) or None,
-        kd_eqs_solver=_solve_blocks,
     )
     whole._form_fr(method.loads)  # not kanes_equations: the auxiliary ones are had already
     whole._form_frstar(method.bodies)
-    return whole
+    return whole, parts
 
 
-def _constraints_of_speeds(method: Any, rates: dict[Any, Any], auxiliary: dict[Any, Any]) -> list[Any]:
+def _constraints_of_speeds(method: Any, auxiliary: dict[Any, Any]) -> list[Any]:
     """SymPy keeps them after it has put its own q' in, as matrices."""
     if not len(method._udep):
         return []

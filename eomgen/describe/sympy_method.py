@@ -45,7 +45,7 @@ def describe_method(
     forces = solve_auxiliary(forms, {*known.motion, *given_inputs}, given_parameters)
     extra = {name: put(expression, forces) for name, expression in extra.items()}
     noncontributing = {str(name_of(force)): value for force, value in forces.items()}
-    contents = [*_contents(forms), *extra.values(), *noncontributing.values()]
+    contents = [*_contents(forms), *forms.intermediates.values(), *extra.values(), *noncontributing.values()]
     constants, functions = known.sort(contents, given_inputs)
     problems = known.problems
     for key in given_parameters:
@@ -70,6 +70,8 @@ def describe_method(
     description = Description(values={"name": name, "equations": equations})
     if rows:
         equations["constraints"] = rows
+    if forms.intermediates:
+        equations["intermediates"] = {symbol.name: part for symbol, part in forms.intermediates.items()}
     names = forms.multipliers or [f"lam{k + 1}" for k in range(len(rows))]
     if not independent or len(names) != len(rows):
         description.notes.append(
@@ -107,6 +109,7 @@ class _Known:
 
     def __init__(self, forms: Forms) -> None:
         self.problems: list[Problem] = []
+        self.intermediates = [symbol.name for symbol in forms.intermediates]
         self.names: dict[str, Any] = {}
         for k, x in enumerate([*forms.q, *forms.v]):
             name = name_of(x)
@@ -136,7 +139,8 @@ class _Known:
                     walk.skip()  # f' is not f
                     if found not in self.motion:
                         functions.add(found)
-        symbols.pop("t", None)
+        for name in ("t", *self.intermediates):
+            symbols.pop(name, None)
         for symbol, different in symbols.items():
             if symbol in self.names or symbol in functions:
                 what = "a coordinate or speed" if symbol in self.names else "a function of time"

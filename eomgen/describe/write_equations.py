@@ -15,10 +15,18 @@ LARGE = 200  #: operations of an expression from which the section is written wi
 def with_intermediates(equations: Mapping[str, Any]) -> Mapping[str, Any]:
     """The section with the common parts of its expressions named, if one of them is large."""
     found = [x for x in _parts(equations) if is_sympy(x)]
-    if not found or max(int(x.count_ops()) for x in found) < LARGE or "intermediates" in equations:
+    if not found or max(int(x.count_ops()) for x in found) < LARGE:
         return equations
     import sympy
     from sympy.core.function import AppliedUndef
+
+    inside: dict[Any, Any] = {}
+    for name, part in equations.get("intermediates", {}).items():
+        if not is_sympy(part):
+            return equations
+        inside[sympy.Symbol(name)] = part.xreplace(inside)
+    equations = {key: value for key, value in equations.items() if key != "intermediates"}
+    found = [x.xreplace(inside) for x in _parts(equations) if is_sympy(x)]
 
     plain: dict[Any, Any] = {}
     names: set[str] = set()

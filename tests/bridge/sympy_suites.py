@@ -114,8 +114,8 @@ def names(expression: Any) -> dict[str, Any]:
 
 
 def evaluated(expression: Any, numbers: dict[str, float]) -> np.ndarray:
-    """A matrix of SymPy at numbers by name."""
-    known = {part: numbers[key] for key, part in names(expression).items()}
+    """A matrix of SymPy at numbers by name; what cancels in eomgen's model may have any."""
+    known = {part: numbers.get(key, 0.6) for key, part in names(expression).items()}
     return np.array(msubs(expression, known).evalf().tolist(), dtype=float)
 
 
