@@ -35,9 +35,11 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
     """What a :class:`~..api.model.Model` is told: methods that add to its description."""
 
     def __init__(
-        self, name: str, gravity: Vector = (0, 0, 0), doc: str = "", *, check_inertia: bool | str = True
+        self, name: str, gravity: Vector | None = None, doc: str = "", *, check_inertia: bool | str = True
     ) -> None:
-        values: dict[str, Any] = {"name": name, "gravity": gravity}
+        values: dict[str, Any] = {"name": name}
+        if gravity is not None:
+            values["gravity"] = gravity
         if doc:
             values["doc"] = doc
         if check_inertia is not True:

@@ -17,7 +17,7 @@ from ..limits.inertia import ACROSS
 from ..limits.motions import SLACK
 from ..operations import CHOICE, OPERATIONS
 from .kinematics import Kinematics
-from .mobility import Mobility
+from .mobility import Mobility, initial_values
 
 POOR = 1e-2  #: conditioning below which another choice of independent coordinates is worth a word
 SHOWN = 6
@@ -69,7 +69,23 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
         "or a joint that turns the body about the axis of its only moment"
         for name in _turned_out_of_plane(kinematics)
     ]
-    return notes + _beyond_limits(kinematics, mobility)
+    return notes + _in_degrees(kinematics, mobility) + _beyond_limits(kinematics, mobility)
+
+
+def _in_degrees(kinematics: Kinematics, mobility: Mobility) -> list[str]:
+    """Angles that start after more than two turns, as degrees would."""
+    numbers = {p.name: p.value for p in (*kinematics.mechanism.parameters, *kinematics.mechanism.inputs)}
+    if mobility.assumed:
+        return []
+    given = initial_values(kinematics, numbers, "guess") | initial_values(kinematics, numbers)
+    names = (*kinematics.names, *kinematics.loop_coordinates.names)
+    kinds = dict(zip(names, (*kinematics.kinds, *kinematics.loop_coordinates.kinds), strict=True))
+    return [
+        f"{name} = {x:g} is an angle of {x / (2.0 * np.pi):.3g} turns, as angles are in radians; write deg({x:g}) if "
+        "these are degrees"
+        for name, x in given.items()
+        if kinds.get(name) in ("angle", "turn") and abs(x) > 4.0 * np.pi
+    ]
 
 
 def _beyond_limits(kinematics: Kinematics, mobility: Mobility) -> list[str]:

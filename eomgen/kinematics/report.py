@@ -177,7 +177,7 @@ class MechanismReport:
             name, (guess, value) = next(iter(self.guessed.items()))
             found = f"{name} = {value:.6g}, guessed {guess:.6g}"
             if self.guess_distance > BESIDE:
-                return f"the guess lies next to no closed position; on the nearest branch found {found}"
+                return f"on the branch nearest to the guess, which is rough, off by {self.guess_distance:.2g}: {found}"
             exact = self.guess_distance <= MEASURED
             return "at the guess" if exact else f"on the branch nearest to the guess ({found})"
         if self.assembly_restarts:

@@ -73,7 +73,7 @@ def epicyclic(kept: set[str]) -> MechanismReport:
         planet = m.body(f"p{i}", mass=0.6, inertia={"zz": 4e-4})
         hub = arm.at(0.1 * np.cos(2.0 * i), 0.1 * np.sin(2.0 * i), 0)
         joint = m.revolute(f"P{i}", hub, planet, coordinate=f"th_{i}")
-        for name in {f"g{i}", *(["g3"] if i == 0 else [])} & kept:
+        for name in sorted({f"g{i}", *(["g3"] if i == 0 else [])} & kept):
             m.planetary(name, sun=s, carrier=c, planet=joint, teeth={"sun": 24, "planet": 18, "ring": 60})
     return m.check()
 
@@ -86,6 +86,22 @@ def test_advice_to_leave_elements_out_keeps_the_freedoms(meshes: set[str]) -> No
     spare = set(advice.group(1).split(", ")) if advice else set()
     assert spare == meshes & {"g3"}
     assert epicyclic(meshes - spare).degrees_of_freedom == report.degrees_of_freedom
+
+
+def test_gravity_that_was_forgotten_and_angles_in_degrees_are_noted() -> None:
+    def pendulum(start: object, **given: object) -> tuple[str, ...]:
+        m = eg.Model("pendulum", **given)  # type: ignore[arg-type]
+        m.revolute("A", m.ground, m.body("bob", mass=1, com=(0, -1, 0)), coordinate="th")
+        m.initial(th=start)
+        return tuple(m.check().notes)
+
+    (note,) = pendulum(0.3)
+    assert note.startswith("no gravity is given and no force acts")
+    assert pendulum("4*pi", gravity=(0, 0, 0)) == pendulum(0.3, gravity=(0, -9.81, 0)) == ()
+    (note,) = pendulum(90, gravity=(0, -9.81, 0))
+    assert note.startswith("th = 90 is an angle of 14.3 turns")
+    assert "deg(90)" in note
+    assert pendulum("deg(90)", gravity=(0, -9.81, 0)) == ()
 
 
 def truss() -> eg.Model:
