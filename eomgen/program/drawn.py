@@ -192,16 +192,15 @@ def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, An
     """One thing to be seen; None where it depends on more than parameters."""
     if isinstance(seen, Drawn):
         stops = [_stop(n, stop) for stop in seen.stops]
-        lines = {"along": seen.along, "about": seen.about}
+        lines: dict[str, Any] = {"along": seen.along, "about": seen.about}
         if seen.walls:
             lines |= {"walls": n.numbers([x for x in seen.walls if n.known([x])])}
         return {"kind": "lines", "stops": stops, "joint": owners.get(seen.coordinate), **lines}
     if isinstance(seen, Pull):
         # a component that is not known before the run counts as positive
         way = [n.number(x) if n.known([x]) else 1.0 for x in seen.value]
-        lines = ROUND_ARROW if seen.turns else ARROW
-        data = {"way": way, "own": seen.own, "turns": seen.turns, "lines": lines}
-        return {"kind": "pull", "marker": n.marker(seen.marker), **data}
+        looks = {"turns": seen.turns, "lines": ROUND_ARROW if seen.turns else ARROW}
+        return {"kind": "pull", "marker": n.marker(seen.marker), "way": way, "own": seen.own, **looks}
     if isinstance(seen, Wheel):
         return {"kind": "wheel", "marker": n.marker(seen.marker), "radius": n.number(seen.radius)}
     if isinstance(seen, PitchCircles):

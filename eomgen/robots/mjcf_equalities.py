@@ -11,9 +11,8 @@ import numpy as np
 
 from ..numeric.rotation_matrices import from_quaternion
 from .mjcf_actuators import fixed_tendon
-from .robot import Loop
+from .robot import Loop, Sum, Tie
 from .robot_frames import Placement, moved
-from .ties import Sum, Tie
 
 if TYPE_CHECKING:
     from .mjcf_compiled import Compiled
