@@ -45,14 +45,14 @@ def _sizes(reader: Reader, path: str, values: Mapping[str, Any], keys: tuple[str
 
 
 def _displayed(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> BodyShape | None:
-    kind, frame = str(values.get("shape")), reader.frame(path, values)
+    kind, frame, color = str(values.get("shape")), reader.frame(path, values), str(values.get("color", ""))
     if kind == "mesh":
         scale = _sizes(reader, path, values, ("scale",)) if "scale" in values else (reader.graph.one,) * 3
-        return BodyShape(body, kind, scale, frame, str(values.get("file", "")))
+        return BodyShape(body, kind, scale, frame, str(values.get("file", "")), color)
     keys = SIZES.get(kind, ())
     if not keys or any(key not in values for key in keys):
         return None
-    return BodyShape(body, kind, _sizes(reader, path, values, keys), frame)
+    return BodyShape(body, kind, _sizes(reader, path, values, keys), frame, color=color)
 
 
 def _solid(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> BodyShape | None:

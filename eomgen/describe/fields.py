@@ -141,11 +141,12 @@ PLACED: Fields = {"body": Field("name", "a body or ground", required=True), **MA
 SHAPES = ("mesh", "box", "cylinder", "sphere", "capsule")
 DISPLAY: Fields = {
     "shape": Field("choice", "kind of shape", required=True, choices=SHAPES),
-    "file": Field("text", "file of a mesh (STL or OBJ), read when the model is drawn"),
+    "file": Field("text", "file of a mesh (STL, OBJ or DAE), read when the model is drawn"),
     "scale": Field("vector", "scale of a mesh"),
     "size": Field("vector", "edges of a box (m)", dimension=LENGTH),
     "radius": Field("expression", "radius (m)", dimension=LENGTH),
     "length": Field("expression", "length along z (m)", dimension=LENGTH),
+    "color": Field("text", 'color "#rrggbb" in pictures; that of the body unless given'),
     **MARKER,
 }
 LIMITS: Fields = {

@@ -6,6 +6,7 @@ Limits, dry friction and shapes travel with the model and enter no equation; the
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,6 +17,7 @@ from .description import items
 from .fields import DISPLAY, LIMITS
 from .values import Reader
 
+_COLOR = re.compile(r"#[0-9a-fA-F]{6}")
 Limits = tuple[tuple[str, float], ...]  #: (key, value) of what is limited
 
 
@@ -104,3 +106,7 @@ def check_display(reader: Reader, path: str, given: Any) -> None:
                 reader.expression(f"{place}.{key}", value)
             else:
                 reader.text(f"{place}.{key}", value)
+                if key == "color" and not (isinstance(value, str) and _COLOR.fullmatch(value)):
+                    reader.faults.add(
+                        f"{place}.{key}", f"{value!r} is no color", 'give six hexadecimal digits: "#1f77b4"'
+                    )

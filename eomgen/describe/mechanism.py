@@ -117,6 +117,7 @@ class BodyShape(NamedTuple):
     sizes: tuple[Expr, ...]  #: edges, half axes, or radius and length (m); of a mesh its scale
     frame: Frame
     file: str = ""  #: of a mesh
+    color: str = ""  #: #rrggbb; the body's own where there is none
 
 
 ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies

@@ -14,6 +14,8 @@ FILES = 200  #: XML files that a model may be made of
 #: Magnitude of a number of a robot file, limits of joints aside: the products of three that a reader forms, such as
 #: mass times distance squared, stay within double precision.
 LARGEST = 1e100
+#: Least impedance of a constraint in MuJoCo, and what the greatest is less than 1.
+IMPEDANCE = 1e-4
 
 # -- what a robot becomes ---------------------------------------------------------------------------------------------
 FREEDOMS = 800  #: coordinates of its joints; checking a model of so many takes 10 s

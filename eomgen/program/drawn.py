@@ -13,7 +13,18 @@ from typing import Any
 import numpy as np
 
 from ..describe.mechanism import JointSpec, Mechanism
-from ..elements.looks import Contour, Drawn, LiftCurve, PitchCircles, Pull, RackAndPinion, Seen, Wheel
+from ..elements.looks import (
+    ARROW,
+    ROUND_ARROW,
+    Contour,
+    Drawn,
+    LiftCurve,
+    PitchCircles,
+    Pull,
+    RackAndPinion,
+    Seen,
+    Wheel,
+)
 from ..errors import UsageError
 from ..forces import Force
 from ..frames import Frame, Marker, WrapCylinder
@@ -130,7 +141,14 @@ def describe_picture(mechanism: Mechanism) -> dict[str, Any] | None:
             for b in mechanism.bodies
         ],
         "shapes": [
-            {"body": s.body, "kind": s.kind, "sizes": n.numbers(s.sizes), "file": s.file, **n.frame(s.frame)}
+            {
+                "body": s.body,
+                "kind": s.kind,
+                "sizes": n.numbers(s.sizes),
+                "file": s.file,
+                "color": s.color,
+                **n.frame(s.frame),
+            }
             for s in mechanism.body_shapes
         ],
         "markers": [{"name": marker.label, **n.marker(marker)} for marker in mechanism.named_markers],
@@ -174,14 +192,15 @@ def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, An
     """One thing to be seen; None where it depends on more than parameters."""
     if isinstance(seen, Drawn):
         stops = [_stop(n, stop) for stop in seen.stops]
-        lines = {"along": seen.along, "about": seen.about}
+        lines: dict[str, Any] = {"along": seen.along, "about": seen.about}
         if seen.walls:
             lines |= {"walls": n.numbers([x for x in seen.walls if n.known([x])])}
         return {"kind": "lines", "stops": stops, "joint": owners.get(seen.coordinate), **lines}
     if isinstance(seen, Pull):
         # a component that is not known before the run counts as positive
         way = [n.number(x) if n.known([x]) else 1.0 for x in seen.value]
-        return {"kind": "pull", "marker": n.marker(seen.marker), "way": way, "own": seen.own, "turns": seen.turns}
+        looks = {"turns": seen.turns, "lines": ROUND_ARROW if seen.turns else ARROW}
+        return {"kind": "pull", "marker": n.marker(seen.marker), "way": way, "own": seen.own, **looks}
     if isinstance(seen, Wheel):
         return {"kind": "wheel", "marker": n.marker(seen.marker), "radius": n.number(seen.radius)}
     if isinstance(seen, PitchCircles):

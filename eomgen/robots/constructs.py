@@ -93,21 +93,6 @@ def _few(names: list[str]) -> str:
     return ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
 
 
-def markdown_of(table: Table) -> str:
-    """The table as the documentation shows it, a line for each fate and reason."""
-    groups: dict[tuple[str, str], list[str]] = {}
-    for rows in table.values():
-        for row in rows:
-            attributes = [a for a in row.attributes if a not in (ANY, INSIDE)]
-            what = f"`{row.element}`" + (f" {' '.join(attributes)}" if attributes else "")
-            groups.setdefault((row.fate, row.why), []).append(what + (" and all inside" * is_whole(row)))
-    order = (TAKEN, DATA, SEEN, LEFT, HARMLESS)
-    lines = ["| | | elements and attributes |", "|---|---|---|"]
-    for (fate, why), found in sorted(groups.items(), key=lambda item: order.index(item[0][0])):
-        lines.append(f"| {fate} | {why} | {'; '.join(found)} |")
-    return "\n".join(lines)
-
-
 def count_all(paths: Iterable[tuple[str, Iterable[str]]]) -> Met:
     """How often elements and attributes are met, of (path, attributes) of each element."""
     met: Met = Counter()

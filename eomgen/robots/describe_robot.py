@@ -17,9 +17,8 @@ from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from .link_names import RobotNames, clean_model_name
 from .link_tree import GROUND, Bodies, RobotBody, build_bodies, find_tied, joints_around, weigh_bodies
 from .resisted_turns import turn_texts
-from .robot import Drive, Range, Robot, RobotJoint, RobotOptions
+from .robot import Drive, Range, Robot, RobotJoint, RobotOptions, Sum, Tie, describe_tie
 from .robot_frames import IDENTITY, Inertia, Placement, numbers
-from .ties import Sum, Tie, describe_tie
 
 SHOWN = 8  #: joints that a note names
 #: Stops of joints: part of the range that one gives way under the drive's effort; what is left of the speed after it.
@@ -261,12 +260,9 @@ class _Writer:
         self._add("forces", self.names.made(f"{name}_{what}"), {"type": kind, "joint": name, **values}, joint.place)
 
     def _spring(self, joint: RobotJoint) -> None:
-        if joint.type == "revolute":
-            rest = {"angle": joint.rest} if joint.rest else {}
-            self._force("torsional_spring", joint, "spring", {"stiffness": joint.stiffness, **rest})
-            return
-        rest = {"rest": joint.rest} if joint.rest else {}
-        self._force("joint_spring", joint, "spring", {"stiffness": joint.stiffness, **rest})
+        kind, key = ("torsional_spring", "angle") if joint.type == "revolute" else ("joint_spring", "rest")
+        rest = {key: joint.rest} if joint.rest else {}
+        self._force(kind, joint, "spring", {"stiffness": joint.stiffness, **rest})
 
     # -- what ties joints together --------------------------------------------------------------------------------
     def _loops(self) -> None:

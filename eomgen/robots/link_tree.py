@@ -270,7 +270,7 @@ def _has_no_lever(joint: RobotJoint, inertia: Inertia) -> bool:
     axis = np.array(joint.axis) / max(map(abs, joint.axis))
     axis /= np.linalg.norm(axis)
     across, arm = float(axis @ own.tensor @ axis), np.cross(axis, own.com)
-    return across + own.mass * float(arm @ arm) <= SINGULAR * (own.tensor.trace() + own.mass * (own.com @ own.com))
+    return across + own.mass * float(arm @ arm) <= SINGULAR * float(own.tensor.trace() + own.mass * (own.com @ own.com))
 
 
 def _check_masses(robot: Robot, found: Bodies, check: str) -> None:

@@ -17,10 +17,9 @@ from ..numeric.rotation_matrices import about, from_quaternion
 from .constructs import notes_of
 from .mjcf_actuators import read_actuators
 from .mjcf_compile import compile_mjcf
-from .mjcf_compiled import Compiled
+from .mjcf_compiled import NOTED, Compiled
 from .mjcf_constructs import find_mjcf
 from .mjcf_equalities import read_equalities
-from .mjcf_fields import NOTED
 from .mjcf_files import Scan
 from .mjcf_text import Text
 from .robot import Place, Robot, RobotJoint, RobotLink, RobotOptions

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..limits.files import IMPEDANCE
 from ..numeric.rotation_matrices import from_quaternion
 from .mjcf_actuators import fixed_tendon
-from .robot import Loop
+from .robot import Loop, Sum, Tie
 from .robot_frames import Placement, moved
-from .ties import Sum, Tie
 
 if TYPE_CHECKING:
     from .mjcf_compiled import Compiled
@@ -48,7 +48,7 @@ def _yielding(reader: Compiled, k: int) -> str:
     """The attributes that make an equality so soft in MuJoCo that it hardly holds; empty if there are none."""
     m = reader.m
     first, second = map(float, m.eq_solref[k])  # time constant and damping ratio, or minus stiffness and minus damping
-    least, most = np.clip(m.eq_solimp[k][:2], 1e-4, 0.9999).tolist()
+    least, most = np.clip(m.eq_solimp[k][:2], IMPEDANCE, 1.0 - IMPEDANCE).tolist()
     stiffness = 1.0 / (first * second) ** 2 if first > 0.0 < second else -first
     slow = stiffness < (SLOWEST * most) ** 2 and (first > 0.0) == (second > 0.0)  # of mixed signs it takes its default
     scale = float(m.eq_data[k][10]) if m.eq_type[k] == WELD else 1.0

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 from ..errors import ModelError, Problem
 from ..limits.files import MESHES
 from .contained import Folder, plain, stem
-from .mjcf_include import Trees
+from .mjcf_files import Trees
 from .xml_text import XmlElement
 
 #: Elements that say nothing of the motion, below the root or where they stand.

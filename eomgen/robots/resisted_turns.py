@@ -18,14 +18,7 @@ _QUATERNION = ("_e0", "_e1", "_e2", "_e3")
 def turn_texts(name: str, in_parameters: bool, rest: np.ndarray) -> tuple[list[str], list[str], list[str]]:
     """Angular velocity in the axes of the child and of the parent, and the rotation vector in those of the child.
 
-    Parameters
-    ----------
-    name : str
-        Of the joint, which its coordinates begin with.
-    in_parameters : bool
-        Whether these are Euler parameters; otherwise angles x-y'-z''.
-    rest : (3, 3) array
-        The rotation at rest.
+    ``name`` begins its coordinates, Euler parameters or angles x-y'-z''; ``rest`` is the rotation (3, 3) at rest.
     """
     if in_parameters:
         raw = [name + suffix for suffix in _QUATERNION]

@@ -44,6 +44,15 @@ _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\Z", re.
 _SPECIAL = {"inf", "-inf", "+inf", "infinity", "-infinity", "nan", "-nan"}
 
 
+def _color(material: XmlElement) -> str:
+    """``#rrggbb`` of the color that a material has itself; empty if it has none that can be read."""
+    color = material.find("color")
+    parts = color.attributes.get("rgba", "").split()[:3] if color is not None else []
+    if len(parts) != 3 or not all(map(_NUMBER.match, parts)):
+        return ""
+    return "#" + "".join(f"{round(255.0 * min(max(float(part), 0.0), 1.0)):02x}" for part in parts)
+
+
 def read_urdf(root: XmlElement, options: RobotOptions) -> Robot:
     """The robot of a URDF file; its faults are in ``problems``."""
     return _UrdfReader(root, options).read()
@@ -55,6 +64,8 @@ class _UrdfReader:
     def __init__(self, root: XmlElement, options: RobotOptions) -> None:
         self.root, self.options = root, options
         self.robot = Robot(root.attributes.get("name") or "robot", root.file)
+        materials = [element for element in root.walk() if element.tag == "material"]  # a name counts everywhere
+        self.colors = {m.attributes.get("name", ""): _color(m) for m in reversed(materials) if _color(m)}
 
     def read(self) -> Robot:
         robot = self.robot
@@ -177,7 +188,7 @@ class _UrdfReader:
 
     def _shape(self, element: XmlElement, path: str) -> tuple[Placement, dict[str, Any]] | None:
         """A visual: what it looks like, as data that is never read."""
-        geometry = element.find("geometry")
+        material, geometry = element.find("material"), element.find("geometry")
         given = geometry.children[0] if geometry is not None and geometry.children else None
         if given is None:
             return None
@@ -197,7 +208,8 @@ class _UrdfReader:
             shape["radius"] = self.number(given, "radius", where)
         else:
             return None
-        return self.origin(element, path), shape
+        own = "" if material is None else _color(material) or self.colors.get(material.attributes.get("name", ""), "")
+        return self.origin(element, path), shape | ({"color": own} if own else {})
 
     def _check_scale(self, element: XmlElement, path: str, factors: list[float]) -> None:
         if not all(factors) and not any(problem.path == path for problem in self.robot.problems):

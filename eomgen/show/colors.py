@@ -46,6 +46,8 @@ def style_of(role: str) -> Style:
 
 def color_of(item: Item | Label) -> str:
     """The colour of lines and, where the role has none of its own, of faces."""
+    if isinstance(item, Item) and item.color:
+        return item.color
     if item.role == "frame":
         return AXES[item.name] if isinstance(item, Item) else DARK
     own = STYLES[item.role].color if isinstance(item, Item) else None

@@ -13,6 +13,7 @@ from ..operations.table import OPERATIONS
 
 Array = NDArray[np.float64]
 GROUND = -1
+_FRAME = ("rotation", "position")
 
 
 class PlacedFrame(NamedTuple):
@@ -47,7 +48,7 @@ class PictureData(NamedTuple):
     mass: Array  #: (n,)
     inertia: Array  #: (n, 3), diagonal (kg m^2)
     gravity: Array
-    shapes: list[dict[str, Any]]  #: body, kind, sizes, frame, file
+    shapes: list[dict[str, Any]]  #: body, kind, sizes, frame, file, color
     markers: dict[str, PlacedFrame]
     joints: list[JointData]
     elements: list[dict[str, Any]]
@@ -136,7 +137,7 @@ def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData
         np.array([b["mass"] for b in bodies]),
         np.array([b["inertia"] for b in bodies]),
         np.array(plain(data["gravity"])),
-        [{**{k: plain(s[k]) for k in ("body", "kind", "sizes", "file")}, "frame": frame(s)} for s in data["shapes"]],
+        [{**{k: plain(x) for k, x in s.items() if k not in _FRAME}, "frame": frame(s)} for s in data["shapes"]],
         {one["name"]: frame(one) for one in data["markers"]},
         joints,
         elements,

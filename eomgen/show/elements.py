@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..elements.looks import ARROW, ROUND_ARROW
 from ..limits.pictures import NOTHING, ROUNDED, SAME
 from .cam_curves import contour_items, lift_items
 from .data import GROUND, Array, PictureData, PlacedFrame
@@ -124,8 +123,7 @@ def _pull(element: dict[str, Any], view: Array | None, symbol: float, poses: Arr
     size = float(np.linalg.norm(way))
     if size == 0.0 or not np.isfinite(size):
         return []
-    lines = ROUND_ARROW if element["turns"] else ARROW
-    shape = _broken([np.asarray(line) for line in lines])
+    shape = _broken([np.asarray(line) for line in element["lines"]])
 
     def points_at(now: Array) -> Array:
         rotation, place = placed(now, marker)

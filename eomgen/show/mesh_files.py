@@ -1,7 +1,8 @@
-"""Stage show, meshes: STL and OBJ files that shapes of bodies name -> as many triangles as a picture needs."""
+"""Stage show, meshes: STL, OBJ and COLLADA files that shapes of bodies name -> as many triangles as a picture needs."""
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import warnings
@@ -24,6 +25,7 @@ from .solids import Mesh, Triangles
 TRIANGLES = 4000  #: of one mesh in a picture, at most; matplotlib draws them one by one
 CELLS = (160, 120, 80, 56, 40, 28, 20, 14, 10)  #: along the longest edge, within which vertices are joined
 PACKAGE = "package://"
+_UNIT = re.compile(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([-+0-9.eE]+)")
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
@@ -59,7 +61,7 @@ def _located(file: str, description: Any) -> str:
 
 
 def read_mesh(path: str) -> Mesh:
-    """Vertices (n, 3) and triangles (m, 3) of an STL or OBJ file, in its units and axes, thinned out to TRIANGLES.
+    """Vertices (n, 3) and triangles (m, 3) of a file, in its units and axes (DAE in metres), thinned out to TRIANGLES.
 
     Raises
     ------
@@ -70,7 +72,7 @@ def read_mesh(path: str) -> Mesh:
     """
     ending = os.path.splitext(path)[1].lower()
     if ending not in READERS:
-        raise UsageError(f"{ending or 'no ending'}: STL and OBJ files can be drawn")
+        raise UsageError(f"{ending or 'no ending'}: STL, OBJ and DAE files can be drawn")
     status = os.stat(path)
     if status.st_size > MESH:
         raise UsageError(f"it has {status.st_size:,} bytes; at most {MESH:,}")
@@ -83,6 +85,8 @@ def _read(path: str, ending: str, _changed: int, _size: int) -> Mesh:
         data = file.read(MESH + 1)
     try:
         vertices, faces = READERS[ending](data)
+    except UsageError:
+        raise
     except (ValueError, IndexError, OverflowError):
         raise UsageError(f"it cannot be read as a file {ending}") from None
     if not len(faces) or not np.isfinite(vertices).all():
@@ -118,6 +122,24 @@ def _read_obj(data: bytes) -> Mesh:
     return np.array(vertices).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
 
 
+def _read_dae(data: bytes) -> Mesh:
+    """All geometry of a COLLADA scene, in metres; its ``up_axis`` is left as it is, as robots' viewers do."""
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+        raise UsageError("it declares a document type or an entity, which is never expanded")
+    try:
+        import collada  # noqa: F401  # by which trimesh reads them
+        import trimesh
+    except ImportError:
+        raise UsageError("files .dae need trimesh and pycollada: pip install 'eomgen[mesh]'") from None
+    try:
+        mesh: Any = trimesh.load(io.BytesIO(data), file_type="dae", force="mesh")
+    except Exception as error:  # pycollada raises errors of many kinds
+        raise ValueError(str(error)) from None
+    unit = _UNIT.search(data)
+    vertices = np.asarray(mesh.vertices, dtype=float) * (float(unit[1]) if unit else 1.0)
+    return vertices, np.asarray(mesh.faces, dtype=np.int64)
+
+
 def thinned(vertices: Array, faces: Triangles) -> Mesh:
     """The same surface with at most TRIANGLES where the coarsest cells give so few; vertices of one cell are joined."""
     vertices, faces = _joined(vertices, faces, vertices)
@@ -142,4 +164,4 @@ def _joined(vertices: Array, faces: Triangles, keys: Array) -> Mesh:
     return means / counts[:, None], corners[whole][np.sort(first)]
 
 
-READERS: dict[str, Callable[[bytes], Mesh]] = {".stl": _read_stl, ".obj": _read_obj}
+READERS: dict[str, Callable[[bytes], Mesh]] = {".stl": _read_stl, ".obj": _read_obj, ".dae": _read_dae}

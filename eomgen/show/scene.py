@@ -47,6 +47,8 @@ class Item(NamedTuple):
         Or its points in ground axes at each frame.
     convex : bool
         Whether the outline of a solid is that of its vertices.
+    color : str
+        ``#rrggbb`` of its faces; else by its role and body.
     """
 
     role: str
@@ -57,6 +59,7 @@ class Item(NamedTuple):
     follow: Callable[[Array], Array] | None = None
     path: Array | None = None
     convex: bool = True
+    color: str = ""
 
     @property
     def layer(self) -> float:
@@ -281,7 +284,7 @@ def link_items(
         if mesh is not None:
             shaped.add(body)
             here = attached(shape["frame"], mesh)
-            items.append(Item("shape", name, body, *here, convex=shape["kind"] != "mesh"))
+            items.append(Item("shape", name, body, *here, convex=shape["kind"] != "mesh", color=shape.get("color", "")))
             if shape["kind"] == "cylinder":
                 items += rim_mark(name, shape["frame"], *shape["sizes"])
     hidden = data.hidden

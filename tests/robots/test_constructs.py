@@ -16,7 +16,7 @@ from robots.shipped import EXAMPLES, package_folder
 
 import eomgen as eg
 from eomgen.errors import ModelError
-from eomgen.robots.constructs import DATA, HARMLESS, INSIDE, LEFT, SEEN, TAKEN, markdown_of
+from eomgen.robots.constructs import ANY, DATA, HARMLESS, INSIDE, LEFT, SEEN, TAKEN, Table, is_whole
 from eomgen.robots.mjcf_constructs import MJCF, find_mjcf, path_of
 from eomgen.robots.mjcf_files import Scan
 from eomgen.robots.urdf_constructs import URDF, find_urdf, note_urdf
@@ -220,8 +220,23 @@ def test_bodies_that_hang_together_do_not_touch(tmp_path: Path) -> None:
 
 
 # -- the page ---------------------------------------------------------------------------------------------------------
+def markdown_of(table: Table) -> str:
+    """The table as the documentation shows it, a line for each fate and reason."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for rows in table.values():
+        for row in rows:
+            attributes = [a for a in row.attributes if a not in (ANY, INSIDE)]
+            what = f"`{row.element}`" + (f" {' '.join(attributes)}" if attributes else "")
+            groups.setdefault((row.fate, row.why), []).append(what + (" and all inside" * is_whole(row)))
+    order = (TAKEN, DATA, SEEN, LEFT, HARMLESS)
+    lines = ["| | | elements and attributes |", "|---|---|---|"]
+    for (fate, why), found in sorted(groups.items(), key=lambda item: order.index(item[0][0])):
+        lines.append(f"| {fate} | {why} | {'; '.join(found)} |")
+    return "\n".join(lines)
+
+
 @pytest.mark.parametrize(("name", "table"), [("URDF", URDF), ("MJCF", MJCF)])
-def test_the_page_shows_the_table_of_the_reader(name: str, table: object) -> None:
+def test_the_page_shows_the_table_of_the_reader(name: str, table: Table) -> None:
     begin, end = f"<!-- every construct of {name} -->\n", f"\n<!-- end of {name} -->"
     shown = PAGE.read_text().partition(begin)[2].partition(end)[0]
     assert shown == markdown_of(table), f"put markdown_of({name}) between {begin!r} and {end!r} in {PAGE.name}"

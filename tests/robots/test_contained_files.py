@@ -306,7 +306,7 @@ def test_all_files_together_are_bounded(model: Any, monkeypatch: pytest.MonkeyPa
         ("DEPTH", 2, "nested too deeply"),
     ):
         with monkeypatch.context() as patch:
-            patch.setattr(f"eomgen.robots.mjcf_include.{name}", value)
+            patch.setattr(f"eomgen.robots.mjcf_files.{name}", value)
             with pytest.raises(eg.ModelError, match=said):
                 eg.load(path)
 

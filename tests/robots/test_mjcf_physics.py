@@ -12,7 +12,7 @@ from robots import mujoco_fields
 from robots.mujoco_judge import Judge
 
 import eomgen as eg
-from eomgen.robots import mjcf_fields
+from eomgen.robots.mjcf_compiled import NOTED as NOTED_FIELDS
 
 TEXT = """
 <mujoco model="pieces">
@@ -300,6 +300,6 @@ def test_every_option_and_flag_has_its_place() -> None:
 
 def test_what_is_noted_is_a_field_that_is_said_to_be() -> None:
     tables = mujoco_fields.JOINT_FIELDS | mujoco_fields.TENDON_FIELDS | mujoco_fields.ACTUATOR_FIELDS
-    for name, (flag, _) in mjcf_fields.NOTED.items():
+    for name, (flag, _) in NOTED_FIELDS.items():
         assert tables[name] == "noted"
         assert flag in mujoco_fields.FLAGS

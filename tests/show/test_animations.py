@@ -18,6 +18,7 @@ import pytest
 from browser import Browser
 from click.testing import CliRunner
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 import eomgen as eg
@@ -326,6 +327,17 @@ def test_a_title_fits_a_narrow_picture() -> None:
     frames = Frames.of(moving_scene(mod, motion, None, False, ())._replace(note="longest arrow 1.23e+04 N"), motion)
     box = frames.titles[0].get_window_extent(frames.canvas.get_renderer())
     assert 0 <= box.x0 < box.x1 <= frames.canvas.get_width_height()[0]
+
+
+@pytest.mark.parametrize("dpi", [45, 80])
+def test_letters_can_be_read_in_pictures_of_few_dots(run: Any, module: Any, dpi: int) -> None:
+    """Names, numbers and titles are at least 8.5 dots high, and each number of an axis too."""
+    motion = sample(run, lambda t: (np.repeat(run.x[:, :1], len(t), axis=1), None), 2, None)
+    curve = ShownColumn("s", "m", motion.over, np.zeros(len(motion.over)))
+    frames = Frames.of(moving_scene(module, motion, True, False, ()), motion, [curve], dpi=dpi)
+    written = [text for text in frames.figure.findobj(Text) if text.get_text() and text.get_visible()]
+    assert {"crank", "A"} < {text.get_text() for text in written}
+    assert min(text.get_fontsize() * dpi / 72 for text in written) > 8.5
 
 
 def test_curves_over_a_range_name_its_unit(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:

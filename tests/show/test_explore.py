@@ -43,6 +43,16 @@ def test_sliders_move_the_mechanism_on_its_branch(module: Any) -> None:
     assert explorer.q == pytest.approx(module.x0()[: module.n_q], abs=1e-9)
 
 
+@pytest.mark.parametrize("limits", [{"upper": 1.0}, {"velocity": 2.0}])
+def test_sliders_end_at_a_limit_of_one_side(limits: dict[str, float]) -> None:
+    m = eg.Model("arm")
+    m.revolute("A", m.ground, m.body("arm", mass=1, com=(0.5, 0, 0), inertia={"zz": 1}), limits=limits)
+    slider = m.compile(target="numpy").explore().sliders["A"]
+    step = slider.step
+    assert slider.min == pytest.approx(-np.pi, abs=step)
+    assert slider.max == pytest.approx(limits.get("upper", np.pi), abs=step)
+
+
 def test_what_cannot_be_closed_is_told_and_the_last_position_stays(module: Any) -> None:
     explorer = module.explore({"theta": 0.0})
     explorer.sliders["l"].value = 0.175

@@ -125,7 +125,7 @@ def test_a_ring_in_a_plane_has_its_hole(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "data", "why"),
     [
-        ("part.dae", b"<COLLADA/>", "STL and OBJ files can be drawn"),
+        ("part.ply", b"ply", "STL, OBJ and DAE files can be drawn"),
         ("part.stl", None, "No such file"),
         ("part.stl", b"no mesh at all", "it holds no triangles"),
         ("part.stl", b"solid a\nvertex 0 0 zero\n", "cannot be read as a file .stl"),
@@ -184,3 +184,47 @@ def test_too_large_files_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyP
     path = write(tmp_path, "stl", trimesh.creation.box((1, 1, 1)))
     with pytest.raises(UsageError, match="bytes; at most 100"):
         read_mesh(str(path))
+
+
+def test_a_collada_file_is_read_in_metres(tmp_path: Path) -> None:
+    pytest.importorskip("collada")
+    mesh = trimesh.creation.annulus(0.2, 0.5, 0.3)
+    data = trimesh.exchange.dae.export_collada(mesh)
+    path = tmp_path / "part.dae"
+    path.write_bytes(data.replace(b"<asset>", b'<asset><unit name="cm" meter="0.01"/>'))
+    found = trimesh.Trimesh(*read_mesh(str(path)))
+    assert found.volume == pytest.approx(1e-6 * mesh.volume, rel=1e-5)
+    path.write_bytes(b'<!DOCTYPE x [<!ENTITY e "e">]>' + data)
+    with pytest.raises(UsageError, match="declares a document type"):
+        read_mesh(str(path))
+    path.write_bytes(data[:500])
+    with pytest.raises(UsageError, match="cannot be read as a file .dae"):
+        read_mesh(str(path))
+
+
+def test_shapes_of_urdf_have_the_colors_of_their_materials(tmp_path: Path) -> None:
+    visual = '<visual><geometry><box size="0.1 0.1 0.4"/></geometry><material name="{}">{}</material></visual>'
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    links = "".join(
+        f'<link name="{name}">{inertial}{visual.format(*given)}</link>'
+        for name, given in (("a", ("steel", "")), ("b", ("", '<color rgba="1 0.5 0 1"/>')), ("c", ("lost", "")))
+    )
+    joints = "".join(
+        f'<joint name="j{name}" type="continuous"><parent link="base"/><child link="{name}"/></joint>' for name in "abc"
+    )
+    path = tmp_path / "painted.urdf"
+    steel = '<material name="steel"><color rgba="0.2 0.4 1.0 1"/></material>'
+    path.write_text(f'<robot name="painted"><link name="base"/>{links}{joints}{steel}</robot>')
+    eg.load(path).save(tmp_path / "painted.yaml")
+    for model in (eg.load(path), eg.load(tmp_path / "painted.yaml")):
+        module = model.compile(target="numpy")
+        scene = build_scene(module, module.x0()[: module.n_q, None])
+        assert {item.name: item.color for item in scene.items if item.role == "shape"} == {
+            "a": "#3366ff",
+            "b": "#ff8000",
+            "c": "",
+        }
+    wrong = (tmp_path / "painted.yaml").read_text().replace("#3366ff", "blueish")
+    (tmp_path / "painted.yaml").write_text(wrong)
+    with pytest.raises(eg.ModelError, match=r"display\[0\].color: 'blueish' is no color"):
+        eg.load(tmp_path / "painted.yaml").check()

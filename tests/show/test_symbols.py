@@ -17,6 +17,63 @@ def lines(module: Any, role: str, name: str, **values: float) -> list[np.ndarray
     return [item.at(scene.frames[0]) for item in scene.items if (item.role, item.name) == (role, name)]
 
 
+def pushed() -> eg.Model:
+    m = eg.Model("pushed", gravity=(0, -9.81, 0))
+    arm, wheel = (
+        m.body("arm", mass=1, com=(0.25, 0, 0), inertia={"zz": 0.02}),
+        m.body("wheel", mass=2, inertia={"zz": 0.01}),
+    )
+    m.revolute("A", m.ground, arm, coordinate="a")
+    m.revolute("B", arm.at(0.5, 0, 0), wheel)
+    slider = m.body("slider", mass=1)
+    m.prismatic("D", m.ground.at(0, -0.3, 0), slider, axis="x", coordinate="s")
+    m.force("down", arm.at(0.4, 0, 0), (0, -3, 0))
+    m.force("along", arm.at(0.4, 0, 0), ("sin(t)", 0, 0), axes="body")
+    m.torque("twist", wheel, (0, 0, -0.5))
+    m.stop("end", "s", lower=-0.1, upper=0.3, stiffness=100)
+    m.stop("bump", "a", upper=1, stiffness=100)
+    return m
+
+
+def test_given_forces_torques_and_stops_are_to_be_seen() -> None:
+    """Arrows end where forces act, in their direction; walls stand at the limits of a slide."""
+    mod = pushed().compile(target="numpy")
+    (down,) = lines(mod, "force", "down", a=0.3)
+    place = 0.4 * np.array([np.cos(0.3), np.sin(0.3), 0])
+    assert down[[1, 4]] == pytest.approx(np.array([place, place]), abs=1e-12)
+    assert (down[1] - down[0]) / np.linalg.norm(down[1] - down[0]) == pytest.approx([0, -1, 0])
+    (along,) = lines(mod, "force", "along", a=0.3)
+    assert (along[1] - along[0]) / np.linalg.norm(along[1] - along[0]) == pytest.approx(place / 0.4)
+    (twist,) = lines(mod, "force", "twist", a=0.3)
+    around = twist - np.array([0.5 * np.cos(0.3), 0.5 * np.sin(0.3), 0])
+    first, second, *_ = around
+    assert np.cross(first, second)[2] < 0.0  # it turns as the torque does
+    (walls,) = lines(mod, "force", "end", a=0.3, s=0.1)
+    assert sorted(set(walls[np.isfinite(walls[:, 0]), 0].round(9))) == [-0.1, 0.3]
+    assert len(lines(mod, "force", "bump")) == 1
+
+
+@pytest.mark.parametrize("moments", [(0.1, 0.2, 0.15), (0.02, 0.02, 0.04)], ids=["any", "disc"])
+def test_a_body_with_inertia_only_hides_nothing_and_shows_its_turning(moments: tuple[float, ...]) -> None:
+    """Sections of the ellipsoid of a uniform body: I_x = m (b^2 + c^2) / 5; a disc with a line to its rim."""
+    m = eg.Model("top")
+    m.spherical("Q", m.ground, m.body("top", mass=2, inertia=moments))
+    m.revolute("A", m.ground, m.body("arm", mass=1, com=(0.5, 0, 0), inertia=(0.1, 0.1, 0.1)))
+    mod = m.compile(target="numpy")
+    scene = build_scene(mod, mod.x0()[: mod.n_q, None])
+    own = [item for item in scene.items if item.name == "top" and item.role != "joint"]
+    if moments[0] != moments[1]:
+        (rings,) = own
+        assert rings.faces is None
+        x, y, z = np.nanmax(rings.points, axis=0) ** 2
+        assert 2 * np.array([y + z, z + x, x + y]) / 5 == pytest.approx(moments, rel=1e-12)
+        return
+    disc, mark = own
+    assert disc.faces is not None
+    assert mark.faces is None
+    assert np.nanmax(np.hypot(*mark.points[:, :2].T)) == pytest.approx(np.sqrt(2 * 0.04 / 2))
+
+
 @pytest.mark.parametrize(("radius", "angle"), [(0.06, 0.0), (-0.06, 0.5)])
 def test_a_rack_touches_its_pinion_where_both_move_alike(radius: float, angle: float) -> None:
     m = eg.Model("rack")
