@@ -34,7 +34,15 @@ def both_names(function: Function) -> Function:
             if others[other] in given or place[others[other]] < len(args):
                 raise UsageError(f"{others[other]} and {other} are the same argument; give one of them")
             given[others[other]] = given.pop(other)
-        return function(*args, **given)
+        try:
+            return function(*args, **given)
+        except TypeError as error:
+            _, own, fault = str(error).partition(f"{function.__qualname__}()")
+            if not own:
+                raise
+            name = getattr(args[0], "name", "f") if function.__name__ == "__call__" else function.__name__
+            needed = [n for n, one in taken.items() if one.default is one.empty and n not in ("self", "module")]
+            raise TypeError(f"{name}({', '.join(needed)}){fault}") from None
 
     return call  # type: ignore[return-value]
 

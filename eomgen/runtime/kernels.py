@@ -296,4 +296,6 @@ def fitting(out: Array, shape: tuple[int, ...]) -> Array:
         raise UsageError(f"out must have shape {shape}, not {out.shape}")
     if not out.flags.writeable:
         raise UsageError("out is read-only")
+    if any(step == 0 and n > 1 for step, n in zip(out.strides, out.shape, strict=True)):
+        raise UsageError(f"out has strides {out.strides}: several of its entries are one number in memory")
     return out

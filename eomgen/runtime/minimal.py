@@ -197,9 +197,9 @@ class Minimal:
         dependent velocities then reverse at once, which no acceleration explains.
         """
         layout = self._layout
-        if not layout.rank or before is None:
-            return
         scales, chosen = layout.scales.q[: layout.moving], layout.independent_moving
+        if not layout.rank or before is None or not len(chosen):
+            return
         v, a = np.abs(motion.reshape(2, -1) / scales).max(axis=1)
         own = np.abs(motion[chosen] / scales[chosen]).max()
         if v <= AMPLIFIED * own:

@@ -306,6 +306,8 @@ def _check_out(out: object, expected: tuple[int, ...], name: str, error: Any) ->
         raise error(f"{wanted}, not {out.shape} of {out.dtype}")
     if not out.flags.writeable:
         raise error(f"out of {name} is read-only")
+    if any(step == 0 and n > 1 for step, n in zip(out.strides, out.shape, strict=True)):
+        raise error(f"out of {name} has strides {out.strides}: several of its entries are one number in memory")
 
 
 def _declared(values: Any) -> list[float]:

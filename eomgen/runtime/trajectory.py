@@ -76,6 +76,7 @@ class Trajectory:
         self.columns = columns  #: where the columns come from: the module's calls, or the arrays of a file
         self._told, self._described = header, described
         self._times, self._states, self._sample = t_events, x_events, sample
+        self.has_dense_output = sample is not None  #: whether the run kept it, so that :meth:`at` costs no second run
 
     _header = cached_property[dict[str, Any]](lambda self: self._told() if callable(self._told) else self._told)
     units = cached_property[dict[str, str]](lambda self: self._header.get("units", {}))
@@ -95,11 +96,6 @@ class Trajectory:
     def name(self) -> str:
         """Name of the model."""
         return str(self.metadata["name"])
-
-    @property
-    def has_dense_output(self) -> bool:
-        """Whether the run kept dense output, so that :meth:`at` can be called."""
-        return self._sample is not None
 
     @property
     def q(self) -> Array:
@@ -163,6 +159,8 @@ class Trajectory:
     def at(self, t: ArrayLike) -> Trajectory:
         """Evaluate the trajectory at other times, from the dense output of the run.
 
+        Where ``simulate`` did not keep that, the first call makes the same run again.
+
         Parameters
         ----------
         t : float or (k,) array
@@ -175,10 +173,14 @@ class Trajectory:
         Raises
         ------
         UsageError
-            The run kept no dense output, or a time lies outside the run.
+            A time lies outside the run, or it kept no dense output and cannot be made again: it has controllers, it
+            was read from a file or copied, or it comes of another call than ``simulate``.
         """
         if self._sample is None:
-            raise UsageError("the run kept no dense output; simulate with dense_output=True")
+            raise UsageError(
+                "this trajectory has no solution between its times, and cannot be made again, for it was read from a "
+                "file or copied, has controllers=, or is not of simulate; give simulate dense_output=True, or t_eval="
+            )
         times = np.atleast_1d(read_numbers("t", t))
         low, high = sorted(self.metadata["span"])
         if times.ndim != 1 or not ((times >= low) & (times <= high)).all():

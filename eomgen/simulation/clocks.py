@@ -13,13 +13,15 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.constraints import MEASURED
-from ..limits.runs import WHOLE
+from ..limits.runs import MOST_STEPS, WHOLE
 from ..numeric.scales import Array
 from ..runtime.refusals import require_switched
 from .events import instant
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+
+FINEST = 1e-3  #: part of a period that times must tell apart
 
 
 def at_next_samples(
@@ -45,10 +47,20 @@ def at_next_samples(
     found = np.array(x, dtype=float)
     for clock in clocks:
         event, place = int(clock["event"]), int(clock["counter"])
-        late, period = _lateness(values, t, found, event, place)
+        states, first = ", ".join(clock["states"]), np.where(np.arange(len(found)) == place, 0.0, found)
+        late, period = _lateness(values, t, found, event, place)[0], _lateness(values, 0.0, first, event, place)[1]
         if not period > 0.0:
+            raise UsageError(f"the period of {states} is {period:.6g} s; give a positive time between samples")
+        start, end = span or (t, t)
+        if abs(end - start) > MOST_STEPS * period:
             raise UsageError(
-                f"the period of {', '.join(clock['states'])} is {period:.6g} s; give a positive time between samples"
+                f"a run from {start:g} to {end:g} s has {abs(end - start) / period:.2g} samples of {states}, one every "
+                f"{period:g} s, so it would not end; give a shorter span"
+            )
+        if (latest := max(abs(start), abs(end))) + FINEST * period == latest:
+            raise UsageError(
+                f"the period of {states}, {period:g} s, is lost in rounding at times near {latest:g} s; begin the run "
+                "nearer to t = 0"
             )
         if not abs(found[place] - round(found[place])) < WHOLE:
             name = module.x_names[place]

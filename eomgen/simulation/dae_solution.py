@@ -111,6 +111,8 @@ def integrate_dae(
             raise UsageError(
                 f"dae.solve sets {name} of IDA itself, so it cannot be given; give events= as for simulate"
             )
+    if not DaeForm(module).n_y:
+        raise UsageError(f"{module.name} has no unknowns that IDA could solve for; use simulate")
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata["simulation"]["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module

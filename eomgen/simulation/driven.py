@@ -168,6 +168,7 @@ def simulate_driven(
         t_events,
         x_events,
         {"status": status, "message": message, "span": [start, float(t[-1])] if t.size else [start, start]},
+        [event.name for event in events],
     )
 
 
@@ -210,8 +211,9 @@ class _DrivenRun:
         return times, states_at, last
 
     def keep(
-        self, t: Array, s: Array, t_events: list[Array], x_events: list[Array], header: dict[str, Any]
-    ) -> KinematicAnalysis:
+        self, t: Array, s: Array, t_events: list[Array], x_events: list[Array], header: dict[str, Any],
+        names: Sequence[str] = (),
+    ) -> KinematicAnalysis:  # fmt: skip
         """The trajectory at parameters s."""
         motion = self.followed.motion(s, None)
         sample: Callable[[Array], KinematicAnalysis] = lambda times: self.keep(  # noqa: E731
@@ -227,7 +229,7 @@ class _DrivenRun:
             len(t),
             (),
             u=u,
-            header=header,
+            header={**header, "event_names": list(names)},
             t_events=t_events,
             x_events=x_events,
             sample=sample,

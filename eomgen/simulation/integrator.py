@@ -72,9 +72,7 @@ class Integrator:
         step: float | None = None,
     ) -> None:
         if not module.layout.n_dof:
-            raise UsageError(
-                f"{module.name} has no degree of freedom to integrate: its drivers determine the motion; use simulate"
-            )
+            raise UsageError(f"{module.name} has no degree of freedom to integrate; use simulate")
         if Events(module.layout, None).resets:
             raise UsageError(f"events of {module.name} reset its state, and an integrator finds no events; simulate it")
         self._given = (module, method, rtol, atol, max_step, first_step, step)

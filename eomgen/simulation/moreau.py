@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -139,7 +140,8 @@ def step_rigidly(
     counts |= {"contact_residual": steps.residual, "penetration": steps.depth}
     ends = (start, end)
     told, found_states = (times, states) if stored is None else (stored, _between(times, states, stored))
-    solution = Solution(told, found_states, [], [], None, 0, "The end of the span is reached.", counts, ends)
+    dense = partial(_between, times, states)
+    solution = Solution(told, found_states, [], [], dense, 0, "The end of the span is reached.", counts, ends)
     asked = {"step": h, "contact_tolerance": tolerance, "contact_iterations": iterations, "contact_forces": keep}
     run = record(bound, forcing, solution, NAME, asked)
     about = module.metadata

@@ -28,8 +28,9 @@ def record(
     method: str,
     options: dict[str, Any],
     event_names: Sequence[str] = (),
+    again: Callable[[], Solution] | None = None,
 ) -> Trajectory:
-    """Project the solution and put the trajectory together.
+    """Project the solution and put the trajectory together; ``again`` makes the same with dense output, if need be.
 
     Raises
     ------
@@ -55,14 +56,19 @@ def record(
         events += [project(module, t, found, forcing)[1] for t, found in happened]
     dense = solution.dense
     sample: Callable[[Array], Trajectory] | None = None
-    if dense is not None:
+    if dense is not None or again is not None:
 
         def sample(t: Array) -> Trajectory:
-            found, states = project(module, t, dense(t), forcing)
+            nonlocal dense
+            if dense is None and again is not None:
+                dense = again().dense
+            found, states = project(module, t, dense(t), forcing)  # type: ignore[misc]
             head = described() | (header() if callable(header) else header) | {"residuals": found}
             return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states)), head)
 
-    return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample, described)
+    made = Trajectory(solution.t, x, columns, header, solution.t_events, events, sample, described)
+    made.has_dense_output = solution.dense is not None
+    return made
 
 
 def _header(

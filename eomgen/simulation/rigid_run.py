@@ -39,7 +39,7 @@ class RigidRun(Trajectory):
         """The same run with forces."""
         columns = ColumnsWithForces(cast("Columns", run.columns), forces)
         header = run._header | {"units": run.units | columns.units}
-        return cls.of((run.t, run.x, columns, header, (), (), None, run._described), forces)
+        return cls.of((run.t, run.x, columns, header, (), (), run._sample, run._described), forces)
 
     def __reduce__(self) -> tuple[Any, ...]:
         _, parts = super().__reduce__()

@@ -20,7 +20,7 @@ from ..runtime.room import read_flag, require_room, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run, watch_run
 from .compiled import can_run, integrate_compiled
-from .events import UNWATCHED, WAIT, Events, is_told_by_the_caller, warn_of_unknown
+from .events import UNWATCHED, WAIT, Events, is_told_by_the_caller, told_by_the_caller, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .passed_limits import warn_of_limits
 from .recording import record
@@ -99,7 +99,7 @@ def simulate(
         Functions that give the new values of sampled states for which the model has no law; x is the state right
         before, in which the sampled states with a law have their new values already.
     dense_output : bool
-        Keep a continuous solution for ``Trajectory.at``.
+        Keep a continuous solution for ``Trajectory.at``, which otherwise makes the run again.
     max_step, first_step : float, optional
     step : float, optional
         Size of the steps of RK4 and of moreau (s), and only of these.
@@ -283,8 +283,19 @@ def simulate(
         if watch is not None:
             watch.close()
     _check(run, solution, start, end, title)
+
+    def again() -> Solution:
+        """The same run, with dense output."""
+        with told_by_the_caller(), np.errstate(all="ignore"):
+            if compiled:
+                options = (title, None, True, settings, None, None, watched)
+                return integrate_compiled(bound, forcing, nodes, x0, *options)[0]
+            listed, reset = watched.listed(bound, forcing), partial(watched.reset, bound, forcing)
+            rhs = run.watched(None)
+            return integrate(rhs, nodes, x0, solver, None, listed, True, settings, None, reset, forcing.enter)
+
     try:
-        made = record(bound, forcing, solution, title, settings, watched.names)
+        made = record(bound, forcing, solution, title, settings, watched.names, again if controllers is None else None)
     except EvaluationError as error:
         where = "?" if error.time is None else f"{error.time:.6g}"
         raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error

@@ -88,8 +88,10 @@ cdef class State(Kernel):
 cdef class Motion(Kernel):
     """A kernel of coordinates, velocities, accelerations: ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
 
-    def __call__(self, q, v, a, p=None, u=None, out=None, t=0.0, parameters=None, inputs=None):
+    def __call__(self, q=None, v=None, a=None, p=None, u=None, out=None, t=0.0, parameters=None, inputs=None):
         """Evaluate at q (n_q,), v and a (n_v,), or with a last axis k; other arguments as for Timed."""
+        if q is None or v is None or a is None:
+            raise TypeError(f"{self.name}(q, v, a) takes at least 3 positional arguments")
         p, u = one_of(self.error, "p", p, "parameters", parameters), one_of(self.error, "u", u, "inputs", inputs)
         cdef int n_v = _FACTS.get("n_v", self.n_in // 3)
         return self.general(t, [("q", self.n_in - 2 * n_v, q), ("v", n_v, v), ("a", n_v, a)], p, u, out)
@@ -147,9 +149,15 @@ cdef object call_plainly(object kernel, PyObject *const *given, Py_ssize_t n, Py
     """By ``__call__``, which says what is wrong with the arguments."""
     cdef Py_ssize_t i
     cdef tuple words = () if names == NULL else <tuple>names
-    return (<ternary>PyType_GetSlot(Py_TYPE(kernel), Py_tp_call))(
-        kernel, tuple([<object>given[i] for i in range(n)]),
-        {words[i]: <object>given[n + i] for i in range(len(words))})
+    try:
+        return (<ternary>PyType_GetSlot(Py_TYPE(kernel), Py_tp_call))(
+            kernel, tuple([<object>given[i] for i in range(n)]),
+            {words[i]: <object>given[n + i] for i in range(len(words))})
+    except TypeError as error:
+        _, own, fault = str(error).partition("__call__()")
+        if not own:
+            raise
+        raise TypeError(f"{kernel.name}({'t, x' if isinstance(kernel, Timed) else 'x'}){fault}") from None
 
 
 cdef int set_quick_call(Kernel kernel) except -1:

@@ -105,3 +105,59 @@ def test_welds_that_late_values_part_are_named(target: str) -> None:
     for call in (lambda: bound.rhs(0, []), lambda: bound.project([]), lambda: bound.reactions(0, [])):
         with pytest.raises(ProjectionError, match=r"largest residual at \w\.r_x, 0\.1"):
             call()
+
+
+def held(kind: str) -> eg.Model:
+    """A body that a weld, two welds in a ring or a driver leave no freedom."""
+    m = eg.Model("held")
+    a = m.body("a", mass=1.0)
+    if kind == "driven":
+        m.prismatic("J", m.ground, a, axis="x", coordinate="q")
+        m.driver("D", "q", "t")
+    else:
+        m.weld("A", m.ground, a)
+    if kind == "ring":
+        b = m.body("b", mass=1.0)
+        m.weld("B", a, b)
+        m.weld("C", m.ground, b)
+    return m
+
+
+SAMPLED = [2.0]  #: of s -> s/2 + 1 at 0, 0.1, ... 0.5 s
+for _ in range(6):
+    SAMPLED.append(0.5 * SAMPLED[-1] + 1)
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("kind", ["weld", "ring", "driven"])
+def test_states_stand_beside_bodies_without_freedoms(kind: str, target: str) -> None:
+    for law, end in ({"rate": "-s"}, 2 * np.exp(-0.55)), ({"value": "0.5*s + 1", "period": 0.1}, SAMPLED[-1]):
+        m = held(kind)
+        if "rate" in law:
+            m.state("s", law["rate"], initial=2.0)
+        else:
+            m.sampled("s", law["value"], law["period"], initial=2.0)
+        m.output("y", "2*s")
+        mod = m.compile(target=target)
+        for method in ("DOP853", "Radau", "LSODA"):
+            run = mod.simulate((0, 0.55), method=method)
+            np.testing.assert_allclose([run["s"][-1], run["y"][-1]], [end, 2 * end], atol=1e-6)
+        np.testing.assert_allclose(mod.dae.solve((0, 0.55))["s"][-1], end, atol=1e-6)
+        assert mod.jacobian(0, mod.x0()).shape == (mod.n_x, mod.n_x)
+        assert target == "cython" or mod.verify().ok
+        if target == "numpy":
+            x, drawn = mod.x0(), m.derive()
+            for rhs in (drawn.to_casadi().rhs, drawn.to_jax().rhs):
+                np.testing.assert_allclose(np.array(rhs(0.0, x, mod.u, mod.p)).ravel(), mod.rhs(0.0, x), atol=1e-6)
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("terminal", [False, True])
+def test_a_driven_mechanism_whose_event_never_happens(terminal: bool, target: str) -> None:
+    m = held("driven")
+    m.event("never", "q + 1", terminal=terminal)
+    m.event("half", "q - 0.5")
+    run = m.compile(target=target).simulate((0, 1))
+    assert run["q"][-1] == pytest.approx(1.0, abs=1e-12)
+    assert [x.shape for x in run.x_events] == [(2, 0), (2, 1)]
+    assert run.t_events["half"] == pytest.approx([0.5], abs=1e-12)

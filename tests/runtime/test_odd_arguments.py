@@ -184,3 +184,35 @@ def test_what_no_loop_can_take_is_named(loop: Any, case: str) -> None:
     call, words = LOOPS[case]
     with pytest.raises(eg.UsageError, match=words):
         call(loop)
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_what_is_missing_and_what_takes_no_result(target: str) -> None:
+    m = eg.Model("cart")
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    m.sampled("a", "a + 1", 0.1)
+    mod = m.compile(target=target)
+    with pytest.raises(TypeError, match=r"^rhs\(t, x\) "):
+        mod.rhs([0, 1])
+    with pytest.raises(TypeError, match=r"^energy\(x\) "):
+        mod.energy()
+    with pytest.raises(TypeError, match=r"^f\(q, v, a\) |^inverse_dynamics\(q, v, a\) "):
+        mod.inverse_dynamics([0.0])
+    one = np.lib.stride_tricks.as_strided(np.zeros(1), (mod.n_x,), (0,))
+    square = np.lib.stride_tricks.as_strided(np.zeros(mod.n_x), (mod.n_x, mod.n_x), (0, 8))
+    for call in (
+        lambda: mod.rhs(0.0, mod.x0(), out=one),
+        lambda: mod.jacobian(0.0, mod.x0(), out=square),
+        lambda: mod.project(mod.x0(), out=one),
+        lambda: mod.bias(0.0, mod.x0(), out=one[:1]) or mod.rhs(0.0, mod.x0(), out=one),
+    ):
+        with pytest.raises(eg.UsageError, match=r"strides \(0.*one number in memory"):
+            call()
+    for span, words in (
+        ((0, 1e300), r"1e\+301 samples of a, one every 0\.1 s, so it would not end"),
+        ((1e16, 1e16 + 2), r"the period of a, 0\.1 s, is lost in rounding at times near 1e\+16 s"),
+        ((1e15, 1e15 + 1), "is lost in rounding"),
+    ):
+        with pytest.raises(eg.UsageError, match=words):
+            mod.simulate(span)
+    assert mod.simulate((1e8, 1e8 + 0.35))["a"][-1] == 4.0

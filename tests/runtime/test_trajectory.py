@@ -1,10 +1,12 @@
 """Trajectory: columns, tables, files, plots."""
 
 import json
+import pickle
 
 import numpy as np
 import pytest
 
+import eomgen as eg
 from eomgen.errors import UsageError
 from eomgen.runtime import load_trajectory
 
@@ -141,3 +143,26 @@ def test_outputs_called_like_energies_come_first_and_the_balance_stays_right(cra
     assert again.energy_drift == plain.energy_drift
     np.testing.assert_array_equal(again["T"], traj["T"])
     assert "T" not in traj.units
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("method", ["DOP853", "Radau", "LSODA"])
+def test_a_run_without_dense_output_is_evaluated_anywhere(method: str, target: str) -> None:
+    """It is made again; with a reset, an input that jumps and arguments that the user has changed since."""
+    m = eg.Model("ball", gravity=(0, -9.81, 0))
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="y", coordinate="h")
+    m.torque("push", "J", m.input("u"))
+    m.event("floor", "h", direction=-1, reset={"h_dot": "-0.8*h_dot"})
+    module = m.compile(target=target)
+    initial, values = {"h": 1.0}, [0.0, 3.0]
+    plain = {"method": method, "inputs": {"u": ([0.0, 1.0], values)}}
+    run = module.simulate(1.0, initial, t_eval=[0, 1], **plain)
+    full = module.simulate(1.0, initial, dense_output=True, **plain)
+    initial["h"], values[1] = 5.0, 0.0
+    times = np.linspace(0, 1, 33)
+    np.testing.assert_array_equal(run.at(times).x, full.at(times).x)
+    np.testing.assert_array_equal(run.at(0.7)["u"], full.at(0.7)["u"])
+    with pytest.raises(eg.UsageError, match=r"0 \.\. 1 s"):
+        run.at(1.1)
+    with pytest.raises(eg.UsageError, match="cannot be made again"):
+        pickle.loads(pickle.dumps(run)).at(0.5)
