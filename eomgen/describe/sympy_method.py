@@ -7,9 +7,10 @@ from typing import Any
 
 from ..errors import ModelError, Problem, UsageError
 from .description import Description
+from .lagrangian import names_of
 from .names import nearest
 from .scope import RATES
-from .sympy_face import function_name, is_sympy, name_of
+from .sympy_face import function_name, is_sympy, name_of, named
 from .sympy_forms import Forms, read_forms
 
 
@@ -28,13 +29,13 @@ def describe_method(
     forms = read_forms(method)
     if potential_energy is not None:
         forms.potential = potential_energy
-    extra = dict(outputs or {})
-    if specified:
+    extra = named("outputs", outputs)
+    if named("specified", specified):
         _specify(forms, extra, specified)
     known = _Known(forms)
-    given_parameters = {name_of(key): value for key, value in (parameters or {}).items()}
-    listed = dict(inputs) if isinstance(inputs, Mapping) else dict.fromkeys(inputs, 0.0)
-    given_inputs = {name_of(key): value for key, value in listed.items()}
+    given_parameters = named("parameters", parameters)
+    alone = names_of("inputs", inputs) if isinstance(inputs, list | tuple | set) else None
+    given_inputs = named("inputs", inputs) if alone is None else dict.fromkeys(alone, 0.0)
     contents = [*_contents(forms), *extra.values()]
     constants, functions = known.sort(contents, given_inputs)
     problems = known.problems
@@ -75,8 +76,8 @@ def describe_method(
     for output, expression in {**_noncontributing(forms, taken), **extra}.items():
         description.add("outputs", output, {"expression": expression})
     for key, values in (("initial", initial), ("guess", guess)):
-        if values:
-            description.values[key] = {name_of(name): value for name, value in values.items()}
+        if found := named(key, values):
+            description.values[key] = found
     return description
 
 
