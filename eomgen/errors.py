@@ -41,8 +41,8 @@ SHOWN = 2000
 #: What to do where a value is not finite.
 TO_BE_FINITE = "look for a division by zero, or a root or logarithm of a negative number"
 #: Files that users do not write: installed packages and eomgen's own.
-_HERE = re.escape(os.path.dirname(os.path.abspath(__file__)))
-_INSTALLED = re.compile(rf"[/\\](site|dist)-packages[/\\]|^{_HERE}|^<frozen")
+_FOLDER = os.path.dirname(__file__)
+_INSTALLED = re.compile(rf"[/\\](site|dist)-packages[/\\]|^{re.escape(os.path.abspath(_FOLDER))}|^<frozen")
 
 
 def calls_within() -> int:
@@ -55,6 +55,21 @@ def calls_within() -> int:
     while frame is not None and str(frame.f_globals.get("__name__")).startswith(within):
         frame, calls = frame.f_back, calls + 1
     return calls
+
+
+def calling_line() -> tuple[str, int]:
+    """File and line of the nearest call that does not lie within the package."""
+    frame: Any = sys._getframe(3)  # the first ones do
+    while frame.f_code.co_filename.startswith(_FOLDER) and frame.f_back is not None:
+        frame = frame.f_back
+    return frame.f_code.co_filename, frame.f_lineno
+
+
+def _cell(file: str) -> str:
+    """``Cell In[3]`` of a file that is a cell of a notebook; else empty."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    naming = getattr(getattr(shell, "compile", None), "format_code_name", lambda _: None)
+    return " ".join(naming(file) or ())
 
 
 class EomgenError(Exception):
@@ -73,12 +88,10 @@ class EomgenError(Exception):
         shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
         if getattr(getattr(shell, "InteractiveTB", None), "mode", "") == "Verbose":
             return "".join(traceback.format_exception(self)).splitlines()
-        naming = getattr(getattr(shell, "compile", None), "format_code_name", lambda _: None)
         lines = []
         for one in traceback.extract_tb(self.__traceback__):
             if not _INSTALLED.search(one.filename):
-                cell = naming(one.filename)
-                place = " ".join(cell) if cell else f'File "{one.filename}"'
+                place = _cell(one.filename) or f'File "{one.filename}"'
                 lines += [f"  {place}, line {one.lineno}, in {one.name}", f"    {one.line}"]
         head = "Traceback of your own lines (%xmode Verbose, then %tb, shows all):"
         return [*([head, *lines] if lines else []), f"{type(self).__name__}: {self}"]
@@ -90,11 +103,11 @@ class Problem(NamedTuple):
     path: str  #: dotted place, e.g. ``joints.A.axis``
     message: str  #: what is wrong
     remedy: str = ""  #: what is allowed, or what to do
-    file: str = ""  #: model file, if the model came from one
+    file: str = ""  #: model file, or the file of the Python call
     line: int = 0  #: 1-based line in that file, 0 if none
 
     def __str__(self) -> str:
-        place = f"{self.file}:{self.line}: " if self.file else ""
+        place = f"{_cell(self.file) or self.file}:{self.line}: " if self.file else ""
         path, message, remedy = (shortened(part, SHOWN) for part in (self.path, self.message, self.remedy))
         return visible(f"{place}{path}: {message}{f'; {remedy}' if remedy else ''}", lines=False)
 

@@ -27,6 +27,7 @@ from .kinematics.other_branches import other_branches
 from .kinematics.report import MechanismReport, report
 from .runtime.near_names import unknown
 from .targets import TARGETS, find_target
+from .texts import shown
 
 if TYPE_CHECKING:
     from .describe.builder import Builder
@@ -55,6 +56,8 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
 def choose_method(mechanism: Mechanism, method: str) -> str:
     """Resolve ``auto`` for a bare Lagrangian; refuse a method that is not there or does not fit."""
     bare = mechanism.lagrangian is not None
+    if not isinstance(method, str):
+        raise UsageError(f"method must be the name of a method, not {shown(method)}")
     if mechanism.given is not None:
         if method not in ("auto", GIVEN):
             raise UsageError(f"method {method!r} needs bodies; for given equations there are: auto, {GIVEN}")

@@ -120,6 +120,6 @@ def find_target(name: str, allowed: Iterable[str] | None = None) -> Target:
         There is none, or none among those allowed.
     """
     names = list(TARGETS if allowed is None else allowed)
-    if name not in names:
+    if not isinstance(name, str) or name not in names:
         raise UsageError(f"no target {name!r}; there are {', '.join(names)}")
     return TARGETS[name]

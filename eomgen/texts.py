@@ -101,9 +101,14 @@ def yaml_quoted(text: str) -> str:
     return f'"{"".join(shown)}"'
 
 
+def one_line(text: str) -> str:
+    """One printable line, as the attributes of XML hold it."""
+    return visible(" ".join(text.split()), lines=False)
+
+
 def summary_text(text: str, longest: int = 500) -> str:
     """One printable line, as the descriptions of packages must be; shortened where it is long."""
-    return shortened(visible(" ".join(text.split()), lines=False), longest)
+    return shortened(one_line(text), longest)
 
 
 def markdown_text(text: str) -> str:
@@ -115,7 +120,7 @@ def markdown_text(text: str) -> str:
 
 def markdown_code(text: str) -> str:
     """A line of code within Markdown, with its backticks."""
-    return f"`{visible(' '.join(text.split()), lines=False).replace('`', chr(39))}`"
+    return f"`{one_line(text).replace('`', chr(39))}`"
 
 
 def html_text(text: str) -> str:

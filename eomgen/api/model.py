@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from .. import pipeline
 from ..describe.builder import Builder
-from ..describe.sympy_face import name_of
+from ..describe.sympy_face import name_list
 from ..describe.visit import copied
 from ..errors import UsageError
 from ..files.inline_pictures import picture_html, side_by_side
@@ -110,7 +110,7 @@ class Model(Builder):
     ) -> Equations:
         """Derive the equations of motion; see ``eomgen.pipeline.derive``."""
         if independent is not None:
-            independent = [name_of(q) for q in ([independent] if isinstance(independent, str) else independent)]
+            independent = name_list(independent)
         return derive(self, method, independent, baumgarte)
 
     def compile(

@@ -38,7 +38,7 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
             "give 1 for a rising, -1 for a falling value, 0 for both",
         )
         direction = 0
-    reset = _reset(reader, f"{path}.reset", values.get("reset") or {})
+    reset = _reset(reader, f"{path}.reset", {} if values.get("reset") is None else values["reset"])
     restitution = None
     if values.get("restitution") is not None:
         restitution = reader.number(f"{path}.restitution", values["restitution"])

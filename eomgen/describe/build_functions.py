@@ -39,7 +39,7 @@ def build_functions(reader: Reader, entries: list[DescribedEntry]) -> None:
 
 
 def _arity_meant(entry: DescribedEntry) -> int:
-    given = entry.values.get("arguments") or len(items(entry.values.get("derivatives")) or ())
+    given = entry.values.get("arguments", len(items(entry.values.get("derivatives")) or ()))
     return given if isinstance(given, int) and 1 <= given <= 16 else 2 if "z" in entry.values else 1
 
 

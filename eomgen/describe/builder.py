@@ -20,7 +20,7 @@ from .model_components import ComponentMethods
 from .model_functions import FunctionMethods
 from .model_states import StateMethods
 from .model_totals import TotalMethods
-from .sympy_face import symbol
+from .sympy_face import name_list, named, symbol
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -40,11 +40,12 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
         values: dict[str, Any] = {"name": name}
         if gravity is not None:
             values["gravity"] = gravity
-        if doc:
+        if not isinstance(doc, str) or doc:
             values["doc"] = doc
         if check_inertia is not True:
             values["check_inertia"] = check_inertia
         self._start(Description(values=values))
+        self._note_line("name", "gravity")
 
     def _start(self, description: Description) -> None:
         self._description = description
@@ -60,6 +61,8 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
         """Make a model from a description, as the readers of model files do."""
         model = cls.__new__(cls)
         model._start(description)
+        if not description.lines:  # of no file
+            model._note_line(*description.values, *SECTIONS)
         return model
 
     @classmethod
@@ -202,16 +205,21 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
             Beside friction: the output that is the sliding velocity, linear in the velocities; in space two outputs,
             along directions at right angles.
         """
-        given = {"expression": expression, "terminal": terminal, "direction": direction, "reset": reset or None}
+        given = {
+            "expression": expression,
+            "terminal": terminal,
+            "direction": direction,
+            "reset": None if isinstance(reset, dict) and not reset else reset,
+        }
         given |= {"restitution": restitution, "doc": doc, "friction": friction, "slip": slip}
         defaults = {"terminal": False, "direction": 0, "doc": ""}
-        self._description.add("events", name, without_defaults(given, defaults))
+        self._add("events", name, without_defaults(given, defaults))
 
     def _quantity(
         self, section: str, name: str, value: Value, unit: str, doc: str, latex: str, key: str = "value"
     ) -> None:
         given = {key: value, "unit": unit, "doc": doc, "latex": latex}
-        self._description.add(section, name, without_defaults(given, {"unit": "", "doc": "", "latex": "", key: ""}))
+        self._add(section, name, without_defaults(given, {"unit": "", "doc": "", "latex": "", key: ""}))
 
     def coordinate(self, name: str) -> Any:
         """The SymPy symbol of a coordinate, by name; it is looked up when the model is checked."""
@@ -275,7 +283,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
 
     @initial.setter
     def initial(self, values: Mapping[Any, Any]) -> None:
-        self._description.values["initial"] = Settings(values)
+        self._description.values["initial"] = Settings(named("initial", values))
 
     @property
     def guess(self) -> Any:
@@ -284,7 +292,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
 
     @guess.setter
     def guess(self, values: Mapping[Any, Any]) -> None:
-        self._description.values["guess"] = Settings(values)
+        self._description.values["guess"] = Settings(named("guess", values))
 
     @property
     def independent(self) -> Any:
@@ -293,7 +301,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
 
     @independent.setter
     def independent(self, names: Sequence[Any]) -> None:
-        self._description.values["independent"] = Names([names] if isinstance(names, str) else names)
+        self._description.values["independent"] = Names(name_list(names))
 
     @property
     def simulation(self) -> Any:
@@ -302,7 +310,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
 
     @simulation.setter
     def simulation(self, values: Mapping[str, Any]) -> None:
-        self._description.values["simulation"] = Settings(values)
+        self._description.values["simulation"] = Settings(named("simulation", values))
 
     # -- what comes next ------------------------------------------------------------------------------------------
     @property

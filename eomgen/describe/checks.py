@@ -40,7 +40,8 @@ def check_names(
         fault = fault_of_name(entry.name)
         if fault:
             faults.add(entry.path, *fault)
-        elif entry.name in reserved:
+            continue
+        if entry.name in reserved:
             faults.add(entry.path, f"{entry.name!r} is a reserved name", f"choose another name for the {what}")
         elif entry.name in seen:
             faults.add(entry.path, f"the name is given to two {_PLURAL.get(what, what + 's')}", "rename one")

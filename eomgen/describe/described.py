@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..errors import calling_line
 from ..graph.shown import shown
-from .description import Description
+from .description import DescribedEntry, Description
+from .sympy_face import require_name
 
 
 class Described:
@@ -17,6 +19,16 @@ class Described:
     def description(self) -> Description:
         """The description of the model, with the same structure as a model file."""
         return self._description
+
+    def _add(self, section: str, name: str, values: dict[str, Any]) -> DescribedEntry:
+        """Append an entry to a section, with the file and line of the call."""
+        entry = self._description.add(section, require_name(section, name), values)
+        self._description.lines[entry.path] = calling_line()
+        return entry
+
+    def _note_line(self, *paths: str) -> None:
+        """Note the file and line of the user's call for what was said there."""
+        self._description.lines.update(dict.fromkeys(paths, calling_line()))
 
     @property
     def name(self) -> Any:

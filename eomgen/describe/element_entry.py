@@ -288,7 +288,7 @@ class ElementEntry:
         if key not in self.values:
             return None
         value = self.values[key]
-        joint = next((one for one in self.around.joints if one.entry.name == value), None)
+        joint = next((one for one in self.around.joints if isinstance(value, str) and one.entry.name == value), None)
         if joint is None:
             found = self._find(key, value)
             return None if found is None else ((found.name, self.graph.symbol(f"{found.name}_dot"), found.kind),)

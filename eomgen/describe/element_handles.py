@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple, Protocol
 
+from ..errors import UsageError
+from ..texts import shown
 from .described import Described
 from .description import DescribedEntry
 from .marker_quantities import ElementQuantity
@@ -62,6 +64,14 @@ class Labelled(Protocol):
     def note(self) -> None: ...
 
 
+def noted(marker: Labelled) -> str:
+    """The label of a marker whose motion an expression uses; UsageError if it is none."""
+    if not hasattr(marker, "note"):
+        raise UsageError(f"give a body or a marker, such as m.ground or rod.at(1, 0, 0), not {shown(marker)}")
+    marker.note()
+    return marker.label
+
+
 class ForceHandle:
     """A force element of the model; what it does can stand in outputs, events and other laws.
 
@@ -109,10 +119,7 @@ class ForceHandle:
         axes : BodyHandle or MarkerHandle, optional
             Along whose axes the components are; ground unless given.
         """
-        for one in (marker, axes):
-            if one is not None:
-                one.note()
-        return Wrench(WRENCH, self.name, "" if axes is None else axes.label, marker.label)
+        return Wrench(WRENCH, self.name, "" if axes is None else noted(axes), noted(marker))
 
 
 class ConstraintHandle:

@@ -47,7 +47,7 @@ class ElementMethods(Described):
         """
         between = [marker_reference(self, predecessor), marker_reference(self, successor)]
         given = {key: value for key, value in keys.items() if value is not None}
-        return JointHandle(self, self._description.add("joints", name, {"type": type, "between": between, **given}))
+        return JointHandle(self, self._add("joints", name, {"type": type, "between": between, **given}))
 
     def _method(self, name: str) -> Any:
         """The method of a type that was added to the tables later; None if there is none."""

@@ -7,9 +7,10 @@ from typing import Any
 
 from .description import Description, items
 from .expressions import names_in
+from .lagrangian import names_of
 from .printed_names import give_latex
 from .scope import RATES
-from .sympy_face import free_names, function_names, is_sympy, name_of
+from .sympy_face import free_names, function_names, is_sympy, named
 
 
 def describe_equations(
@@ -66,29 +67,27 @@ def describe_equations(
     -------
     Description
     """
-    listed = items(coordinates)
-    names = [name_of(q) for q in ([coordinates] if listed is None else listed)]
-    speeds = [name_of(v) for v in items(velocities) or ()]
+    names = names_of("equations.coordinates", coordinates)
+    speeds = names_of("equations.velocities", velocities)
     given: dict[str, Any] = {"coordinates": names}
     if speeds:
         given["velocities"] = speeds
     for key, table in (("rates", rates), ("intermediates", intermediates)):
-        if table:
-            given[key] = {name_of(part): value for part, value in table.items()}
+        if values := named(key, table):
+            given[key] = values
     rows = [items(row) for row in items(mass_matrix) or ()]
     if rows and all(row is None for row in rows):  # one coordinate: SymPy's 1 x 1 matrix counts as a plain list
         rows = [items(mass_matrix)]
     given |= {"mass_matrix": rows or mass_matrix, "forcing": items(forcing) or forcing}
     if items(constraints):
         given["constraints"] = items(constraints)
-    if items(multipliers):
-        given["multipliers"] = [name_of(part) for part in items(multipliers) or ()]
+    if forces := names_of("equations.multipliers", multipliers):
+        given["multipliers"] = forces
     for key, energy in (("kinetic_energy", kinetic_energy), ("potential_energy", potential_energy)):
         if energy is not None:
             given[key] = energy
     description = Description(values={"name": name, "equations": given})
-    values = {name_of(symbol): value for symbol, value in (parameters or {}).items()}
-    driven = {name_of(symbol): value for symbol, value in (inputs or {}).items()}
+    values, driven = named("parameters", parameters), named("inputs", inputs)
     known = {part + rate for part in (*names, *speeds) for rate in RATES}
     known |= {*driven, *given.get("intermediates", ()), *given.get("multipliers", ())}
     declared = ("coordinates", "velocities", "multipliers")

@@ -11,7 +11,7 @@ from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
 from .described import Described
 from .description import GROUND_NAME, DescribedEntry, is_zero, items, label_of
-from .element_handles import JointReaction
+from .element_handles import JointReaction, noted
 from .marker_quantities import MarkerQuantity
 from .mechanism import velocity_names
 from .names import REACTION
@@ -96,26 +96,20 @@ class MarkerHandle:
         -------
         SeenMotion
         """
-        for other in (origin, axes):
-            if other is not None:
-                other.note()
-        self.note()
-        return SeenMotion(self.label, *("" if end is None else end.label for end in (origin, axes)))
+        ends = ["" if end is None else noted(end) for end in (origin, axes)]
+        return SeenMotion(noted(self), *ends)
 
     def distance(self, other: MarkerHandle) -> Any:
         """Distance from the origin of another marker (m), as a SymPy symbol."""
-        other.note()
-        return self._symbol(MarkerQuantity("distance", self.label, other.label))
+        return self._symbol(MarkerQuantity("distance", self.label, noted(other)))
 
     def distance_rate(self, other: MarkerHandle) -> Any:
         """Rate of the distance from the origin of another marker (m/s), as a SymPy symbol."""
-        other.note()
-        return self._symbol(MarkerQuantity("distance_rate", self.label, other.label))
+        return self._symbol(MarkerQuantity("distance_rate", self.label, noted(other)))
 
     def angle_from(self, other: MarkerHandle) -> Any:
         """Turn of this marker about the z axis of another (rad), as a SymPy symbol."""
-        other.note()
-        return self._symbol(MarkerQuantity("angle", self.label, other.label))
+        return self._symbol(MarkerQuantity("angle", self.label, noted(other)))
 
     def note(self) -> None:
         """Store an unnamed marker in the description, because an expression uses its motion."""
@@ -240,11 +234,12 @@ class BodyHandle(MarkerHandle):
         MarkerHandle
         """
         if self._entry is None:
-            self._entry = self.model.description.add("bodies", GROUND_NAME, {})
+            self._entry = self.model._add("bodies", GROUND_NAME, {})
         placed: dict[str, Any] = {"at": at}
         if not is_zero(rpy):
             placed["rpy"] = rpy
         placed |= _turned(axes, matrix)
+        self.model._note_line(f"{self._entry.path}.markers.{name}")
         markers = self._entry.values.get("markers", [])
         listed = list(markers.items()) if isinstance(markers, dict) else list(markers)
         self._entry.values["markers"] = [*listed, (name, placed)]
@@ -329,8 +324,7 @@ class JointHandle:
 
     def reaction_in(self, axes: MarkerHandle) -> JointReaction:
         """What the joint carries, along the axes of a marker."""
-        axes.note()
-        return JointReaction(REACTION, self.name, axes.label)
+        return JointReaction(REACTION, self.name, noted(axes))
 
     def _only(self) -> str:
         names = self.coordinate_names

@@ -12,7 +12,7 @@ from .expressions import names_in
 from .input_names import split_rate
 from .printed_names import give_latex
 from .scope import RATES
-from .sympy_face import derivative_names, free_names, function_names, is_sympy, name_of, sympy_name
+from .sympy_face import derivative_names, free_names, function_names, is_sympy, name_of, named, sympy_name
 
 
 def describe_lagrangian(
@@ -60,28 +60,17 @@ def describe_lagrangian(
     ModelError
         A coordinate is neither a symbol nor a function of time ``q(t)``.
     """
-    listed = items(coordinates)
-    listed = [coordinates] if listed is None else listed
-    names = [name_of(q) for q in listed]
-    remedy = "give symbols q or functions q(t) of the time t"
-    wrong = [
-        Problem(f"lagrangian.coordinates[{k}]", f"{shortened(q)} is not a coordinate", remedy)
-        for k, q in enumerate(listed)
-        if not isinstance(q, str) and sympy_name(q) is None
-    ]
-    if wrong:
-        raise ModelError(wrong)
+    names = names_of("lagrangian.coordinates", coordinates)
     given: dict[str, Any] = {"coordinates": names, "expression": L}
     if forces is not None:
-        given["forces"] = {name_of(q): Q for q, Q in forces.items()} if isinstance(forces, Mapping) else forces
+        given["forces"] = named("forces", forces) if isinstance(forces, Mapping) else forces
     if dissipation is not None:
         given["dissipation"] = dissipation
     if items(constraints) or not isinstance(constraints, list | tuple):
         given["constraints"] = constraints
 
     description = Description(values={"name": name, "lagrangian": given})
-    values = {name_of(symbol): value for symbol, value in (parameters or {}).items()}
-    driven = {name_of(symbol): value for symbol, value in (inputs or {}).items()}
+    values, driven = named("parameters", parameters), named("inputs", inputs)
     known = {q + rate for q in names for rate in RATES} | set(driven)
     stems = {split_rate(source)[0] for source in driven}
     others = [name for name in _symbols(given, rates=True) if name not in {*known, *values}]
@@ -97,6 +86,29 @@ def describe_lagrangian(
         description.add("inputs", rate, {})
     give_latex(description, "lagrangian", latex)
     return description
+
+
+def names_of(path: str, given: Any) -> list[str]:
+    """Names of what is given as symbols, functions of time or texts; none of None.
+
+    Raises
+    ------
+    ModelError
+        Something else is among them.
+    """
+    listed = items(given)
+    if listed is None:
+        listed = [] if given is None else [given]
+    what = path.rpartition(".")[2].removesuffix("s").replace("velocitie", "velocity")
+    remedy = "give symbols q or functions q(t) of the time t"
+    wrong = [
+        Problem(f"{path}[{k}]", f"{shortened(q)} is not a {what}", remedy)
+        for k, q in enumerate(listed)
+        if not isinstance(q, str) and sympy_name(q) is None
+    ]
+    if wrong:
+        raise ModelError(wrong)
+    return [name_of(q) for q in listed]
 
 
 def _symbols(given: Mapping[str, Any], rates: bool = False) -> list[str]:

@@ -168,7 +168,7 @@ def method_of(section: str, found: ElementType) -> Callable[..., Any]:
         kept = {key: value for key, value in bound.items() if value is not None or key in found.ends}
         given = {key: value for key, value in kept.items() if key not in ("self", "name")}
         values = {"type": found.name, **_entry(self, found, bound["name"], given)}
-        entry = self._description.add(section, bound["name"], values)
+        entry = self._add(section, bound["name"], values)
         handle = _HANDLES.get(section)
         return None if handle is None else handle(self, entry)
 
@@ -235,6 +235,7 @@ def _is_default(value: Any, field: Field) -> bool:
 def _where(model: Described, between: Sequence[Any], joint: Any) -> dict[str, Any]:
     if joint is not None and not between:
         return {"joint": joint_reference(model, joint)}
+    between = items(between) or ()
     if joint is None and len(between) == 1:
         return {"joint": joint_reference(model, between[0])}
     if joint is None and len(between) == 2:
@@ -255,7 +256,7 @@ def _converted(model: Described, found: ElementType, name: Any, key: str, value:
     if kind in ("marker", "joint", "body"):
         return _reference(model, kind, value)
     if kind in ("pair", "joints"):
-        return [_reference(model, kind, part) for part in value]
+        return [_reference(model, kind, part) for part in items(value) or [value]]
     if kind == "factors" and isinstance(value, Mapping):
         return {_reference(model, kind, part): factor for part, factor in value.items()}
     if kind == "shapes":

@@ -87,7 +87,7 @@ class BodyMethods(Described):
             "display": display,
         }
         values = {key: value for key, value in given.items() if value is not None}
-        return BodyHandle(self, name, self._description.add("bodies", name, values))
+        return BodyHandle(self, name, self._add("bodies", name, values))
 
     @property
     def check_inertia(self) -> bool | str:

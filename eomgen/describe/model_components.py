@@ -15,7 +15,7 @@ from .handles import BodyHandle, JointHandle, MarkerHandle
 from .instance import Component, Instance, add_instance
 from .names import fault_of_name
 from .references import marker_reference
-from .sympy_face import is_sympy, symbol
+from .sympy_face import is_sympy, require_name, symbol
 
 
 class InstanceHandle:
@@ -47,11 +47,11 @@ class InstanceHandle:
 
     def symbol(self, name: str) -> Any:
         """The SymPy symbol of a parameter, input or coordinate of the component, or of a rate."""
-        return symbol(self.prefix + name)
+        return symbol(self.prefix + require_name("symbol", name))
 
     def marker(self, label: str) -> MarkerHandle:
         """A named marker of one of its bodies: ``foot.tip``."""
-        return MarkerHandle(self.model, self.prefix + label)
+        return MarkerHandle(self.model, self.prefix + require_name("marker", label))
 
     def _entries(self, section: str) -> dict[str, Any]:
         made = self.model.description.origins
@@ -79,6 +79,7 @@ class ComponentMethods(Described):
         MarkerHandle
             For joints, forces and outputs, like a marker of a body.
         """
+        require_name("attachment", name)
         self._description.values["attachments"] = [*self._description.values.get("attachments", ()), name]
         return MarkerHandle(self, name)
 

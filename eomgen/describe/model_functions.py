@@ -9,6 +9,7 @@ from typing import Any
 from ..errors import UsageError
 from .build_native import PythonTwin
 from .described import Described
+from .description import items
 from .keywords import names_keywords
 from .sympy_face import function
 
@@ -96,7 +97,9 @@ class FunctionMethods(Described):
         sympy.Function
         """
         twin: Any = None if python is None else str(python) if isinstance(python, str | PathLike) else python
-        further = (python_derivatives or (), python_second_derivatives or ())
+        further = [items(() if given is None else given) for given in (python_derivatives, python_second_derivatives)]
+        if None in further:
+            raise UsageError(f"native {name}: python_derivatives must be lists of functions")
         if twin is not None and not isinstance(twin, str):
             twin = PythonTwin(twin, *further)
         elif any(further):
@@ -115,5 +118,5 @@ class FunctionMethods(Described):
 
     def _function(self, type_name: str, name: str, keys: dict[str, Any]) -> Any:
         given = {key: value for key, value in keys.items() if value is not None}
-        self._description.add("functions", name, {"type": type_name, **given})
+        self._add("functions", name, {"type": type_name, **given})
         return function(name)

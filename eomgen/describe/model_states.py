@@ -35,7 +35,7 @@ class StateMethods(Described):
         """
         given = {"rate": rate, "initial": initial, "unit": unit, "doc": doc, "latex": latex}
         defaults = {"rate": None, "initial": 0.0, "unit": "", "doc": "", "latex": ""}
-        self._description.add("states", name, without_defaults(given, defaults))
+        self._add("states", name, without_defaults(given, defaults))
         return symbol(name)
 
     def sampled(
@@ -71,5 +71,5 @@ class StateMethods(Described):
         given = {"sampled": value, "period": period, "offset": offset, "initial": initial}
         given |= {"unit": unit, "doc": doc, "latex": latex}
         defaults = {"sampled": None, "period": None, "offset": 0.0, "initial": 0.0, "unit": "", "doc": "", "latex": ""}
-        self._description.add("states", name, without_defaults(given, defaults))
+        self._add("states", name, without_defaults(given, defaults))
         return symbol(name)

@@ -10,7 +10,7 @@ from ..notation import NotationError, read_latex
 from ..notation.latex_tree import spaced
 from .description import Description, items
 from .names import nearest
-from .sympy_face import name_of
+from .sympy_face import name_of, named
 from .values import Reader
 
 #: What multipliers of constraint equations are called, with a number; the second word where names look like the first.
@@ -74,7 +74,6 @@ def take_coordinates_latex(
 def give_latex(description: Description, section: str, latex: Mapping[Any, str] | None) -> None:
     """Put the LaTeX of names where each is described: parameters, inputs, else coordinates of the section."""
     entries = {e.name: e for place in ("parameters", "inputs") for e in description.sections[place]}
-    for key, text in (latex or {}).items():
-        name = name_of(key)
+    for name, text in named("latex", latex).items():
         home = entries[name].values if name in entries else description.values[section].setdefault("latex", {})
         home["latex" if name in entries else name] = text

@@ -6,8 +6,9 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..errors import ExpressionError
+from ..errors import ExpressionError, UsageError
 from ..graph.shown import parts_of, quoted
+from ..texts import shown
 
 if TYPE_CHECKING:
     from ..graph.core import Expr, Graph
@@ -15,11 +16,42 @@ if TYPE_CHECKING:
 Resolve = Callable[[str], "Expr"]
 
 
+def require_name(what: str, name: Any) -> str:
+    """The name that was given for something; UsageError if it is no text."""
+    if not isinstance(name, str):
+        raise UsageError(f"{what}: a name is a text, such as 'A', not {shown(name)}")
+    return name
+
+
+def named(what: str, given: Any) -> dict[Any, Any]:
+    """Values by name, of a mapping by symbol or name; none of None.
+
+    Raises
+    ------
+    UsageError
+        It is no mapping.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise UsageError(f"{what} must be a mapping of names to values, such as {{'m': 2.0}}, not {shown(given)}")
+    return {require_name(what, name_of(key)): value for key, value in given.items()}
+
+
+def name_list(given: Any) -> list[Any]:
+    """Names of independent coordinates, given as symbols or texts, one or several; UsageError if they are not."""
+    listed = given if isinstance(given, list | tuple | set) else [given]
+    names = list(map(name_of, listed))
+    if not all(isinstance(name, str) for name in names):
+        raise UsageError(f"independent must be a coordinate or a list of them, by symbol or name, not {shown(given)}")
+    return names
+
+
 def symbol(name: str) -> Any:
     """The plain SymPy symbol that stands for a name."""
     import sympy
 
-    return sympy.Symbol(name)
+    return sympy.Symbol(require_name("symbol", name))
 
 
 def function(name: str) -> Any:

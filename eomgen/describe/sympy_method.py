@@ -7,11 +7,12 @@ from typing import Any
 
 from ..errors import ModelError, Problem, UsageError
 from .description import Description
+from .lagrangian import names_of
 from .names import nearest
 from .printed_names import give_latex
 from .scope import RATES
 from .sympy_auxiliary import put, solve_auxiliary
-from .sympy_face import function_name, is_sympy, name_of
+from .sympy_face import function_name, is_sympy, name_of, named
 from .sympy_forms import Forms, read_forms
 from .sympy_names import SympyNames
 
@@ -29,19 +30,19 @@ def describe_method(
 ) -> Description:
     """The description behind :func:`from_sympy`, which see."""
     forms = read_forms(method)
-    told = (parameters or {}, inputs, outputs or {}, initial or {}, specified or {}, potential_energy, guess or {})
+    told = (parameters, inputs, outputs, initial, specified, potential_energy, guess)
     renamed = SympyNames([vars(forms), *told], forms.q)
     vars(forms).update(renamed.put(vars(forms)))
     parameters, inputs, outputs, initial, specified, potential_energy, guess = (renamed.put(x) for x in told)
     if potential_energy is not None:
         forms.potential = potential_energy
-    extra = dict(outputs or {})
-    if specified:
+    extra = named("outputs", outputs)
+    if named("specified", specified):
         _specify(forms, extra, specified)
     known = _Known(forms)
-    given_parameters = {name_of(key): value for key, value in (parameters or {}).items()}
-    listed = dict(inputs) if isinstance(inputs, Mapping) else dict.fromkeys(inputs, 0.0)
-    given_inputs = {name_of(key): value for key, value in listed.items()}
+    given_parameters = named("parameters", parameters)
+    alone = names_of("inputs", inputs) if isinstance(inputs, list | tuple | set) else None
+    given_inputs = named("inputs", inputs) if alone is None else dict.fromkeys(alone, 0.0)
     forces = solve_auxiliary(forms, {*known.motion, *given_inputs}, given_parameters)
     extra = {name: put(expression, forces) for name, expression in extra.items()}
     noncontributing = {str(name_of(force)): value for force, value in forces.items()}
@@ -91,8 +92,8 @@ def describe_method(
     for output, expression in {**noncontributing, **extra}.items():
         description.add("outputs", output, {"expression": expression})
     for key, values in (("initial", initial), ("guess", guess)):
-        if values:
-            description.values[key] = {name_of(name): value for name, value in values.items()}
+        if found := named(key, values):
+            description.values[key] = found
     give_latex(description, "equations", renamed.latex())
     return renamed.noted(description)
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from ..records import dataclass
+from ..texts import visible
 
 _PARTS = re.compile(r"(\$[^$]+\$|`[^`]+`)")
 
@@ -23,7 +24,7 @@ class Span(NamedTuple):
 
 def spans(text: str) -> Iterator[Span]:
     """The pieces of a text."""
-    for part in _PARTS.split(text):
+    for part in _PARTS.split(visible(text)):
         if part[:1] == "$" and len(part) > 2:
             yield Span("math", part[1:-1])
         elif part[:1] == "`" and len(part) > 2:

@@ -44,7 +44,7 @@ def _piece(piece: Piece, printer: Printer) -> str:
             return "\n".join("| " + " | ".join(map(_cell, row)) + " |" for row in rows)
         case DrawnPicture():
             data = b64encode(piece.png).decode()
-            return f"![{piece.words}](data:image/png;base64,{data})"
+            return f"![{_text(piece.words)}](data:image/png;base64,{data})"
         case Folded():
             inner = "\n\n".join(_piece(part, printer) for part in piece.pieces)
             plain = html_text(piece.title.replace("`", "").replace("$", ""))

@@ -118,7 +118,8 @@ class BrownMcPhee(SlidingFriction):
 
 def has_bristles(values: Mapping[str, Any]) -> bool:
     """Whether an entry's law of friction has states."""
-    return values.get("friction_law") == BRISTLES
+    law = values.get("friction_law")
+    return isinstance(law, str) and law == BRISTLES
 
 
 #: Of contacts, as parts of the normal force.

@@ -14,6 +14,7 @@ from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..numeric.scales import Array
+from ..texts import visible
 from .arrays import sealed
 from .near_names import require
 
@@ -126,7 +127,7 @@ def dataset(trajectory: TrajectoryLike) -> xarray.Dataset:
 
 def attributes(name: str, units: Mapping[str, str], metadata: Mapping[str, Any]) -> dict[str, str]:
     """Unit and meaning of a column, as the CF conventions for climate and forecast data call them."""
-    doc = metadata.get("docs", {}).get(name, "")
+    doc = visible(metadata.get("docs", {}).get(name, ""))  # HDF5 takes no NUL
     return {"units": units.get(name, ""), **({"long_name": doc} if doc else {})}
 
 

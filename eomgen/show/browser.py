@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from html import escape
 from typing import Any
 
 import numpy as np
 
+from ..texts import html_text
 from .colors import color_of, style_of
 from .data import Array
 from .label_places import offsets_within
@@ -45,7 +45,7 @@ def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 60
     span = high - low
     plot = viewer.plot(
         height=height,
-        name=escape(scene.name),
+        name=html_text(scene.name),
         camera_auto_fit=False,
         camera_mode="trackball" if scene.view is None else "orbit",
         grid_visible=scene.view is None,
@@ -88,7 +88,7 @@ def _objects(viewer: Any, scene: Scene, times: list[float]) -> list[Any]:
     for label, offset in zip(scene.labels, _offsets(scene), strict=True):
         found.append(
             viewer.text(
-                f'<span style="{GROUND}">{escape(label.text)}</span>',
+                f'<span style="{GROUND}">{html_text(label.text)}</span>',
                 is_html=True,  # else underscores would be read as TeX
                 position=_over_time(times, [label.at(scene.frames[k]) + offset for k in range(len(times))]),
                 reference_point="cc",
@@ -219,4 +219,4 @@ def page(scene: Scene, motion: ShownMotion, curves: Sequence[Any] = ()) -> str:
     text: str = plot.get_snapshot(9, additional_js_code=player_script(motion, (wide, high)))
     title = f"{scene.name}   {scene.note}" if scene.note else scene.name
     text = text.replace("<body>", f"<body>{player_html(motion, curves, title)}", 1)
-    return re.sub(r"<title>.*?</title>", lambda _: f"<title>{escape(scene.name)}</title>", text, count=1)
+    return re.sub(r"<title>.*?</title>", lambda _: f"<title>{html_text(scene.name)}</title>", text, count=1)

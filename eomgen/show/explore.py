@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import Any
 
 import numpy as np
 
 from ..errors import EomgenError
 from ..limits.pictures import HELD, SAME
+from ..texts import html_text
 from .browser import move_objects, scene_plot
 from .build_scene import build_scene
 from .data import Array
@@ -147,7 +147,7 @@ class Explorer:
             move_objects(self._plot, scene)
             self._nudge = -self._nudge  # k3d shows names once the camera has moved
             self._plot.camera = [x * (1.0 + self._nudge) for x in self._plot.camera]
-        self._says.value = f"<b style='color:#b22222'>{escape(self.message)}</b>"
+        self._says.value = f"<b style='color:#b22222'>{html_text(self.message)}</b>"
 
     def _closed(self, module: Any, wanted: dict[str, float], t: float) -> Array:
         """The position of these values, reached in small steps so that the way of closing the loops stays the same."""

@@ -8,6 +8,7 @@ from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
 
+from ..texts import html_text
 from .optional import matplotlib
 from .shown_motion import ShownMotion
 from .unit_panels import ShownColumn, by_unit, draw_curves
@@ -115,7 +116,7 @@ def player_html(motion: ShownMotion, curves: Sequence[ShownColumn], title: str) 
 #title {{ position: fixed; left: 14px; top: 10px; font: 15px sans-serif; white-space: pre; z-index: 5;
   pointer-events: none; }}
 </style>
-<div id="title">{escape(title)}</div>{plot}
+<div id="title">{html_text(title)}</div>{plot}
 <script>(function () {{
   if (document.createElement("canvas").getContext("webgl2")) return;
   const words = document.createElement("div");

@@ -8,9 +8,13 @@ import json
 import re
 import subprocess
 import tomllib
+import zipfile
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
+import xarray
 from hostile.held_texts import PLACES, assert_held, described, equations_of, files_of, model_of, text_fields
 from hostile.nasty_texts import CLOSERS, NASTY
 from ruamel.yaml import YAML
@@ -203,6 +207,53 @@ def test_what_is_shown_shows_the_text_and_obeys_none_of_it(key: str, monkeypatch
     for shown in (str(model), repr(model), str(module), repr(module), str(equations), str(equations.report)):
         assert texts.visible(shown) == shown
     assert_held(module.metadata, NASTY[key])
+
+
+#: Every nasty text, and what a reader of XML does not take, or what turns and hides the characters around it.
+TOGETHER = (
+    "\n".join(t for key, t in NASTY.items() if not key.startswith("long")) + "\x07\x1b\uffff\u202e\u2066\u200b\ufeff"
+)
+
+
+def test_a_unit_holds_the_text_in_well_formed_files(tmp_path: Path) -> None:
+    for version in ("2.0", "3.0"):
+        unit = model_of(described(TOGETHER, "unit")).derive().write_fmu(tmp_path / f"unit{version[0]}.fmu", version)
+        with zipfile.ZipFile(unit) as archive:
+            root = ElementTree.fromstring(archive.read("modelDescription.xml"))
+            page = archive.read("documentation/index.html").decode()
+        told = [root.attrib["description"], *(x.attrib["description"] for x in root.iter() if x.get("name") == "tau")]
+        assert told == [texts.one_line(TOGETHER)] * 2
+        assert texts.visible(page) == page
+        own = (
+            "html",
+            "head",
+            "meta",
+            "title",
+            "body",
+            "h1",
+            "p",
+            "table",
+            "tr",
+            "th",
+            "td",
+            "charset",
+            "lang",
+            "declaration",
+        )
+        assert Tags(page).tags <= {*own}
+
+
+@pytest.mark.filterwarnings("ignore:the mesh")
+def test_documents_and_tables_hold_no_character_that_does_not_print(tmp_path: Path) -> None:
+    equations = model_of(described(TOGETHER)).derive()
+    for form in ("html", "md", "tex"):
+        written = equations.explain("short").save(tmp_path / f"x.{form}").read_text(encoding="utf-8")
+        assert texts.visible(written) == written, form
+    run = equations.compile(target="numpy").simulate(0.1)
+    page = str(run.animate())
+    assert texts.visible(page) == page
+    data = xarray.load_dataset(run.save(tmp_path / "run.nc"))
+    assert data["y"].attrs["long_name"] == texts.visible(TOGETHER)
 
 
 @pytest.mark.parametrize("key", NASTY)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,6 +11,7 @@ from typing import Any, NamedTuple
 from ...layer import read_layer
 from ...limits.in_c import definitions
 from ...program import Program
+from ...texts import html_text
 from ..c import emit_c
 from ..sources import read_template, render
 from .model_description import describe_build, describe_model
@@ -92,11 +92,11 @@ def _token(version: str, *parts: Any) -> str:
 def _page(program: Program, variables: Sequence[Variable]) -> str:
     """documentation/index.html: what the model is, and its variables."""
     rows = "".join(
-        f"<tr><td>{html.escape(v.name)}</td><td>{html.escape(v.unit)}</td><td>{html.escape(v.doc)}</td></tr>\n"
+        f"<tr><td>{html_text(v.name)}</td><td>{html_text(v.unit)}</td><td>{html_text(v.doc)}</td></tr>\n"
         for v in variables
         if v.group != "rate"
     )
-    doc = html.escape(str(program.metadata.get("doc") or ""))
+    doc = html_text(str(program.metadata.get("doc") or ""))
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{program.name}</title></head>\n'
         f"<body><h1>{program.name}</h1>\n<p>{doc}</p>\n<p>Equations of motion by method {program.metadata['method']}, "

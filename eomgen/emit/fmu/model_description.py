@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 from ... import __version__
 from ...describe.units import read_unit
 from ...program import Program
+from ...texts import one_line
 from .variables import Variable
 
 TOOL = f"eomgen {__version__}"
@@ -24,7 +25,7 @@ def describe_model(program: Program, version: str, token: str, variables: Sequen
     two = version == "2.0"
     metadata = program.metadata
     about = {"fmiVersion": version, "modelName": program.name, "guid" if two else "instantiationToken": token}
-    doc = " ".join(str(metadata.get("doc") or "").split())
+    doc = one_line(str(metadata.get("doc") or ""))
     about |= {"description": doc} if doc else {}
     about |= {"generationTool": TOOL, "variableNamingConvention": "flat"}
     if two:
@@ -96,7 +97,7 @@ def _add_units(root: ElementTree.Element, variables: Sequence[Variable]) -> None
 def _attributes(variable: Variable) -> dict[str, str]:
     """What both versions say of a variable, but for its type."""
     given = {"name": variable.name, "valueReference": str(variable.reference)}
-    given |= {"description": " ".join(variable.doc.split())} if variable.doc else {}
+    given |= {"description": one_line(variable.doc)} if variable.doc else {}
     given["causality"] = _CAUSALITY.get(variable.group, "local")
     given["variability"] = "tunable" if variable.group == "p" else "continuous"
     if variable.group == "p":
