@@ -31,7 +31,7 @@ test thorough: lint
 	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal \
 	  $(if $(filter thorough,$@),--thorough) $(if $(PROGRAMS),--programs)
 
-lint: $(VENV)/.installed-test
+lint: $(VENV)/.installed-$(if $(PROGRAMS),all-tests,test)
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 
@@ -64,6 +64,7 @@ clean:
 $(VENV)/.installed-plot: EXTRAS := plot
 $(VENV)/.installed-docs: EXTRAS := dev
 $(VENV)/.installed-test: EXTRAS := test,dev
+$(VENV)/.installed-all-tests: EXTRAS := test,dev,cuda
 
 # uv installs in seconds what takes pip a minute; where uv cannot be had or cannot reach the index, pip does it.
 # Bytecode is made now: without it every start costs a second more where PYTHONDONTWRITEBYTECODE is set.

@@ -37,8 +37,9 @@ def pytest_configure(config: pytest.Config) -> None:
     if not is_worker(config):
         os.environ["EOMGEN_CACHE_DIR"] = tempfile.mkdtemp(prefix="eomgen-tests-")
     config.stash[CACHE] = os.environ["EOMGEN_CACHE_DIR"]
-    if config.getoption("--programs") and missing():
-        raise pytest.UsageError(f"--programs was given, and there is no {', no '.join(missing())}")
+    lacking = [name for name in (*PROGRAMS, "NVRTC") if not is_there(name)]
+    if config.getoption("--programs") and lacking:
+        raise pytest.UsageError(f"--programs was given, and there is no {', no '.join(lacking)}")
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
@@ -53,7 +54,7 @@ def is_worker(config: pytest.Config) -> bool:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--no-skips", action="store_true", help="fail the run when a test was skipped or expected to fail")
-    parser.addoption("--programs", action="store_true", help="fail where a program that some tests need is missing")
+    parser.addoption("--programs", action="store_true", help="fail where what some tests need is missing, a GPU apart")
     parser.addoption("--thorough", action="store_true", help="run also what is marked thorough, as make thorough does")
 
 
