@@ -24,7 +24,7 @@ LIBRARIES = {
     "Numba": ("numba.cuda", "pip install numba-cuda"),
 }
 #: The same for instructions of the processor: name -> what Linux calls them.
-INSTRUCTIONS = {"AVX2": "avx2", "AVX-512": "avx512dq"}
+INSTRUCTIONS = {"x86-64": "lm", "AVX2": "avx2", "AVX-512": "avx512dq"}
 #: The same for a GPU of NVIDIA: name -> where Linux has it.
 DEVICES = {"a GPU": "/dev/nvidiactl"}
 
