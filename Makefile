@@ -1,5 +1,6 @@
 # make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png and .gif
-# make test   ruff, mypy, then every test, fast ones first, on all processors; fails if anything was skipped
+# make test   ruff, mypy, then every test, fast ones first, on all processors; fails if anything was skipped;
+#             PROGRAMS=all fails too where a program that some tests need is missing, as continuous integration does
 # make thorough  make test with all of the sweeps of which it runs a part
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
 # make notebooks  executes the notebooks anew and stores their outputs; NOTEBOOKS=FILE only this one
@@ -28,9 +29,9 @@ demo: $(VENV)/.installed-plot
 
 test thorough: lint
 	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal \
-	  $(if $(filter thorough,$@),--thorough)
+	  $(if $(filter thorough,$@),--thorough) $(if $(PROGRAMS),--programs)
 
-lint: $(VENV)/.installed-test
+lint: $(VENV)/.installed-$(if $(PROGRAMS),all-tests,test)
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 
@@ -63,6 +64,7 @@ clean:
 $(VENV)/.installed-plot: EXTRAS := plot
 $(VENV)/.installed-docs: EXTRAS := dev
 $(VENV)/.installed-test: EXTRAS := test,dev
+$(VENV)/.installed-all-tests: EXTRAS := test,dev,cuda
 
 # uv installs in seconds what takes pip a minute; where uv cannot be had or cannot reach the index, pip does it.
 # Bytecode is made now: without it every start costs a second more where PYTHONDONTWRITEBYTECODE is set.

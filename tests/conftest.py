@@ -10,20 +10,13 @@ from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+from outside_programs import PROGRAMS, missing
 
 CACHE = pytest.StashKey[str]()
 #: Scripts that made reference numbers with other programs, which need not be installed.
 collect_ignore_glob = ["reference/*.py"]
-#: Programs that some tests need and the README does not promise: a mark ``needs(name)`` leaves a test out where there
-#: is none, and the end of the run says so.  Name -> the commands it goes by, and Debian's package.
-PROGRAMS = {
-    "chromium": (("chromium", "chromium-browser", "google-chrome"), "chromium"),
-    "gcc for ARM": (("arm-none-eabi-gcc",), "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
-    "gcc for RISC-V": (("riscv64-linux-gnu-gcc",), "gcc-riscv64-linux-gnu libc6-dev-riscv64-cross"),
-    "octave": (("octave-cli", "octave"), "octave"),
-    "qemu": (("qemu-arm",), "qemu-user"),
-}
-#: The same for libraries of Python: name -> its module, and how it is installed.
+#: What some tests need beside the programs of outside_programs: a mark ``needs(name)`` leaves a test out where there is
+#: none, and the end of the run says so.  Libraries of Python: name -> its module, and how it is installed.
 LIBRARIES = {
     "NVRTC": ("cuda.bindings.nvrtc", "pip install '.[cuda]'"),
     "CuPy": ("cupy", "pip install cupy-cuda13x"),
@@ -31,7 +24,7 @@ LIBRARIES = {
     "Numba": ("numba.cuda", "pip install numba-cuda"),
 }
 #: The same for instructions of the processor: name -> what Linux calls them.
-INSTRUCTIONS = {"AVX2": "avx2", "AVX-512": "avx512dq"}
+INSTRUCTIONS = {"x86-64": "lm", "AVX2": "avx2", "AVX-512": "avx512dq"}
 #: The same for a GPU of NVIDIA: name -> where Linux has it.
 DEVICES = {"a GPU": "/dev/nvidiactl"}
 
@@ -44,6 +37,9 @@ def pytest_configure(config: pytest.Config) -> None:
     if not is_worker(config):
         os.environ["EOMGEN_CACHE_DIR"] = tempfile.mkdtemp(prefix="eomgen-tests-")
     config.stash[CACHE] = os.environ["EOMGEN_CACHE_DIR"]
+    lacking = [name for name in (*PROGRAMS, "NVRTC") if not is_there(name)]
+    if config.getoption("--programs") and lacking:
+        raise pytest.UsageError(f"--programs was given, and there is no {', no '.join(lacking)}")
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
@@ -58,22 +54,23 @@ def is_worker(config: pytest.Config) -> bool:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--no-skips", action="store_true", help="fail the run when a test was skipped or expected to fail")
+    parser.addoption("--programs", action="store_true", help="fail where what some tests need is missing, a GPU apart")
     parser.addoption("--thorough", action="store_true", help="run also what is marked thorough, as make thorough does")
 
 
 def is_there(program: str) -> bool:
     """Whether it is on the path, installed, in the processor or in the computer; by the table that names it."""
+    if program in PROGRAMS:
+        return program not in missing()
     if program in DEVICES:
         return Path(DEVICES[program]).exists()
     if program in INSTRUCTIONS:
         info = Path("/proc/cpuinfo")
         return info.exists() and INSTRUCTIONS[program] in info.read_text().split()
-    if program in LIBRARIES:
-        try:
-            return find_spec(LIBRARIES[program][0]) is not None
-        except ModuleNotFoundError:  # a package above it
-            return False
-    return any(shutil.which(command) for command in PROGRAMS[program][0])
+    try:
+        return find_spec(LIBRARIES[program][0]) is not None
+    except ModuleNotFoundError:  # a package above it
+        return False
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

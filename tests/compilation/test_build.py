@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import platform
 import shutil
 import subprocess
 import sys
@@ -97,7 +96,7 @@ def test_flags_are_those_measured_to_be_best(monkeypatch: pytest.MonkeyPatch) ->
     assert {"-march=native", "-ffp-contract=fast"} <= set(native)
 
 
-@pytest.mark.skipif(platform.machine() != "x86_64", reason="instructions of x86-64")
+@pytest.mark.needs("x86-64")
 def test_a_library_for_others_has_no_instructions_of_this_processor_alone(sources: dict[str, str]) -> None:
     library = compile_c_library(sources, "pendulum").path
     text = subprocess.run(["objdump", "-d", str(library)], capture_output=True, text=True, check=True).stdout

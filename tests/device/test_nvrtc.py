@@ -33,11 +33,12 @@ def test_every_example_compiles_to_ptx(name: str) -> None:
     text = text_of(name)
     kernels = set(re.findall(r"EOMGEN_KERNEL void (\w+)\(", text))
     assert f"{name}_rhs_batch" in kernels
-    for architecture in ("compute_80", "compute_90"):
-        code = compile_device_text(text, architecture, sorted(set(re.findall(r"EOMGEN_WANT_\w+", text))), [QUICK])
+    for architecture, other in (("compute_80", "rk4"), ("compute_90", "dop853")):  # runs by one of them at a time
+        wanted = set(re.findall(r"EOMGEN_WANT_\w+", text)) - {f"EOMGEN_WANT_{other.upper()}"}
+        code = compile_device_text(text, architecture, sorted(wanted), [QUICK])
         ptx = code.decode(errors="replace")
         assert f".target sm_{architecture[-2:]}" in ptx
-        assert set(re.findall(r"\.entry (\w+)\(", ptx)) == kernels
+        assert set(re.findall(r"\.entry (\w+)\(", ptx)) == {kernel for kernel in kernels if f"_{other}_" not in kernel}
 
 
 @pytest.mark.slow

@@ -48,7 +48,6 @@ def test_sympy_text_is_the_compiled_equations(pendulum: Any) -> None:
     assert np.array(space["f"].subs(numbers), dtype=float)[:, 0] == pytest.approx(f, rel=1e-12)
 
 
-@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc compiles the text")
 def test_c_text_is_the_compiled_equations(pendulum: Any, tmp_path: Path) -> None:
     equations, numbers, M, f = pendulum
     text = write_format(equations, "c")

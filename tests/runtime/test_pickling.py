@@ -13,8 +13,6 @@ import pytest
 
 import eomgen as eg
 from eomgen.api.module import Module
-from eomgen.compilation.options import WITH_AVX
-from eomgen.compilation.processor import lane_width
 from eomgen.errors import ToolchainError
 from eomgen.runtime import pickling
 from eomgen.runtime.late import eager
@@ -66,7 +64,7 @@ def test_a_module_whose_code_has_gone_says_so(tmp_path: Path) -> None:
         pickling.restore(Module, "eomgen._gone", str(tmp_path / "_core.py"), np.zeros(1), np.zeros(1))
 
 
-@pytest.mark.skipif(lane_width() < WITH_AVX, reason="all processors of the kind know what it is compiled to")
+@pytest.mark.needs("AVX2")
 def test_code_that_this_processor_does_not_know_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     module = eg.load(EXAMPLES / "pendulum.yaml").compile()
     given = pickle.dumps(module)
