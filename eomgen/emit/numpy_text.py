@@ -53,8 +53,8 @@ class _NumpyPrinter:
             a, *b = map(self.operand, node[1:])
             if row.name == "hypot":
                 a = f"{a} * {a} + {b[0]} * {b[0]}"
-            function = f"lambda s: np.power(s, {b[0]})" if row.name == "pow" else "np.sqrt"
-            return f"of_squares({a}, {function})"
+            root = f"lambda s: np.power(s, {b[0]})" if row.name == "pow" else "np.sqrt"
+            return f"of_squares({a}, {root})"
         if row.chooses:
             return row.numpy.format(self.condition(node[1], piece), *map(self.operand, node[2:]))
         return row.numpy.format(*map(self.operand, node[1:])) + " * 1.0" * (row.kind == CONDITION)

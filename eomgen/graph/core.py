@@ -11,13 +11,12 @@ Operations: ``const``, ``sym``, those of the table :mod:`eomgen.operations`, and
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Union, cast
+from typing import TYPE_CHECKING, Any, Union, cast
 
 from .nodes import Node, Nodes
 
 if TYPE_CHECKING:
     from .functions import Function
-    from .slopes import Roots
 
 Scalar = Union["Expr", float, int]
 
@@ -46,7 +45,7 @@ class Graph(Nodes):
 
     def __init__(self) -> None:
         super().__init__()
-        self.roots: Roots | None = None
+        self.roots: Any = None
         self.functions: dict[str, Function] = {}
         self.zero = self.constant(0.0)
         self.one = self.constant(1.0)

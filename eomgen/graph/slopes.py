@@ -74,9 +74,10 @@ class Roots:
 
 def roots_in(g: Graph) -> Roots:
     """The roots of a graph, kept with it, as nodes never change."""
-    g.roots = g.roots or Roots()
-    g.roots.look(g)
-    return g.roots
+    roots: Roots = g.roots or Roots()
+    g.roots = roots
+    roots.look(g)
+    return roots
 
 
 def _of_operation(g: Graph, operation: str, operands: Sequence[int]) -> int:

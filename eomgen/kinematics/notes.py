@@ -74,7 +74,8 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
 
 def _in_degrees(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     """Angles that start after more than two turns, as degrees would."""
-    numbers = {p.name: p.value for p in (*kinematics.mechanism.parameters, *kinematics.mechanism.inputs)}
+    m = kinematics.mechanism
+    numbers = {p.name: p.value for p in m.parameters} | {u.name: u.value for u in m.inputs}
     if mobility.assumed:
         return []
     given = initial_values(kinematics, numbers, "guess") | initial_values(kinematics, numbers)
