@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import errors as errors
+    from .api.equations import Equations as Equations
     from .api.model import Model as Model
     from .api.model import from_sympy as from_sympy
+    from .api.module import Module as Module
     from .errors import AssemblyError as AssemblyError
     from .errors import EomgenError as EomgenError
     from .errors import EquilibriumError as EquilibriumError
@@ -38,11 +40,13 @@ if TYPE_CHECKING:
     from .loading import load_example as load_example
     from .runtime import Signal as Signal
     from .runtime import load_trajectory as load_trajectory
+    from .runtime.trajectory import Trajectory as Trajectory
 
 __version__ = "0.1.0"
 _STARTED = time()  #: files of eomgen that are newer than this are not the code that runs
 
 _HOMES = {"Model": "api.model", "from_sympy": "api.model", "load": "loading", "load_example": "loading"}
+_HOMES |= {"Equations": "api.equations", "Module": "api.module", "Trajectory": "runtime.trajectory"}
 _HOMES |= {"Signal": "runtime", "load_trajectory": "runtime"}
 _ERRORS = (
     "AssemblyError",
@@ -69,8 +73,11 @@ _ERRORS = (
 _HOMES |= dict.fromkeys(_ERRORS, "errors")
 
 __all__ = [
+    "Equations",
     "Model",
+    "Module",
     "Signal",
+    "Trajectory",
     "__version__",
     "errors",
     "from_sympy",
