@@ -46,7 +46,9 @@ __version__ = "0.1.0"
 _STARTED = time()  #: files of eomgen that are newer than this are not the code that runs
 
 _HOMES = {"Model": "api.model", "from_sympy": "api.model", "load": "loading", "load_example": "loading"}
-_HOMES |= {"Equations": "api.equations", "Module": "api.module", "Trajectory": "runtime.trajectory"}
+#: For annotations: what calls return, so no name that a misspelt one stands for.
+_TYPES = {"Equations": "api.equations", "Module": "api.module", "Trajectory": "runtime.trajectory"}
+_HOMES |= _TYPES
 _HOMES |= {"Signal": "runtime", "load_trajectory": "runtime"}
 _ERRORS = (
     "AssemblyError",
@@ -94,7 +96,11 @@ def _late(name: str) -> Any:
         return import_module(".errors", __name__)
     home = _HOMES.get(name)
     if home is None:
-        near = "" if name.startswith("_") else import_module(".suggestions", __name__).hint(name, __all__)
+        near = (
+            ""
+            if name.startswith("_")
+            else import_module(".suggestions", __name__).hint(name, [n for n in __all__ if n not in _TYPES])
+        )
         text = f"module {__name__!r} has no attribute {name!r}; {near}".removesuffix("; ")
         raise import_module(".errors", __name__).UnavailableError(text)
     value = getattr(import_module(f".{home}", __name__), name)
