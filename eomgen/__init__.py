@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     from typing import Any
 
     from . import errors as errors
+    from .api.equations import Equations as Equations
     from .api.model import Model as Model
     from .api.model import from_sympy as from_sympy
+    from .api.module import Module as Module
     from .errors import AssemblyError as AssemblyError
     from .errors import EomgenError as EomgenError
     from .errors import EquilibriumError as EquilibriumError
@@ -40,11 +42,15 @@ if TYPE_CHECKING:
     from .loading import load_example as load_example
     from .runtime import Signal as Signal
     from .runtime import load_trajectory as load_trajectory
+    from .runtime.trajectory import Trajectory as Trajectory
 
 __version__ = "0.1.0"
 _STARTED = time()  #: files of eomgen that are newer than this are not the code that runs
 
 _HOMES = {"Model": "api.model", "from_sympy": "api.model", "load": "loading", "load_example": "loading"}
+#: For annotations: what calls return, so no name that a misspelt one stands for.
+_TYPES = {"Equations": "api.equations", "Module": "api.module", "Trajectory": "runtime.trajectory"}
+_HOMES |= _TYPES
 _HOMES |= {"Signal": "runtime", "load_trajectory": "runtime"}
 _ERRORS = (
     "AssemblyError",
@@ -71,8 +77,11 @@ _ERRORS = (
 _HOMES |= dict.fromkeys(_ERRORS, "errors")
 
 __all__ = [
+    "Equations",
     "Model",
+    "Module",
     "Signal",
+    "Trajectory",
     "__version__",
     "errors",
     "from_sympy",
@@ -89,7 +98,11 @@ def _late(name: str) -> Any:
         return import_module(".errors", __name__)
     home = _HOMES.get(name)
     if home is None:
-        near = "" if name.startswith("_") else import_module(".suggestions", __name__).hint(name, __all__)
+        near = (
+            ""
+            if name.startswith("_")
+            else import_module(".suggestions", __name__).hint(name, [n for n in __all__ if n not in _TYPES])
+        )
         text = f"module {__name__!r} has no attribute {name!r}; {near}".removesuffix("; ")
         raise import_module(".errors", __name__).UnavailableError(text)
     value = getattr(import_module(f".{home}", __name__), name)

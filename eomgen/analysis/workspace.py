@@ -162,10 +162,9 @@ class Workspace:
             with whole_file(target) as stream:
                 np.savez_compressed(stream, over=list(self.over), of=self.of, jacobian=self.jacobian, **arrays)
             return target
-        heads = [f"{name} [{self.units[name]}]" if self.units.get(name) else name for name in self.names]
         columns = [self[name].ravel() for name in self.names]
         with whole_file(target) as file:
-            file.write((",".join(heads) + "\n").encode())
+            file.write((",".join(self.names) + "\n").encode())
             for row in zip(*columns, strict=True):
                 line = ",".join(f"{x:.17g}" if isinstance(x, float) else str(x) for x in row)
                 file.write(f"{line}\n".encode())

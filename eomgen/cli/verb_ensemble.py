@@ -15,7 +15,7 @@ from ..files.reading import open_plain
 from ..files.writing import save_figure, write_whole
 from ..runtime.near_names import require
 from ..runtime.room import require_room
-from ..runtime.storage import write_netcdf
+from ..runtime.storage import split_head, write_netcdf
 from .analysis import Prepared, analysis_options
 from .number_option import Number, NumberRange
 from .screen import finite, print_heading, print_json, print_table, say, stage
@@ -24,6 +24,7 @@ from .shared_options import parse_number, require_folder
 from .workspace_request import read_axes
 
 if TYPE_CHECKING:
+    from ..api.module import Module
     from ..ensembles.ensemble import Ensemble
 
 SHOWN = 10  #: failures listed
@@ -91,7 +92,7 @@ def ensemble(
     if grid and (cases is not None or vary or count is not None):
         raise UsageError("--grid defines all runs itself; leave out --cases, --vary and --count")
     axes = read_axes("--grid", grid)
-    values = _read(cases) if cases is not None else {}
+    values = _read(cases, module) if cases is not None else {}
     values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
     if not values and not axes:
         raise UsageError("nothing differs between the runs: give --cases FILE, --vary NAME=LOW:HIGH or --grid")
@@ -149,7 +150,7 @@ def _cluster(given: str | None) -> int | str | None:
     return int(given) if given is not None and given.isdigit() else given
 
 
-def _read(path: Path) -> dict[str, list[float]]:
+def _read(path: Path, module: Module) -> dict[str, list[float]]:
     """The columns of a table of cases."""
     with TextIOWrapper(open_plain(path), newline="", encoding="utf-8-sig") as file:
         try:
@@ -158,7 +159,8 @@ def _read(path: Path) -> dict[str, list[float]]:
             raise UsageError(f"--cases {path}: this is not a table of text (CSV, UTF-8): {error}") from None
     if len(rows) < 2:
         raise UsageError(f"--cases {path}: the table needs a line of names and a line for each run")
-    names = [name.strip() for name in rows[0]]
+    heads = [split_head(head) for head in rows[0]]
+    names = [name for name, _ in heads]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise UsageError(f"--cases {path}: the table has the names {', '.join(twice)} twice")
     columns: dict[str, list[float]] = {name: [] for name in names}
@@ -170,6 +172,9 @@ def _read(path: Path) -> dict[str, list[float]]:
                 columns[name].append(float(word))
             except ValueError:
                 raise UsageError(f"{path}:{number}: {name} must be a number, not {word!r}") from None
+    for name, unit in heads:
+        if unit and unit != (own := module.layout.unit(name)):
+            raise UsageError(f"--cases {path}: {name} is given in {unit}; give values in {own or '1'}, without a unit")
     return columns
 
 

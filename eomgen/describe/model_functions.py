@@ -97,7 +97,9 @@ class FunctionMethods(Described):
         sympy.Function
         """
         twin: Any = None if python is None else str(python) if isinstance(python, str | PathLike) else python
-        further = [items(() if given is None else given) for given in (python_derivatives, python_second_derivatives)]
+        further: list[Any] = [
+            items(() if given is None else given) for given in (python_derivatives, python_second_derivatives)
+        ]
         if None in further:
             raise UsageError(f"native {name}: python_derivatives must be lists of functions")
         if twin is not None and not isinstance(twin, str):

@@ -37,7 +37,7 @@ def describe_method(
     if potential_energy is not None:
         forms.potential = potential_energy
     extra = named("outputs", outputs)
-    if named("specified", specified):
+    if specified is not None and named("specified", specified):
         _specify(forms, extra, specified)
     known = _Known(forms)
     given_parameters = named("parameters", parameters)

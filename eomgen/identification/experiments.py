@@ -12,6 +12,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.near_names import unknown
 from ..runtime.room import read_numbers
+from ..runtime.storage import split_head
 from ..texts import shown
 
 if TYPE_CHECKING:
@@ -127,6 +128,9 @@ def _columns(data: Any, where: str, module: BoundModel, problems: list[str]) -> 
     else:
         problems.append(f"{where} must be a trajectory, a table or a mapping of names to values, not {shown(data)}")
         return None
+    heads = {name: split_head(name) for name in given}
+    units = {heads[name][0]: unit or units.get(name) for name, (_, unit) in heads.items()}
+    given = {heads[name][0]: values for name, values in given.items()}
     states = [name for name in module.x_names if name in given]
     if states and getattr(data, "attrs", {}).get("model") == module.name:  # the table of a run: as of the run itself
         given = {name: values for name, values in given.items() if name in (TIME, *states)}

@@ -40,7 +40,7 @@ def load_trajectory(path: str | Path) -> Trajectory:
             raise ValueError("another format")
         names, x, t = tuple(header.pop("names")), arrays["x"], arrays["t"]
         count = sum(name.startswith("t_events_") for name in arrays)
-        events = [[arrays[f"{part}_events_{k}"] for k in range(count)] for part in "tx"]
+        t_events, x_events = ([arrays[f"{part}_events_{k}"] for k in range(count)] for part in "tx")
         columns = Stored(names, arrays["columns"], arrays.get("energies"))
     except FileNotFoundError:
         raise
@@ -48,4 +48,4 @@ def load_trajectory(path: str | Path) -> Trajectory:
         told = f"a {source.suffix} is for other programs; load the .npz of the run"
         told = told if source.suffix in RUNS[1:] else str(error)
         raise UsageError(f"{source} is not a trajectory saved by eomgen: {told}") from None
-    return Trajectory(t, x, columns, header, *events)
+    return Trajectory(t, x, columns, header, t_events, x_events)

@@ -77,10 +77,11 @@ def save(trajectory: TrajectoryLike, path: str | Path) -> Path:
     names = trajectory.names
     values = trajectory.to_numpy()
     if target.suffix == ".csv":
-        heads = [_head(trajectory, name) for name in ("t", *names)]
         table = np.vstack([trajectory.t, values]).T
         with whole_file(target) as file:
-            np.savetxt(file, table, fmt="%.17g", delimiter=",", header=",".join(heads), comments="", encoding="utf-8")
+            np.savetxt(
+                file, table, fmt="%.17g", delimiter=",", header=",".join(("t", *names)), comments="", encoding="utf-8"
+            )
         return target
     header = {"format": FORMAT, "names": list(names), **trajectory.metadata}
     arrays: dict[str, Any] = {
@@ -98,9 +99,10 @@ def save(trajectory: TrajectoryLike, path: str | Path) -> Path:
     return target
 
 
-def _head(trajectory: TrajectoryLike, name: str) -> str:
-    unit = trajectory.units.get(name, "")
-    return f"{name} [{unit}]" if unit else name
+def split_head(head: str) -> tuple[str, str]:
+    """Name and unit of the head of a column, ``theta`` or ``theta [rad]``; tables of other programs have units."""
+    name, bracket, unit = head.strip().partition(" [")
+    return (name.strip(), unit[:-1].strip()) if bracket and unit.endswith("]") else (head.strip(), "")
 
 
 def dataset(trajectory: TrajectoryLike) -> xarray.Dataset:

@@ -14,7 +14,7 @@ PENDULUM, CRANK = EXAMPLES / "double_pendulum.yaml", EXAMPLES / "slider_crank.ya
 
 def test_a_table_of_cases(call: Call, tmp_path: Path) -> None:
     cases, ends = tmp_path / "cases.csv", tmp_path / "ends.csv"
-    cases.write_text("r, theta\n0.1,0.3\n0.5,1.2\n0.12,0.3\n")
+    cases.write_text("r [m], theta\n0.1,0.3\n0.5,1.2\n0.12,0.3\n")
     result = call("ensemble", CRANK, "--cases", cases, "--end", "0.5", "--rtol", "1e-12", "--out", ends, "--json")
     assert result.code == 0, result.err
     found = result.json
@@ -90,6 +90,7 @@ def test_wrong_tables(call: Call, tmp_path: Path) -> None:
         ("r\n", "a line of names and a line for each run"),
         ("r,theta\n0.1\n", "cases.csv:2: 1 values for 2 names"),
         ("r\n0.1\nx\n", "cases.csv:3: r must be a number, not 'x'"),
+        ("theta [deg]\n10\n", "theta is given in deg; give values in rad"),
     ):
         (tmp_path / "cases.csv").write_text(text)
         result = call("ensemble", CRANK, "--cases", tmp_path / "cases.csv")

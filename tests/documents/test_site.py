@@ -32,7 +32,7 @@ ROOT = Path(__file__).parents[2]
 #: Pages that Sphinx makes, without words of ours.
 LISTS = {"genindex", "search", "py-modindex"}
 
-PUBLIC = set(eomgen.__all__) - {"__version__", "errors", "Model", "Signal"}
+PUBLIC = set(eomgen.__all__) - {"__version__", "errors", "Equations", "Model", "Module", "Signal", "Trajectory"}
 #: What users hold: all their public names are documented.
 CLASSES = (
     "eomgen.Model",

@@ -92,6 +92,11 @@ def test_public_names() -> None:
     for name in eomgen.__all__:
         assert getattr(eomgen, name) is not None
     assert eomgen.errors is errors
+    m = eomgen.Model("cart")
+    m.prismatic("slide", m.ground, m.body("box", mass=1.0))
+    module = m.compile(target="numpy")
+    kinds = (eomgen.Equations, eomgen.Module, eomgen.Trajectory)  # for annotations
+    assert all(map(isinstance, (m.derive(), module, module.simulate(0.1)), kinds))
     tree = {name for name, value in vars(errors).items() if isinstance(value, type) and issubclass(value, Exception)}
     assert tree <= set(eomgen.__all__)
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):

@@ -276,7 +276,8 @@ def test_tables_of_runs_and_units_that_tables_tell(module: eg.Module) -> None:
         {"t": ("t", 1000.0 * TIMES, {"units": "ms"})},
     )
     later = run.to_pandas().set_index(pd.to_timedelta(TIMES, unit="s"))
-    for data in (run, given, run.to_pandas(), degrees, later):
+    headed = {"t [ms]": 1000.0 * TIMES, "a [deg]": np.degrees(run["a"]), "b_dot": run["b_dot"]}
+    for data in (run, given, run.to_pandas(), degrees, later, headed):
         fit = module.fit(data, {"m3": 1.5, "d1": 0.1}, initial=START, inputs=DRIVE, derivatives="differences")
         assert list(fit.values.values()) == pytest.approx([1.2, 0.15], rel=1e-6)
     wrong = given[["a"]].assign(a=given["a"].assign_attrs(units="kg"))

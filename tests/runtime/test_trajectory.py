@@ -99,7 +99,7 @@ def test_files_that_are_none(tmp_path, traj):
 def test_csv(traj, tmp_path):
     path = traj.save(tmp_path / "run.csv")
     head, first = path.read_text().splitlines()[:2]
-    assert head.startswith("t [s],theta [rad],beta [rad],s [m],theta_dot [rad/s]")
+    assert head.startswith("t,theta,beta,s,theta_dot")
     assert [float(x) for x in first.split(",")][1] == 0.3
 
 
