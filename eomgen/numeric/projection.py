@@ -75,7 +75,7 @@ def correct_position(
         if step == STEPS:
             break
         z = gram_solver(J, max(GENTLE, float(np.abs(e).mean())))(e)
-        dz, dq = J.T @ z, 0.0 * q
+        dz = J.T @ z
         if largest(e - J @ dz) > HINDERED * size and not within(e, EXACT, 0.0625 * rounded):
             weak = weakness(J, z)
             if size < NEAR * weak:
@@ -83,11 +83,12 @@ def correct_position(
         left = e - J @ dz
         if given is not None and largest(left) > HINDERED * size:
             dq = beyond_velocities(J, e, given.gradient(q), scales)[1]
-        longest = max(largest(dz), largest(dq))
+            q = q - dq * (DAMPING / max(largest(dq), DAMPING))
+        longest = largest(dz)
         # one step at least: near configurations where rows depend on each other a small residual is no small distance
         last = longest <= SHORT and largest(left) <= EXACT
         part = DAMPING / longest if longest > DAMPING else 1.0
-        q = scales.move(q, -part * dz) if given is None else given.move(q, -part * scales.q * dz) - part * dq
+        q = scales.move(q, -part * dz) if given is None else given.move(q, -part * scales.q * dz)
         before = size
     if within(e, ACCEPTED, rounded):
         return q, C_q
