@@ -82,7 +82,7 @@ def correct_position(
                 dz = J.T @ gram_solver(J, smaller(weak))(e)
         left = e - J @ dz
         if given is not None and largest(left) > HINDERED * size:
-            dq = beyond_velocities(J, e, given.gradient(q), scales)[1]
+            dq = beyond_velocities(J, e, given.gradient(q), scales)[1]  # as of the length of Euler parameters
             q = q - dq * (DAMPING / max(largest(dq), DAMPING))
         longest = largest(dz)
         # one step at least: near configurations where rows depend on each other a small residual is no small distance
@@ -96,10 +96,7 @@ def correct_position(
 
 
 def beyond_velocities(J: Array, y: Array, gradient: Array, scales: Scales) -> tuple[Array, Array]:
-    """The smallest scaled d that changes the scaled residual by y (h,) or (h, k), and the least dq for what d leaves.
-
-    No velocity changes the length of Euler parameters of which e^T e - 1 stands as a constraint.
-    """
+    """The smallest scaled d that changes the residual by y (h,) or (h, k), and the least dq for what d leaves."""
     d, solve, rows = least(J, y, J.T @ (0.0 * y), largest(y)), gram_solver(J), gradient / scales.c[: len(y), None]
     for _ in range(2):  # it ends where something is left, of the size of its term
         d = d + J.T @ solve(y - J @ d)
