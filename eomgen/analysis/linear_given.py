@@ -61,8 +61,11 @@ def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequ
     J = layout.place_scales.jacobian(slopes)
     count = rank(J).rank
     places = _chosen(layout.q, names, n_q - count)
-    if places is None and layout.independent_places:  # as the model says
-        places = np.array(layout.independent_places, dtype=np.intp), False
+    if places is None and "independent_places" in layout.metadata:
+        places = (
+            np.array([layout.q.index(name) for name in layout.metadata["independent_places"]], dtype=np.intp),
+            False,
+        )
     Z, positions = _basis(J, count, places, layout.place_scales.q)
     velocities = _chosen(layout.v, names, layout.n_dof)
     preferred = (layout.independent, False) if velocities is None else velocities

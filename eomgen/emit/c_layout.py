@@ -59,7 +59,7 @@ def rhs_files(program: Program) -> tuple[str, ...]:
         here: tuple[str, ...] = (*CLOSE, *PIVOT, "embed", *SOLVE, "weakest", "system_rhs_here")
     else:
         direct = (straight_file(program), "rhs_here_direct") if "dynamics" in program.block_names else ("rhs_here",)
-        here = (*ACCELERATE, "weakest", *direct)
+        here = (*ACCELERATE, *(("weakest",) if passes(program) or direct[0] != "rhs_here" else ()), *direct)
     return (*here, *(PASSING if passes(program) else ()))
 
 

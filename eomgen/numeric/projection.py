@@ -75,19 +75,20 @@ def correct_position(
         if step == STEPS:
             break
         z = gram_solver(J, max(GENTLE, float(np.abs(e).mean())))(e)
-        dz, dq = J.T @ z, 0.0 * q
+        dz = J.T @ z
         if largest(e - J @ dz) > HINDERED * size and not within(e, EXACT, 0.0625 * rounded):
             weak = weakness(J, z)
             if size < NEAR * weak:
                 dz = J.T @ gram_solver(J, smaller(weak))(e)
         left = e - J @ dz
         if given is not None and largest(left) > HINDERED * size:
-            dq = beyond_velocities(J, e, given.gradient(q), scales)[1]
-        longest = max(largest(dz), largest(dq))
+            dq = beyond_velocities(J, e, given.gradient(q), scales)[1]  # as of the length of Euler parameters
+            q = q - dq * (DAMPING / max(largest(dq), DAMPING))
+        longest = largest(dz)
         # one step at least: near configurations where rows depend on each other a small residual is no small distance
         last = longest <= SHORT and largest(left) <= EXACT
         part = DAMPING / longest if longest > DAMPING else 1.0
-        q = scales.move(q, -part * dz) if given is None else given.move(q, -part * scales.q * dz) - part * dq
+        q = scales.move(q, -part * dz) if given is None else given.move(q, -part * scales.q * dz)
         before = size
     if within(e, ACCEPTED, rounded):
         return q, C_q
@@ -95,10 +96,7 @@ def correct_position(
 
 
 def beyond_velocities(J: Array, y: Array, gradient: Array, scales: Scales) -> tuple[Array, Array]:
-    """The smallest scaled d that changes the scaled residual by y (h,) or (h, k), and the least dq for what d leaves.
-
-    No velocity changes the length of Euler parameters of which e^T e - 1 stands as a constraint.
-    """
+    """The smallest scaled d that changes the residual by y (h,) or (h, k), and the least dq for what d leaves."""
     d, solve, rows = least(J, y, J.T @ (0.0 * y), largest(y)), gram_solver(J), gradient / scales.c[: len(y), None]
     for _ in range(2):  # it ends where something is left, of the size of its term
         d = d + J.T @ solve(y - J @ d)

@@ -70,8 +70,6 @@ class Layout:
             self.velocity_labels = tuple(n if k < 0 else self.q[k] for n, k in zip(self.v, coordinate_of, strict=True))
         #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
         self.given_rates = coordinate_of is not None and coordinate_of != list(range(self.n_q))
-        #: coordinates named as independent ones, where their rates are given
-        self.independent_places = [self.q.index(name) for name in data.get("independent_places", ())]
         self.energy_known: bool = data.get("energy_known", True)
         #: rates of Euler parameters, which are in q' but not in v
         self.parameter_rates = tuple(f"{name}_dot" for i, _ in self.quaternion_slots for name in self.q[i : i + 4])

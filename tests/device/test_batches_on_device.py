@@ -77,6 +77,34 @@ def test_every_function_of_every_example(name: str, device: Any) -> None:
         assert (status == 0).all() or kernel == "events", kernel
 
 
+@pytest.mark.parametrize("kind", ["blade", "length"])
+def test_rows_that_hold_no_position_and_given_rates(kind: str, device: Any) -> None:
+    """A blade; two coordinates with one speed, and a length that it does not change."""
+    if kind == "blade":
+        model = eg.Model("sleigh")
+        body = model.body("b", mass=2.0, com=(0.25, 0, 0), inertia={"zz": 0.3})
+        model.planar("J", model.ground, body)
+        model.knife_edge("k", body)
+    else:
+        model = eg.Model.from_equations(
+            "turning",
+            ["c", "s"],
+            velocities=["w"],
+            rates={"c": "-s*w", "s": "c*w"},
+            mass_matrix=[["2 + c"]],
+            forcing=["-s"],
+            constraints=["c**2 + s**2 - 1"],
+        )
+        model.guess(c=1.0)
+    equations = model.derive()
+    device_model, module = cuda_functions(equations, device), equations.compile(target="numpy")
+    x = states_of(module)
+    for name in ("rhs", "jacobian"):
+        found = getattr(device_model, name)(0.0, x)
+        for k in range(COLUMNS):
+            assert_near(found[..., k], getattr(module, name)(0.0, x[:, k]), name)
+
+
 def test_parameters_inputs_and_times_of_each_state(device: Any) -> None:
     equations = eg.load(models.EXAMPLES / "slider_crank.yaml").derive()
     model, module = cuda_functions(equations, device), equations.compile(target="numpy")

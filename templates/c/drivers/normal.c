@@ -51,3 +51,25 @@ static void add_left(const double *restrict G, const double *restrict r, double 
         }
     }
 }
+
+/* Moves q towards the constraints by what no velocity changes, at C and J in w. */
+static int mend(double t, double *restrict q, const double *restrict u, const double *restrict c, double *restrict w)
+{
+    double *const change = w + AT_MENDED;
+    double r[M + 1], d[N] = {0.0};
+    (void)memset(change, 0, NQ * sizeof *change);
+    for (int i = 0; i < MH; i++) {
+        r[i] = -w[AT_POSITION + i] / w[AT_SCALES + N + i];
+    }
+    int status = factor_gram(MH, w + AT_J, CONSTRAINTS_GENTLE, w + AT_G);
+    status = status == 0 ? correct_change(MH, w + AT_G, r, d, w) : status;
+    status = status == 0 ? form_normal(t, q, u, c, w) : status;
+    if (status == 0) {
+        add_left(w + AT_G, r, d, change, w);
+        const double part = damping(change, NQ);
+        for (int k = 0; k < NQ; k++) {
+            q[k] -= part * change[k];
+        }
+    }
+    return status;
+}

@@ -48,35 +48,18 @@ static int close_position(double t, double *restrict q, const double *restrict u
                 left = step_back(C, w);
             }
         }
-        double part = damping(dz, N);
+        const double part = damping(dz, N);
         last = arrives(longest_of(dz, N), left);
 #ifdef NORMAL_STEPS
-        double *const change = w + AT_MENDED;
-        (void)memset(change, 0, NQ * sizeof *change);
-        if (left > CONSTRAINTS_HINDERED * size) {
-            double r[M + 1], full[N] = {0.0};
-            for (int i = 0; i < MH; i++) {
-                r[i] = -C[i] / s[N + i];
-            }
-            int formed = factor_gram(MH, J, CONSTRAINTS_GENTLE, w + AT_G);
-            formed = formed == 0 ? correct_change(MH, w + AT_G, r, full, w) : formed;
-            formed = formed == 0 ? form_normal(t, q, u, c, w) : formed;
-            if (formed != 0) {
-                return formed;
-            }
-            add_left(w + AT_G, r, full, change, w);
-            part = fmin(part, damping(change, NQ));
+        const int mended = left > CONSTRAINTS_HINDERED * size ? mend(t, q, u, c, w) : 0;
+        if (mended != 0) {
+            return mended;
         }
 #endif
         for (int k = 0; k < N; k++) {
             dz[k] *= -s[k] * part;
         }
         move(q, dz);
-#ifdef NORMAL_STEPS
-        for (int k = 0; k < NQ; k++) {
-            q[k] -= part * change[k];
-        }
-#endif
         before = size;
     }
     return EOMGEN_PROJECTION_FAILED;
