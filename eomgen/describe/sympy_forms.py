@@ -90,7 +90,7 @@ def _read_lagrange(method: Any) -> Forms:
 
 
 def _read_kane(method: Any) -> Forms:
-    from sympy import S, Symbol, sympify
+    from sympy import S, Symbol
 
     if method._fr is None or method._frstar is None:
         raise UsageError("the KanesMethod has no equations yet; call kanes_equations(bodies, loads) on it first")
@@ -120,7 +120,7 @@ def _read_kane(method: Any) -> Forms:
         potential=potential,
         noncontributing=list(method.auxiliary_eqs.xreplace(auxiliary)) if len(method._uaux) else [],
         intermediates={named[x]: part.xreplace(named) for x, part in parts.items()},
-        masses=[symbol for body in bodies for symbol in sympify(body.mass).free_symbols],
+        masses=[symbol for body in bodies for symbol in getattr(body.mass, "free_symbols", ())],
     )
 
 

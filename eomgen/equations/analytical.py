@@ -27,9 +27,9 @@ def form_energies(kinematics: Kinematics, differentiated: bool = False) -> tuple
     if bare is not None:
         v = list(kinematics.v)
         momenta = gradient(bare.expression, v)
-        at_rest, *linear = substitute([bare.expression, *momenta], dict.fromkeys(v, graph.zero))
+        at_rest, *first_degree = substitute([bare.expression, *momenta], dict.fromkeys(v, graph.zero))
         quadratic = bare.expression - at_rest
-        if not all(vanishing(linear)):
+        if not all(vanishing(first_degree)):
             quadratic = graph.zero
             for rate, inertial in zip(v, jvp(momenta, dict(zip(v, v, strict=True))), strict=True):  # M v
                 quadratic = quadratic + 0.5 * (rate * inertial)

@@ -11,13 +11,13 @@ from ..constraints.rolling import LYING
 from ..errors import AssemblyError, ModelError
 from ..graph.rounding_bounds import vanishing
 from ..graph.substitute import substitute, symbols_of
+from ..limits.constraints import BESIDE
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics
 from .undefined_rows import place_of
 
 IDLE = "holds nothing"  #: what is said of rows without slopes
-#: Directions in which rows are evaluated, and how far (scaled): beyond the root of what counts as closed.
-TRIES, AWAY = 12, 1e-4
+TRIES = 12  #: directions in which a row is evaluated
 
 
 def require_finite(functions: ConstraintFunctions, q: Array) -> None:
@@ -56,7 +56,7 @@ def refuse_squares(functions: ConstraintFunctions, q: Array) -> None:
     k, scales = functions.kinematics, functions.system.scales
     least = np.array(k.constraints.written[: functions.h], dtype=bool)
     side = np.zeros(functions.h)
-    for step in np.random.default_rng(5).normal(size=(TRIES, len(scales.q))) * AWAY:
+    for step in np.random.default_rng(5).normal(size=(TRIES, len(scales.q))) * BESIDE:
         for away in (step, -step):
             higher = np.sign(functions.position(scales.move(q, away))[0] - functions.position(q)[0])
             side = np.where(side == 0, higher, side)

@@ -91,3 +91,7 @@ HELD_STEP = 2.5
 
 # -- the same --------------------------------------------------------------------------------------------------------
 ALIKE = 1e-13  #: relative difference of two inputs that count as one: 500 eps
+
+#: Scaled step at which a constraint is judged to be a square: far beyond the root of what counts as closed, to which
+#: its zero is found.
+BESIDE = 1e-4
