@@ -148,10 +148,9 @@ def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
         rate = derive(name, dict(rate_pairs(forcing.layout)).get(name, f"d/dt {name}"), value)
         rate = rate.function(forcing.parameters) if isinstance(rate, Expressed) else rate
         return float(rate(t, x) if callable(rate) else rate)
-    f = lambda t, x: forcing(t, x)[index]  # noqa: E731
-    if any(f(t, x + move) != f(t, x) for move in ELSEWHERE * np.eye(len(x))):
+    if any(forcing(t, x + move)[index] != forcing(t, x)[index] for move in ELSEWHERE * np.eye(len(x))):
         raise UsageError(words)
-    return float(drift(lambda time: np.array([f(time, x)]), t)[0])
+    return float(drift(lambda time: forcing(time, x)[[index]], t)[0])
 
 
 def by_velocity(layout: Layout, q: Array, slope: Array) -> Array:

@@ -103,7 +103,7 @@ class StallCheck:
             )
 
 
-def slides(rhs: Callable[[float, Array], Array], crawl: Crawling, moved: Array, still: Array, time: float) -> bool:
+def slides(rhs: Callable[[float, Array], Array], crawl: Crawling, moved: Array, still: Any, time: float) -> bool:
     """Whether a run is held where a rate jumps, so that all its states stand still or do not go as their rates say.
 
     Parameters
