@@ -84,7 +84,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
 
         given = [L, coordinates, forces, dissipation, constraints, parameters, inputs]
         names = SympyNames(given, coordinates)
-        return cls.from_description(names.noted(describe_lagrangian(name, *names.put(given), latex=names.latex(latex))))
+        return cls.from_description(names.noted(describe_lagrangian(name, *names.put([*given, names.latex(latex)]))))
 
     @classmethod
     def from_equations(
