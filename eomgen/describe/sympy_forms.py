@@ -33,6 +33,7 @@ class Forms:
     noncontributing: list[Any] = field(default_factory=list)  #: equations of auxiliary speeds, each = 0
     intermediates: dict[Any, Any] = field(default_factory=dict)  #: symbol -> part of the equations
     masses: list[Any] = field(default_factory=list)  #: symbols of the masses of the bodies
+    notes: list[str] = field(default_factory=list)
 
 
 def read_forms(method: Any) -> Forms:
@@ -72,9 +73,10 @@ def _read_lagrange(method: Any) -> Forms:
     lagrangian = method._L[0]  # there is no public name for it
     still = dict.fromkeys(v, S.Zero)
     at_rest = lagrangian.xreplace(still)
-    mass, kinetic = method.mass_matrix[:, :n], lagrangian - at_rest
+    mass, kinetic, notes = method.mass_matrix[:, :n], lagrangian - at_rest, list[str]()
     if not all(lagrangian.diff(x).xreplace(still).is_zero for x in v):  # terms linear in v are no energy
         kinetic = (Matrix(v).T * mass * Matrix(v))[0] / 2
+        notes.append("L has terms linear in the velocities; T, momenta and lagrangian of the equations are without them")
     return Forms(
         q=q,
         v=v,
@@ -86,6 +88,7 @@ def _read_lagrange(method: Any) -> Forms:
         kinetic=kinetic,
         potential=-at_rest,
         multipliers=[x.func.__name__ for x in method.lam_vec],
+        notes=notes,
     )
 
 

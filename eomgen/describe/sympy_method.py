@@ -68,7 +68,7 @@ def describe_method(
         "kinetic_energy": forms.kinetic,
         "potential_energy": forms.potential,
     }
-    description = Description(values={"name": name, "equations": equations})
+    description = Description(values={"name": name, "equations": equations}, notes=forms.notes)
     if rows:
         equations["constraints"] = rows
     if forms.intermediates:

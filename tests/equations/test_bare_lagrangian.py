@@ -126,3 +126,4 @@ def test_the_energy_of_a_lagrangian_that_sympy_forms() -> None:
         for model in (in_rotating_axes()[0], eg.from_sympy(method, "charge", parameters=values))
     ]
     assert energies[1] == pytest.approx(energies[0], rel=1e-14)
+    assert "linear in the velocities" in eg.from_sympy(method, "charge", parameters=values).notes[0]
