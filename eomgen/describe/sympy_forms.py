@@ -76,7 +76,9 @@ def _read_lagrange(method: Any) -> Forms:
     mass, kinetic, notes = method.mass_matrix[:, :n], lagrangian - at_rest, list[str]()
     if not all(lagrangian.diff(x).xreplace(still).is_zero for x in v):  # terms linear in v are no energy
         kinetic = (Matrix(v).T * mass * Matrix(v))[0] / 2
-        notes.append("L has terms linear in the velocities; T, momenta and lagrangian of the equations are without them")
+        notes.append(
+            "L has terms linear in the velocities; T, momenta and lagrangian of the equations are without them"
+        )
     return Forms(
         q=q,
         v=v,

@@ -29,6 +29,7 @@ STYLES = {
     "link": Style(None, None, None, 0.8, 0.85),
     "wheel": Style(DARK, None, DARK, 1.2, 0.45),
     "force": Style("#B22222", "#B22222", "#B22222", 1.3),
+    "pull": Style("#B22222", width=1.3),
     "com": Style(DARK, DARK, DARK, 0.5),
     "block": Style(None, None, DARK, 1.0),
     "joint": Style(DARK, "white", DARK, 1.3),

@@ -133,7 +133,7 @@ def _pull(element: dict[str, Any], view: Array | None, symbol: float, poses: Arr
             return np.asarray(place + symbol * (shape[:, :1] * other + shape[:, 1:2] * np.cross(along, other)))
         return np.asarray(place + symbol * (LONG * (shape[:, :1] - 1.0) * along + shape[:, 1:2] * across))
 
-    return [Item("force", element["name"], GROUND, points_at(poses), None, points_at)]
+    return [Item("pull", element["name"], GROUND, points_at(poses), None, points_at)]
 
 
 def _across(along: Array, view: Array | None) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ OFF = 0.3  #: of a link's length: a centre of mass so far beside it belongs to i
 NEAR = SAME  #: of the extent: points that are one
 
 #: Order in which roles lie over each other.
-ROLES = ("hatch", "rail", "wheel", "shape", "link", "force", "block", "com", "joint", "frame", "trace", "arrow")
+ROLES = ("hatch", "rail", "wheel", "shape", "link", "force", "block", "pull", "com", "joint", "frame", "trace", "arrow")
 
 
 class Item(NamedTuple):

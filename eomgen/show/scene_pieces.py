@@ -22,7 +22,7 @@ FINEST = 80.0  #: pieces along the picture, at most
 MOST = 30_000  #: pieces of a picture
 FEWER = 1.3  #: factor of the longest edge, until there are no more
 #: Sizes of a symbol by which roles are drawn nearer, as if in front of what they lie in.
-NEARER = {"shape": 1.0, "wheel": 2.0, "joint": 1.4, "force": 1.6, "trace": 1.6, "arrow": 3.0, "frame": 3.0}
+NEARER = {"shape": 1.0, "wheel": 2.0, "joint": 1.4, "force": 1.6, "pull": 1.6, "trace": 1.6, "arrow": 3.0, "frame": 3.0}
 LINE = 4.5  #: and by which lines on wheels are, whose faces would hide them
 SEAM = 0.8  #: width of the edges of faces, which closes the seams between them (points)
 AMBIENT, DIFFUSE = 0.64, 0.40  #: light on a face: everywhere, and by the angle to the light

@@ -38,13 +38,13 @@ def pushed() -> eg.Model:
 def test_given_forces_torques_and_stops_are_to_be_seen() -> None:
     """Arrows end where forces act, in their direction; walls stand at the limits of a slide."""
     mod = pushed().compile(target="numpy")
-    (down,) = lines(mod, "force", "down", a=0.3)
+    (down,) = lines(mod, "pull", "down", a=0.3)
     place = 0.4 * np.array([np.cos(0.3), np.sin(0.3), 0])
     assert down[[1, 4]] == pytest.approx(np.array([place, place]), abs=1e-12)
     assert (down[1] - down[0]) / np.linalg.norm(down[1] - down[0]) == pytest.approx([0, -1, 0])
-    (along,) = lines(mod, "force", "along", a=0.3)
+    (along,) = lines(mod, "pull", "along", a=0.3)
     assert (along[1] - along[0]) / np.linalg.norm(along[1] - along[0]) == pytest.approx(place / 0.4)
-    (twist,) = lines(mod, "force", "twist", a=0.3)
+    (twist,) = lines(mod, "pull", "twist", a=0.3)
     around = twist - np.array([0.5 * np.cos(0.3), 0.5 * np.sin(0.3), 0])
     first, second, *_ = around
     assert np.cross(first, second)[2] < 0.0  # it turns as the torque does
