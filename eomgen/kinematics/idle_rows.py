@@ -11,7 +11,7 @@ from ..constraints.rolling import LYING
 from ..errors import AssemblyError, ModelError
 from ..graph.rounding_bounds import vanishing
 from ..graph.substitute import substitute, symbols_of
-from ..limits.constraints import BESIDE
+from ..limits.constraints import BESIDE, FLAT
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics
 from .undefined_rows import place_of
@@ -53,8 +53,13 @@ def refuse_squares(functions: ConstraintFunctions, q: Array) -> None:
     ModelError
         Names the constraints.
     """
+    if not functions.h:
+        return
     k, scales = functions.kinematics, functions.system.scales
-    least = np.array(k.constraints.written[: functions.h], dtype=bool)
+    slopes = np.abs(functions.scaled_jacobian(q)[: functions.h]).max(axis=1, initial=0.0)
+    least = np.array(k.constraints.written[: functions.h], dtype=bool) & (slopes < FLAT)
+    if not least.any():
+        return
     side = np.zeros(functions.h)
     for step in np.random.default_rng(5).normal(size=(TRIES, len(scales.q))) * BESIDE:
         for away in (step, -step):

@@ -92,6 +92,9 @@ HELD_STEP = 2.5
 # -- the same --------------------------------------------------------------------------------------------------------
 ALIKE = 1e-13  #: relative difference of two inputs that count as one: 500 eps
 
+#: Scaled slope below which a constraint may be a square: one that is closed to SETTLED is off by its root, and has a
+#: slope of twice that.  A circle closes with larger slopes, even where its radius is less than BESIDE.
+FLAT = 2.0 * SETTLED**0.5
 #: Scaled step at which a constraint is judged to be a square: far beyond the root of what counts as closed, to which
 #: its zero is found.
 BESIDE = 1e-4

@@ -136,7 +136,9 @@ def test_an_equation_between_bodies_that_is_a_square_is_named() -> None:
         model.check()
 
 
-def test_a_small_circle_is_no_square() -> None:
-    model = eg.Model.from_lagrangian("bead", "x_dot**2 + y_dot**2", ["x", "y"], constraints=["x**2 + y**2 - 1e-6"])
-    model.initial(x=1e-3)
+@pytest.mark.parametrize("radius", [1e-3, 1e-5, 1.1e-6])
+def test_a_small_circle_is_no_square(radius: float) -> None:
+    circle = f"x**2 + y**2 - {radius}**2"
+    model = eg.Model.from_lagrangian("bead", "x_dot**2 + y_dot**2", ["x", "y"], constraints=[circle])
+    model.initial(x=radius)
     assert model.check().degrees_of_freedom == 1
