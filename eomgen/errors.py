@@ -41,8 +41,9 @@ SHOWN = 2000
 #: What to do where a value is not finite.
 TO_BE_FINITE = "look for a division by zero, or a root or logarithm of a negative number"
 #: Files that users do not write: installed packages and eomgen's own.
-_FOLDER = os.path.dirname(__file__)
-_INSTALLED = re.compile(rf"[/\\](site|dist)-packages[/\\]|^{re.escape(os.path.abspath(_FOLDER))}|^<frozen")
+_INSTALLED = re.compile(
+    rf"[/\\](site|dist)-packages[/\\]|^{re.escape(os.path.dirname(os.path.abspath(__file__)))}[/\\]|^<frozen"
+)
 
 
 def calls_within() -> int:
@@ -50,18 +51,19 @@ def calls_within() -> int:
 
     A warning's ``stacklevel`` is one more.
     """
-    within, calls = (__name__.rpartition("errors")[0], "numpy.", "scipy.", "functools"), 0
+    within, calls = (__name__.rpartition("errors")[0], "numpy.", "scipy.", "functools."), 0
     frame: Any = sys._getframe(1)
-    while frame is not None and str(frame.f_globals.get("__name__")).startswith(within):
+    while frame is not None and f"{frame.f_globals.get('__name__')}.".startswith(within):
         frame, calls = frame.f_back, calls + 1
     return calls
 
 
 def calling_line() -> tuple[str, int]:
-    """File and line of the nearest call that does not lie within the package."""
-    frame: Any = sys._getframe(3)  # the first ones do
-    while frame.f_code.co_filename.startswith(_FOLDER) and frame.f_back is not None:
-        frame = frame.f_back
+    """File and line of the nearest call that does not lie within the package; none if a thread begins within it."""
+    try:
+        frame = sys._getframe(calls_within())
+    except ValueError:
+        return "", 0
     return frame.f_code.co_filename, frame.f_lineno
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import _thread
 import inspect
+import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -162,3 +165,18 @@ def test_faults_name_the_line_of_the_call() -> None:
     assert lines["bodies.c.markers.tip.at[0]"] == last - 2
     assert lines["outputs.height.expression"] == last - 1
     assert f"{__file__}:{last - 3}: bodies.c.mass: is -1" in str(found.value)
+
+
+def test_a_package_named_like_eomgen_is_the_users_own(tmp_path: Path) -> None:
+    """Its calls are the lines to name; a thread that begins within eomgen has none."""
+    file = Path(eg.__file__).parent.with_name("eomgen_demo") / "arm.py"  # never written
+    scope: dict[str, Any] = {"__name__": "eomgen_demo.arm"}
+    exec(compile("import eomgen\nmade = eomgen.Model('arm')\nmade.body('c', mass=-1)\n", str(file), "exec"), scope)
+    with pytest.raises(eg.ModelError) as found:
+        scope["made"].check()
+    assert {(p.file, p.line) for p in found.value.problems if "mass" in p.path} == {(str(file), 3)}
+    threads: list[eg.Model] = []
+    _thread.start_new_thread(threads.extend, (map(eg.Model, ["arm"]),))
+    for _ in range(1000):
+        time.sleep(0.0 if threads else 0.01)
+    assert threads[0].description.lines["name"] == ("", 0)
