@@ -44,16 +44,17 @@ TO_BE_FINITE = "look for a division by zero, or a root or logarithm of a negativ
 _INSTALLED = re.compile(
     rf"[/\\](site|dist)-packages[/\\]|^{re.escape(os.path.dirname(os.path.abspath(__file__)))}[/\\]|^<frozen"
 )
+#: How the names of modules begin whose calls are no user's own: those of the package and of what calls it.
+_WITHIN = (__name__.rpartition("errors")[0], "numpy.", "scipy.", "functools.")
 
 
-def calls_within() -> int:
+def calls_within(known: int = 0) -> int:
     """How many calls, this one's caller first, lie within the package, or in what calls it for the package.
 
-    A warning's ``stacklevel`` is one more.
+    A warning's ``stacklevel`` is one more.  The first ``known`` of them need no look.
     """
-    within, calls = (__name__.rpartition("errors")[0], "numpy.", "scipy.", "functools."), 0
-    frame: Any = sys._getframe(1)
-    while frame is not None and f"{frame.f_globals.get('__name__')}.".startswith(within):
+    calls, frame = known, sys._getframe(known + 1)
+    while frame is not None and f"{frame.f_globals.get('__name__')}.".startswith(_WITHIN):
         frame, calls = frame.f_back, calls + 1
     return calls
 
@@ -61,7 +62,7 @@ def calls_within() -> int:
 def calling_line() -> tuple[str, int]:
     """File and line of the nearest call that does not lie within the package; none if a thread begins within it."""
     try:
-        frame = sys._getframe(calls_within())
+        frame = sys._getframe(calls_within(3))  # this one, the one that keeps the line, and the builder's method
     except ValueError:
         return "", 0
     return frame.f_code.co_filename, frame.f_lineno
