@@ -22,13 +22,6 @@ if TYPE_CHECKING:
 SUFFIXES = {".yaml": "a model file (YAML 1.2)", ".yml": "a model file (YAML 1.2)"}
 ROBOTS = {".urdf": "a robot (URDF)", ".xml": "a robot (MJCF or URDF)"}
 
-#: Suffix of a file that another program converts -> how.
-CONVERTED = {
-    ".sdf": "convert it to MJCF first: sdf2mjcf FILE.sdf FILE.xml (pip install sdformat-mjcf); it leaves out joints "
-    "that close loops: add them as <equality> of the MJCF file, or write the robot as URDF with <loop_joint>",
-    ".xacro": "expand it first: xacro FILE.xacro > FILE.urdf",
-}
-
 
 def load(
     path: str | os.PathLike[str],
@@ -79,6 +72,8 @@ def load(
     if suffix not in SUFFIXES:
         known = ", ".join(f"{s} {what}" for s, what in {**SUFFIXES, **ROBOTS}.items())
         example = f"; the example is load_example({path!r})" if find_example(path, example_files()) else ""
+        from .robots.robot import CONVERTED
+
         if suffix in CONVERTED:
             raise UsageError(f"{path}: files with the ending {suffix} cannot be loaded; {CONVERTED[suffix]}")
         ending = suffix or "(none)"

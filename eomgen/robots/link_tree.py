@@ -141,7 +141,8 @@ def joints_around(loop: Loop, found: Bodies) -> set[str]:
         chain: set[str] = set()
         joint = found.bodies[found.home[link][0]].joint
         while joint is not None:
-            chain |= {joint.name} - {joint.name if joint.type == "weld" else ""}
+            if joint.type != "weld":
+                chain.add(joint.name)
             joint = found.bodies[found.home[joint.parent][0]].joint if joint.parent else None
         ends.append(chain)
     return ends[0] ^ ends[1]  # those towards ground of both turn them alike

@@ -18,7 +18,7 @@ from ..files.path_names import as_name
 from ..limits.files import LARGEST
 from ..numeric.rigid_inertia import CHECKS, word_of_check
 from .describe_robot import describe_robot
-from .robot import RobotOptions
+from .robot import CONVERTED, RobotOptions
 from .urdf import read_urdf
 from .xml_text import read_xml
 
@@ -62,7 +62,7 @@ def describe_file(path: str | os.PathLike[str], **given: Any) -> Description:
     else:
         remedy = "a URDF file begins with <robot>, an MJCF file with <mujoco>"
         if root.tag == "sdf":
-            remedy += "; convert SDF first: sdf2mjcf FILE.sdf FILE.xml (pip install sdformat-mjcf)"
+            remedy += f"; {CONVERTED['.sdf']}"
         raise ModelError([root.problem(root.tag, "is not a robot", remedy)])
     return describe_robot(robot, options)
 

@@ -12,6 +12,12 @@ from .robot_frames import IDENTITY, NOTHING, Inertia, Placement
 
 Place = tuple[str, int]  # file, line
 Range = tuple[float, float]  # lowest and highest value
+#: Suffix of a file that another program converts -> how.
+CONVERTED = {
+    ".sdf": "convert it to MJCF first: sdf2mjcf FILE.sdf FILE.xml (pip install sdformat-mjcf); it leaves out joints "
+    "that close loops: add them as <equality> of the MJCF file, or write the robot as URDF with <loop_joint>",
+    ".xacro": "expand it first: xacro FILE.xacro > FILE.urdf",
+}
 
 
 @dataclass(frozen=True)

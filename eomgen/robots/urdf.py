@@ -16,7 +16,7 @@ from ..describe.joint_data import limits_nothing
 from ..errors import ModelError
 from ..limits.files import LARGEST
 from ..numeric.rigid_inertia import SWITCH
-from .robot import Loop, Mimic, Robot, RobotJoint, RobotLink, RobotOptions
+from .robot import CONVERTED, Loop, Mimic, Robot, RobotJoint, RobotLink, RobotOptions
 from .robot_frames import IDENTITY, NOTHING, Inertia, Placement, placed
 from .urdf_constructs import LOOPS, note_urdf
 from .xml_text import XmlElement
@@ -65,14 +65,15 @@ class _UrdfReader:
         self.root, self.options = root, options
         self.robot = Robot(root.attributes.get("name") or "robot", root.file)
         materials = [element for element in root.walk() if element.tag == "material"]  # a name counts everywhere
-        self.colors = {m.attributes.get("name", ""): _color(m) for m in reversed(materials) if _color(m)}
+        self.colors = {m.attributes.get("name", ""): c for m in reversed(materials) if (c := _color(m))}
 
     def read(self) -> Robot:
         robot = self.robot
-        for element in self.root.walk():
-            if element.tag in UNEXPANDED or any("${" in text for text in element.attributes.values()):
-                problem = element.problem("robot", "is a xacro file", "expand it first: xacro FILE.xacro > FILE.urdf")
-                raise ModelError([problem])
+        for part in self.root.children:
+            read = part.tag in ("link", "joint", *LOOPS)  # elsewhere, "${" may be of ROS or Gazebo
+            for element in part.walk():
+                if element.tag in UNEXPANDED or (read and any("${" in x for x in element.attributes.values())):
+                    raise ModelError([element.problem("robot", "is a xacro file", CONVERTED[".xacro"])])
         if len(self.root.children) > 20 * LINKS:
             raise ModelError([self.root.problem("robot", "has too many elements", f"at most {20 * LINKS:,}")])
         for element in self.root.children:

@@ -116,6 +116,7 @@ NOTED = [
         '<loop_joint name="l" type="ball"><link1 link="c"/><link2 link="c"/></loop_joint>',
         "left out: l, because no joint moves its two links against each other",
     ),
+    ('<ros2_control name="r"><param value="${port}"/></ros2_control>', "<ros2_control>"),
     ('<xacro:imu_sensor name="x"/>', "left out: elements of xacro that it did not expand (<xacro:imu_sensor>)"),
 ]
 
@@ -130,7 +131,9 @@ def test_what_leaves_more_freedoms_is_named(extra: str, said: str, tmp_path: Pat
     assert model.check().degrees_of_freedom == 3
 
 
-@pytest.mark.parametrize("part", ['<xacro:include filename="a"/>', '<material name="${grey}"/>', "<xacro:macro/>"])
+@pytest.mark.parametrize(
+    "part", ['<xacro:include filename="a"/>', '<link name="m"><visual name="${v}"/></link>', "<xacro:macro/>"]
+)
 def test_files_that_xacro_must_expand_are_refused(part: str, tmp_path: Path) -> None:
     path = tmp_path / "four_bar.urdf"
     path.write_text(FOUR_BAR.replace("<robot", '<robot xmlns:xacro="x"').format(part))
