@@ -17,6 +17,7 @@ from . import __version__
 from .alone import alone
 from .derivation import Derivation
 from .describe.dotted_names import Undotted
+from .describe.sympy_face import names_of
 from .equations import GIVEN, METHODS, take_given
 from .equations.digits_kept import note_lost_digits
 from .equations.positive import require_inertia
@@ -123,7 +124,7 @@ def derive_as(
     chosen = choose_method(mechanism, method)
     with alone(), _timed(seconds, "kinematics"):
         plain = Undotted(mechanism.instances).coordinate  # leg.hip of an instance is leg_hip
-        wanted = tuple(plain(name) if isinstance(name, str) else name for name in independent or ())
+        wanted = tuple(map(plain, names_of("independent", independent, "a coordinate")))
         kinematics = analyse(mechanism, wanted)
         mobility = _mobility(kinematics, wanted)
     if baumgarte is not None:

@@ -17,7 +17,7 @@ from ..numeric.partitions import partition
 from ..numeric.projection import minimum_norm
 from ..numeric.ranks import rank
 from ..numeric.scales import Array, Indices
-from ..runtime.near_names import unknown
+from ..runtime.near_names import read_names, unknown
 from .balance import assembly_jacobian
 from .tangent import TangentSpace
 
@@ -52,7 +52,7 @@ def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequ
     """
     layout = module.layout
     n_q, n_h, n_c = layout.n_q, layout.n_h, layout.n_c
-    names = tuple(independent or ())
+    names = () if independent is None else read_names("independent", independent)
     for name in names:
         if name not in layout.x:
             raise unknown("coordinate or velocity", name, layout.x)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from .. import pipeline
 from ..describe.builder import Builder
-from ..describe.sympy_face import name_list
 from ..describe.visit import copied
 from ..errors import UsageError
 from ..files.inline_pictures import picture_html, side_by_side
@@ -109,8 +108,6 @@ class Model(Builder):
         baumgarte: tuple[float, float] | None = None,
     ) -> Equations:
         """Derive the equations of motion; see ``eomgen.pipeline.derive``."""
-        if independent is not None:
-            independent = name_list(independent)
         return derive(self, method, independent, baumgarte)
 
     def compile(

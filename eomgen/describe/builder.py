@@ -20,7 +20,7 @@ from .model_components import ComponentMethods
 from .model_functions import FunctionMethods
 from .model_states import StateMethods
 from .model_totals import TotalMethods
-from .sympy_face import name_list, named, symbol
+from .sympy_face import named, names_of, one_or_several, symbol
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -82,6 +82,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
         from .lagrangian import describe_lagrangian
         from .sympy_names import SympyNames
 
+        coordinates = one_or_several(coordinates)
         given = [L, coordinates, forces, dissipation, constraints, parameters, inputs]
         names = SympyNames(given, coordinates)
         return cls.from_description(names.noted(describe_lagrangian(name, *names.put([*given, names.latex(latex)]))))
@@ -95,6 +96,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
         from .sympy_names import SympyNames
 
         check_keywords("from_equations", further, keywords_of(describe_equations))
+        coordinates = one_or_several(coordinates)
         names = SympyNames([coordinates, mass_matrix, forcing, further], coordinates)
         further = names.put(further) | {"latex": names.latex(further.get("latex"))}
         return cls.from_description(
@@ -301,7 +303,7 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, StateMethods, TotalM
 
     @independent.setter
     def independent(self, names: Sequence[Any]) -> None:
-        self._description.values["independent"] = Names(name_list(names))
+        self._description.values["independent"] = Names(names_of("independent", names, "a coordinate"))
 
     @property
     def simulation(self) -> Any:

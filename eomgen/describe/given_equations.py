@@ -7,10 +7,9 @@ from typing import Any
 
 from .description import Description, items
 from .expressions import names_in
-from .lagrangian import names_of
 from .printed_names import give_latex
 from .scope import RATES
-from .sympy_face import free_names, function_names, is_sympy, named
+from .sympy_face import free_names, function_names, is_sympy, named, names_of
 
 
 def describe_equations(
@@ -67,8 +66,8 @@ def describe_equations(
     -------
     Description
     """
-    names = names_of("equations.coordinates", coordinates)
-    speeds = names_of("equations.velocities", velocities)
+    names = names_of("equations.coordinates", coordinates, "a coordinate")
+    speeds = names_of("equations.velocities", velocities, "a velocity")
     given: dict[str, Any] = {"coordinates": names}
     if speeds:
         given["velocities"] = speeds
@@ -81,7 +80,7 @@ def describe_equations(
     given |= {"mass_matrix": rows or mass_matrix, "forcing": items(forcing) or forcing}
     if items(constraints):
         given["constraints"] = items(constraints)
-    if forces := names_of("equations.multipliers", multipliers):
+    if forces := names_of("equations.multipliers", multipliers, "a multiplier"):
         given["multipliers"] = forces
     for key, energy in (("kinetic_energy", kinetic_energy), ("potential_energy", potential_energy)):
         if energy is not None:

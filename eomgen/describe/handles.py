@@ -16,7 +16,7 @@ from .marker_quantities import MarkerQuantity
 from .mechanism import velocity_names
 from .names import REACTION
 from .scope import RATES
-from .sympy_face import symbol
+from .sympy_face import names_of, symbol
 
 Triple = tuple[Any, Any, Any]
 
@@ -356,6 +356,4 @@ class Names(list[Any]):
 
     def __call__(self, *names: Any) -> None:
         """Replace the list by the given names, or by one list of names."""
-        if len(names) == 1 and isinstance(names[0], list | tuple):
-            names = tuple(names[0])
-        self[:] = names
+        self[:] = names_of("independent", names[0] if len(names) == 1 else names, "a coordinate")

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..errors import ModelError, Problem
-from ..graph.shown import shortened
 from .description import Description, items
 from .expressions import names_in
 from .input_names import split_rate
 from .printed_names import give_latex
 from .scope import RATES
-from .sympy_face import derivative_names, free_names, function_names, is_sympy, name_of, named, sympy_name
+from .sympy_face import derivative_names, free_names, function_names, is_sympy, named, names_of
 
 
 def describe_lagrangian(
@@ -60,7 +58,7 @@ def describe_lagrangian(
     ModelError
         A coordinate is neither a symbol nor a function of time ``q(t)``.
     """
-    names = names_of("lagrangian.coordinates", coordinates)
+    names = names_of("lagrangian.coordinates", coordinates, "a coordinate")
     given: dict[str, Any] = {"coordinates": names, "expression": L}
     if forces is not None:
         given["forces"] = named("forces", forces) if isinstance(forces, Mapping) else forces
@@ -86,29 +84,6 @@ def describe_lagrangian(
         description.add("inputs", rate, {})
     give_latex(description, "lagrangian", latex)
     return description
-
-
-def names_of(path: str, given: Any) -> list[str]:
-    """Names of what is given as symbols, functions of time or texts; none of None.
-
-    Raises
-    ------
-    ModelError
-        Something else is among them.
-    """
-    listed = items(given)
-    if listed is None:
-        listed = [] if given is None else [given]
-    what = path.rpartition(".")[2].removesuffix("s").replace("velocitie", "velocity")
-    remedy = "give symbols q or functions q(t) of the time t"
-    wrong = [
-        Problem(f"{path}[{k}]", f"{shortened(q)} is not a {what}", remedy)
-        for k, q in enumerate(listed)
-        if not isinstance(q, str) and sympy_name(q) is None
-    ]
-    if wrong:
-        raise ModelError(wrong)
-    return [name_of(q) for q in listed]
 
 
 def _symbols(given: Mapping[str, Any], rates: bool = False) -> list[str]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..errors import ExpressionError, UsageError
-from ..graph.shown import parts_of, quoted
+from ..errors import ExpressionError, ModelError, Problem, UsageError
+from ..graph.shown import parts_of, quoted, shortened
 from ..texts import shown
+from .description import items
 
 if TYPE_CHECKING:
     from ..graph.core import Expr, Graph
@@ -38,13 +39,34 @@ def named(what: str, given: Any) -> dict[Any, Any]:
     return {require_name(what, name_of(key)): value for key, value in given.items()}
 
 
-def name_list(given: Any) -> list[Any]:
-    """Names of independent coordinates, given as symbols or texts, one or several; UsageError if they are not."""
-    listed = given if isinstance(given, list | tuple | set) else [given]
-    names = list(map(name_of, listed))
-    if not all(isinstance(name, str) for name in names):
-        raise UsageError(f"independent must be a coordinate or a list of them, by symbol or name, not {shown(given)}")
-    return names
+def one_or_several(given: Any) -> list[Any]:
+    """The items of a list, array, set, view of a mapping or generator; anything else is one item, None none."""
+    if given is None:
+        return []
+    if (listed := items(given)) is not None:
+        return listed
+    one = isinstance(given, str | bytes | Mapping) or hasattr(given, "tolist")  # an array without axes
+    return [given] if one or not isinstance(given, Iterable) else list(given)
+
+
+def names_of(path: str, given: Any, what: str) -> list[str]:
+    """Names of what is given as symbols, functions of time or texts, one or several; none of None.
+
+    Raises
+    ------
+    ModelError
+        Something else is among them.
+    """
+    listed = one_or_several(given)
+    remedy = "give symbols q or functions q(t) of the time t"
+    wrong = [
+        Problem(f"{path}[{k}]", f"{shortened(q)} is not {what}", remedy)
+        for k, q in enumerate(listed)
+        if not isinstance(q, str) and sympy_name(q) is None
+    ]
+    if wrong:
+        raise ModelError(wrong)
+    return [name_of(q) for q in listed]
 
 
 def symbol(name: str) -> Any:

@@ -7,12 +7,11 @@ from typing import Any
 
 from ..errors import ModelError, Problem, UsageError
 from .description import Description
-from .lagrangian import names_of
 from .names import nearest
 from .printed_names import give_latex
 from .scope import RATES
 from .sympy_auxiliary import put, solve_auxiliary
-from .sympy_face import function_name, is_sympy, name_of, named
+from .sympy_face import function_name, is_sympy, name_of, named, names_of, one_or_several
 from .sympy_forms import Forms, read_forms
 from .sympy_names import SympyNames
 
@@ -30,10 +29,12 @@ def describe_method(
 ) -> Description:
     """The description behind :func:`from_sympy`, which see."""
     forms = read_forms(method)
-    told = (parameters, inputs, outputs, initial, specified, potential_energy, guess)
-    renamed = SympyNames([vars(forms), *told], forms.q)
+    if not isinstance(inputs, Mapping):
+        inputs = one_or_several(inputs)
+    arguments = (parameters, inputs, outputs, initial, specified, potential_energy, guess)
+    renamed = SympyNames([vars(forms), *arguments], forms.q)
     vars(forms).update(renamed.put(vars(forms)))
-    parameters, inputs, outputs, initial, specified, potential_energy, guess = (renamed.put(x) for x in told)
+    parameters, inputs, outputs, initial, specified, potential_energy, guess = map(renamed.put, arguments)
     if potential_energy is not None:
         forms.potential = potential_energy
     extra = named("outputs", outputs)
@@ -41,8 +42,11 @@ def describe_method(
         _specify(forms, extra, specified)
     known = _Known(forms)
     given_parameters = named("parameters", parameters)
-    alone = names_of("inputs", inputs) if isinstance(inputs, list | tuple | set) else None
-    given_inputs = named("inputs", inputs) if alone is None else dict.fromkeys(alone, 0.0)
+    given_inputs = (
+        named("inputs", inputs)
+        if isinstance(inputs, Mapping)
+        else dict.fromkeys(names_of("inputs", inputs, "an input"), 0.0)
+    )
     forces = solve_auxiliary(forms, {*known.motion, *given_inputs}, given_parameters)
     extra = {name: put(expression, forces) for name, expression in extra.items()}
     noncontributing = {str(name_of(force)): value for force, value in forces.items()}

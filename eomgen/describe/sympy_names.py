@@ -14,7 +14,7 @@ from ..notation.signs import GREEK
 from .description import Description, items
 from .names import LONGEST, clean_name, fault_of_name
 from .scope import RATES
-from .sympy_face import is_sympy
+from .sympy_face import is_sympy, one_or_several
 
 _WORDS = {sign: word for word, sign in GREEK.items()}
 
@@ -35,7 +35,7 @@ class SympyNames:
         from sympy.core.function import AppliedUndef
 
         found: dict[Any, str] = {}
-        listed = [x for x in items(coordinates) or [coordinates] if isinstance(x, AppliedUndef) and len(x.args) == 1]
+        listed = [x for x in one_or_several(coordinates) if isinstance(x, AppliedUndef) and len(x.args) == 1]
         time = sympy.Symbol("t")
         clock = next((x.args[0] for x in listed if isinstance(x.args[0], sympy.Symbol) and x.args[0].name != "t"), time)
         self.replaced: dict[Any, Any] = {} if clock == time else {clock: time}
@@ -70,9 +70,10 @@ class SympyNames:
         if isinstance(value, Mapping):
             keys = (self.name(key) if isinstance(key, str) else self.put(key) for key in value)
             return dict(zip(keys, map(self.put, value.values()), strict=True))
-        if isinstance(value, list | tuple):
-            return [self.put(part) for part in value]
-        return value.xreplace(self.replaced) if hasattr(value, "xreplace") else value
+        if hasattr(value, "xreplace"):  # SymPy's matrices too, which keep their shape
+            return value.xreplace(self.replaced)
+        listed = items(value)
+        return value if listed is None else [self.put(part) for part in listed]
 
     def latex(self, given: Any = None) -> Any:
         """The LaTeX of names: as it is given, else what the names were in SymPy where that is LaTeX."""

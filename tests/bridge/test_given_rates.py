@@ -263,6 +263,14 @@ def test_independent_ones_as_linearize_takes_them(names: tuple[str, ...]) -> Non
         np.testing.assert_allclose(near.A, chosen_later.A, atol=1e-12)
 
 
+@pytest.mark.parametrize("collection", [np.array, set, lambda names: dict.fromkeys(names).keys(), iter])
+def test_independent_ones_in_any_collection(collection: Any) -> None:
+    names = ["a", "c", "r", "s"]
+    assert set(tied().derive(independent=collection(names)).mobility.independent) == {"r", "s"}
+    module = tied().compile(target="numpy")
+    assert set(module.linearize(module.x0(a=0.3, c=0.2, r=0.5), independent=collection(names)).states) >= set(names)
+
+
 def test_independent_ones_that_depend_on_each_other_are_refused() -> None:
     with pytest.raises(eg.ModelError, match="a, b, c: the positions have 2 degrees of freedom"):
         tied().derive(independent=["a", "b", "c"])

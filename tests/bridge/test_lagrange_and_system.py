@@ -191,7 +191,10 @@ def test_names_are_checked() -> None:
     with pytest.raises(eg.UsageError, match=r"specified takes functions of time f\(t\)"):
         eg.from_sympy(lagrange(m * x.diff() ** 2 / 2, [x]), specified={m: 1.0})
     pulled = lagrange(x.diff() ** 2 / 2 - m * x, [x])
-    assert eg.from_sympy(pulled, inputs=[m]).compile(target="numpy").u_names == ("m",)
+    for several in ([m], {m}, {m: 0}.keys(), (name for name in "m"), np.array([m]), m):
+        assert eg.from_sympy(pulled, inputs=several).compile(target="numpy").u_names == ("m",)
+    with pytest.raises(eg.ModelError, match=r"inputs\[0\]: 5 is not an input"):
+        eg.from_sympy(pulled, inputs=5)
 
 
 def test_constraints_that_contradict_each_other_are_refused() -> None:
@@ -297,6 +300,8 @@ def test_the_time_may_have_another_name() -> None:
     model = eg.from_sympy(method, parameters={t: 2.0})
     assert model.renamed == {"parameters": {"t": "t_"}}
     assert model.compile(target="numpy").rhs(0.3, [0.5, 0.1]) == pytest.approx([0.1, -np.sin(0.3) / 2.0])
+    arrays = eg.Model.from_equations("arrays", np.array([q]), np.array([[2.0]]), np.array([-q.diff(tau)]))
+    assert arrays.compile(target="numpy").rhs(0.3, [0.5, 0.1]) == pytest.approx([0.1, -0.05])
 
 
 def test_symbols_of_a_lagrangian_and_of_equations_are_taken_too() -> None:
@@ -304,7 +309,9 @@ def test_symbols_of_a_lagrangian_and_of_equations_are_taken_too() -> None:
     values = {k: 2.0, mu: 4.0}
     one = eg.Model.from_lagrangian("one", mu * rate**2 / 2 - k * angle**2 / 2, [angle], parameters=values)
     two = eg.Model.from_equations("two", [angle], [[mu]], [-k * angle - 0 * rate], parameters=values)
-    for model in (one, two):
+    M, f = np.array([[mu]]), np.array([-k * angle])
+    three = eg.Model.from_equations("three", {angle: 0}.keys(), M, f, parameters=values)
+    for model in (one, two, three):
         assert model.renamed == {"coordinates": {r"\theta": "theta"}, "parameters": {"lambda": "lambda_", "µ": "mu"}}
         assert model.compile(target="numpy").rhs(0.0, [3.0, 0.5]) == pytest.approx([0.5, -1.5])
 
