@@ -71,12 +71,12 @@ class Trajectory:
         x_events: Sequence[Array] = (),
         sample: Callable[[Array], Trajectory] | None = None,
         described: Callable[[], dict[str, Any]] = dict,
+        again: Callable[[], Trajectory] | None = None,
     ) -> None:
         self.t, self.x, self.names = t, x, columns.names
         self.columns = columns  #: where the columns come from: the module's calls, or the arrays of a file
         self._told, self._described = header, described
-        self._times, self._states, self._sample = t_events, x_events, sample
-        self.has_dense_output = sample is not None  #: whether the run kept it, so that :meth:`at` costs no second run
+        self._times, self._states, self._sample, self._again = t_events, x_events, sample, again
 
     _header = cached_property[dict[str, Any]](lambda self: self._told() if callable(self._told) else self._told)
     units = cached_property[dict[str, str]](lambda self: self._header.get("units", {}))
@@ -156,6 +156,11 @@ class Trajectory:
         columns = Stored(self.names, self.to_numpy(), self.energies if self.has_energies else None)
         return type(self), (self.t, self.x, columns, self.metadata, self.t_events, self.x_events)
 
+    @property
+    def has_dense_output(self) -> bool:
+        """Whether :meth:`at` costs no second run."""
+        return self._sample is not None
+
     def at(self, t: ArrayLike) -> Trajectory:
         """Evaluate the trajectory at other times, from the dense output of the run.
 
@@ -174,9 +179,10 @@ class Trajectory:
         ------
         UsageError
             A time lies outside the run, or it kept no dense output and cannot be made again: it has controllers, it
-            was read from a file or copied, or it comes of another call than ``simulate``.
+            was read from a file or copied, or it comes of another call than ``simulate``; or the run made again is
+            another one.
         """
-        if self._sample is None:
+        if self._sample is None and (self._again is None or not len(self.t)):
             raise UsageError(
                 "this trajectory has no solution between its times, and cannot be made again, for it was read from a "
                 "file or copied, has controllers=, or is not of simulate; give simulate dense_output=True, or t_eval="
@@ -185,6 +191,14 @@ class Trajectory:
         low, high = sorted(self.metadata["span"])
         if times.ndim != 1 or not ((times >= low) & (times <= high)).all():
             raise UsageError(f"times must lie within the run, {low:.6g} .. {high:.6g} s")
+        if self._sample is None:
+            run: Any = self._again()  # type: ignore[misc]
+            if not np.array_equal(run.x, self.x):
+                raise UsageError(
+                    "the run made again is another one: its inputs or events give other values now; give simulate "
+                    "dense_output=True"
+                )
+            self._sample = run._sample
         return self._sample(times)
 
     def to_numpy(self, *names: str) -> Array:

@@ -28,9 +28,9 @@ def record(
     method: str,
     options: dict[str, Any],
     event_names: Sequence[str] = (),
-    again: Callable[[], Solution] | None = None,
+    again: Callable[[], Trajectory] | None = None,
 ) -> Trajectory:
-    """Project the solution and put the trajectory together; ``again`` makes the same with dense output, if need be.
+    """Project the solution and put the trajectory together; ``again`` makes the same run with dense output.
 
     Raises
     ------
@@ -54,21 +54,15 @@ def record(
     if solution.t_events:
         happened = zip(solution.t_events, solution.x_events, strict=True)
         events += [project(module, t, found, forcing)[1] for t, found in happened]
-    dense = solution.dense
     sample: Callable[[Array], Trajectory] | None = None
-    if dense is not None or again is not None:
+    if (dense := solution.dense) is not None:
 
         def sample(t: Array) -> Trajectory:
-            nonlocal dense
-            if dense is None and again is not None:
-                dense = again().dense
-            found, states = project(module, t, dense(t), forcing)  # type: ignore[misc]
+            found, states = project(module, t, dense(t), forcing)
             head = described() | (header() if callable(header) else header) | {"residuals": found}
             return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states)), head)
 
-    made = Trajectory(solution.t, x, columns, header, solution.t_events, events, sample, described)
-    made.has_dense_output = solution.dense is not None
-    return made
+    return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample, described, again)
 
 
 def _header(

@@ -137,6 +137,13 @@ def simulate(
     MissingDependencyError
         The run needs SciPy, which is not installed.
     """
+    again = None
+    if dense_output is False and controllers is None:
+        first, values, signals, times = map(_copied, (initial, parameters, inputs, t_eval))
+        again = partial(
+            _again, module, span, first, values, signals, method=method, rtol=rtol, atol=atol, t_eval=times,
+            events=events, max_step=max_step, first_step=first_step, progress=progress, step=step, **options,
+        )  # fmt: skip
     settings: dict[str, Any] = {**options}
     kept = pause = usual = size = None
     shared = False
@@ -284,18 +291,8 @@ def simulate(
             watch.close()
     _check(run, solution, start, end, title)
 
-    def again() -> Solution:
-        """The same run, with dense output."""
-        with told_by_the_caller(), np.errstate(all="ignore"):
-            if compiled:
-                options = (title, None, True, settings, None, None, watched)
-                return integrate_compiled(bound, forcing, nodes, x0, *options)[0]
-            listed, reset = watched.listed(bound, forcing), partial(watched.reset, bound, forcing)
-            rhs = run.watched(None)
-            return integrate(rhs, nodes, x0, solver, None, listed, True, settings, None, reset, forcing.enter)
-
     try:
-        made = record(bound, forcing, solution, title, settings, watched.names, again if controllers is None else None)
+        made = record(bound, forcing, solution, title, settings, watched.names, again)
     except EvaluationError as error:
         where = "?" if error.time is None else f"{error.time:.6g}"
         raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error
@@ -303,6 +300,21 @@ def simulate(
         atol = float(np.max(settings.get("atol", 0.0)))
         warn_of_limits(made, bound.layout, float(settings.get("rtol", 0.0)), atol)
     return made
+
+
+def _again(*arguments: Any, **options: Any) -> Trajectory:
+    """The same run with dense output, without the warnings that the first one gave."""
+    with told_by_the_caller():
+        return simulate(*arguments, dense_output=True, **options)
+
+
+def _copied(value: Any) -> Any:
+    """A copy of what the user may change later."""
+    if isinstance(value, dict):
+        return {name: _copied(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_copied(part) for part in value]
+    return value.copy() if isinstance(value, np.ndarray) else value
 
 
 def _check(run: Run, solution: Solution, start: float, end: float, method: str) -> None:

@@ -145,6 +145,17 @@ def test_outputs_called_like_energies_come_first_and_the_balance_stays_right(cra
     assert "T" not in traj.units
 
 
+@pytest.fixture
+def slider():
+    def make(target):
+        m = eg.Model("pushed")
+        m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="y", coordinate="h")
+        m.torque("push", "J", m.input("u"))
+        return m.compile(target=target)
+
+    return make
+
+
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 @pytest.mark.parametrize("method", ["DOP853", "Radau", "LSODA"])
 def test_a_run_without_dense_output_is_evaluated_anywhere(method: str, target: str) -> None:
@@ -166,3 +177,60 @@ def test_a_run_without_dense_output_is_evaluated_anywhere(method: str, target: s
         run.at(1.1)
     with pytest.raises(eg.UsageError, match="cannot be made again"):
         pickle.loads(pickle.dumps(run)).at(0.5)
+
+
+class Remembering:
+    """An input with memory."""
+
+    def __init__(self):
+        self.calls = 0
+
+    def __call__(self, t, x):
+        self.calls += 1
+        return 1e-3 * self.calls
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_a_run_that_cannot_be_made_again_is_refused(slider, target):
+    module, push, runs = slider(target), {"gain": 1.0}, []
+    for k in (1.0, 2.0, 3.0):
+        runs.append(module.simulate(1.0, inputs={"u": lambda t, x: k}))  # noqa: B023
+    runs.append(module.simulate(1.0, inputs={"u": Remembering()}))
+    runs.append(module.simulate(1.0, inputs={"u": lambda t, x: push["gain"]}, t_eval=[0.5, 1.0]))
+    push["gain"] = 2.0
+    for run in (runs[0], runs[1], *runs[3:]):
+        for _ in range(2):  # nothing of the other run is kept
+            with pytest.raises(UsageError, match="give other values now"):
+                run.at(0.5)
+    assert runs[2].at(0.5)["h"] == pytest.approx(0.375, abs=1e-9)
+
+
+@pytest.mark.parametrize("where", ["events", "inputs"])
+def test_what_stops_a_run_made_again_comes_out(slider, where):
+    """Ctrl-C and a function that fails, in compiled code and out of it; nothing of the unfinished run is kept."""
+    module, stop = slider("cython"), [None]
+
+    def one(t, x):
+        if stop[0] is not None and t > 0.2:
+            raise stop[0]
+        return 1.0
+
+    run = module.simulate(
+        1.0, inputs={"u": one if where == "inputs" else 1.0}, events=one if where == "events" else None
+    )
+    for raised, seen in ((KeyboardInterrupt(), eg.SimulationInterrupted), (ZeroDivisionError(), ZeroDivisionError)):
+        stop[0] = raised
+        with pytest.raises(seen):
+            run.at(0.5)
+    stop[0] = None
+    assert not run.has_dense_output
+    assert run.at(0.9)["h"] == pytest.approx(0.405, abs=1e-6)
+    assert run.has_dense_output
+
+
+def test_a_run_made_again_keeps_to_the_limits(slider, monkeypatch):
+    """A run may keep its steps, but not their polynomials, which take eight times as much."""
+    run = slider("cython").simulate(1.0, max_step=2e-4)
+    monkeypatch.setattr("eomgen.runtime.room.MOST_NUMBERS", 10**5)
+    with pytest.raises(UsageError, match="would keep"):
+        run.at(0.5)
