@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..constraints import CONSTRAINTS, Driver
+from ..constraints import CONSTRAINTS
 from ..errors import ModelError
 from ..forces import FORCES, Force
 from ..frames import GROUND, Frame, Marker
@@ -181,18 +181,10 @@ def build(description: Description) -> Mechanism:
             for shape in read_shapes(reader, entry.path, reader.bodies[entry.name], entry.values)
         ),
         added_bodies=tuple(range(described, len(bodies))),
-        notes=(*inertia_notes, *([] if "gravity" in values else _nothing_acts(bodies, forces, constraints))),
+        default_gravity="gravity" not in values,
+        notes=inertia_notes,
         requirements=tuple(reader.requirements.all),
     )
-
-
-def _nothing_acts(bodies: Sequence[Body], forces: Sequence[Any], constraints: Sequence[Any]) -> list[str]:
-    """A note where gravity was forgotten, as it seems."""
-    if forces or any(isinstance(c, Driver) for c in constraints) or all(b.mass.is_zero for b in bodies):
-        return []
-    return [
-        "no gravity is given and no force acts, so that nothing speeds up or slows down but by inertia; give gravity"
-    ]
 
 
 def _limits_told(reader: Reader, given: Any) -> bool:

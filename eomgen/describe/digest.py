@@ -36,6 +36,7 @@ ASIDE = frozenset(
         "body_shapes",
         "added_bodies",
         "limits_told",
+        "default_gravity",
         "of_velocities",
         "requirements",
     }

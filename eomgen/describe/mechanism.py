@@ -343,6 +343,7 @@ class Mechanism:
     instances: Mapping[str, str] = field(default_factory=dict)  #: of components: name -> prefix, for display
     check_inertia: str = "error"  #: what becomes of motions without inertia: error, note or off
     limits_told: bool = True  #: whether runs that pass a limit of a joint say so
+    default_gravity: bool = False  #: whether the description leaves gravity out
     negative: tuple[str, ...] = ()  #: bodies with a negative mass or moment, taken because it was asked for
     named_markers: tuple[Marker, ...] = ()  #: for pictures
     body_shapes: tuple[BodyShape, ...] = ()  #: for pictures

@@ -26,7 +26,14 @@ TRIED = 3  #: states at which a body's angular velocity is looked at
 
 def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     """Locked and overconstrained mechanisms, change points, badly chosen independent coordinates."""
-    notes = list(kinematics.mechanism.notes)
+    m = kinematics.mechanism
+    notes = list(m.notes)
+    moved = mobility.driven or m.forces or m.inputs or m.switched
+    if m.default_gravity and not moved and any(not body.mass.is_zero for body in m.bodies):
+        notes.append(
+            "no gravity is given and no force acts, so that nothing speeds up or slows down but by inertia; if it "
+            "should fall, give gravity; gravity (0, 0, 0) says that it should not"
+        )
     if kinematics.constraints.labels and mobility.n_dof == 0 and not mobility.driven:
         held = _few([*dict.fromkeys(label.partition(".")[0] for label in kinematics.constraints.labels)])
         notes.append(

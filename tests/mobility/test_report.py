@@ -97,11 +97,19 @@ def test_gravity_that_was_forgotten_and_angles_in_degrees_are_noted() -> None:
 
     (note,) = pendulum(0.3)
     assert note.startswith("no gravity is given and no force acts")
+    assert "if it should fall, give gravity" in note
     assert pendulum("4*pi", gravity=(0, 0, 0)) == pendulum(0.3, gravity=(0, -9.81, 0)) == ()
     (note,) = pendulum(90, gravity=(0, -9.81, 0))
     assert note.startswith("th = 90 is an angle of 14.3 turns")
     assert "deg(90)" in note
     assert pendulum("deg(90)", gravity=(0, -9.81, 0)) == ()
+
+
+def test_a_motion_given_by_an_equation_needs_no_gravity() -> None:
+    m = eg.Model("shaker")
+    m.prismatic("A", m.ground, m.body("slide", mass=1), coordinate="q")
+    m.coupling("shake", equation="q - 0.1*sin(5*t)")
+    assert not m.check().notes
 
 
 def truss() -> eg.Model:
