@@ -59,7 +59,7 @@ class StallCheck:
     ) -> None:  # fmt: skip
         self.start, self.taken, self.kept = start, 0, kept
         self.end, self.parts = end, (slice(n_q), slice(n_q, None))
-        self.limit, self.asked = SHORT * abs(end - start), 0.1 * max_step
+        self.limit, self.shortest = SHORT * abs(end - start), 0.1 * max_step
         self.troubled, self.rhs = troubled, rhs
         self.steps = self.slow = 0
         self.t, self.x = start, x
@@ -77,15 +77,17 @@ class StallCheck:
         time = abs(t - self.t)
         self.t, self.x, self.steps = t, np.array(x), 0
         self.largest = np.fmax(largest, np.abs(self.x))
-        if step > self.asked or abs(self.end - t) < MANY * step:
+        if step > self.shortest or abs(self.end - t) < MANY * step:
             return
         still = np.concatenate([moved[part] <= STILL * self.largest[part].max(initial=0.0) for part in self.parts])
         crawl = Crawling(t, self.x, step)
         if step <= self.limit and (still.all() or self.troubled(t, self.x)):
             raise crawl
-        self.slow += abs(self.end - t) > IN_PLACE * step
-        if self.slow & -self.slow == self.slow > 0 and slides(self.rhs, crawl, moved, still, time):
-            raise crawl  # looked for at 1, 2, 4, 8 ... windows
+        if abs(self.end - t) > IN_PLACE * step:
+            self.slow += 1
+            # 12 n_x + 1 evaluations: only in the 1st, 2nd, 4th, 8th ... window
+            if self.slow & (self.slow - 1) == 0 and slides(self.rhs, crawl, moved, still, time):
+                raise crawl
 
     def _require_end(self, t: float) -> None:
         """Refuse to go on for ever, or to fill the memory."""

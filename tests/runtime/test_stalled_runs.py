@@ -80,6 +80,16 @@ def test_sticking_within_loose_tolerances_is_no_stall(target: str) -> None:
     np.testing.assert_allclose(run["s"][-1], 0.15 + 2 * 0.2, atol=1e-3)  # 0.1 s up to the belt's speed
 
 
+def test_sticking_that_leaves_few_steps_is_no_stall() -> None:
+    """After 10 ns of a stiff state, some 4e8 steps of which would be left, friction holds for 10 us: 7e5 are left."""
+    m = sliding("-3*s - mu*sign(s_dot)", s=1 / 3)
+    m.state("z", initial=1.0, rate=f"-{m.input('k')}*z")
+    m.input("mu")
+    times = {"k": eg.Signal([0, 1e-8], [1e11, 0], "zero-order"), "mu": eg.Signal([0, 1e-5], [2, 0], "zero-order")}
+    run = m.compile(target="numpy").simulate(2e-3, {"s_dot": 1e-9}, inputs=times, atol=3e-10)
+    np.testing.assert_allclose(run["s_dot"][-1], -(2e-3 - 1e-5), rtol=1e-4)  # the spring pulls with 1 N from there
+
+
 @pytest.mark.parametrize(("method", "rtol"), [("DOP853", 1e-12), ("RK23", 1e-8), ("LSODA", 1e-10)])
 def test_hard_impacts_are_no_crawl(method: str, rtol: float) -> None:
     """A ball of 1 kg on a contact of 1e10 N/m: 31 us of touch (pi sqrt(m/k)) every 0.2 s, in a run of 20 s."""
