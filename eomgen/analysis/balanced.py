@@ -45,7 +45,7 @@ class Equilibrium:
     eigenvalues : (n,) complex array
         Of the motion near it, held coordinates held (1/s).
     stability : {'asymptotically stable', 'stable (undamped)', 'marginal', 'unstable', 'no freedom'}
-        By their largest real part; 'marginal' where it vanishes.
+        By the eigenvalues, or by the sign of the stiffness; as ``Linearization.stability``.
     linear : Linearization or None
         About the equilibrium; None where supports hold it.
     module : BoundModel

@@ -28,7 +28,7 @@ CORE = ("sympy", "numpy", "scipy", "threadpoolctl", "cython", "jinja2", "click",
 #: extra -> (what it is for, its packages besides those that are always needed)
 EXTRAS = {
     "robots": ("robots in MJCF files", ("mujoco",)),
-    "mesh": ("mass and inertia from a mesh", ("trimesh",)),
+    "mesh": ("mass and inertia from a mesh", ("trimesh", "pycollada")),
     "sundials": ("IDA, a solver of differential-algebraic equations", ("scikit-sundae",)),
     "cluster": ("ensembles on many machines", ("distributed",)),
     "plot": ("plots and pictures", ("matplotlib",)),
@@ -42,8 +42,14 @@ EXTRAS = {
     "notebook": ("Jupyter notebooks", ("casadi", "jupyterlab", "ipywidgets", "matplotlib", "k3d", "pandas", "control")),
 }
 #: package -> what is imported, where that has another name
-MODULES = {"cython": "Cython", "scikit-sundae": "sksundae", "cuda-core": "cuda.core", "cuda-bindings": "cuda.bindings",
-           "nvidia-cuda-nvrtc": "cuda.bindings.nvrtc"}  # fmt: skip
+MODULES = {
+    "cython": "Cython",
+    "pycollada": "collada",
+    "scikit-sundae": "sksundae",
+    "cuda-core": "cuda.core",
+    "cuda-bindings": "cuda.bindings",
+    "nvidia-cuda-nvrtc": "cuda.bindings.nvrtc",
+}
 
 
 class Check(NamedTuple):
