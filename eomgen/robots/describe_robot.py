@@ -176,7 +176,7 @@ class _Writer:
         self._add("joints", name, values, joint.place)
         single = len(kind.coordinates) == 1
         if not single and (joint.damping or joint.stiffness):
-            self._resist(joint, between if home != GROUND else between[1:])
+            self._resist(joint, between, (self.bodies[home], self.bodies[body.name]))
         rubbing = {"viscous": joint.damping} if joint.damping and single else {}
         if self.options.smoothing and joint.dry_friction:
             rubbing |= {"coulomb": joint.dry_friction, "smoothing": self.options.smoothing}
@@ -227,25 +227,26 @@ class _Writer:
         }
         self._force("stop", joint, "stop", {**bounds, **law})
 
-    def _resist(self, joint: RobotJoint, ends: list[Any]) -> None:
+    def _resist(self, joint: RobotJoint, between: list[Any], bodies: tuple[str, str]) -> None:
         """Damping and stiffness of a ball or a free joint, on its child and on a parent that moves."""
         name, d, k = self.joints[joint.name], joint.damping, joint.stiffness
         rest = joint.start or IDENTITY
-        own, outer, turn = turn_texts(name, self._in_parameters(joint.type), rest.rotation)
+        turn = turn_texts(name, self._in_parameters(joint.type), rest.rotation)
         for axis, place in zip("xyz" if joint.start else "", numbers(rest.position), strict=False):
             on = f"{name}_{axis}"
             for kind, law in (("damper", {"damping": d}), ("spring", {"stiffness": k, "rest": place})):
                 if d if kind == "damper" else k:
                     given = {"type": f"joint_{kind}", "joint": on, **law}
                     self._add("forces", self.names.made(f"{on}_{kind}"), given, joint.place)
-        for end, sign, rates in zip(reversed(ends), (-1.0, 1.0), (own, outer), strict=False):
+        parent, child = bodies
+        for body, frame, sign in ((child, between[1], -1.0), (parent, between[0], 1.0)):
             # turned by the rotation about it, the rotation vector is itself: the same in the axes of both
-            torque = [
-                " + ".join([f"({sign * d!r})*({w})"] * bool(d) + [f"({sign * k!r})*{x}"] * bool(k))
-                for w, x in zip(rates, turn, strict=True)
-            ]
-            given = {"type": "torque", "body": end, "value": torque, "axes": "body"}
-            self._add("forces", self.names.made(f"{name}_resistance"), given, joint.place)
+            spring = [f"({sign * k!r})*{x}" for x in turn]
+            damper = [f"({sign * d!r})*w{axis}({child}, from={parent}, in={body})" for axis in "xyz"]
+            for factor, end, torque in ((k, frame, spring), (d, body, damper)):
+                if factor and body != GROUND_NAME:
+                    given = {"type": "torque", "body": end, "value": torque, "axes": "body"}
+                    self._add("forces", self.names.made(f"{name}_resistance"), given, joint.place)
 
     def _start(self, pose: Placement) -> list[float]:
         """Coordinates of a free joint."""

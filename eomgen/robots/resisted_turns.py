@@ -1,4 +1,4 @@
-"""Robots, balls and free joints: damping and stiffness of their rotation -> torques in the words of a model file.
+"""Robots, balls and free joints: the rotation vector of their stiffness -> expressions of a model file.
 
 MuJoCo resists by -d w - k theta: w is the angular velocity, theta the rotation vector from the pose at rest, of at most
 half a turn, both in the axes of the child.
@@ -15,8 +15,8 @@ from ..rotations import euler_parameters_from_matrix
 _QUATERNION = ("_e0", "_e1", "_e2", "_e3")
 
 
-def turn_texts(name: str, in_parameters: bool, rest: np.ndarray) -> tuple[list[str], list[str], list[str]]:
-    """Angular velocity in the axes of the child and of the parent, and the rotation vector in those of the child.
+def turn_texts(name: str, in_parameters: bool, rest: np.ndarray) -> list[str]:
+    """The rotation vector from the pose at rest, in the axes of the child.
 
     ``name`` begins its coordinates, Euler parameters or angles x-y'-z''; ``rest`` is the rotation (3, 3) at rest.
     """
@@ -24,25 +24,8 @@ def turn_texts(name: str, in_parameters: bool, rest: np.ndarray) -> tuple[list[s
         raw = [name + suffix for suffix in _QUATERNION]
         size = f"sqrt({' + '.join(f'{x}**2' for x in raw)})"  # 1, but for what an integrator makes of it
         e = [f"({x}/{size})" for x in raw]
-        own = [f"{name}_w{axis}" for axis in "xyz"]
-        outer = [
-            f"(1 - 2*{e[j]}**2 - 2*{e[k]}**2)*{own[i - 1]} + 2*({e[i]}*{e[j]} - {e[0]}*{e[k]})*{own[j - 1]}"
-            f" + 2*({e[i]}*{e[k]} + {e[0]}*{e[j]})*{own[k - 1]}"
-            for i, j, k in ((1, 2, 3), (2, 3, 1), (3, 1, 2))
-        ]
     else:
         a, b, c = (f"{name}_{k}" for k in (1, 2, 3))
-        da, db, dc = (f"{q}_dot" for q in (a, b, c))
-        own = [
-            f"cos({b})*cos({c})*{da} + sin({c})*{db}",
-            f"cos({c})*{db} - cos({b})*sin({c})*{da}",
-            f"sin({b})*{da} + {dc}",
-        ]
-        outer = [
-            f"{da} + sin({b})*{dc}",
-            f"cos({a})*{db} - sin({a})*cos({b})*{dc}",
-            f"sin({a})*{db} + cos({a})*cos({b})*{dc}",
-        ]
         (ca, cb, cc), (sa, sb, sc) = ([f"{f}({q}/2)" for q in (a, b, c)] for f in ("cos", "sin"))
         e = [
             f"({ca}*{cb}*{cc} - {sa}*{sb}*{sc})",
@@ -58,7 +41,7 @@ def turn_texts(name: str, in_parameters: bool, rest: np.ndarray) -> tuple[list[s
     series = f"2 + {square}/3 + 3*{square}**2/20 + 5*{square}**3/56"
     exact = f"2*atan2(sqrt({square}), abs({p[0]}))/sqrt({square})"
     factor = f"where({p[0]} < 0, -1, 1)*where({square} < 1e-3, {series}, {exact})"
-    return own, outer, [f"({x})*{factor}" for x in p[1:]]
+    return [f"({x})*{factor}" for x in p[1:]]
 
 
 def _sum(factors: Sequence[float], terms: Sequence[str]) -> str:
