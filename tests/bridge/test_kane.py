@@ -228,6 +228,34 @@ def test_constants_of_auxiliary_equations_stay_parameters() -> None:
     )
 
 
+def pushed_block(normal: Any, sideways: Any, mu: Any) -> KanesMethod:
+    """A block with friction on a plane; auxiliary speeds along the normal, and sideways."""
+    m, g = sympy.symbols("m g")
+    q, u, w, z = dynamicsymbols("q u w z")
+    frame, origin, point = ReferenceFrame("A"), Point("O"), Point("P")
+    origin.set_vel(frame, 0)
+    point.set_vel(frame, u * frame.x + w * frame.y + z * frame.z)
+    kane = KanesMethod(frame, [q], [u], [q.diff() - u], u_auxiliary=[w, z])
+    force = -mu * normal * frame.x + (normal - m * g) * frame.y + sideways * frame.z
+    kane.kanes_equations([Particle("b", point, m)], [(point, force)])
+    return kane
+
+
+def test_forces_of_auxiliary_speeds_that_are_symbols() -> None:
+    """They are solved for where they act nowhere else; else they are refused by name, or noted."""
+    N, S, h, mu = sympy.symbols("N S h mu")
+    values = {"m": 2.0, "g": 10.0, "mu": 0.5}
+    mod = eg.from_sympy(pushed_block(dynamicsymbols("N"), S, mu), "block", values).compile(target="numpy")
+    assert dict(zip(mod.y_names, mod.outputs(0.0, [0.0, 0.0]), strict=True)) == pytest.approx({"N": 20.0, "S": 0.0})
+    assert mod.rhs(0.0, [0.0, 0.0])[1] == pytest.approx(-5.0)
+    with pytest.raises(eg.ModelError, match=r"the forces N of .* act elsewhere too; .* functions of time"):
+        eg.from_sympy(pushed_block(N, S, mu), "block", values)
+    pushed = eg.from_sympy(pushed_block(N, S, mu), "block", {"m": 2.0, "mu": 0.5}, inputs=["N"])
+    assert (pushed.compile(target="numpy").y_names, pushed.notes) == (("S",), ())
+    notes = eg.from_sympy(pushed_block(dynamicsymbols("N"), S + h, mu), "block", values).notes
+    assert notes == ("auxiliary equations with S, h are not used; write the force as a function of time",)
+
+
 def test_euler_parameters_whose_kinematics_are_written_implicitly() -> None:
     """Angular velocity as given, e . e' = 0 and the norm as configuration constraint: Euler's equations."""
     e, w = dynamicsymbols("e0:4"), dynamicsymbols("w1:4")
