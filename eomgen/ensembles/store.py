@@ -74,8 +74,8 @@ class Store:
         import io
 
         buffer = io.BytesIO()
-        told = np.array(json.dumps({str(k): text for k, text in words.items()}))
-        np.savez(buffer, **sealed({**arrays, "words": told}, self._key(index)))
+        messages = np.array(json.dumps({str(k): text for k, text in words.items()}))
+        np.savez(buffer, **sealed({**arrays, "words": messages}, self._key(index)))
         write_whole(self._path(index), buffer.getvalue())
 
     def load(self, index: int) -> tuple[dict[str, Any], dict[int, str]] | None:

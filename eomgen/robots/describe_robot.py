@@ -207,7 +207,8 @@ class _Writer:
         joint = body.joint
         assert joint is not None
         limits = joint.limits
-        bounds = {key: limits[key] for key in ("lower", "upper") if abs(limits.get(key, math.inf)) <= LARGEST}
+        # a finite limit beyond LARGEST gets no stop, as powers of its range overflow
+        bounds = {key: x for key, x in limits.items() if key in ("lower", "upper") and abs(x) <= LARGEST}
         if not bounds or len(JOINTS[joint.type].coordinates) != 1:
             return
         span = bounds.get("upper", math.inf) - bounds.get("lower", -math.inf)
