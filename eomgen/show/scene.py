@@ -318,9 +318,9 @@ def link_items(
             if bar is not None:
                 items.append(Item("link", name, k, *bar))
         elif k not in blocks and k not in wheels and data.mass[k] > 0.0:
-            solid, size = inertia_items(data, k, symbol)
+            uniform, size = inertia_items(data, k, symbol)
             if 4.0 * symbol < size <= 2.0 * extent:
-                items += solid
+                items += uniform
             else:
                 items.append(Item("link", name, k, *_moved(sphere(1.6 * symbol), com)))
         if data.mass[k] > 0.0 and len(points[k]) >= 2 and len(own) >= 2:
