@@ -5,7 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from ..graph.shown import quoted
 from ..operations import OPERATIONS
@@ -124,6 +124,16 @@ def clean_name(name: str, kind: str) -> str:
     if not result[:1].isalpha():
         result = f"{kind}_{result.lstrip('_')}"
     return f"{result}_" if fault_of_name(result[:LONGEST], symbol=True) else result
+
+
+def unique(name: str, kind: str, taken: set[str], suffixes: Collection[str] = ("",)) -> str:
+    """A clean name, with a number where it is taken with one of the suffixes; it is taken with all of them then."""
+    base = new = clean_name(name, kind)[: LONGEST - 12]  # leaves place for a number and _ddot
+    count = 1
+    while not taken.isdisjoint(new + suffix for suffix in suffixes):
+        count, new = count + 1, f"{base}_{count + 1}"
+    taken.update(new + suffix for suffix in suffixes)
+    return new
 
 
 def fault_of_model_name(name: object) -> tuple[str, str] | None:

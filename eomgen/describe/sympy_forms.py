@@ -150,8 +150,8 @@ def _of_all_speeds(method: Any) -> tuple[Any, dict[Any, Any]]:
         return result
 
     known = right.row_join(rest)
-    inverse = named("inverse", _solve_blocks(left, eye(n)))
-    forward = named("kinematics", -inverse * known)
+    inverse = named("kindiff_inverse", _solve_blocks(left, eye(n)))
+    forward = named("kindiff_matrix", -inverse * known)
     changes = -inverse * (left.diff(t) * forward + known.diff(t))
     parts |= {
         forward[i, j].diff(t): changes[i, j] for i in range(n) for j in range(forward.cols) if forward[i, j] in parts

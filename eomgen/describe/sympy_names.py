@@ -12,7 +12,7 @@ from ..notation import NotationError, read_latex
 from ..notation.latex_of_names import split_rate
 from ..notation.signs import GREEK
 from .description import Description, items
-from .names import LONGEST, clean_name, fault_of_name
+from .names import fault_of_name, unique
 from .scope import RATES
 from .sympy_face import is_sympy, one_or_several
 
@@ -50,7 +50,7 @@ class SympyNames:
         for name in sorted(set(found.values())):
             if fault_of_name(name, symbol=True):
                 stem = split_rate(name)[0]
-                self.renamed[stem] = self.renamed.get(stem) or _fresh(stem, taken)
+                self.renamed[stem] = self.renamed.get(stem) or unique(_plain(stem), "symbol", taken, RATES)
         for part, name in found.items():
             if (new := self.name(name)) != name:
                 if isinstance(part, sympy.Symbol):
@@ -108,16 +108,7 @@ def _expressions(given: Any) -> Iterator[Any]:
             yield from _expressions(part)
 
 
-def _fresh(name: str, taken: set[str]) -> str:
-    """A new name like ``theta_1`` of ``\\theta_{1}``, not yet taken."""
-    plain = (
-        "".join(_WORDS.get(c, c) for c in normalize("NFKC", name))
-        .replace("_{", "_")
-        .translate({ord(c): None for c in "\\{}$"})
-    )
-    base = clean_name(plain.strip(), "symbol")[: LONGEST - 12]
-    count, new = 1, base
-    while not taken.isdisjoint(new + rate for rate in RATES):
-        count, new = count + 1, f"{base}_{count + 1}"
-    taken.update(new + rate for rate in RATES)
-    return new
+def _plain(name: str) -> str:
+    """Letters like ``theta_1`` of ``\\theta_{1}``."""
+    words = "".join(_WORDS.get(c, c) for c in normalize("NFKC", name)).replace("_{", "_")
+    return words.translate({ord(c): None for c in "\\{}$"}).strip()

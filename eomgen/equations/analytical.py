@@ -54,12 +54,6 @@ def form_energies(kinematics: Kinematics, differentiated: bool = False) -> tuple
     return 0.5 * kinetic, potential
 
 
-def velocity_terms(kinematics: Kinematics, kinetic: Expr) -> Expr:
-    """What the momenta are derivatives of: T, or L less L(v = 0) of a bare Lagrangian, which may have linear terms."""
-    bare = kinematics.mechanism.lagrangian
-    return kinetic if bare is None else bare.expression + form_energies(kinematics)[1]
-
-
 def _velocity(kinematics: Kinematics, k: int) -> Vec3:
     """Velocity of a link's centre of mass in ground axes, in which that of a free body is the rate of its place."""
     pose, link = kinematics.poses.link(k), kinematics.links[k]

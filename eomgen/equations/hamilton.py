@@ -17,7 +17,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import gradient, jacobian, jvp, vjp
 from ..kinematics import Kinematics
 from ..kinematics.loads import drive_inertias
-from .analytical import form_energies, generalized_forces, velocity_terms
+from .analytical import form_energies, generalized_forces
 from .tree_equations import TreeEquations
 
 
@@ -32,12 +32,13 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         loop = kinematics.loop_coordinates
         rate = loop.rates[loop.names.index(name)]
         kinetic = kinetic + 0.5 * inertia * (rate * rate)
-    moving = velocity_terms(kinematics, kinetic)
-    momenta = gradient(moving, v)
+    bare = kinematics.mechanism.lagrangian
+    L = kinetic - form_energies(kinematics, differentiated=True)[1] if bare is None else bare.expression
+    momenta = gradient(L, v)
     entries = jacobian(momenta, v)
     mass = tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n))
     forces = generalized_forces(kinematics)
-    slopes = gradient(moving - form_energies(kinematics, differentiated=True)[1], list(kinematics.q))
+    slopes = gradient(L, list(kinematics.q))
     rates = [s + f for s, f in zip(_turned(kinematics, slopes, momenta), forces, strict=True)]
     drift = jvp(momenta, kinematics.flow | kinematics.clock)
     total = kinematics.total_derivative(momenta)

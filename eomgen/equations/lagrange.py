@@ -12,7 +12,7 @@ from __future__ import annotations
 from ..graph import vectors as vec
 from ..graph.differentiate import gradient, jacobian, jvp, vjp
 from ..kinematics import Kinematics
-from .analytical import form_energies, generalized_forces, velocity_terms
+from .analytical import form_energies, generalized_forces
 from .tree_equations import TreeEquations
 
 
@@ -21,11 +21,12 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     graph = kinematics.graph
     q, v = list(kinematics.q), list(kinematics.v)
     kinetic, potential = form_energies(kinematics)
-    moving = velocity_terms(kinematics, kinetic)
-    momentum = gradient(moving, v)
+    bare = kinematics.mechanism.lagrangian
+    L = kinetic - form_energies(kinematics, differentiated=True)[1] if bare is None else bare.expression
+    momentum = gradient(L, v)
     drift = jvp(momentum, kinematics.flow | kinematics.clock)
     total = kinematics.total_derivative(momentum)
-    slope = gradient(moving - form_energies(kinematics, differentiated=True)[1], q)
+    slope = gradient(L, q)
     if kinematics.quaternion_slots:
         slope = vjp(list(kinematics.rates), slope, v)
     for _, j in kinematics.quaternion_slots:

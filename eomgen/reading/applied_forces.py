@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..equations.analytical import form_energies, velocity_terms
+from ..equations.analytical import form_energies
 from ..forces import CoordinateLoad, MarkerLoad
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -98,6 +98,7 @@ def without_forces(kinematics: Kinematics) -> Kinematics:
     bare = mechanism.lagrangian
     if bare is not None:
         still = tuple(graph.zero for _ in bare.forces)
-        bare = replace(bare, expression=velocity_terms(kinematics, graph.zero), forces=still, dissipation=graph.zero)
+        moving = bare.expression + form_energies(kinematics)[1]
+        bare = replace(bare, expression=moving, forces=still, dissipation=graph.zero)
     alone = replace(mechanism, gravity=vec.zero(graph), forces=(), lagrangian=bare)
     return replace(kinematics, mechanism=alone, forces=())

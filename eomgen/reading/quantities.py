@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 from ..equations import METHODS
-from ..equations.analytical import velocity_terms
 from ..equations.reduction import LoopNames, VelocityTransformation, transform_velocities
 from ..equations.tree_equations import TreeEquations
 from ..errors import UnavailableError
@@ -105,7 +104,7 @@ class Quantities:
     def momenta(self) -> Row:
         """p = dL/dv (n_v,)."""
         self._require_energy("the momentum", ("kinetic_energy",))
-        return tuple(gradient(velocity_terms(self.kinematics, self.kinetic_energy), list(self.kinematics.v)))
+        return tuple(gradient(self.lagrangian, list(self.kinematics.v)))
 
     # -- equations of motion ------------------------------------------------------------------------------------------
     @cached_property

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..describe.names import LONGEST, clean_name, fault_of_model_name
+from ..describe.names import LONGEST, clean_name, fault_of_model_name, unique
 from ..describe.scope import RATES
 
 
@@ -17,43 +17,30 @@ class RobotNames:
     """Gives out names: bodies and joints have a list each; coordinates, parameters and inputs share one."""
 
     def __init__(self) -> None:
-        self.taken: dict[str, set[str]] = {"link": {"ground"}, "joint": set(), "symbol": set()}
+        self.taken = {"ground link"}  # names of bodies and of joints with their kind behind, and symbols
         self.renamed: dict[str, dict[str, str]] = {}  # section of the model -> old name -> new
 
     def link(self, name: str) -> str:
         """The name of a body or marker."""
-        return self._note("bodies", name, self._fresh(name, "link", ("",)))
+        return self._note("bodies", name, self.made(name))
 
     def joint(self, name: str, suffixes: Sequence[str]) -> str:
         """The name of a joint whose coordinates are that name with these suffixes."""
-        return self._note("joints", name, self._fresh(name, "joint", suffixes))
+        symbols = (suffix + rate for suffix in suffixes for rate in RATES)
+        return self._note("joints", name, unique(name, "joint", self.taken, (" joint", *symbols)))
 
     def symbol(self, name: str) -> str:
         """The name of a parameter or an input."""
-        return self._note("inputs", name, self._fresh(name, "symbol", ("",)))
+        return self._note("inputs", name, unique(name, "symbol", self.taken))
 
     def made(self, name: str) -> str:
         """The name of an element that the file does not name, told apart from others without a word about it."""
-        return self._fresh(name, "link", ("",))
+        return unique(name, "link", self.taken, (" link",))
 
     def _note(self, section: str, name: str, given: str) -> str:
         if given != name:
             self.renamed.setdefault(section, {})[name] = given
         return given
-
-    def _fresh(self, name: str, kind: str, suffixes: Sequence[str]) -> str:
-        base = clean_name(name, kind)
-        base = base[: LONGEST - 12]  # room for a number and _ddot
-        count = 1
-        while True:
-            given = base if count == 1 else f"{base}_{count}"
-            symbols = [] if kind == "link" else [given + suffix for suffix in suffixes]
-            rates = [s + rate for s in symbols for rate in (RATES if kind == "joint" else ("",))]
-            if given not in self.taken[kind] and not self.taken["symbol"].intersection(rates):
-                self.taken[kind].add(given)
-                self.taken["symbol"].update(rates)
-                return given
-            count += 1
 
 
 def clean_model_name(name: str) -> str:
