@@ -182,3 +182,8 @@ KERNELS: tuple[Kernel, ...] = (
 
 #: The same by name.
 NAMED = {kernel.name: kernel for kernel in KERNELS}
+
+
+def argument(kernel: str, label: str) -> str:
+    """What users call an argument of a kernel: the x of some is q."""
+    return "q" if label == "x" and kernel in NAMED and NAMED[kernel].inputs == ("q",) else label

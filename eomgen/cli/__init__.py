@@ -40,5 +40,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _leave(number: int, _: object) -> None:
-    """Unwind, so that compilers and unfinished files go too."""
+    """Unwind, so that compilers and unfinished files go too; as in compilation.commands, which is slow to import."""
     sys.exit(128 + number)

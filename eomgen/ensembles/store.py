@@ -15,7 +15,7 @@ from ..files.writing import remove_parts, write_whole
 from ..runtime.arrays import BROKEN, read_arrays, sealed
 from .run_blocks import LARGEST
 
-FORMAT = "eomgen ensemble 1"
+FORMAT = "eomgen ensemble 2"
 
 
 class Store:

@@ -8,6 +8,7 @@ from inspect import signature
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import UsageError
+from ..kernel_table import argument
 
 if TYPE_CHECKING:
     from .layout import Layout
@@ -42,7 +43,9 @@ def both_names(function: Function) -> Function:
                 raise
             name = getattr(args[0], "name", "f") if function.__name__ == "__call__" else function.__name__
             needed = [n for n, one in taken.items() if one.default is one.empty and n not in ("self", "module")]
-            raise TypeError(f"{name}({', '.join(needed)}){fault}") from None
+            if "x" in needed:
+                fault = fault.replace("'x'", f"'{argument(name, 'x')}'")
+            raise TypeError(f"{name}({', '.join(argument(name, n) for n in needed)}){fault}") from None
 
     return call  # type: ignore[return-value]
 

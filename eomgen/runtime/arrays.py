@@ -64,7 +64,9 @@ def read_arrays(path: Path, compressed: bool = True, key: str = "") -> dict[str,
             found = _read(file, path.stat().st_size, compressed)
         except Exception as error:  # whatever zipfile, zlib and NumPy's parser of headers raise
             raise ValueError(str(error) or type(error).__name__) from None
-    if str(found.pop(SEAL, "")) != _seal(found, key):
+    if SEAL not in found:
+        raise ValueError("it has no seal, which is another format, as that of earlier versions")
+    if str(found.pop(SEAL)) != _seal(found, key):
         raise ValueError("its arrays are not those that eomgen sealed it with")
     return found
 

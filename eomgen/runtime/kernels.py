@@ -18,7 +18,7 @@ from .argument_names import both_names
 from .failure import Fail
 from .layout import Layout
 from .refusals import Refusal
-from .room import read_numbers
+from .room import fitting, read_numbers
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
@@ -285,17 +285,3 @@ def into(out: Array | None, result: Array) -> Array:
     if out is not None:
         fitting(out, result.shape)[...] = result
     return result if out is None else out
-
-
-def fitting(out: Array, shape: tuple[int, ...]) -> Array:
-    """The array that takes a result, if it can."""
-    if not isinstance(out, np.ndarray) or out.dtype != np.float64:
-        kind = getattr(out, "dtype", type(out).__name__)
-        raise UsageError(f"out must be a float64 array of shape {shape}, not {kind}")
-    if out.shape != shape:
-        raise UsageError(f"out must have shape {shape}, not {out.shape}")
-    if not out.flags.writeable:
-        raise UsageError("out is read-only")
-    if any(step == 0 and n > 1 for step, n in zip(out.strides, out.shape, strict=True)):
-        raise UsageError(f"out has strides {out.strides}: several of its entries are one number in memory")
-    return out

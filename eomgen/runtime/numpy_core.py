@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import STATUS, EvaluationError, NonFiniteError
-from ..kernel_table import NAMED
+from ..kernel_table import NAMED, argument
 from ..numeric.scales import Array
 from ..texts import shown
 from .argument_names import both_names
 from .layout import Layout
 from .numpy_drivers import Drivers
-from .room import as_real, read_vector
+from .room import as_real, fitting, read_vector
 
 #: f(t, x, u, c) -> out
 Block: TypeAlias = Callable[[Any, Array, Array, Array], Array]
@@ -164,18 +164,14 @@ class NumpyKernel:
         if found is not None:
             return found
         wanted = "be a real number, or (k,)" if label == "t" else f"hold real numbers, ({n},) or ({n}, k)"
-        raise self.error(f"{self.label(label)} of {self.name} must {wanted}, not {shown(value)}")
+        raise self.error(f"{argument(self.name, label)} of {self.name} must {wanted}, not {shown(value)}")
 
     def misfit(self, label: str, n: int, given: Array) -> Exception:
         """The error for a wrong shape."""
         error: Exception = self.error(
-            f"{self.label(label)} of {self.name} must have shape ({n},) or ({n}, k), not {given.shape}"
+            f"{argument(self.name, label)} of {self.name} must have shape ({n},) or ({n}, k), not {given.shape}"
         )
         return error
-
-    def label(self, label: str) -> str:
-        """What users call an argument: the x of some kernels is q."""
-        return "q" if label == "x" and self.name in NAMED and NAMED[self.name].inputs == ("q",) else label
 
     def by_name(self, label: str, given: Any, bound: Array) -> Any:
         """Values by name as an array, the others as bound, where who asked for the kernel knows names."""
@@ -199,7 +195,7 @@ class NumpyKernel:
             raise self.error(f"t of {self.name} must be a number or have shape (k,), not {t.shape}")
         expected = (*self.shape, *x.shape[1:])
         if out is not None:
-            _check_out(out, expected, self.name, self.error)
+            fitting(out, expected, f"out of {self.name}", self.error)
         with np.errstate(all="ignore"):
             if x.ndim == 1 or self.vectorised:
                 result = self._batch(t, x, force, c, expected, given)
@@ -296,18 +292,6 @@ class NumpyMotion(NumpyKernel):
                 raise self.misfit(label, n, part)
         x = [part if part.shape[1:] == columns else np.repeat(part[:, None], columns[0], axis=1) for part in parts]
         return self.evaluate(t, np.concatenate(x), p, u, out)
-
-
-def _check_out(out: object, expected: tuple[int, ...], name: str, error: Any) -> None:
-    wanted = f"out of {name} must be a float64 array of shape {expected}"
-    if not isinstance(out, np.ndarray):
-        raise error(f"{wanted}, not a {type(out).__name__}")
-    if out.shape != expected or out.dtype != np.float64:
-        raise error(f"{wanted}, not {out.shape} of {out.dtype}")
-    if not out.flags.writeable:
-        raise error(f"out of {name} is read-only")
-    if any(step == 0 and n > 1 for step, n in zip(out.strides, out.shape, strict=True)):
-        raise error(f"out of {name} has strides {out.strides}: several of its entries are one number in memory")
 
 
 def _declared(values: Any) -> list[float]:

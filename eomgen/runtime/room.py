@@ -114,6 +114,23 @@ def read_vector(what: str, given: Any, n: int, error: type[Exception] = UsageErr
     return found
 
 
+def fitting(out: Any, shape: tuple[int, ...], what: str = "out", error: type[Exception] = UsageError) -> Array:
+    """The array that takes a result, if it can.
+
+    Raises
+    ------
+    error
+    """
+    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != np.float64:
+        given = f"{out.shape} of {out.dtype}" if isinstance(out, np.ndarray) else f"a {type(out).__name__}"
+        raise error(f"{what} must be a float64 array of shape {shape}, not {given}")
+    if not out.flags.writeable:
+        raise error(f"{what} is read-only")
+    if any(step == 0 and n > 1 for step, n in zip(out.strides, shape, strict=True)):
+        raise error(f"{what} has strides {out.strides}: several of its entries are one number in memory")
+    return out
+
+
 def read_times(what: str, given: Any, per_time: int) -> Array:
     """Times as an array of floats (n,), refused where a row of `per_time` numbers for each would not fit.
 

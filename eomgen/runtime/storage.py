@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 TABLES = (".npz", ".csv")
 RUNS = (".npz", ".csv", ".nc", ".parquet")  #: endings of files of a run
-FORMAT = "eomgen trajectory 1"
+FORMAT = "eomgen trajectory 2"
 
 
 class Stored:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..runtime.signals import Forcing
     from .events import Events
 
-FORMAT = "eomgen checkpoint 1"
+FORMAT = "eomgen checkpoint 2"
 
 
 class Checkpoint:

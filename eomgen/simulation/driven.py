@@ -167,8 +167,12 @@ def simulate_driven(
         s,
         t_events,
         x_events,
-        {"status": status, "message": message, "span": [start, float(t[-1])] if t.size else [start, start]},
-        [event.name for event in events],
+        {
+            "status": status,
+            "message": message,
+            "span": [start, float(t[-1]) if t.size else start],
+            "event_names": [event.name for event in events],
+        },
     )
 
 
@@ -211,9 +215,8 @@ class _DrivenRun:
         return times, states_at, last
 
     def keep(
-        self, t: Array, s: Array, t_events: list[Array], x_events: list[Array], header: dict[str, Any],
-        names: Sequence[str] = (),
-    ) -> KinematicAnalysis:  # fmt: skip
+        self, t: Array, s: Array, t_events: list[Array], x_events: list[Array], header: dict[str, Any]
+    ) -> KinematicAnalysis:
         """The trajectory at parameters s."""
         motion = self.followed.motion(s, None)
         sample: Callable[[Array], KinematicAnalysis] = lambda times: self.keep(  # noqa: E731
@@ -229,7 +232,7 @@ class _DrivenRun:
             len(t),
             (),
             u=u,
-            header={**header, "event_names": list(names)},
+            header=header,
             t_events=t_events,
             x_events=x_events,
             sample=sample,

@@ -260,9 +260,11 @@ class _Journey:
         if options.get("first_step") is not None:
             options["first_step"] = min(options["first_step"], abs(end - self.t))
         if callable(jac := options.get("jac")):
-            options["jac"] = lambda t, x: jac(
-                t, x.copy()
-            )  # a function may change what it is given, and so may a solver
+
+            def jacobian(t: float, x: Array) -> Any:
+                return jac(t, x.copy())  # a function may change what it is given, and so may a solver
+
+            options["jac"] = jacobian
         return self.solver(self.rhs, self.t, self.x.copy(), end, **options)
 
     def _length(self, solver: Any) -> float:

@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 from ..errors import UnavailableError, UsageError
 from ..limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..numeric.scales import Array
-from ..runtime.kernels import fitting
 from ..runtime.late import eager
 from ..runtime.near_names import require
 from ..runtime.refusals import refuse_rigid
-from ..runtime.room import read_plain, read_vector
+from ..runtime.room import fitting, read_plain, read_vector
 from .compiled import no_series, stepper_options
 from .events import Events
 from .tolerances import IMPLICIT

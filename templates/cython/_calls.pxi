@@ -157,7 +157,8 @@ cdef object call_plainly(object kernel, PyObject *const *given, Py_ssize_t n, Py
         _, own, fault = str(error).partition("__call__()")
         if not own:
             raise
-        raise TypeError(f"{kernel.name}({'t, x' if isinstance(kernel, Timed) else 'x'}){fault}") from None
+        words = ("t", "x") if isinstance(kernel, Timed) else (called("x", None, (<Kernel>kernel).n_in),)
+        raise TypeError(f"{kernel.name}({', '.join(words)}){fault}") from None
 
 
 cdef int set_quick_call(Kernel kernel) except -1:

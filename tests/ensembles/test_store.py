@@ -89,7 +89,7 @@ def test_hostile_stores_are_refused(pendulum: Any, tmp_path: Path) -> None:
     files = [{("old" if name == one else name): x for name, x in arrays.items()} for one in arrays]
     for damaged in (*files, *(arrays | change for change in changes)):
         np.savez(block, **damaged)
-        with pytest.raises(eg.UsageError, match=r"block_000000\.npz cannot be read: its arrays are not those"):
+        with pytest.raises(eg.UsageError, match=r"block_000000\.npz cannot be read: it(s arrays are| has) no"):
             pendulum.simulate_many(1, angles(20), store=folder)
     block.write_bytes((folder / "block_000001.npz").read_bytes())  # that of other runs
     with pytest.raises(eg.UsageError, match=r"block_000000\.npz cannot be read"):

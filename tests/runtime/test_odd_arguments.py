@@ -196,6 +196,8 @@ def test_what_is_missing_and_what_takes_no_result(target: str) -> None:
         mod.rhs([0, 1])
     with pytest.raises(TypeError, match=r"^energy\(x\) "):
         mod.energy()
+    with pytest.raises(TypeError, match=r"^mass_matrix\(q\) (missing .*'q'|takes at least 1)"):
+        mod.mass_matrix()
     with pytest.raises(TypeError, match=r"^f\(q, v, a\) |^inverse_dynamics\(q, v, a\) "):
         mod.inverse_dynamics([0.0])
     one = np.lib.stride_tricks.as_strided(np.zeros(1), (mod.n_x,), (0,))

@@ -88,7 +88,7 @@ def test_files_that_are_none(tmp_path, traj):
     with pytest.raises(UsageError, match="not a trajectory"):
         load_trajectory(tmp_path / "x.npz")
     np.savez(tmp_path / "y.npz", header=np.array(json.dumps({"format": "other"})))
-    with pytest.raises(UsageError, match="not a trajectory"):
+    with pytest.raises(UsageError, match="not a trajectory .* no seal, which is another format"):
         load_trajectory(tmp_path / "y.npz")
     with pytest.raises(FileNotFoundError):
         load_trajectory(tmp_path / "none.npz")
