@@ -53,7 +53,8 @@ def calls_within(known: int = 0) -> int:
 
     A warning's ``stacklevel`` is one more.  The first ``known`` of them need no look.
     """
-    calls, frame = known, sys._getframe(known + 1)
+    frame: Any = sys._getframe(known + 1)
+    calls = known
     while frame is not None and f"{frame.f_globals.get('__name__')}.".startswith(_WITHIN):
         frame, calls = frame.f_back, calls + 1
     return calls
