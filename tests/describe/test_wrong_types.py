@@ -167,7 +167,7 @@ def test_faults_name_the_line_of_the_call() -> None:
     assert f"{__file__}:{last - 3}: bodies.c.mass: is -1" in str(found.value)
 
 
-def test_a_package_named_like_eomgen_is_the_users_own(tmp_path: Path) -> None:
+def test_a_package_named_like_eomgen_is_the_users_own() -> None:
     """Its calls are the lines to name; a thread that begins within eomgen has none."""
     file = Path(eg.__file__).parent.with_name("eomgen_demo") / "arm.py"  # never written
     scope: dict[str, Any] = {"__name__": "eomgen_demo.arm"}
