@@ -278,7 +278,7 @@ class _UrdfReader:
         name = element.attributes.get("name") or f"loop_{len(self.robot.loops)}"
         path = f"{element.tag}.{name}"
         given = element.attributes.get("type")
-        plain = "spherical" if element.find("axis") is None and element.tag != "loop_joint" else "revolute"
+        plain = "spherical" if element.find("axis") is None else "revolute"
         if given is None:
             self.robot.notes.append(f"{path}: names no type; taken as {plain}")
         kind = LOOP_TYPES.get(given or plain)

@@ -77,11 +77,15 @@ FOUR_BAR = f"""<robot name="four_bar"><link name="base"/><link name="a">{INERTIA
 def test_a_loop_without_a_type_is_taken_by_its_axis_and_said(tmp_path: Path) -> None:
     path = tmp_path / "four_bar.urdf"
     ends = '<parent link="b"/><parent_origin xyz="0.4 0 0"/><child link="c"/><child_origin xyz="0.3 0 0"/>'
-    for inside, word in ((ends, "spherical"), ('<axis xyz="0 0 1"/>' + ends, "revolute")):
-        path.write_text(FOUR_BAR.format(f'<loop_constraint name="l">{inside}</loop_constraint>'))
+    links = '<link1 link="b" xyz="0.4 0 0"/><link2 link="c" xyz="0.3 0 0"/>'
+    axis = '<axis xyz="0 0 1"/>'
+    loops = [("loop_constraint", ends, "spherical"), ("loop_constraint", axis + ends, "revolute")]
+    loops += [("loop_joint", links, "spherical"), ("loop_joint", axis + links, "revolute")]
+    for tag, inside, word in loops:
+        path.write_text(FOUR_BAR.format(f'<{tag} name="l">{inside}</{tag}>'))
         model = eg.load(path)
         model.guess(j1=1.0, j2=-0.7, j3=1.6)
-        assert model.notes == (f"loop_constraint.l: names no type; taken as {word}",)
+        assert model.notes == (f"{tag}.l: names no type; taken as {word}",)
         module = model.compile(target="numpy")
         assert (module.n_dof, module.q_names) == (1, ("j1", "j2", "j3"))
         j1, j2, j3 = module.x0()[:3]
