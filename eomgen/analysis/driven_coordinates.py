@@ -101,6 +101,8 @@ class DrivenCoordinates:
     def tangent(self, t: float, q: Array, t1: float, y1: Array) -> Tangent:
         """dq/ds where dt/ds = t1 and dy/ds = y1."""
         K = self.matrix(q, t)
+        if not len(q):  # nothing moves, and no singular value says so
+            return Tangent(q, 1.0, 1.0, q, np.zeros(len(K)))
         U, S, V = algebra.svd(K, full_matrices=False)
         right = U.T @ self.right(q, t, t1, y1)
         small = NULL * S[0]

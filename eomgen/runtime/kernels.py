@@ -111,6 +111,9 @@ class Kernels:
 
     def motion(self, name: str) -> Motion:
         """A kernel called as ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
+        shape = self.layout.shape(name)
+        if name not in self.core.names and 0 in shape:
+            return cast("Motion", lambda q, *_, **__: np.zeros((*shape, *np.shape(q)[1:])))
         return cast("Motion", self._make(self.core.motion, name, False))
 
     def _make(self, maker: Callable[..., Any], name: str, nan: bool) -> Any:

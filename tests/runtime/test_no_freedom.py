@@ -22,6 +22,13 @@ def test_a_welded_tree_simulates(target: str) -> None:
         assert traj.at([0.03, 0.04]).x.shape == (0, 2)
         np.testing.assert_array_equal(traj["height"], 2.0)
         assert traj.energy_drift == 0.0
+    still = mod.kinematic_analysis(t=[0, 1])
+    assert (still.x.shape, still["height"].tolist()) == ((0, 2), [2.0, 2.0])
+    for form in ("minimal", "full"):
+        near = mod.linearize(form=form)
+        assert (near.A.shape, near.B.shape, near.C.shape, near.D.shape) == ((0, 0), (0, 0), (1, 0), (1, 0))
+    assert mod.modes().frequencies.shape == (0,)
+    assert mod.equilibrium().stability == "no freedom"
 
 
 def truss() -> eg.Model:
