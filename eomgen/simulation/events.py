@@ -23,6 +23,7 @@ from ..numeric.scales import Array
 from ..runtime.input_texts import is_formula, read_formula
 from ..runtime.layout import Layout
 from ..runtime.near_names import check_names, require_time_and_state
+from ..runtime.room import as_real
 from ..texts import shown
 
 if TYPE_CHECKING:
@@ -83,15 +84,16 @@ class RunEvent:
         Raises
         ------
         UsageError
-            The user's function gives no finite number, unless it is asked ``aside`` of the run.
+            The user's function gives no number, or none that is finite, unless it is asked ``aside`` of the run.
         """
-        value = float(self.function(t, x.copy()))  # a function may change what it is given
-        if self.users and not aside and not isfinite(value):
+        value = self.function(t, x.copy())  # a function may change what it is given
+        found = as_real(value) if self.users else value
+        if self.users and (found is None or found.ndim or not (aside or isfinite(found))):
             raise UsageError(
-                f"event {self.name} is {value} at t = {t:.6g} s; its function must return a finite number at every "
+                f"event {self.name} is {shown(value if found is None or found.ndim else float(found))} at t = {t:.6g} s; its function must return a finite number at every "
                 "time and state of the run; an expression as a text may be undefined in parts of it"
             )
-        return self.seen_value(t, value)
+        return self.seen_value(t, float(found))
 
     def seen_value(self, t: float, value: float) -> float:
         """The same where the function's value is known."""

@@ -462,3 +462,9 @@ def test_a_function_that_gives_no_number_is_refused_by_name(target: str) -> None
         assert run.t_events[-1] == pytest.approx([0.75], abs=1e-9)
     with pytest.raises(eg.UsageError, match="event broken is nan"):
         mod.dae.solve((0, 1), events=[broken])
+    for value, text in ((None, "None"), (1j, "1j"), (np.ones(2), r"array\(\[1"), ("a", "'a'")):
+        for method in ("DOP853", "LSODA"):
+            with pytest.raises(eg.UsageError, match=f"event odd is {text}"):
+                mod.simulate((0, 1), events={"odd": lambda t, x, value=value: value}, method=method)
+        with pytest.raises(eg.UsageError, match=f"event odd is {text}"):
+            mod.dae.solve((0, 1), events={"odd": lambda t, x, value=value: value})
