@@ -22,7 +22,8 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
 
     ``slopes`` keeps the slopes of functions of one operand from one sweep to the next.
     """
-    nodes, rooted = g.nodes, roots_in(g).of
+    nodes, roots = g.nodes, roots_in(g)
+    rooted, own, live = roots.of, roots.own, roots.varying(tangents)
     add, sub, mul = g.add, g.sub, g.mul
     zero, one = g.zero.id, g.one.id
     tangent = tangents.get
@@ -36,15 +37,15 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
                 dc = tangent(found[0])
                 if dc is None:
                     continue
-                d = multiply(g, rooted, i, found[1], dc, found[0], found[0])
+                d = multiply(g, rooted, live, i, found[1], dc, found[0], found[0])
             elif da is None:
                 if db is None:
                     continue
-                d = multiply(g, rooted, i, a, db, b) if b in rooted else mul(a, db)
+                d = multiply(g, rooted, live, i, a, db, b) if b in rooted else mul(a, db)
             elif db is None:
-                d = multiply(g, rooted, i, b, da, a) if a in rooted else mul(da, b)
+                d = multiply(g, rooted, live, i, b, da, a) if a in rooted else mul(da, b)
             elif a in rooted or b in rooted:
-                d = add(multiply(g, rooted, i, b, da, a), multiply(g, rooted, i, a, db, b))
+                d = add(multiply(g, rooted, live, i, b, da, a), multiply(g, rooted, live, i, a, db, b))
             else:
                 d = add(mul(da, b), mul(a, db))
         elif operation == "add":
@@ -80,9 +81,9 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
                     continue
                 d = g.div(da, b) if nodes[b][0] == "const" else mul(g.div(one, b), da)
             elif da is None:
-                d = g.neg(multiply(g, rooted, i, mul(i, g.div(one, b)), db, b, a))
+                d = g.neg(multiply(g, rooted, live, i, mul(i, g.div(one, b)), db, b, a))
             else:
-                d = mul(g.div(one, b), sub(da, multiply(g, rooted, i, i, db, b, a)))
+                d = mul(g.div(one, b), sub(da, multiply(g, rooted, live, i, i, db, b, a)))
         elif operation == "absorb":
             a, b = node[1], node[2]
             d = add(g.make("absorb", tangents.get(a, zero), b), g.make("absorb", a, tangents.get(b, zero)))
@@ -104,7 +105,7 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
                 continue
             if i not in slopes:
                 slopes[i] = row.slopes[0](g, i, node[1])
-            d = multiply(g, rooted, i, slopes[i], da, node[1], node[1])
+            d = multiply(g, rooted, live, i, slopes[i], da, node[1], node[1])
         else:
             parts = [tangent(k) for k in node[1:]]
             if all(p is None for p in parts):
@@ -113,15 +114,17 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
             flags = [p is not None for p in parts]
             for slope, p, k in zip(partials(g, i, flags), parts, node[1:], strict=True):
                 if p is not None:
-                    d = add(d, multiply(g, rooted, i, slope, p, k, k))
+                    d = add(d, multiply(g, rooted, live, i, slope, p, k, k))
         if d != zero:
             tangents[i] = d
+            if i in own:
+                live |= own[i]
 
 
 def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, int], branches: list[int]) -> None:
     """Reverse sweep over ``order`` (ascending); active branching nodes are not entered but listed in ``branches``."""
     nodes, roots = g.nodes, roots_in(g)
-    rooted, exposed = roots.of, set[int]()  #: exposed: their adjoints may vanish where there is no derivative
+    rooted, exposed = roots.of_varying(active), set[int]()  #: exposed: their adjoints may vanish where there is no derivative
     add, sub, mul = g.add, g.sub, g.mul
     zero = g.zero.id
     for i in reversed(order):
@@ -172,9 +175,8 @@ def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, 
             adjoints[a] = add(adjoints[a], d) if a in adjoints else d
         else:
             flags = [k in active for k in node[1:]]
-            tame = i not in exposed and roots.vanishes(
-                g, i, w
-            )  # where its adjoint is 0 it has no part in the derivative
+            # where its adjoint is 0 it has no part in the derivative
+            tame = i not in exposed and roots.vanishes(g, i, w)
             for k, slope, flag in zip(node[1:], partials(g, i, flags), flags, strict=True):
                 if flag:
                     d = g.make("absorb", w, slope) if tame else mul(w, slope)

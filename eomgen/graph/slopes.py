@@ -8,7 +8,7 @@ sqrt(x) sqrt(2 x), of sign(x) sqrt(|x|), or of |v| alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import Any
 
 from ..operations import OPERATIONS
@@ -30,7 +30,8 @@ class Roots:
     def __init__(self) -> None:
         self.of: dict[int, int] = {}
         self._poles: dict[int, int] = {}
-        self._own: dict[int, int] = {}  #: the bit of a root
+        self.own: dict[int, int] = {}  #: the bit of a root
+        self._kept: tuple[int, int, dict[int, int]] = (0, 0, {})
         self._seen = 0
 
     def look(self, g: Graph) -> None:
@@ -42,8 +43,8 @@ class Roots:
                 continue
             bits, pole = _of_operation(g, operation, operands), 0
             if bits & ROOT:
-                self._own[i] = ROOT << len(self._own)
-                bits += self._own[i] - ROOT
+                self.own[i] = ROOT << len(self.own)
+                bits += self.own[i] - ROOT
             if found:
                 for k in operands:
                     bits |= found.get(k, 0)
@@ -63,13 +64,26 @@ class Roots:
         """The roots with which a product vanishes."""
         if g.nodes[i][0] == "mul":
             return self._factors(g, g.nodes[i][1]) | self._factors(g, g.nodes[i][2])
-        return self._own.get(i, 0)
+        return self.own.get(i, 0)
+
+    def varying(self, active: Container[int]) -> int:
+        """The bits of the roots among nodes that vary; the others, such as the scale of lengths, have no slope."""
+        return sum(bit for i, bit in self.own.items() if i in active)
+
+    def of_varying(self, active: Container[int]) -> dict[int, int]:
+        """The bits of all nodes without those of roots that do not vary."""
+        live, seen, found = self.varying(active), self._seen, self.of
+        if live and live != sum(self.own.values()):
+            if self._kept[:2] != (live, seen):
+                self._kept = live, seen, {i: bits & (live | ROUGH | JUMPS) for i, bits in found.items()}
+            found = self._kept[2]
+        return found if live else {}
 
     def vanishes(self, g: Graph, i: int, w: int) -> bool:
         """Whether node i is a root that may vanish, without that making w infinite."""
-        if i in self._own:
+        if i in self.own:
             self.look(g)
-        return bool(self._own.get(i, 0) & ~self._poles.get(w, 0))
+        return bool(self.own.get(i, 0) & ~self._poles.get(w, 0))
 
 
 def roots_in(g: Graph) -> Roots:
@@ -124,14 +138,14 @@ def square_under_root(g: Graph, i: int) -> bool:
 
 
 def multiply(
-    g: Graph, found: dict[int, int], product: int, w: int, slope: int, r: int, factor: int | None = None
+    g: Graph, found: dict[int, int], live: int, product: int, w: int, slope: int, r: int, factor: int | None = None
 ) -> int:
-    """w r' in the derivative of a product, of the nodes w and r with the slope r'.
+    """w r' in the derivative of a product, of the nodes w and r with the slope r', with the bits of roots that vary.
 
     ``factor`` is the node whose bits w has, by default itself.
     """
-    bits = found.get(r, 0)
-    may_vanish = bits & found.get(product, 0) >= ROOT
+    bits = found.get(r, 0) & (live | ROUGH | JUMPS)
+    may_vanish = bits & found.get(product, 0) & live
     return g.make("absorb", w, slope) if may_vanish and _tames(found, factor or w, bits) else g.mul(w, slope)
 
 
