@@ -35,6 +35,11 @@ def _root_of_square(g: Any, a: int) -> int | None:
     return g.make("abs", factors[0]) if kind == "mul" and factors[0] == factors[1] else None
 
 
+def _length(g: Any, a: int, b: int) -> int | None:
+    """The root of one square, which has a slope at 0 that |v| has and v / |v| has not."""
+    return g.make("abs", b if a == g.zero.id else a) if g.zero.id in (a, b) else None
+
+
 def _chosen(g: Any, c: int, a: int, b: int) -> int | None:
     kind, *known = g.nodes[c]
     return (a if known[0] else b) if kind == "const" else a if a == b else None
@@ -154,7 +159,7 @@ ROWS = (
     function(
         "hypot", math.hypot, np.hypot, (lambda g, y, a, b: g.div(a, y), lambda g, y, a, b: g.div(b, y)),
         (lambda y, a, b: abs(a) / y, lambda y, a, b: abs(b) / y), recurrence=lambda g, y, a, b: ((a, b), y),
-        sympy=lambda s, a, b: s.sqrt(a**2 + b**2), sympy_class="hypot", commutative=True,
+        rule=_length, sympy=lambda s, a, b: s.sqrt(a**2 + b**2), sympy_class="hypot", commutative=True,
         dimension="alike",
     ),
     function(

@@ -69,6 +69,18 @@ def test_what_has_no_derivative_is_refused_by_the_call_that_takes_it(force: tupl
         assert np.isfinite(mod.simulate(0.5).x).all()
 
 
+@pytest.mark.parametrize("speed", ["hypot(vx(b), vy(b))", "hypot(0, vx(b))", "hypot(hypot(vx(b), vy(b)), vz(b))"])
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_a_hypotenuse_of_one_side_has_the_derivative_of_its_length(speed: str, target: str) -> None:
+    m = eg.Model("slide")
+    b = m.body("b", mass=1)
+    m.prismatic("j", m.ground, b, axis=(1, 0, 0), coordinate="x")
+    m.force("F", b, (f"1 - {speed}*vx(b)", 0, 0))
+    mod = m.compile(target=target)
+    assert (mod.jacobian(0.0, np.zeros(2)) == [[0.0, 1.0], [0.0, 0.0]]).all()
+    assert mod.simulate(5.0, method="Radau")["x_dot"][-1] == pytest.approx(np.tanh(5.0), abs=1e-5)
+
+
 @pytest.mark.parametrize("law", ["sqrt", "hypot", "a power of squares"])
 def test_compiled_runs_from_rest(law: str) -> None:
     """v' = -g + v^2 has v = -sqrt(g) tanh(sqrt(g) t); other powers against DOP853."""
