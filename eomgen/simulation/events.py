@@ -89,8 +89,9 @@ class RunEvent:
         value = self.function(t, x.copy())  # a function may change what it is given
         found = as_real(value) if self.users else value
         if self.users and (found is None or found.ndim or not (aside or isfinite(found))):
+            text = shown(value if found is None or found.ndim else float(found))
             raise UsageError(
-                f"event {self.name} is {shown(value if found is None or found.ndim else float(found))} at t = {t:.6g} s; its function must return a finite number at every "
+                f"event {self.name} is {text} at t = {t:.6g} s; its function must return a finite number at every "
                 "time and state of the run; an expression as a text may be undefined in parts of it"
             )
         return self.seen_value(t, float(found))
