@@ -43,8 +43,7 @@ def both_names(function: Function) -> Function:
                 raise
             name = getattr(args[0], "name", "f") if function.__name__ == "__call__" else function.__name__
             needed = [n for n, one in taken.items() if one.default is one.empty and n not in ("self", "module")]
-            if "x" in needed:
-                fault = fault.replace("'x'", f"'{argument(name, 'x')}'")
+            fault = fault.replace("'x'", f"'{argument(name, 'x')}'")
             raise TypeError(f"{name}({', '.join(argument(name, n) for n in needed)}){fault}") from None
 
     return call  # type: ignore[return-value]

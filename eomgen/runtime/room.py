@@ -115,12 +115,7 @@ def read_vector(what: str, given: Any, n: int, error: type[Exception] = UsageErr
 
 
 def fitting(out: Any, shape: tuple[int, ...], what: str = "out", error: type[Exception] = UsageError) -> Array:
-    """The array that takes a result, if it can.
-
-    Raises
-    ------
-    error
-    """
+    """The array that takes a result, if it can."""
     if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != np.float64:
         given = f"{out.shape} of {out.dtype}" if isinstance(out, np.ndarray) else f"a {type(out).__name__}"
         raise error(f"{what} must be a float64 array of shape {shape}, not {given}")

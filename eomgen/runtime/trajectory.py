@@ -194,10 +194,7 @@ class Trajectory:
         if self._sample is None:
             run: Any = self._again()  # type: ignore[misc]
             if not np.array_equal(run.x, self.x):
-                raise UsageError(
-                    "the run made again is another one: its inputs or events give other values now; give simulate "
-                    "dense_output=True"
-                )
+                raise UsageError("inputs or events of this run give other values now; give dense_output=True")
             self._sample = run._sample
         return self._sample(times)
 

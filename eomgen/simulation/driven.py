@@ -162,17 +162,13 @@ def simulate_driven(
         s, t = s[kept], t[kept]
         if t_eval is None:
             s, t = np.append(s, last), np.append(t, start + sense * last)
+    ends = [start, float(t[-1]) if t.size else start]
     return run.keep(
         t,
         s,
         t_events,
         x_events,
-        {
-            "status": status,
-            "message": message,
-            "span": [start, float(t[-1]) if t.size else start],
-            "event_names": [event.name for event in events],
-        },
+        {"status": status, "message": message, "span": ends, "event_names": [event.name for event in events]},
     )
 
 

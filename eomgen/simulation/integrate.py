@@ -17,7 +17,6 @@ from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown
 from .event_crossings import Crossings, Step
 from .events import RunEvent
-from .stalling import StallCheck
 
 if TYPE_CHECKING:
     from .solver_state import Pause
@@ -260,11 +259,8 @@ class _Journey:
         if options.get("first_step") is not None:
             options["first_step"] = min(options["first_step"], abs(end - self.t))
         if callable(jac := options.get("jac")):
-
-            def jacobian(t: float, x: Array) -> Any:
-                return jac(t, x.copy())  # a function may change what it is given, and so may a solver
-
-            options["jac"] = jacobian
+            # both the function and the solver may change the state that they are given
+            options["jac"] = lambda t, x: jac(t, x.copy())
         return self.solver(self.rhs, self.t, self.x.copy(), end, **options)
 
     def _length(self, solver: Any) -> float:

@@ -139,10 +139,10 @@ def simulate(
     """
     again = None
     if dense_output is False and controllers is None:
-        first, values, signals, times = map(_copied, (initial, parameters, inputs, t_eval))
         again = partial(
-            _again, module, span, first, values, signals, method=method, rtol=rtol, atol=atol, t_eval=times,
-            events=events, max_step=max_step, first_step=first_step, progress=progress, step=step, **options,
+            _again, module, span, *map(_copied, (initial, parameters, inputs)), t_eval=_copied(t_eval), events=events,
+            method=method, rtol=rtol, atol=atol, dense_output=True, max_step=max_step, first_step=first_step,
+            progress=progress, step=step, **options,
         )  # fmt: skip
     settings: dict[str, Any] = {**options}
     kept = pause = usual = size = None
@@ -302,19 +302,15 @@ def simulate(
     return made
 
 
-def _again(*arguments: Any, **options: Any) -> Trajectory:
-    """The same run with dense output, without the warnings that the first one gave."""
-    with told_by_the_caller():
-        return simulate(*arguments, dense_output=True, **options)
+_again = told_by_the_caller()(simulate)  # without the warnings that the first run gave
 
 
 def _copied(value: Any) -> Any:
     """A copy of what the user may change later."""
     if isinstance(value, dict):
         return {name: _copied(part) for name, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_copied(part) for part in value]
-    return value.copy() if isinstance(value, np.ndarray) else value
+    parts = [_copied(part) for part in value] if isinstance(value, list | tuple) else value
+    return parts.copy() if isinstance(parts, np.ndarray) else parts
 
 
 def _check(run: Run, solution: Solution, start: float, end: float, method: str) -> None:

@@ -84,8 +84,7 @@ class StallCheck:
         if step <= self.limit and (still.all() or self.troubled(t, self.x)):
             raise crawl
         if abs(self.end - t) > IN_PLACE * step:
-            self.slow += 1
-            # 12 n_x + 1 evaluations: only in the 1st, 2nd, 4th, 8th ... window
+            self.slow += 1  # sliding is looked for in the 1st, 2nd, 4th, 8th ...: it takes 12 n_x + 1 evaluations
             if self.slow & (self.slow - 1) == 0 and slides(self.rhs, crawl, moved, still, time):
                 raise crawl
 
