@@ -40,7 +40,12 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
             f"locked: the mechanism has no degree of freedom, and no driver moves it (held by {held}); "
             "if it should move, remove a constraint, or replace a joint by one with more freedom"
         )
-    if mobility.redundant and not mobility.assumed:
+    follow = f"{_few(mobility.redundant)} follow{'s' if len(mobility.redundant) == 1 else ''} from"
+    if mobility.redundant and kinematics.given_rates and not mobility.assumed:
+        notes.append(
+            f"{follow} the rates or from other constraints; the motion is not affected, and states are projected onto all"
+        )
+    elif mobility.redundant and not mobility.assumed:
         redundant = Counter(label.partition(".")[0] for label in mobility.redundant)
         rows = Counter(label.partition(".")[0] for label in kinematics.constraints.labels)
         remedies = []
@@ -49,8 +54,7 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
         if spare := [name for name in redundant if name not in needed]:
             remedies.append(f"leave {_few(spare)} out")
         notes.append(
-            f"overconstrained: {_few(mobility.redundant)} follow{'s' if len(mobility.redundant) == 1 else ''} from the "
-            f"other constraints; the motion is not affected, but the reactions there are not unique; if you need them, "
+            f"overconstrained: {follow} the other constraints; the motion is not affected, but the reactions there are not unique; if you need them, "
             f"{' and '.join(remedies)}"
         )
     if mobility.instantaneous > mobility.n_dof and not mobility.assumed:
