@@ -43,7 +43,8 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     follow = f"{_few(mobility.redundant)} follow{'s' if len(mobility.redundant) == 1 else ''} from"
     if mobility.redundant and kinematics.given_rates and not mobility.assumed:
         notes.append(
-            f"{follow} the rates or from other constraints; the motion is not affected, and states are projected onto all"
+            f"{follow} the rates or from other constraints; the motion is not affected, and states are projected onto "
+            "all of them"
         )
     elif mobility.redundant and not mobility.assumed:
         redundant = Counter(label.partition(".")[0] for label in mobility.redundant)
@@ -54,8 +55,8 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
         if spare := [name for name in redundant if name not in needed]:
             remedies.append(f"leave {_few(spare)} out")
         notes.append(
-            f"overconstrained: {follow} the other constraints; the motion is not affected, but the reactions there are not unique; if you need them, "
-            f"{' and '.join(remedies)}"
+            f"overconstrained: {follow} the other constraints; the motion is not affected, but the reactions there are "
+            f"not unique; if you need them, {' and '.join(remedies)}"
         )
     if mobility.instantaneous > mobility.n_dof and not mobility.assumed:
         notes.append(
