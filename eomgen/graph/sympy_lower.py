@@ -103,7 +103,9 @@ def _error(walk: _Walk, allowed: list[str]) -> LoweringError:
     if unresolved:
         names = ", ".join(shortened(x) for x in unresolved)
         calls = (getattr(x, "expr", x) for x in unresolved)
-        functions = any(isinstance(x, AppliedUndef) and [str(a) for a in x.args] != ["t"] for x in calls)
+        functions = any(
+            isinstance(x, AppliedUndef) and [getattr(a, "name", "") for a in x.args] != ["t"] for x in calls
+        )
         declare = "declare functions first, by model.table or model.native" if functions else "declare them"
         lines.append(f"unknown names {names}; " + (f"known are {', '.join(allowed)}" if allowed else declare))
     first = walk.faults[0][0] if walk.faults else unresolved[0]
