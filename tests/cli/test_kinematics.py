@@ -20,8 +20,8 @@ def test_a_driven_model_runs_over_its_own_span(call: Call, tmp_path: Path) -> No
     assert (result.code, "kinematics over t: 201 points" in result.out) == (0, True)
     assert "loop residual" in result.out
     table = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True)
-    theta = table["theta_rad"]
-    assert np.abs(table["s_m"] - 0.1 * np.cos(theta) - np.sqrt(0.09 - 0.01 * np.sin(theta) ** 2)).max() < 1e-14
+    theta = table["theta"]
+    assert np.abs(table["s"] - 0.1 * np.cos(theta) - np.sqrt(0.09 - 0.01 * np.sin(theta) ** 2)).max() < 1e-14
     assert (tmp_path / "run.png").stat().st_size > 10_000
 
 
@@ -106,8 +106,8 @@ def test_a_workspace(call: Call, model_file: Callable[[str], Path], tmp_path: Pa
     assert found["range"]["x"] == pytest.approx([-0.8, 0.8])
     assert len(found["singular"]) == 74
     table = np.genfromtxt(tmp_path / "ws.csv", delimiter=",", names=True, usecols=range(4))
-    assert table["x_m"] == pytest.approx(
-        0.5 * np.cos(table["q1_rad"]) + 0.3 * np.cos(table["q1_rad"] + table["q2_rad"])
+    assert table["x"] == pytest.approx(
+        0.5 * np.cos(table["q1"]) + 0.3 * np.cos(table["q1"] + table["q2"])
     )
     assert (tmp_path / "ws.png").stat().st_size > 10_000
     result = call("kinematics", path, *FAST, *words, "--within-limits")

@@ -78,8 +78,8 @@ def test_load_goes_by_the_suffix(tmp_path: Path, slider_crank_text: str) -> None
     assert load(path).name == load(str(path)).name == "slider_crank"
     with pytest.raises(FileNotFoundError):
         load(tmp_path / "absent.yaml")
-    for name in ("panda.sdf", "model"):
-        with pytest.raises(UsageError, match=r"supported are \.yaml"):
+    for name, remedy in (("panda.sdf", "convert it to MJCF"), ("model", r"supported are \.yaml")):
+        with pytest.raises(UsageError, match=remedy):
             load(tmp_path / name)
 
 

@@ -133,8 +133,8 @@ FAULTS = (
     ),
     Fault(
         "series-root", "eomgen/emit/c_series.py",
-        "*(0.5*{self._reciprocal(i)})",
-        "*({self._reciprocal(i)})",
+        ", 0.5*{self._reciprocal(i)})",
+        ", {self._reciprocal(i)})",
         "Taylor coefficients of a root: a factor 1/2",
         ("tests/emit/test_c_series.py::test_coefficients_are_those_of_mpmath[root]",),
     ),

@@ -38,8 +38,8 @@ FAULTS = (
     ),
     Fault(
         "rounding-of-products", "eomgen/operations/table.py",
-        "(lambda y, a, b: abs(b), lambda y, a, b: abs(a)),",
-        "(lambda y, a, b: abs(b), lambda y, a, b: 0.0),",
+        "(lambda y, a, b: abs(b), lambda y, a, b: abs(a)),\n        error=",
+        "(lambda y, a, b: abs(b), lambda y, a, b: 0.0),\n        error=",
         "bounds of rounding lose that of a product's second factor",
         ("tests/graph/test_rounding.py::test_bounds_hold_and_are_not_far_above[1e-06]",),
     ),
