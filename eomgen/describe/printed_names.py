@@ -72,8 +72,8 @@ def take_coordinates_latex(
 
 
 def give_latex(description: Description, section: str, latex: Mapping[Any, str] | None) -> None:
-    """Put the LaTeX of names where each is described: parameters, inputs, else coordinates of the section."""
-    entries = {e.name: e for place in ("parameters", "inputs") for e in description.sections[place]}
+    """Put the LaTeX of names where each is described: parameters, inputs, outputs, else coordinates of the section."""
+    entries = {e.name: e for place in ("outputs", "parameters", "inputs") for e in description.sections[place]}
     for name, text in named("latex", latex).items():
         home = entries[name].values if name in entries else description.values[section].setdefault("latex", {})
         home["latex" if name in entries else name] = text

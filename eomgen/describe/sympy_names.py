@@ -88,7 +88,10 @@ class SympyNames:
 
     def noted(self, description: Description) -> Description:
         """The description with a note of what was renamed."""
-        homes = {entry.name: place for place in ("parameters", "inputs") for entry in description.sections[place]}
+        places, given = ("outputs", "parameters", "inputs"), description.values.get("equations", {})
+        homes = {entry.name: place for place in places for entry in description.sections[place]}
+        for name in (*given.get("coordinates", ()), *given.get("velocities", ())):  # which outputs may repeat
+            homes.pop(name, None)
         renamed: dict[str, dict[str, str]] = {}
         for old, new in self.renamed.items():
             renamed.setdefault(homes.get(new, "coordinates"), {})[old] = new
