@@ -139,10 +139,10 @@ def simulate(
     """
     again = None
     if dense_output is False and controllers is None:
+        *copies, times = [value if value is None else _copied(value) for value in (initial, parameters, inputs, t_eval)]
         again = partial(
-            _again, module, span, *map(_copied, (initial, parameters, inputs)), t_eval=_copied(t_eval), events=events,
-            method=method, rtol=rtol, atol=atol, dense_output=True, max_step=max_step, first_step=first_step,
-            progress=progress, step=step, **options,
+            _again, module, span, *copies, t_eval=times, events=events, method=method, rtol=rtol, atol=atol,
+            dense_output=True, max_step=max_step, first_step=first_step, progress=progress, step=step, **options,
         )  # fmt: skip
     settings: dict[str, Any] = {**options}
     kept = pause = usual = size = None
