@@ -26,7 +26,7 @@ from .kinematics import Kinematics, analyse
 from .kinematics.mobility import Mobility, find_mobility
 from .kinematics.other_branches import other_branches
 from .kinematics.report import MechanismReport, report
-from .runtime.near_names import unknown
+from .runtime.near_names import read_names, unknown
 from .targets import TARGETS, find_target
 from .texts import shown
 
@@ -246,6 +246,7 @@ def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] 
     from .program.collect import collect_metadata, collect_terms
 
     row = find_target(target)
+    kernels = read_names("kernels", kernels or ())
     kinematics, mobility, tree = equations.fresh()
     kinematics.mechanism.require_values()
     idle = require_inertia(kinematics, mobility, tree)

@@ -198,7 +198,7 @@ def check_gaps(
     for what, names, allowed in ((word, gaps, [*placed, *layout.y]), (other, locked, coordinates)):
         for name in names:
             if name not in allowed:
-                near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")
+                near = joined(hint(name, allowed), f"there are {', '.join(allowed) or 'none'}")
                 raise UsageError(f"{what}: no coordinate or output {name!r}; {near}")
     found: dict[str, float] = {}
     for name, e in (gaps or {}).items():

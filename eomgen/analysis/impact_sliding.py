@@ -85,7 +85,7 @@ def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], wor
 
 
 def _listed(names: Any) -> str:
-    return f"there are {', '.join(names)}"
+    return f"there are {', '.join(names) or 'none'}"
 
 
 def _is_velocity(layout: Layout, output: str) -> bool:

@@ -39,7 +39,9 @@ from .units import Unit
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a plain real number (truth values are not)."""
+    """Whether a value is a plain real number (truth values are not), or one in an array of no axes."""
+    if getattr(value, "shape", None) == () and hasattr(value, "dtype"):
+        return bool(value.dtype.kind in "iuf")
     return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 

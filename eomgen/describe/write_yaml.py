@@ -88,6 +88,8 @@ def _value(value: Any, functions: Names) -> str:
         return _text(os.fspath(value))
     if isinstance(value, bool):
         return "true" if value else "false"
+    if getattr(value, "shape", None) == () and hasattr(value, "tolist"):
+        value = value.tolist()
     if not isinstance(value, numbers.Real | str | Mapping | list | tuple):
         listed = items(value)
         if listed is not None:

@@ -81,12 +81,14 @@ def test_values_of_all_kinds() -> None:
     def add(m: Model) -> None:
         m.parameter("r", sympy.Rational(1, 4))
         m.parameter("k", "pi/2")
-        m.parameter("n", np.float64(2.5))
+        m.parameter("n", np.array(2.5))
         b = m.body("c", mass=np.int64(3), com=sympy.Matrix([r, 0, r**2]), inertia=sympy.diag(1, r, 1))
         m.body("d", mass=1, inertia=np.diag([1.0, 2.0, 2.0]))
         m.weld("J", m.ground, "b")
         m.weld("K", b, "d")
         m.revolute("H", b.at("r", 0.5, sympy.sin(r)), m.ground)
+        m.torque("t", "H", np.array(3))
+        assert all(text in m.to_yaml() for text in ("n: 2.5", "value: 3}"))
 
     m = single(add)
     assert [p.value for p in m.parameters] == [0.25, math.pi / 2, 2.5]

@@ -31,6 +31,16 @@ def test_a_welded_tree_simulates(target: str) -> None:
     assert mod.equilibrium().stability == "no freedom"
 
 
+def test_names_that_are_not_there() -> None:
+    m = eg.Model("welded")
+    m.weld("A", m.ground, m.body("b", mass=2))
+    with pytest.raises(eg.UsageError, match="no coordinate or output 'z'; there are none"):
+        m.compile(target="numpy").impact(0.0, [], {"z": 0.5})
+    assert m.compile(target="numpy", kernels="rhs").rhs(0.0, []).shape == (0,)
+    with pytest.raises(eg.UsageError, match="no kernel is named 'rsh'; did you mean 'rhs'"):
+        m.compile(target="numpy", kernels="rsh")
+
+
 def truss() -> eg.Model:
     """Two bars of weight m g from pins a distance of 2 apart, which meet at (1, 1), where a load F pulls upwards."""
     m = eg.Model("truss", gravity=(0, "-g", 0))
