@@ -225,7 +225,8 @@ def test_length_written_otherwise(row: str) -> None:
     x = module.x0(wy=2.0)
     assert module.n_dof == 4
     (note,) = (note for note in turning(row, k=2.0).check().notes if "constraint_1" in note)
-    assert note.startswith("constraint_1 follows from the rates or from other constraints;") and "leave" not in note
+    assert note.startswith("constraint_1 follows from the rates or from other constraints;")
+    assert "leave" not in note
     assert module.project(np.r_[1.001 * x[:4], x[4:]]) == pytest.approx(x, abs=1e-14)
 
 
