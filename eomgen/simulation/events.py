@@ -87,7 +87,7 @@ class RunEvent:
             The user's function gives no number, or none that is finite, unless it is asked ``aside`` of the run.
         """
         value = self.function(t, x.copy())  # a function may change what it is given
-        found = as_real(value) if self.users else value
+        found: Any = as_real(value) if self.users else value
         if self.users and (found is None or found.ndim or not (aside or isfinite(found))):
             text = shown(value if found is None or found.ndim else float(found))
             raise UsageError(
