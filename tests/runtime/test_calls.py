@@ -87,7 +87,10 @@ def test_wrong_arguments_are_told_as_ever(arm: Any) -> None:
         except Exception as error:
             with pytest.raises(type(error)) as raised:
                 call(*given, **words)
-            assert str(raised.value) == str(error)
+            plain, said = str(error), str(raised.value)
+            if plain.startswith("__call__()"):  # the call has the name that users know
+                plain, said = plain.partition(")")[2], said.partition(")")[2]
+            assert said == plain
             told += 1
         else:
             np.testing.assert_array_equal(call(*given, **words), expected)
