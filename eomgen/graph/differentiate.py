@@ -124,7 +124,8 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
 def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, int], branches: list[int]) -> None:
     """Reverse sweep over ``order`` (ascending); active branching nodes are not entered but listed in ``branches``."""
     nodes, roots = g.nodes, roots_in(g)
-    rooted, exposed = roots.of_varying(active), set[int]()  #: exposed: their adjoints may vanish where there is no derivative
+    rooted = roots.of_varying(active)
+    exposed = set[int]()  #: nodes whose adjoints may vanish where there is no derivative
     add, sub, mul = g.add, g.sub, g.mul
     zero = g.zero.id
     for i in reversed(order):

@@ -106,9 +106,7 @@ def test_a_workspace(call: Call, model_file: Callable[[str], Path], tmp_path: Pa
     assert found["range"]["x"] == pytest.approx([-0.8, 0.8])
     assert len(found["singular"]) == 74
     table = np.genfromtxt(tmp_path / "ws.csv", delimiter=",", names=True, usecols=range(4))
-    assert table["x"] == pytest.approx(
-        0.5 * np.cos(table["q1"]) + 0.3 * np.cos(table["q1"] + table["q2"])
-    )
+    assert table["x"] == pytest.approx(0.5 * np.cos(table["q1"]) + 0.3 * np.cos(table["q1"] + table["q2"]))
     assert (tmp_path / "ws.png").stat().st_size > 10_000
     result = call("kinematics", path, *FAST, *words, "--within-limits")
     assert result.code == 0
