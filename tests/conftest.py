@@ -18,6 +18,7 @@ collect_ignore_glob = ["reference/*.py"]
 #: What some tests need beside the programs of outside_programs: a mark ``needs(name)`` leaves a test out where there is
 #: none, and the end of the run says so.  Libraries of Python: name -> its module, and how it is installed.
 LIBRARIES = {
+    "PyDy": ("pydy", "pip install pydy"),
     "NVRTC": ("cuda.bindings.nvrtc", "pip install '.[cuda]'"),
     "CuPy": ("cupy", "pip install cupy-cuda13x"),
     "PyTorch": ("torch", "pip install torch"),
