@@ -48,19 +48,23 @@ def length_scale(mechanism: Mechanism) -> Expr:
     for square in squares:
         total = total + square
     size = graph.apply("sqrt", total / float(len(squares)))
-    least = max(NO_LENGTH, HAIR * _radius_of_gyration(mechanism))
+    least = max(NO_LENGTH, HAIR * _radius_of_gyration(mechanism, size))
     return graph.apply("select", graph.apply("lt", size, least), 1.0, size)  # parameters may make all of them 0
 
 
-def _radius_of_gyration(mechanism: Mechanism) -> float:
-    """That of all bodies with the declared parameters, each about its own centre; 0 without masses or values."""
-    names = [p.name for p in mechanism.parameters]
+def _radius_of_gyration(mechanism: Mechanism, size: Expr) -> float:
+    """That of all bodies with the declared parameters, each about its own centre.
+
+    0 without masses or values, and where parameters given late may change it, unless ``size`` is a hair beside it.
+    """
     entries = [x for b in mechanism.bodies for x in (b.mass, b.inertia[0][0], b.inertia[1][1], b.inertia[2][2])]
     if not entries or any(p.value is None for p in mechanism.parameters):
         return 0.0
-    values = np.reshape(compile_evaluator(entries, names)([p.value for p in mechanism.parameters]), (-1, 4))
-    mass, inertia = values[:, 0].sum(), values[:, 1:].sum()
-    return float(np.sqrt(0.5 * inertia / mass)) if mass > 0.0 and 0.0 < inertia < np.inf else 0.0
+    numbers = compile_evaluator([size, *entries], [p.name for p in mechanism.parameters])
+    declared, *found = numbers([p.value for p in mechanism.parameters])
+    mass, inertia = sum(found[::4]), sum(found) - sum(found[::4])
+    radius = float(np.sqrt(0.5 * inertia / mass)) if mass > 0.0 and 0.0 < inertia < np.inf else 0.0
+    return radius if declared < HAIR * radius or all(x.node[0] == "const" for x in entries) else 0.0
 
 
 def _square(a: Vec3, b: Vec3) -> Expr:
