@@ -27,6 +27,7 @@ PLACES: dict[tuple[str, str], str | None] = {
     ("STATE", "doc"): "states.z.doc",
     ("EVENT", "doc"): "events.low.doc",
     ("DISPLAY", "file"): "bodies.rod.display[0].file",
+    ("DISPLAY", "color"): None,  # only "#rrggbb" is taken
     ("COMPONENT", "doc"): None,  # nothing of it stands in the model that a component becomes
     ("COMPONENT", "file"): None,
     ("FUNCTION", "source"): None,
