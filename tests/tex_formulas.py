@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
 from matplotlib.mathtext import MathTextParser
 
-#: What Matplotlib does not know, and which ends a cell of a matrix or a line of aligned equations.
-CELLS = re.compile(r"\\begin\{[a-z]+\}|\\end\{[a-z]+\}|&|\\\\")
+#: A matrix or cases with none in it, which Matplotlib does not know, and what ends a cell or a line.
+INNERMOST = re.compile(r"\\begin\{([a-z]+)\}((?:(?!\\begin\{|\\end\{).)*)\\end\{\1\}", re.S)
+ENDS = re.compile(r"&|\\\\")
 
 
 def require_tex(markdown: str) -> None:
@@ -18,8 +20,16 @@ def require_tex(markdown: str) -> None:
     inline = re.findall(r"(?<![\\$])\$(?!\$)(.+?)(?<!\\)\$", re.sub(r"\$\$.+?\$\$", "", markdown, flags=re.S), re.S)
     for formula in (*displays, *inline):
         assert not re.search(r"\\text\{[^}]*(?<!\\)[_^&%#]", formula), formula
-        for cell in CELLS.split(formula):
+        for cell in _cells(formula):
             _require(re.sub(r"\\(left|right|displaystyle)\b", "", cell).replace(r"\text{", r"\mathrm{").strip())
+
+
+def _cells(formula: str) -> Iterator[str]:
+    """The cells of all matrices and cases, and the formula with a letter in their places."""
+    while found := INNERMOST.search(formula):
+        yield from ENDS.split(found[2])
+        formula = f"{formula[: found.start()]} x {formula[found.end() :]}"
+    yield from ENDS.split(formula)
 
 
 @cache
