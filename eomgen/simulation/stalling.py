@@ -19,7 +19,7 @@ from .stalled import Crawling
 
 WINDOW = 200  #: steps judged together
 MANY = 100_000  #: steps left that a run may take at any stall_check
-IN_PLACE = 10_000_000  #: steps left that it may take where it is held between two sides of a jump
+IN_PLACE = 1_000_000  #: steps left that it may take where it is held between two sides of a jump
 HALVED = 10  #: times that an interval is halved in which a rate jumps: a change that is not one shrinks to 1/1024
 HINDERED = 0.1  #: part of what its rate says up to which a state that moves is held
 REMEDY = (
@@ -85,7 +85,7 @@ class StallCheck:
             raise crawl
         if abs(self.end - t) > IN_PLACE * step:
             self.slow += 1  # sliding is looked for in the 1st, 2nd, 4th, 8th ...: it takes 12 n_x + 1 evaluations
-            if self.slow & (self.slow - 1) == 0 and slides(self.rhs, crawl, moved, still, time):
+            if self.slow & (self.slow - 1) == 0 and slides(self.rhs, crawl, moved, time):
                 raise crawl
 
     def _require_end(self, t: float) -> None:
@@ -104,8 +104,8 @@ class StallCheck:
             )
 
 
-def slides(rhs: Callable[[float, Array], Array], crawl: Crawling, moved: Array, still: Any, time: float) -> bool:
-    """Whether a run is held where a rate jumps, so that all its states stand still or do not go as their rates say.
+def slides(rhs: Callable[[float, Array], Array], crawl: Crawling, moved: Array, time: float) -> bool:
+    """Whether a run is held where a rate jumps, so that none of its states goes as its rate says.
 
     Parameters
     ----------
@@ -115,8 +115,6 @@ def slides(rhs: Callable[[float, Array], Array], crawl: Crawling, moved: Array, 
         Time, state and mean step.
     moved : (n_x,) array
         What the states have changed in a while.
-    still : (n_x,) array of bool
-        Which of them that leaves where they are.
     time : float
         The while (s).
     """
@@ -141,7 +139,7 @@ def slides(rhs: Callable[[float, Array], Array], crawl: Crawling, moved: Array, 
                 else:
                     high, above = middle, between
             jumped = jumped or bool(abs(above[i] - below[i]) > 0.5 * change[i] > NOTICED * rates[i])
-    return jumped and bool((still | (moved <= HINDERED * time * rates)).all())
+    return jumped and bool((moved <= HINDERED * time * rates).all())
 
 
 def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple[str, ...], atol: Any) -> str:
