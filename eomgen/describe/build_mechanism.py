@@ -319,7 +319,7 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
         reader.wrong("independent", given, "names")
         return ()
     coordinates = list(reader.names.of("coordinate"))
-    rates = {name + "_dot" for name in coordinates}
+    rates = [name + "_dot" for name in coordinates]
     known = [*coordinates, *(name for name in reader.names.of("velocity") if name not in rates)]
     result: list[str] = []
     for k, item in enumerate(listed):
