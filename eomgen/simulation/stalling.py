@@ -20,7 +20,7 @@ from .stalled import Crawling
 WINDOW = 200  #: steps judged together
 MANY = 100_000  #: steps left that a run may take at any stall_check
 IN_PLACE = 1_000_000  #: steps left that it may take where it is held between two sides of a jump
-HELD = 100  #: times as many, from which on a state that moves by little is held too
+HELD = 50  #: times as many, from which on a state that moves by little is held too
 HALVED = 10  #: times that an interval is halved in which a rate jumps: a change that is not one shrinks to 1/1024
 HINDERED = 0.1  #: part of what its rate says up to which a state that moves is held
 REMEDY = (
