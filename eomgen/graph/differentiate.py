@@ -165,6 +165,8 @@ def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, 
         elif operation == "neg":
             a = node[1]
             adjoints[a] = sub(adjoints[a], w) if a in adjoints else g.neg(w)
+        elif operation == "absorb" and node[1] not in active:
+            adjoints[node[2]] = add(adjoints[node[2]], mul(w, node[1])) if node[2] in adjoints else mul(w, node[1])
         elif (
             operation == "absorb"
             or is_pair_item(g, operation)

@@ -210,7 +210,7 @@ main()
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_command_without_a_traceback(number: signal.Signals) -> None:
     """While it imports, reads and derives: with 130 and 143, as shells say of both signals."""
-    words = ["derive", str(EXAMPLES / "stewart_platform.yaml"), "--method", "lagrange"]
+    words = ["derive", str(EXAMPLES / "large" / "tracked_excavator.yaml"), "--method", "lagrange"]  # some seconds
     for after in (0.0, 0.01, 0.03, 0.06, 0.1, 0.2, 0.4):
         with child([sys.executable, "-c", COMMAND, *words], stdout=PIPE, stderr=PIPE, text=True) as process:
             assert process.stdout is not None
@@ -218,6 +218,5 @@ def test_a_signal_ends_a_command_without_a_traceback(number: signal.Signals) -> 
             time.sleep(after)
             process.send_signal(number)
             _, said = process.communicate(timeout=60)
-        # after its last line Python lets a signal end the process, which shells call 130 and 143 too
-        assert process.returncode in (128 + number, -number), (after, said)
-        assert "Traceback" not in said
+        assert process.returncode == 128 + number, (after, said)
+        assert said.replace("interrupted\n", "").strip() == ""
