@@ -139,16 +139,17 @@ def sensitivities(
     fail, title = bound.kernels.fail, solver.__name__
     longest = float(settings.get("max_step", np.inf))
     numbers = len(z0) if times is None else 0
-    troubled = lambda t, z: fail.trouble(z[: layout.n_x], t) is not None  # noqa: E731
-    stall_check = StallCheck(start, stop, z0, layout.n_q, longest, troubled, run, numbers)
+    troubled = lambda t, x: fail.trouble(x, t) is not None  # noqa: E731
+    rates = lambda t, x: bound.rhs(t, x, u=forcing(t, x))  # noqa: E731
+    stall_check = StallCheck(start, stop, x0, layout.n_q, longest, troubled, rates, numbers)
     try:
         with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
             solution = integrate(
                 run, nodes, z0, solver, times, salts.watched, False, settings, stall_check, salts.reset, forcing.enter
             )
     except Crawling as crawl:
-        _refuse_change_point(bound, forcing, crawl.t, crawl.x[: layout.n_x])
-        trouble = "; ".join(fail.trouble(crawl.x[: layout.n_x], crawl.t) or ())
+        _refuse_change_point(bound, forcing, crawl.t, crawl.x)
+        trouble = "; ".join(fail.trouble(crawl.x, crawl.t) or ())
         raise SimulationError(describe_crawl(crawl, layout.x, stop, title, trouble)) from None
     if solution.status < 0 or not np.isfinite(solution.x).all():
         failure = run.rhs.failure or run.tangent.failure

@@ -12,15 +12,14 @@ import numpy as np
 
 from ..errors import SimulationError
 from ..limits.rounding import TINY
-from ..limits.runs import ENDLESS, ENOUGH, FEW, HOPELESS, MOST_NUMBERS, NOTICED, SHORT, STEEP, STILL
+from ..limits.runs import ENDLESS, ENOUGH, FEW, HOPELESS, MOST_NUMBERS, MOST_STEPS, NOTICED, SHORT, STEEP, STILL
 from ..numeric.scales import Array
 from ..runtime.failure import place
 from .stalled import Crawling
 
 WINDOW = 200  #: steps judged together
 MANY = 100_000  #: steps left that a run may take at any stall_check
-IN_PLACE = 1_000_000  #: steps left that it may take where it is held between two sides of a jump
-HELD = 50  #: times as many, from which on a state that moves by little is held too
+IN_PLACE = 1_000_000  #: steps left that it may take where nothing of it gets on, held between two sides of a jump
 HALVED = 10  #: times that an interval is halved in which a rate jumps: a change that is not one shrinks to 1/1024
 HINDERED = 0.1  #: part of what its rate says up to which a state that moves is held
 REMEDY = (
@@ -34,14 +33,15 @@ class StallCheck:
 
     A run crawls if its mean step would take more than ``MANY`` further steps and is less than ``SHORT`` of its span,
     while either the state stands still or it is at a known singularity: a short impact moves the state.  So it does if
-    it would take more than ``IN_PLACE`` and is held where a rate jumps, as in sliding modes.
+    it would take more than ``IN_PLACE`` and is held where a rate jumps, as in sliding modes, and none of its states
+    goes as its rate says; where others do, as they may end the sliding, it may take ``MOST_STEPS``.
 
     Parameters
     ----------
     start, end : float
         Of the run (s).
     x : (n_x,) array
-        First state.
+        First state; of what follows it in those looked at, as derivatives by parameters, nothing is judged.
     n_q : int
         Number of positions; velocities follow.
     max_step : float
@@ -73,6 +73,7 @@ class StallCheck:
         self._require_end(t)
         if self.steps < WINDOW:
             return
+        x = x[: len(self.x)]
         step, moved = abs(t - self.t) / self.steps, np.abs(x - self.x)
         largest = np.abs(self.x) if self.largest is None else self.largest
         time = abs(t - self.t)
@@ -86,7 +87,8 @@ class StallCheck:
             raise crawl
         if abs(self.end - t) > IN_PLACE * step:
             self.slow += 1  # sliding is looked for in the 1st, 2nd, 4th, 8th ...: it takes 12 n_x + 1 evaluations
-            moved = np.where(still & (abs(self.end - t) > HELD * IN_PLACE * step), 0.0, moved)
+            if abs(self.end - t) > MOST_STEPS * step:
+                moved[still] = 0.0
             if self.slow & (self.slow - 1) == 0 and slides(self.rhs, crawl, moved, time):
                 raise crawl
 
