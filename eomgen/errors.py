@@ -193,11 +193,6 @@ class UnavailableError(UsageError, AttributeError):
     """
 
 
-def left_out(what: str) -> UnavailableError:
-    """The error for what is not part of a slim package."""
-    return UnavailableError(f"this package was generated slim; generate it without --slim for {what}")
-
-
 class EvaluationError(EomgenError):
     """A kernel failed at a state; a recoverable failure, so integrators see NaN and shorten their step."""
 

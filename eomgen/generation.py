@@ -32,7 +32,6 @@ def generate(
     target: str = "cython",
     independent: Sequence[str] | None = None,
     baumgarte: tuple[float, float] | None = None,
-    slim: bool = False,
     precision: str = "double",
     fmi: str = "2.0",
 ) -> Path:
@@ -47,8 +46,6 @@ def generate(
     method, independent, baumgarte : optional
         As for ``Model.compile``.
     target : {'cython', 'numpy', 'c', 'casadi', 'jax', 'cuda', 'fmu'}
-    slim : bool, optional
-        Write calls, events and ``simulate`` only, in a tenth of the Python text; what else is called refuses by name.
     precision : {'double', 'float'}, optional
         Of the numbers of a ``c`` library: ``float`` is for processors whose unit knows single precision alone, and
         leaves five to six digits.
@@ -64,19 +61,18 @@ def generate(
     row = find_target(target)
     equations = derive(model, method, independent, baumgarte)
     if row.whole:
-        if slim or precision != "double":
-            raise UsageError(f"slim and precision are for packages; target {target} makes one file")
+        if precision != "double":
+            raise UsageError(f"precision is for packages; target {target} makes one file")
         return row.write(equations, folder, fmi)
     program = build(equations, target)
     if row.kernels and not row.module:
         program = with_start(equations, program)
     asked = {"independent": list(independent or ()) or None, "baumgarte": baumgarte, "precision": precision}
     told = {name: value for name, value in asked.items() if value not in (None, "double")}
-    sources = dict(emit_package(program, target, slim, precision, told))
+    sources = dict(emit_package(program, target, precision, told))
     if row.module:
         sources[RECORDED] = record_calls(_evaluated(equations))
-        if not slim:
-            sources[FILE] = record(program)
+        sources[FILE] = record(program)
     return write_package(sources, folder / equations.name)
 
 

@@ -11,7 +11,6 @@ from importlib import import_module
 from types import MethodType
 from typing import TYPE_CHECKING, Any
 
-from ..errors import left_out
 from ..runtime.argument_names import both_names, plain_names
 from ..runtime.bound_model import BoundModel
 from ..runtime.near_names import find_lacking
@@ -100,22 +99,8 @@ FORMS = {
 
 
 def find_function(file: str, name: str) -> Any:
-    """A function or class of another part of the package, which is loaded now.
-
-    Raises
-    ------
-    MissingDependencyError
-        A slim package was generated without it.
-    """
-    try:
-        found = getattr(import_module(f"..{file}", __package__), name, None)
-    except ModuleNotFoundError as error:
-        found = None
-        if not str(error.name).startswith(f"{__package__.rpartition('.')[0]}."):
-            raise  # something else that it needs
-    if found is None:
-        raise left_out(name.lower())
-    return found
+    """A function or class of another part of the package, which is loaded now."""
+    return getattr(import_module(f"..{file}", __package__), name)
 
 
 class LateMethod:

@@ -36,11 +36,6 @@ from .shared_options import (
 @independent_option
 @target_option(*TARGETS)
 @click.option(
-    "--slim",
-    is_flag=True,
-    help="Write a small package with calls, events and simulate only; other methods raise an error.",
-)
-@click.option(
     "--precision",
     type=click.Choice(PRECISIONS),
     default="double",
@@ -70,7 +65,6 @@ def generate(
     baumgarte: tuple[float, float] | None,
     independent: tuple[str, ...],
     target: str,
-    slim: bool,
     precision: str,
     fmi: str,
     wheel: bool,
@@ -88,7 +82,7 @@ def generate(
         require_wheel(target)
     with blaming_option(independent), stage("generate"):
         described = load_model(model, allow_native, robot)
-        folder = write_out(described, out, method, target, independent or None, baumgarte, slim, precision, fmi)
+        folder = write_out(described, out, method, target, independent or None, baumgarte, precision, fmi)
     built = None
     if wheel:
         with stage("wheel"):
@@ -97,7 +91,7 @@ def generate(
             say(f"note: {built.path.name} {built.note}", err=True)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     if as_json:
-        found = {"name": folder.stem, "target": target, "slim": slim, "folder": str(folder), "files": files}
+        found = {"name": folder.stem, "target": target, "folder": str(folder), "files": files}
         print_json(found | ({"wheel": str(built.path), "note": built.note} if built else {}))
         return
     say(str(folder))

@@ -21,7 +21,6 @@ from .layouts import describe_layouts
 from .numpy import emit_numpy
 from .provenance import trace_provenance
 from .python_calls import describe_calls
-from .slim import carry_slim
 from .sources import SourceSet, metadata_json, number_texts, render
 
 #: Annotated attributes of the package, all of its default module.
@@ -44,16 +43,13 @@ MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
 ANALYSES = (*MOTIONS, *DERIVATIVES, "linearize", "modes", "equilibrium", "sensitivities", *FORCES)
 PICTURES = ("draw", "draw_branches")
 METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *PICTURES, *ANALYSES)
-#: What a slim package has of them.
-SLIM_METHODS = ("x0", "assemble", "bind", "simulate")
-
 
 #: Files of every package.
 ABOUT = ("LICENSE.txt", "PROVENANCE.md")
 
 
 def emit_package(
-    program: Program, target: str, slim: bool = False, precision: str = "double", asked: Mapping[str, Any] | None = None
+    program: Program, target: str, precision: str = "double", asked: Mapping[str, Any] | None = None
 ) -> SourceSet:
     """All files of an exported package, relative to its own folder.
 
@@ -61,8 +57,6 @@ def emit_package(
     ----------
     program : Program
     target : {'cython', 'numpy', 'c'}
-    slim : bool, optional
-        Only calls and runs, as ``cython`` or ``numpy``; everything else refuses by name.
     precision : {'double', 'float'}, optional
         Of the numbers of a ``c`` library.
     asked : mapping of str to object, optional
@@ -77,22 +71,18 @@ def emit_package(
     Raises
     ------
     UsageError
-        An unknown target or precision, ``slim`` for a library of C, which holds no Python, or ``float`` for another.
+        An unknown target or precision, or ``float`` for another target than ``c``.
     """
     row = find_target(target)
     if row.whole:
         raise UsageError(f"target {target!r} makes one file, not a package; use generate")
-    if slim and not row.module:
-        raise UsageError(
-            f"slim is for target cython or numpy; packages of target {target} contain no Python to leave out"
-        )
     if precision not in PRECISIONS:
         raise UsageError(f"no precision {precision!r}; there are {', '.join(PRECISIONS)}")
     if precision != "double" and not row.precisions:
         raise UsageError(f"precision={precision!r} is for target c; packages of target {target} compute in double")
     made = {"target": target, "provenance": trace_provenance(program, target, asked or {})}
     program = replace(program, metadata={**program.metadata, **made})
-    context = _context(program, slim) | {"precision": precision}
+    context = _context(program) | {"precision": precision}
     about = {name: render(f"python/{name}.j2", context) for name in ABOUT}
     return SourceSet({"model.json": metadata_json(program), **about, **row.files(program, context)})
 
@@ -121,14 +111,9 @@ def numpy_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
 
 def _python_files(context: dict[str, Any], core: Mapping[str, str]) -> dict[str, str]:
     """What is generated in Python besides the core, and all of eomgen that it needs."""
-    slim = context["slim"]
-    names = ("__init__.py", "__init__.pyi", *(() if slim else ("selftest.py",)))
+    names = ("__init__.py", "__init__.pyi", "selftest.py")
     own = {name: render(f"python/{name}.j2", context) for name in names}
-    parts = ("signals", "start_terms", "states", "clocks", "contact_shapes")
-    declared = {key: bool(context["metadata"].get(key)) for key in parts}
-    declared["start_terms"] |= bool(context["metadata"].get("start_fixed"))
-    declared["clocks"] |= bool(context["metadata"].get("switched"))  # of which runs go forward in time too
-    found = carry_slim({**core, **own}, **declared) if slim else carry({**core, **own})
+    found = carry({**core, **own})
     context = context | {"folders": sorted({name.partition("/")[0] for name in found if "/" in name})}
     names = ("pyproject.toml", "README.md", "tests/test_recorded.py")
     about = {name: render(f"python/{name}.j2", context) for name in names}
@@ -144,14 +129,12 @@ def _forms(metadata: Mapping[str, Any]) -> tuple[str, ...]:
     return (*found, *(["canonical"] if metadata.get("method") == "hamilton" else []))
 
 
-def _context(program: Program, slim: bool) -> dict[str, Any]:
+def _context(program: Program) -> dict[str, Any]:
     metadata = program.metadata
     doc = str(metadata.get("doc") or "").strip()
-    calls, methods = describe_calls(program), SLIM_METHODS if slim else METHODS
-    attributes, forms = [*(name for name, _ in ANNOTATED), *methods], () if slim else _forms(metadata)
+    attributes, forms = [*(name for name, _ in ANNOTATED), *METHODS], _forms(metadata)
     return {
         "name": program.name,
-        "slim": slim,
         "prefix": program.name.upper(),
         "doc": doc,
         "description": summary_text(doc.splitlines()[0] if doc else f"Equations of motion of {program.name}"),
@@ -160,12 +143,12 @@ def _context(program: Program, slim: bool) -> dict[str, Any]:
         "metadata": metadata,
         "provenance": metadata["provenance"],
         "layouts": describe_layouts(program),
-        "calls": [call for call in calls if not slim or call.text.partition("(")[0] in attributes],
+        "calls": describe_calls(program),
         "attributes": attributes,
         "listed": fill(", ".join(f'"{name}"' for name in (*attributes, *forms)), 110).splitlines(),
         "annotations": ANNOTATED,
         "forms": forms,
-        "methods": methods,
+        "methods": METHODS,
         "p_values": number_texts(metadata.get("p_values")),
         "u_values": number_texts(metadata.get("u_values")),
     }

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError, UnavailableError
+from ..errors import AssemblyError
 from ..limits.constraints import CONTRADICTION, GIVEN
 from . import algebra
 from .scales import Array, Indices, Scales
@@ -79,10 +79,8 @@ def assemble_velocity(
             break
     else:
         return v
-    try:
-        from .assembly_failure import describe_contradiction
-    except UnavailableError:
-        raise AssemblyError("the given velocities are inconsistent with the constraints; give others") from None
+    from .assembly_failure import describe_contradiction
+
     given = {names[i] if names else f"v[{i}]": x[i] for i in held}
     row_scales, all_labels = scales.c, list(labels) or [f"C[{i}]" for i in range(len(C_t))]
     if equations is not None:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError, UnavailableError
+from ..errors import AssemblyError
 from .closure import ClosureSystem, WantedValues, close, closed
 from .projection import largest
 from .scales import Array, Indices, Scales
@@ -145,10 +145,8 @@ class ConstraintSystem(NamedTuple):
                 flipped = True
             else:
                 return Assembly(q, residual, attempt, largest(self.scales.distance(q, guess)))
-        try:
-            from .assembly_failure import AssemblyFailure
-        except UnavailableError:
-            raise AssemblyError("the loops do not close with the given values; give others") from None
+        from .assembly_failure import AssemblyFailure
+
         moved = self.scales.velocities(self.indices(held))
         failure = AssemblyFailure(system, guess, moved, best, flipped, self.names, self.labels, restarts)
         raise AssemblyError(failure.message(), [label for label, _ in failure.open_rows()])

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import UnavailableError
 from ..limits.motions import BLOCKED, UNJUDGED
 from .curves import OFF, TURNED, Point, predict
 from .projection import largest
@@ -110,11 +109,9 @@ class Continuation:
         return found
 
     def _leap(self, here: Point) -> Point | None:
-        """The point behind a singular position; a slim package stops there."""
-        try:
-            from .leaps import leap
-        except UnavailableError:
-            return None
+        """The point behind a singular position."""
+        from .leaps import leap
+
         return leap(self.curve, self.points, here)
 
     def _bend(self, here: Point) -> Array:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError, Problem, UnavailableError
+from ..errors import ParameterError, Problem
 from ..numeric.scales import Array
 from ..numeric.value_ranges import Allowed, Flaw, judge_range
 
@@ -28,10 +27,10 @@ def require_allowed(metadata: Mapping[str, Any], p: Array) -> None:
         if len(wrong):
             flaws = judge_range(columns[k, wrong[:1]], *data)
             problems += told(metadata, path, flaws, [k], p, wrong.tolist())
-    with suppress(UnavailableError):  # a slim package judges single parameters only
+    if rules := metadata.get("rules"):
         from .late_rules import broken_rules
 
-        for path, flaws, used, runs in broken_rules(metadata.get("rules", ()), columns):
+        for path, flaws, used, runs in broken_rules(rules, columns):
             problems += told(metadata, path, flaws, used, p, runs)
     if problems:
         raise ParameterError(list(dict.fromkeys(problems)))

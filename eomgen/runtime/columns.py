@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UnavailableError, UsageError
+from ..errors import UsageError
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .layout import Layout
@@ -152,10 +152,8 @@ def units_of_layout(layout: Layout) -> dict[str, str]:
 def describe(module: BoundModel) -> dict[str, Any]:
     """What the columns of any run of a module are called, where it comes from, and its parameters."""
     known = {**_described(module.layout), "parameters": dict(module._parameters)}
-    try:
-        from .origin import origin
-    except UnavailableError:  # a slim package does not say
-        return known
+    from .origin import origin
+
     return known | {"origin": origin(module)}
 
 

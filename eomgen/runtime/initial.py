@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError, UnavailableError, calls_within
+from ..errors import AssemblyError, calls_within
 from ..limits.constraints import GONE, INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
 from ..numeric.assembly_velocity import VelocityEquations, assemble_velocity
@@ -106,10 +106,9 @@ class Initial:
         """The closed position near a start, also where Newton's steps halve the distance only, as at a change point."""
         found = self.system.close(start, held, restarts)
         if found.residual > SETTLED:
-            with suppress(UnavailableError):
-                from .start_branch import where_lost  # not in a slim package
+            from .start_branch import where_lost
 
-                return where_lost(self.system.closure(held), found.q)
+            return where_lost(self.system.closure(held), found.q)
         return found.q
 
     def used(self, declared: dict[str, float]) -> dict[str, float]:
@@ -181,7 +180,7 @@ class Initial:
         if set(guess) <= set(favoured):
             with suppress(AssemblyError):
                 return self.assembled(guess, rough=True)
-        from ..numeric.nearest_branch import close_nearest  # not in a slim package
+        from ..numeric.nearest_branch import close_nearest
 
         declared = {**self.sort(layout.guess).positions, **self.sort(layout.initial).positions}
         declared = self.used({k: v for k, v in declared.items() if k not in guess})
@@ -259,7 +258,7 @@ class Initial:
         sizes = algebra.singular_values(J := self.scaled_jacobian(q))
         if sizes[rank - 1] > GONE * sizes[0]:
             return v
-        from .start_branch import on_branches  # not in a slim package
+        from .start_branch import on_branches
 
         return on_branches(self.kernels, self.t, q, J, {n: self.gradients(q, n) for n in names}, v)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UnavailableError, UsageError
+from ..errors import UsageError
 from ..numeric.scales import Array
 from .argument_names import both_names
 from .failure import Fail
@@ -128,11 +128,9 @@ class Kernels:
         return self.state("poses", nan=True)(q, t=t, p=p)
 
     def _culprit(self, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None) -> str:
-        """Names what a failure at a state is due to, as far as it can be told; a slim package does not look for it."""
-        try:
-            from .culprit import find_culprit
-        except UnavailableError:
-            return ""
+        """Names what a failure at a state is due to, as far as it can be told."""
+        from .culprit import find_culprit
+
         return find_culprit(self, status, t, x, p, u)
 
 

@@ -62,11 +62,7 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
 
 def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
     choice = list(dict.fromkeys(allowed))
-    try:
-        near: list[str] = import_module("..suggestions", __package__).closest(name, choice, 3)
-    except ModuleNotFoundError:  # a slim package has no table of words
-        near = import_module("difflib").get_close_matches(str(name), choice, 3)
-    if near:
+    if near := import_module("..suggestions", __package__).closest(name, choice, 3):
         return f"did you mean {' or '.join(near)}?"
     if not choice:
         return "there are none"

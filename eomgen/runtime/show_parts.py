@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-#: What is asked for by name; a generated package carries these files, a slim one does not.
+#: What is asked for by name; a generated package carries these files.
 PARTS = {
     "animate": "show.animate",
     "data": "show.data",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import EvaluationError, SimulationError, UnavailableError
+from ..errors import EvaluationError, SimulationError
 from ..limits.runs import SCIPY_ATOL
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
@@ -65,16 +65,16 @@ class Run:
         self._first = (start, end, x, self.module.n_q, longest), kept
 
     @cached_property
-    def stall_check(self) -> StallCheck | None:
-        """What ends the run where its steps lead nowhere, made when first looked at; a slim package has none."""
-        check = find_stall_check()
+    def stall_check(self) -> StallCheck:
+        """What ends the run where its steps lead nowhere, made when first looked at."""
+        from .stalling import StallCheck
+
         first, kept = self._first
-        return None if check is None else check(*first, partial(_troubled, self.module), self.watched(None), kept)
+        return StallCheck(*first, partial(_troubled, self.module), self.watched(None), kept)
 
     def look(self, t: float, x: Array, steps: int = 1) -> None:
         """Take note of further steps."""
-        if self.stall_check is not None:
-            self.stall_check.look(t, x, steps)
+        self.stall_check.look(t, x, steps)
 
     def remember(self, name: str, kernel: Timed) -> None:
         """Keep a failure as the cause, unless its state came out of an earlier failure as NaN."""
@@ -144,32 +144,15 @@ def _troubled(module: BoundModel, t: float, x: Array) -> bool:
     return module.kernels.fail.trouble(x, t) is not None
 
 
-@cache
-def find_stall_check() -> type[StallCheck] | None:
-    """The class of what ends runs whose steps lead nowhere; None in a slim package."""
-    try:
-        from .stalling import StallCheck
-    except UnavailableError:
-        return None
-    return StallCheck
-
-
 def watch_run(start: float, end: float, progress: bool | None) -> Progress | None:
     """What shows the progress of a run: if that is asked for, or by default on a terminal."""
-    found = _progress()
-    if type(found) is not tuple:
-        if progress:
-            raise found
-        return None
-    shown, wanted = found
+    shown, wanted = _progress()
     return shown(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
 
 
 @cache
-def _progress() -> Any:
-    """The class of what shows progress and the function that tells whether to; in a slim package why there is none."""
-    try:
-        from .progress import Progress, wanted
-    except UnavailableError as error:
-        return error
+def _progress() -> tuple[type[Progress], Callable[[bool | None], bool]]:
+    """The class of what shows progress and the function that tells whether to, found once: a run starts with them."""
+    from .progress import Progress, wanted
+
     return Progress, wanted

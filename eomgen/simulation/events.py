@@ -149,7 +149,7 @@ class Events:
             self.names.append(name if taken[name] == 1 else f"{name}_{taken[name]}")
         if all(event.direction == UNWATCHED for event in self.model):
             self.names, self.model = self.names[len(known) :], []
-        if any(event.action == WAIT for event in self.model):  # here, so that a slim package refuses before the run
+        if any(event.action == WAIT for event in self.model):
             from ..analysis.impact import strike_events
 
             self._strike = strike_events

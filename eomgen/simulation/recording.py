@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UnavailableError
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, project, units_of_layout
 from ..runtime.signals import Forcing
@@ -77,11 +76,9 @@ def _header(
 
 
 def _described(module: BoundModel, forcing: Forcing, options: dict[str, Any]) -> dict[str, Any]:
-    """The model, options and inputs as they were given; a slim package does not keep the latter."""
-    try:
-        from ..runtime.origin import inputs_of, plain
-    except UnavailableError:
-        return describe(module)
+    """The model, options and inputs as they were given."""
+    from ..runtime.origin import inputs_of, plain
+
     given = {name: plain(value) for name, value in options.items() if name != "jac"}
     return {**describe(module), "options": given, "inputs": inputs_of(module, forcing)}
 

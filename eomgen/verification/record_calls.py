@@ -25,7 +25,7 @@ SEED = 30
 STATES = 2
 NUDGES = 4  #: states beside each, by which the effect of rounding is estimated
 
-#: Calls that every package has, slim ones too, and their arguments.
+#: Calls that every package has, and their arguments.
 CALLS: dict[str, Callable[[Case], tuple[Any, ...]]] = {
     "rhs": lambda c: (c.t, c.x),
     "jacobian": lambda c: (c.t, c.x),

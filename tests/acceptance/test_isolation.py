@@ -158,52 +158,6 @@ def test_exported_package_in_a_fresh_environment(
         assert "scipy" in there["simulate"].lower()
 
 
-SLIM = """
-import importlib.util, json, sys
-import numpy as np
-
-for absent in ("eomgen", "sympy", "scipy"):
-    assert importlib.util.find_spec(absent) is None, f"{absent} is there"
-import slider_crank as model
-
-x = model.x0(theta=0.4)
-result = {
-    "x": x.tolist(),
-    "x_dot": model.rhs(0.3, np.stack([x, x], axis=-1))[:, 1].tolist(),
-    "jacobian": model.jacobian(0.3, x).tolist(),
-    "reached": model.simulate((0, 0.5), initial=x, inputs={"tau": ([0.0, 1.0], [0.0, 2.0])}).x[:, -1].tolist(),
-}
-try:
-    model.simulate((0, 1), method="BDF")
-except ImportError as error:
-    result["bdf"] = str(error)
-try:
-    model.equilibrium()
-except model.EomgenError as error:
-    result["refused"] = str(error)
-result["loaded"] = len([name for name in sys.modules if name.startswith("slider_crank")])
-print(json.dumps(result))
-"""
-
-
-@pytest.mark.slow
-def test_slim_package_in_a_fresh_environment(module: Callable[..., Any], fresh: Path, tmp_path: Path) -> None:
-    folder = generate(models.build("slider_crank"), tmp_path / "slim", slim=True)
-    command = [fresh, "-m", "pip", "install", "--no-build-isolation", "--no-deps", "--no-index", "--force-reinstall"]
-    succeed(*command, folder, cwd=tmp_path, env=clean_environment())
-    there = json.loads(succeed(fresh, "-I", "-c", SLIM, cwd=tmp_path, env=clean_environment()))
-    mod = module("slider_crank")
-    x = mod.x0(theta=0.4)
-    np.testing.assert_array_equal(there["x"], x)
-    np.testing.assert_array_equal(there["x_dot"], mod.rhs(0.3, x))
-    np.testing.assert_array_equal(there["jacobian"], mod.jacobian(0.3, x))
-    run = mod.simulate((0, 0.5), initial=x, inputs={"tau": ([0.0, 1.0], [0.0, 2.0])})
-    np.testing.assert_array_equal(there["reached"], run.x[:, -1])
-    assert "scipy" in there["bdf"]
-    assert there["refused"] == "this package was generated slim; generate it without --slim for equilibrium"
-    assert there["loaded"] < 70
-
-
 def test_exported_sources_name_neither_eomgen_nor_sympy(tmp_path: Path) -> None:
     folder = generate(models.build("slider_crank"), tmp_path)
     for file in folder.rglob("*.py*"):

@@ -114,17 +114,17 @@ def test_derive_needs_no_parameter_values(call: Call, model_file: Callable[[str]
 
 def test_generate_json(call: Call, tmp_path: Path) -> None:
     written = call("generate", EXAMPLES / "pendulum.yaml", "--out", tmp_path / "out", "--json").json
-    assert set(written) == {"name", "target", "slim", "folder", "files"}
-    assert (written["target"], written["slim"]) == ("cython", False)
+    assert set(written) == {"name", "target", "folder", "files"}
+    assert written["target"] == "cython"
     assert Path(written["folder"]) == tmp_path / "out" / "pendulum"
     assert {"model.json", "pyproject.toml", "README.md"} <= set(written["files"])
     assert all((tmp_path / "out" / "pendulum" / name).is_file() for name in written["files"])
 
 
 def test_generate_a_wheel(call: Call, tmp_path: Path) -> None:
-    words = ("generate", EXAMPLES / "pendulum.yaml", "--out", "out", "--slim", "--wheel")
+    words = ("generate", EXAMPLES / "pendulum.yaml", "--out", "out", "--wheel")
     written = call(*words, "--target", "numpy", "--json").json
-    assert set(written) == {"name", "target", "slim", "folder", "files", "wheel", "note"}
+    assert set(written) == {"name", "target", "folder", "files", "wheel", "note"}
     assert Path(written["wheel"]) == Path("out", "pendulum-0.1.0-py3-none-any.whl")
     assert Path(written["wheel"]).is_file()
     assert written["note"] == ""

@@ -132,7 +132,7 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_its_tests_see_what_is_wrong(fault: str, tmp_path: Path) -> None:
     """In the folder, where they need no installation; nothing of them asks for what model.json says."""
-    folder = generate(models.build("pendulum"), tmp_path, target="numpy", slim=True)
+    folder = generate(models.build("pendulum"), tmp_path, target="numpy")
     file, old, new = FAULTS[fault]
     text = (folder / file).read_text()
     assert old in text
@@ -147,7 +147,7 @@ def test_one_of_numpy_is_for_every_computer(tmp_path: Path) -> None:
     m = eg.Model("class_", gravity=(0, -9.81, 0))  # which no project may be called, though a module may
     m.revolute("A", m.ground, m.body("rod", mass=1.0, com=(0, -1, 0)), coordinate="theta")
     m.initial(theta=0.5)
-    made = build_wheel(generate(m, tmp_path, target="numpy", slim=True), tmp_path / "wheels")
+    made = build_wheel(generate(m, tmp_path, target="numpy"), tmp_path / "wheels")
     assert made == BuiltWheel(tmp_path / "wheels" / "class-0.1.0-py3-none-any.whl", "")
     unpacked(made, tmp_path / "there")
     script = (
@@ -184,7 +184,7 @@ def test_setuptools_is_asked_for(version: str, monkeypatch: pytest.MonkeyPatch) 
 def test_a_folder_of_others_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="is not a generated package"):
         build_wheel(tmp_path)
-    folder = generate(models.build("pendulum"), tmp_path, target="numpy", slim=True)
+    folder = generate(models.build("pendulum"), tmp_path, target="numpy")
     (tmp_path / "elsewhere").write_text("kept")
     (tmp_path / "pendulum-0.1.0-py3-none-any.whl").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(UsageError, match="symbolic link"):

@@ -220,7 +220,6 @@ def test_packages_tell_whence_they_are_and_whose(packages):
         text = (folder / "crank" / "PROVENANCE.md").read_text()
         assert f"| method | `{found['options']['method']}` |" in text
         assert f"| version of numpy | `{np.__version__}` |" in text
-        assert ("| slim |" in text) == (target != "c")
         told = (folder / "crank" / "LICENSE.txt").read_text()
         assert told.endswith(licence)
         assert "eomgen claims no right in them" in told
@@ -229,11 +228,10 @@ def test_packages_tell_whence_they_are_and_whose(packages):
 def test_options_are_in_the_provenance(tmp_path):
     from eomgen.generation import generate
 
-    folder = generate(models.build("slider_crank"), tmp_path, "augmented", "numpy", ["theta"], (5.0, 5.0), slim=True)
+    folder = generate(models.build("slider_crank"), tmp_path, "augmented", "numpy", ["theta"], (5.0, 5.0))
     facts = json.loads((folder / "model.json").read_text())
     options = {"method": "augmented", "target": "numpy", "independent": ["theta"], "baumgarte": [5.0, 5.0]}
     assert facts["provenance"]["options"] == options
     assert facts["provenance"]["model_digest"] == facts["model_digest"]
     text = (folder / "PROVENANCE.md").read_text()
     assert facts["model_digest"] in text
-    assert "| slim | `True` |" in text

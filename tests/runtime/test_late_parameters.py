@@ -134,12 +134,10 @@ print(dropped.simulate(0.01, parameters={"r": 0.12}).status)
 """
 
 
-@pytest.mark.parametrize("slim", [False, True])
-def test_an_exported_package_refuses_by_itself(file: Path, tmp_path: Path, slim: bool) -> None:
-    generate(eg.load(file), tmp_path, target="numpy", slim=slim)
+def test_an_exported_package_refuses_by_itself(file: Path, tmp_path: Path) -> None:
+    generate(eg.load(file), tmp_path, target="numpy")
     done = subprocess.run([sys.executable, "-c", ALONE], cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr[-2000:]
     found = json.loads(done.stdout.splitlines()[0])
     assert found[0] == "forces.floor.first[0].radius: is -0.1 with r = -0.1; must be greater than 0"
-    rules = [line for line in found if line.startswith("forces.floor.restitution")]
-    assert bool(rules) is not slim  # a slim package judges single parameters
+    assert any(line.startswith("forces.floor.restitution") for line in found)

@@ -149,9 +149,8 @@ def test_an_output_that_is_declared_holds_for_each_run() -> None:
     assert module.bind({"reach": 1.0}).x0()[0] == pytest.approx(np.arcsin(0.5), abs=1e-12)
 
 
-@pytest.mark.parametrize("slim", [False, True])
-def test_an_exported_package_follows_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, slim: bool) -> None:
-    folder = generate(thrown(), tmp_path / "thrown", target="numpy", slim=slim)
+def test_an_exported_package_follows_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = generate(thrown(), tmp_path / "thrown", target="numpy")
     monkeypatch.syspath_prepend(folder.parent)
     package = importlib.import_module("thrown")
     try:

@@ -143,11 +143,10 @@ def test_libraries_that_trace_have_states() -> None:
         np.testing.assert_allclose(found, by_hand(X), rtol=1e-13)
 
 
-@pytest.mark.parametrize("slim", [False, True])
-def test_an_exported_package_has_states(tmp_path: Path, slim: bool) -> None:
+def test_an_exported_package_has_states(tmp_path: Path) -> None:
     file = tmp_path / "servo.yaml"
     servo().save(file)
-    words = ["generate", str(file), "--out", str(tmp_path / "out"), "--target", "numpy", *(["--slim"] if slim else [])]
+    words = ["generate", str(file), "--out", str(tmp_path / "out"), "--target", "numpy"]
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     subprocess.run([sys.executable, "-m", "eomgen", *words], check=True, capture_output=True, env=env)
     code = (

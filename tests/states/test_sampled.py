@@ -287,8 +287,8 @@ def test_units_sample_at_the_same_times(kind: str, start: float, tmp_path: Path)
     assert [found[name][-1] for name in ("s", "z", "u")] == pytest.approx(exact[[0, 2, 3]], abs=1e-6)
 
 
-def test_slim_packages_sample_too(tmp_path: Path) -> None:
-    generate(servo(), tmp_path, target="numpy", slim=True)
+def test_packages_sample_too(tmp_path: Path) -> None:
+    generate(servo(), tmp_path, target="numpy")
     code = "import servo; print(*servo.module.simulate((0.35, 1.05)).x[:4, -1])"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     exact = by_hand(1.05, 0.1 * np.arange(4, 11), start=0.35)
