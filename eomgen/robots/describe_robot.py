@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,6 @@ from ..numeric.rigid_inertia import EXCESS, fault_of_inertia
 from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from .link_names import RobotNames, clean_model_name
 from .link_tree import GROUND, Bodies, RobotBody, build_bodies, find_tied, joints_around, weigh_bodies
-from .resisted_turns import turn_texts
 from .robot import Drive, Range, Robot, RobotJoint, RobotOptions, Sum, Tie, describe_tie
 from .robot_frames import IDENTITY, Inertia, Placement, numbers
 
@@ -24,6 +24,7 @@ SHOWN = 8  #: joints that a note names
 #: Stops of joints: part of the range that one gives way under the drive's effort; what is left of the speed after it.
 GIVE, REBOUND = 0.01, 0.3
 GRAVITY = 9.81  #: m/s^2, of the weight that stands for an effort that is not told
+_PARAMETERS = ("_e0", "_e1", "_e2", "_e3")
 _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
 
 
@@ -232,7 +233,7 @@ class _Writer:
         """Damping and stiffness of a ball or a free joint, on its child and on a parent that moves."""
         name, d, k = self.joints[joint.name], joint.damping, joint.stiffness
         rest = joint.start or IDENTITY
-        turn = turn_texts(name, self._in_parameters(joint.type), rest.rotation)
+        turn = _turn_texts(name, self._in_parameters(joint.type), rest.rotation)
         for axis, place in zip("xyz" if joint.start else "", numbers(rest.position), strict=False):
             on = f"{name}_{axis}"
             for kind, law in (("damper", {"damping": d}), ("spring", {"stiffness": k, "rest": place})):
@@ -395,3 +396,39 @@ def _axis(axis: tuple[float, float, float]) -> Any:
         if np.array_equal(columns[2], axis):
             return word
     return [float(x) for x in axis]
+
+
+def _turn_texts(name: str, in_parameters: bool, rest: np.ndarray) -> list[str]:
+    """The rotation vector from the pose at rest, in the axes of the child, of at most half a turn.
+
+    MuJoCo resists turns of balls and free joints by -d w - k theta, with this vector theta and the angular velocity w.
+    ``name`` begins its coordinates, Euler parameters or angles x-y'-z''; ``rest`` is the rotation (3, 3) at rest.
+    """
+    if in_parameters:
+        raw = [name + suffix for suffix in _PARAMETERS]
+        size = f"sqrt({' + '.join(f'{x}**2' for x in raw)})"  # 1, but for what an integrator makes of it
+        e = [f"({x}/{size})" for x in raw]
+    else:
+        a, b, c = (f"{name}_{k}" for k in (1, 2, 3))
+        (ca, cb, cc), (sa, sb, sc) = ([f"{f}({q}/2)" for q in (a, b, c)] for f in ("cos", "sin"))
+        e = [
+            f"({ca}*{cb}*{cc} - {sa}*{sb}*{sc})",
+            f"({sa}*{cb}*{cc} + {ca}*{sb}*{sc})",
+            f"({ca}*{sb}*{cc} - {sa}*{cb}*{sc})",
+            f"({ca}*{cb}*{sc} + {sa}*{sb}*{cc})",
+        ]
+    r0, r1, r2, r3 = (float(x) for x in euler_parameters_from_matrix(rest))
+    # the conjugate of the rest times e
+    p = [_sum((r0, r1, r2, r3), e)]
+    p += [_sum(row, e) for row in ((-r1, r0, r3, -r2), (-r2, -r3, r0, r1), (-r3, r2, -r1, r0))]
+    square = f"(1 - ({p[0]})**2)"  # sin(phi/2)^2; near 0 the series of phi / sin(phi/2)
+    series = f"2 + {square}/3 + 3*{square}**2/20 + 5*{square}**3/56"
+    exact = f"2*atan2(sqrt({square}), abs({p[0]}))/sqrt({square})"
+    factor = f"where({p[0]} < 0, -1, 1)*where({square} < 1e-3, {series}, {exact})"
+    return [f"({x})*{factor}" for x in p[1:]]
+
+
+def _sum(factors: Sequence[float], terms: Sequence[str]) -> str:
+    """The sum of the terms whose factors are not zero."""
+    kept = [(f, x) for f, x in zip(factors, terms, strict=True) if f]
+    return " + ".join(x if f == 1.0 else f"({f!r})*{x}" for f, x in kept) or "0"

@@ -78,7 +78,7 @@ class Crossings:
         """Rates of the values along the motion, by a short way along x', onward (1) or back (-1)."""
         least = max(abs(t), 1.0) * MOMENTARY  # a step that ends with a part of the run may be as short as rounding
         h = way * ASIDE * (length if abs(length) >= least else self.forward * least)
-        return (self.values(t + h, x + h * f, aside=True) - g) / h
+        return (self.values(t + h, x + h * f, for_slope=True) - g) / h
 
     def arm(self, t: float, x: Array, length: float = 0.0) -> None:
         """Begin at a state; `length` is that of the step to come, with its sign, if it is known."""

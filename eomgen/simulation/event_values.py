@@ -30,11 +30,11 @@ class EventValues:
             else:
                 self.together.setdefault(id(event.source[0]), (event.source[0], []))[1].append(i)
 
-    def __call__(self, t: float, x: Array, aside: bool = False) -> Array:
-        """The values (n,) of all events at a time and state, of the run or aside of it."""
+    def __call__(self, t: float, x: Array, for_slope: bool = False) -> Array:
+        """The values (n,) of all events at a time and state; ``for_slope``: for a difference quotient, off the path."""
         g = np.empty(len(self.events))
         for i in self.alone:
-            g[i] = self.events[i](t, x, aside)
+            g[i] = self.events[i](t, x, for_slope)
         for together, places in self.together.values():
             values = together.values(t, x)
             for i in places:

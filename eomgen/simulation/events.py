@@ -78,17 +78,17 @@ class RunEvent:
         self.source: tuple[Together, int] | None = None  #: what gives the values of several events, and its place there
         self.users = False  #: whether the function is the user's, who must give a number wherever the run comes
 
-    def __call__(self, t: float, x: Array, aside: bool = False) -> float:
+    def __call__(self, t: float, x: Array, for_slope: bool = False) -> float:
         """The value at time t and state x; right after a reset, one on the side to which it led.
 
         Raises
         ------
         UsageError
-            The user's function gives no number, or none that is finite, unless it is asked ``aside`` of the run.
+            The user's function gives no number, or one that is not finite, unless it is ``for_slope``: off the path.
         """
         value = self.function(t, x.copy())  # a function may change what it is given
         found: Any = as_real(value) if self.users else value
-        if self.users and (found is None or found.ndim or not (aside or isfinite(found))):
+        if self.users and (found is None or found.ndim or not (for_slope or isfinite(found))):
             text = shown(value if found is None or found.ndim else float(found))
             raise UsageError(
                 f"event {self.name} is {text} at t = {t:.6g} s; its function must return a finite number at every "

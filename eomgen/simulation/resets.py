@@ -62,7 +62,7 @@ class Resets:
         """How fast an event's value changes along the motion, in the direction of the run."""
         h = AHEAD * self.span
         event.left = None
-        return float((event(t + h, x + h * np.asarray(self.rhs(t, x)), aside=True) - event(t, x)) / abs(h))
+        return float((event(t + h, x + h * np.asarray(self.rhs(t, x)), for_slope=True) - event(t, x)) / abs(h))
 
     def side(self, event: RunEvent, t: float, x: Array) -> float:
         """The side of zero, 1 or -1, to which the value of an event goes that is zero now; 0 where it stays.
@@ -74,4 +74,4 @@ class Resets:
             return float(np.sign(rate))
         h = AHEAD**0.5 * self.span
         middle = x + 0.5 * h * np.asarray(self.rhs(t, x))
-        return float(np.sign(event(t + h, x + h * np.asarray(self.rhs(t + 0.5 * h, middle)), aside=True)))
+        return float(np.sign(event(t + h, x + h * np.asarray(self.rhs(t + 0.5 * h, middle)), for_slope=True)))

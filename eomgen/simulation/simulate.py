@@ -139,9 +139,9 @@ def simulate(
     """
     again = None
     if dense_output is False and controllers is None:
-        *copies, times = [value if value is None else _copied(value) for value in (initial, parameters, inputs, t_eval)]
+        copies = [value if value is None else _copied(value) for value in (initial, parameters, inputs)]
         again = partial(
-            _again, module, span, *copies, t_eval=times, events=events, method=method, rtol=rtol, atol=atol,
+            _again, module, span, *copies, events=events, method=method, rtol=rtol, atol=atol,
             dense_output=True, max_step=max_step, first_step=first_step, progress=progress, step=step, **options,
         )  # fmt: skip
     settings: dict[str, Any] = {**options}
@@ -243,6 +243,8 @@ def simulate(
         settings.setdefault("jac", run.jacobian)
     watch = watch_run(start, end, progress)
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
+    if again is not None and stored is not None:
+        again = partial(again, t_eval=stored.copy())
     longest = float(settings.get("max_step", inf))
     numbers = (1 + module.n_x) * ((stored is None) + 8 * dense_output)  # of each step
     many = abs(end - start) / longest if longest > 0.0 else 0.0  # a solver of another refuses what it does not take

@@ -36,7 +36,7 @@ cdef extern from "eomgen_loop.h" nogil:
         int crowd
         double *latest
         double last_reset
-        int crowded, aside
+        int crowded, for_slope
     ctypedef struct eomgen_journey:
         const double *nodes
         long n_nodes
@@ -110,7 +110,7 @@ cdef class Journey(Stepper):
         nodes (n,): times not to step over, the end last; t_eval (k,) or None; dense: keep the solution between steps;
         trail: numbers at most of the steps to keep where t_eval is given; watch: told the time now and then, or None;
         stall_check: told time, state and steps since, or None; events: None, or a dict of names (how many of the model's,
-        or 0), tape (code, numbers, out) or None, outside: functions f(t, x, aside), and for each event direction, most, action;
+        or 0), tape (code, numbers, out) or None, outside: functions f(t, x, for_slope), and for each event direction, most, action;
         resets: rows (event, state) of the model's kernel; crowd: so many resets in a row are too many; keep: (seconds, function),
         called about so often, between two steps, with what freeze gives; or None.
 
@@ -362,7 +362,7 @@ cdef class Journey(Stepper):
             return 1
         try:
             for event in self.outside:
-                g[k] = event(t, copy(y, self.run.n), self.events.aside != 0)
+                g[k] = event(t, copy(y, self.run.n), self.events.for_slope != 0)
                 k += 1
         except BaseException as error:
             self.raised = error

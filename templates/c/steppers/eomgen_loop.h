@@ -44,7 +44,7 @@ typedef struct {
     double last_reset;
     int crowded;                   /* resets in a row that followed each other too closely */
     int crowd;                     /* so many are too many */
-    int aside;                     /* values are asked for beside the run, for their rates */
+    int for_slope;                 /* values are for a difference quotient, off the path of the run */
 } eomgen_events;
 
 /* One trajectory: what is asked, and what came of it so far. */

@@ -55,9 +55,9 @@ static void event_slopes(eomgen_run *run, eomgen_events *ev, const double *g, do
     for (int i = 0; i < run->n; i++) {
         ev->y[i] = run->y[i] + h * run->f[i];
     }
-    ev->aside = 1;
+    ev->for_slope = 1;
     event_values(run, ev, run->t + h, ev->y, slope);
-    ev->aside = 0;
+    ev->for_slope = 0;
     for (int i = 0; i < ev->n; i++) {
         slope[i] = (slope[i] - g[i]) / h;
     }
