@@ -172,10 +172,12 @@ class _Writer:
             values["limits"] = dict(joint.limits)
         if joint.dry_friction:
             values["dry_friction"] = joint.dry_friction
-        if joint.armature:
+        single = len(kind.coordinates) == 1
+        if joint.armature and single:
             values["armature"] = joint.armature
         self._add("joints", name, values, joint.place)
-        single = len(kind.coordinates) == 1
+        if joint.armature and not single:
+            self._rotor(joint)
         if not single and (joint.damping or joint.stiffness):
             self._resist(joint, between, (self.bodies[home], self.bodies[body.name]))
         rubbing = {"viscous": joint.damping} if joint.damping and single else {}
@@ -228,6 +230,19 @@ class _Writer:
             "formula": "flores",
         }
         self._force("stop", joint, "stop", {**bounds, **law})
+
+    def _rotor(self, joint: RobotJoint) -> None:
+        """The armature of a ball joint: inertia without mass that turns in space as the child does on its parent."""
+        name = self.joints[joint.name]
+        suffixes = self._suffixes(joint.type)
+        turning = {"rotation": self.options.rotation} if self._in_parameters(joint.type) else {}
+        rates = ("_wx", "_wy", "_wz") if turning else ()
+        body, twin = self.names.made(f"{name}_rotor"), self.names.made_joint(f"{name}_rotor", [*suffixes, *rates])
+        self._add("bodies", body, {"mass": 0, "inertia": [joint.armature] * 3}, joint.place)
+        self._add("joints", twin, {"type": joint.type, "between": [GROUND_NAME, body], **turning}, joint.place)
+        for suffix in rates or suffixes:  # Euler parameters may take any value: their rates alone are tied
+            law = {"type": "coupling", "equation": f"{twin}{suffix} - {name}{suffix}"}
+            self._add("constraints", self.names.made(f"{twin}{suffix}"), law, joint.place)
 
     def _resist(self, joint: RobotJoint, between: list[Any], bodies: tuple[str, str]) -> None:
         """Damping and stiffness of a ball or a free joint, on its child and on a parent that moves."""

@@ -26,8 +26,7 @@ class RobotNames:
 
     def joint(self, name: str, suffixes: Sequence[str]) -> str:
         """The name of a joint whose coordinates are that name with these suffixes."""
-        symbols = (suffix + rate for suffix in suffixes for rate in RATES)
-        return self._note("joints", name, unique(name, "joint", self.taken, (" joint", *symbols)))
+        return self._note("joints", name, self.made_joint(name, suffixes))
 
     def symbol(self, name: str) -> str:
         """The name of a parameter or an input."""
@@ -36,6 +35,11 @@ class RobotNames:
     def made(self, name: str) -> str:
         """The name of an element that the file does not name, told apart from others without a word about it."""
         return unique(name, "link", self.taken, (" link",))
+
+    def made_joint(self, name: str, suffixes: Sequence[str]) -> str:
+        """The name of a joint that the file does not have, told apart from others without a word about it."""
+        symbols = (suffix + rate for suffix in suffixes for rate in RATES)
+        return unique(name, "joint", self.taken, (" joint", *symbols))
 
     def _note(self, section: str, name: str, given: str) -> str:
         if given != name:

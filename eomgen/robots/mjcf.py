@@ -22,7 +22,7 @@ from .mjcf_constructs import find_mjcf
 from .mjcf_equalities import read_equalities
 from .mjcf_files import Scan
 from .mjcf_text import Text
-from .robot import Place, Robot, RobotJoint, RobotLink, RobotOptions
+from .robot import Robot, RobotJoint, RobotLink, RobotOptions
 from .robot_frames import IDENTITY, NOTHING, Inertia, Placement, moved, numbers
 from .xml_text import XmlElement
 
@@ -83,27 +83,21 @@ class _MjcfReader(Compiled):
         for j in joints:
             last = j == joints[-1]
             child = name if last else f"{name}.{self.names['joint'][j]}"
-            if _TYPES[m.jnt_type[j]] == "spherical" and (rotor := float(m.dof_armature[m.jnt_dofadr[j]])):
+            still = j == joints[0] and m.body_weldid[m.body_parentid[k]] == 0
+            if still and _TYPES[m.jnt_type[j]] == "spherical" and (rotor := float(m.dof_armature[m.jnt_dofadr[j]])):
                 own = inertia if last else NOTHING
                 inertia_of[child] = replace(own, tensor=own.tensor + rotor * np.eye(3))
-                self._judge_rotor(j, place, still=j == joints[0] and m.body_weldid[m.body_parentid[k]] == 0)
+                robot.notes.append(
+                    f"the armature of the ball joint {self.names['joint'][j]} is part of the inertia of its body"
+                )
             if not last:
                 robot.links[child] = RobotLink(child, place, inertia_of.get(child, NOTHING))
-            joint = self._joint(j, parent, child, at if j == joints[0] else IDENTITY)
+            joint = self._joint(j, parent, child, at if j == joints[0] else IDENTITY, still)
             robot.joints[joint.name] = joint
             parent = child
         robot.links[name] = RobotLink(name, place, inertia_of.get(name, inertia))
 
-    def _judge_rotor(self, j: int, place: Place, still: bool) -> None:
-        """The armature of a ball is inertia of its child where the parent stands still; else it belongs to no body."""
-        name = self.names["joint"][j]
-        if still:
-            self.robot.notes.append(f"the armature of the ball joint {name} is part of the inertia of its body")
-            return
-        message = "armature on a ball joint of a parent that moves is not supported: it belongs to no body"
-        self.robot.problem(f"joint.{name}.armature", message, 'set armature="0" there', place)
-
-    def _joint(self, j: int, parent: str, child: str, at: Placement) -> RobotJoint:
+    def _joint(self, j: int, parent: str, child: str, at: Placement, still: bool) -> RobotJoint:
         m, name = self.m, self.names["joint"][j]
         kind = _TYPES[m.jnt_type[j]]
         dof, start = m.jnt_dofadr[j], m.jnt_qposadr[j]
@@ -127,7 +121,7 @@ class _MjcfReader(Compiled):
                 stiffness=0.0 if self.off("SPRING") else float(m.jnt_stiffness[j]),
             )
             if kind == "spherical":
-                return joint
+                return joint if still else replace(joint, armature=float(m.dof_armature[dof]))
             pose = Placement(from_quaternion(*m.qpos0[start + 3 : start + 7]), m.qpos0[start : start + 3])
             return replace(joint, outer=IDENTITY, inner=IDENTITY, start=pose)
         axis = numbers(m.jnt_axis[j])

@@ -229,13 +229,6 @@ def test_what_is_left_out_is_said(tmp_path: Path) -> None:
     assert "(site)" in notes
 
 
-def test_an_inertia_that_no_body_has_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "armature.xml"
-    path.write_text(EVERYTHING.replace('type="ball"', 'type="ball" armature="0.1"'))
-    with pytest.raises(eg.ModelError, match=r"armature.xml:13: joint.ball.armature: armature on a ball joint"):
-        eg.load(path)
-
-
 def test_it_floats_by_its_own_word(tmp_path: Path) -> None:
     path = tmp_path / "m.xml"
     path.write_text(EVERYTHING)
