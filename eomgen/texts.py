@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from math import tau
 from typing import Any
 
 #: Characters of the generated lines that hold a comment or a literal.
@@ -144,3 +145,11 @@ def shown(given: Any) -> str:
     except Exception:  # its own __repr__, or an integer of thousands of digits
         return f"an object of type {type(given).__name__}, which cannot be shown"
     return text if len(text) <= 80 else f"{text[:80]}..."
+
+
+def angle_in_degrees(name: str, value: float) -> str:
+    """The note on an initial angle beyond ``limits.motions.MOST_ANGLE``, as degrees would be."""
+    return (
+        f"{name} = {value:g} is an angle of {value / tau:.3g} turns, as angles are in radians; write "
+        f"deg({value:g}) if these are degrees"
+    )

@@ -14,8 +14,9 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import symbols_of
 from ..graph.traverse import reachable
 from ..limits.inertia import ACROSS
-from ..limits.motions import SLACK
+from ..limits.motions import MOST_ANGLE, SLACK
 from ..operations import CHOICE, OPERATIONS
+from ..texts import angle_in_degrees
 from .kinematics import Kinematics
 from .mobility import Mobility, initial_values
 
@@ -94,10 +95,9 @@ def _in_degrees(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     names = (*kinematics.names, *kinematics.loop_coordinates.names)
     kinds = dict(zip(names, (*kinematics.kinds, *kinematics.loop_coordinates.kinds), strict=True))
     return [
-        f"{name} = {x:g} is an angle of {x / (2.0 * np.pi):.3g} turns, as angles are in radians; write deg({x:g}) if "
-        "these are degrees"
+        angle_in_degrees(name, x)
         for name, x in given.items()
-        if kinds.get(name) in ("angle", "turn") and abs(x) > 4.0 * np.pi
+        if kinds.get(name) in ("angle", "turn") and abs(x) > MOST_ANGLE
     ]
 
 

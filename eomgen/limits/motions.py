@@ -46,3 +46,5 @@ DRIFTED = 1e-6
 #: Scaled distance (rad, lengths) between a guess and a closed position that lie beside each other: angles then turn
 #: directions by less than a twentieth of a turn, and cosines, which close loops, by 5 %.
 BESIDE = 0.3
+#: Initial angle (rad) beyond which degrees are supposed: two turns.
+MOST_ANGLE = 12.566370614359172

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
@@ -9,9 +10,11 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import UsageError, calls_within
 from ..limits.constraints import CHOSEN
+from ..limits.motions import MOST_ANGLE
 from ..numeric.scales import Array
+from ..texts import angle_in_degrees
 from .argument_names import both_names
 from .initial import Given, Initial
 from .kernels import Kernels
@@ -75,7 +78,7 @@ class Assembled:
         -----
         UserWarning
             The values are not reached from the declared position without leaving its branch; the loops are then closed
-            from the nearest guess.
+            from the nearest guess; or an angle of more than two turns is given, as degrees would be.
         """
         initial, given = self._given(values, named, t, p, u)
         q = initial.assembled(given.positions)
@@ -172,6 +175,10 @@ class Assembled:
         if values is not None:
             require_mapping("initial values", values)
         numbers = {name: read_number(name, value) for name, value in {**(values or {}), **named}.items()}
+        layout = self.layout
+        for name, kind in zip(layout.q + layout.loops, layout.coordinate_kinds + layout.loop_kinds, strict=True):
+            if kind in ("angle", "turn") and abs(numbers.get(name, 0.0)) > MOST_ANGLE:
+                warnings.warn(angle_in_degrees(name, numbers[name]), stacklevel=calls_within() + 1)
         initial = self._initial(t, p, u, numbers)
         return initial, initial.sort(numbers)
 

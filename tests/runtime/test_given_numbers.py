@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import models
@@ -68,6 +70,16 @@ def test_either_name_of_an_argument(mod: Any) -> None:
             both(p=heavy, parameters=heavy)
     with pytest.raises(eg.UsageError, match="no option .*'q'"):
         mod.simulate(0.5, q=heavy)
+
+
+@pytest.mark.parametrize("call", [lambda m: m.x0(theta=90), lambda m: m.simulate(0.01, initial={"theta": 90.0})])
+def test_an_initial_angle_of_many_turns_is_noted(call: Callable[[Any], Any]) -> None:
+    module = eg.load_example("pendulum").compile(target="numpy")
+    with pytest.warns(UserWarning, match=r"theta = 90 is an angle of 14.3 turns.*write deg\(90\)") as noted:
+        call(module)
+    assert [Path(str(one.filename)).name for one in noted] == [Path(__file__).name]
+    module.x0(theta=12.0)
+    module.simulate(0.01, initial={"theta": "deg(90)"})
 
 
 def test_degrees_in_expressions() -> None:
