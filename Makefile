@@ -1,7 +1,8 @@
 # make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png and .gif
-# make test   ruff, mypy, then every test, fast ones first, on all processors; fails if anything was skipped;
+# make quick  in 20 seconds: tests without a compiler for what differs from the last commit (the table in tests/conftest.py)
+# make test   ruff, mypy, then the tests of all that users see, on all processors; fails if anything was skipped;
 #             PROGRAMS=all fails too where a program that some tests need is missing, as continuous integration does
-# make thorough  make test with all of the sweeps of which it runs a part
+# make thorough  make test with everything that is marked thorough: long sweeps, C of all examples, sanitizers, packages
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
 # make notebooks  executes the notebooks anew and stores their outputs; NOTEBOOKS=FILE only this one
 # make lint   ruff and mypy alone
@@ -21,7 +22,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
-.PHONY: demo test thorough bench notebooks lint docs pictures mutations fuzz clean
+.PHONY: demo quick test thorough bench notebooks lint docs pictures mutations fuzz clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed-plot
@@ -30,6 +31,9 @@ demo: $(VENV)/.installed-plot
 test thorough: lint
 	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal \
 	  $(if $(filter thorough,$@),--thorough) $(if $(PROGRAMS),--programs)
+
+quick: $(VENV)/.installed-test
+	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest --quick -q tests
 
 lint: $(VENV)/.installed-$(if $(PROGRAMS),all-tests,test)
 	@$(BIN)/ruff check .

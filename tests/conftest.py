@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 import tempfile
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,6 +14,19 @@ from hypothesis import HealthCheck, settings
 from outside_programs import PROGRAMS, missing
 
 CACHE = pytest.StashKey[str]()
+QUICK = pytest.StashKey[set[str]]()
+#: What ``--quick`` runs a folder of tests for: the packages of eomgen that it guards.
+ROOMS = {
+    "mechanics": "constraints derivation equations frames joints kinematics rotations solids",
+    "forces": "elements forces",
+    "runs": "analysis ensembles identification runtime simulation",
+    "model": "describe instance_names loading marker_places robots suggestions",
+    "code": "compilation cuda_functions device emit files fmu generation kernel_table layer program shipped targets "
+    "traced_functions",
+    "shown": "cli explain notation printing reading show",
+    "core": "alone graph numeric operations pipeline records simplify syntax_trees verification",
+    "attack": "describe files robots texts",
+}
 #: Scripts that made reference numbers with other programs, which need not be installed.
 collect_ignore_glob = ["reference/*.py"]
 #: What some tests need beside the programs of outside_programs: a mark ``needs(name)`` leaves a test out where there is
@@ -56,7 +70,37 @@ def is_worker(config: pytest.Config) -> bool:
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--no-skips", action="store_true", help="fail the run when a test was skipped or expected to fail")
     parser.addoption("--programs", action="store_true", help="fail where what some tests need is missing, a GPU apart")
+    parser.addoption("--quick", action="store_true", help="tests marked quick, for what differs from the last commit")
     parser.addoption("--thorough", action="store_true", help="run also what is marked thorough, as make thorough does")
+
+
+def rooms_touched() -> set[str]:
+    """Folders of tests for what differs from the last commit; all of them where that is nothing, or shared by all."""
+    chosen: set[str] = set()
+    for words in (["diff", "--name-only", "HEAD"], ["ls-files", "--others", "--exclude-standard"]):
+        command = ["git", "-C", str(Path(__file__).parents[1]), *words]
+        for path in subprocess.run(command, capture_output=True, text=True).stdout.splitlines():
+            top, _, rest = path.partition("/")
+            part = rest.partition("/")[0].removesuffix(".py")
+            if top in ("docs", "notebooks", "benchmarks") or top.endswith(".md"):
+                continue
+            if top == "tests" and part in ROOMS:
+                chosen.add(part)
+            elif top == "eomgen" and (rooms := {room for room, parts in ROOMS.items() if part in parts.split()}):
+                chosen |= rooms
+            else:
+                return set(ROOMS)
+    return chosen or set(ROOMS)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """With ``--quick`` only files of the rooms touched are read, and of these the ones that have a test so marked."""
+    if not config.getoption("--quick") or collection_path.is_dir():
+        return None
+    if QUICK not in config.stash:
+        config.stash[QUICK] = rooms_touched()
+    inside = collection_path.relative_to(Path(__file__).parent).parts
+    return inside[0] not in config.stash[QUICK] or "mark.quick" not in collection_path.read_text(encoding="utf-8")
 
 
 def is_there(program: str) -> bool:
@@ -79,6 +123,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     left_out = {item for item in items if not all(map(is_there, needs[item]))}
     if not config.getoption("--thorough"):
         left_out |= {item for item in items if item.get_closest_marker("thorough") is not None}
+    if config.getoption("--quick"):
+        left_out |= {item for item in items if item.get_closest_marker("quick") is None}
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))
     items[:] = [item for item in items if item not in left_out]
@@ -86,6 +132,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    if terminalreporter.config.getoption("--quick"):
+        return
     told = {name: f"apt install {package}" for name, (_, package) in PROGRAMS.items()}
     told |= {name: command for name, (_, command) in LIBRARIES.items()}
     told |= dict.fromkeys(INSTRUCTIONS, "take a processor that has them")
