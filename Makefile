@@ -1,11 +1,11 @@
 # make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png and .gif
 # make quick  in 20 seconds: tests without a compiler for what differs from the last commit (the table in tests/conftest.py)
-# make test   ruff, mypy, then the tests of all that users see, on all processors; fails if anything was skipped;
+# make test   make lint, then the tests of all that users see, on all processors; fails if anything was skipped;
 #             PROGRAMS=all fails too where a program that some tests need is missing, as continuous integration does
 # make thorough  make test with everything that is marked thorough: long sweeps, C of all examples, sanitizers, packages
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
 # make notebooks  executes the notebooks anew and stores their outputs; NOTEBOOKS=FILE only this one
-# make lint   ruff and mypy alone
+# make lint   ruff, mypy and tools/lint.py alone
 # make docs   the documentation as a site, docs/_build/html/index.html; a warning is an error
 # make pictures  draws the stored pictures of the documentation anew: of pages, of their blocks, of the gallery
 # make mutations  puts deliberate faults into a copy of the sources; fails if no test notices one (half an hour)
@@ -38,6 +38,7 @@ quick: $(VENV)/.installed-test
 lint: $(VENV)/.installed-$(if $(PROGRAMS),all-tests,test)
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
+	@$(BIN)/python tools/lint.py
 
 bench: $(VENV)/.installed-plot
 	@$(BIN)/python -m benchmarks.run $(BENCHMARKS)

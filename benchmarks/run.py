@@ -28,7 +28,17 @@ BENCHMARKS = (
         "traced",
         "fit",
     ),
-    *("operation_counts", "rhs", "robot_kernels", "derivatives", "grid_robots", "lanes", "loop_lanes", "ensembles"),
+    *(
+        "counts",
+        "operation_counts",
+        "rhs",
+        "robot_kernels",
+        "derivatives",
+        "grid_robots",
+        "lanes",
+        "loop_lanes",
+        "ensembles",
+    ),
     *("device", "equilibria", "tracks", "track_contacts", "rigid_tracks", "long_drive"),
 )
 APART = ("swing_up",)  #: need packages that the tests have not; by name only

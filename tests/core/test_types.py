@@ -84,7 +84,7 @@ WRONG = {
 
 
 def check(tmp_path: Path, text: str) -> list[str]:
-    """Lines that mypy prints of a user's file, with what a wheel holds beside it (``test_packaging.py``)."""
+    """Lines that mypy prints of a user's file, with what a wheel holds beside it."""
     site = tmp_path / "site"
     shutil.copytree(ROOT / "eomgen", site / "eomgen", ignore=shutil.ignore_patterns("__pycache__", "built"))
     (tmp_path / "mine.py").write_text(text)
@@ -96,6 +96,7 @@ def check(tmp_path: Path, text: str) -> list[str]:
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_a_checker_names_results_and_finds_slips(tmp_path: Path) -> None:
     first = BEGIN.count("\n") + len(SEEN) + len(UNIONS) + 1
     text = BEGIN + "".join(f"reveal_type({expression})\n" for expression in (*SEEN, *UNIONS))
@@ -113,30 +114,3 @@ def test_a_checker_names_results_and_finds_slips(tmp_path: Path) -> None:
     assert sorted(errors) == list(range(first, first + len(WRONG))), lines
     for (wrong, expected), said in zip(WRONG.items(), (errors[k] for k in sorted(errors)), strict=True):
         assert expected in said, wrong
-
-
-def test_options_have_the_types_of_what_takes_them() -> None:
-    """The keywords that type checkers know are the fields and arguments that there are."""
-    from dataclasses import fields
-    from inspect import signature
-
-    from eomgen.compilation import Options
-    from eomgen.ensembles.simulate_many import OPTIONS as MANY
-    from eomgen.loading import load
-    from eomgen.robots import RobotOptions
-    from eomgen.runtime import option_types as types
-    from eomgen.show.animate import animate
-    from eomgen.show.mode_shapes import animate_mode
-    from eomgen.simulation.sensitivities import OPTIONS as SENSITIVE
-
-    bound = set(types.BoundValues.__annotations__)
-    assert set(types.BuildOptions.__annotations__) == {field.name for field in fields(Options)}
-    assert set(types.StepOptions.__annotations__) - bound == set(MANY)
-    assert set(types.ReducedOptions.__annotations__) - bound == set(SENSITIVE)
-    robot = set(types.RobotKeywords.__annotations__)
-    assert robot | {"check_inertia"} == {field.name for field in fields(RobotOptions)}
-    assert set(types.LoadOptions.__annotations__) == (set(signature(load).parameters) - {"path", "robot"}) | robot
-    taken = set(signature(animate).parameters) - {"trajectory", "module", "file", "states", "columns", "format"}
-    assert set(types.AnimationOptions.__annotations__) - {"model"} == taken
-    taken = set(signature(animate_mode).parameters) - {"module", "x", "shape", "file", "format"}
-    assert set(types.FilmOptions.__annotations__) == taken

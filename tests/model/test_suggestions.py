@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import inspect
 from pathlib import Path
 from typing import Any
 
+import command
 import pytest
-from click.testing import CliRunner
 
 import eomgen as eg
-from eomgen.cli.command import VERBS, Verbs, eomgen
-from eomgen.constraints import CONSTRAINTS
-from eomgen.describe.fields import BODY, MODEL, SIMULATION
-from eomgen.describe.names import function_words
-from eomgen.forces import FORCES
-from eomgen.joints import JOINTS
-from eomgen.suggestions import SYNONYMS, closest
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -34,29 +26,7 @@ def held() -> dict[str, Any]:
     }
 
 
-def test_every_suggestion_names_something_that_exists(held: dict[str, Any]) -> None:
-    known = {name for one in held.values() for name in dir(one)} | {*VERBS, *MODEL, *BODY, "ground", "marker", "output"}
-    known |= {*JOINTS, *FORCES, *CONSTRAINTS, *SIMULATION, *function_words()}
-    for section, table in (("joints", JOINTS), ("forces", FORCES), ("constraints", CONSTRAINTS)):
-        for name in table:
-            known |= {*inspect.signature(getattr(eg.Model, name)).parameters}
-            known |= {"between"} if section == "joints" else set()
-    for call in (held["Module"].simulate, held["Module"].simulate_many, held["Trajectory"].animate):
-        known |= {*inspect.signature(call).parameters}
-    group = Verbs()
-    for verb in VERBS:
-        command = group.get_command(None, verb)  # type: ignore[arg-type]
-        assert command is not None
-        known |= {name.lstrip("-") for option in command.params for name in option.opts}
-    meant = {other for names in SYNONYMS.values() for other in names.split()}
-    assert sorted(meant - known) == []
-
-
-def test_a_word_stands_once() -> None:
-    words = [word for words in SYNONYMS for word in words.split()]
-    assert sorted({word for word in words if words.count(word) > 1}) == []
-
-
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("kind", "word", "meant"),
     [
@@ -116,17 +86,36 @@ def test_words_of_other_programs_in_a_file(tmp_path: Path, text: str, meant: str
     ],
 )  # fmt: skip
 def test_words_of_other_programs_on_the_command_line(words: list[str], meant: str) -> None:
-    done = CliRunner().invoke(eomgen, words)
-    assert done.exit_code == 2
-    assert f"id you mean {meant}" in done.output.replace("'", "")
+    done = command.run(*words)
+    assert done.code == 2
+    assert f"id you mean {meant}" in done.err.replace("'", "")
 
 
-def test_spelling_comes_before_a_word_that_is_less_alike() -> None:
-    assert closest("thetta", ["theta", "phi"]) == ["theta"]
-    assert closest("Theta", ["theta", "phi"]) == ["theta"]
-    assert closest("hinge", ["hinges", "revolute"]) == ["revolute"]
-    assert closest("hinge", ["hinges"]) == ["hinges"]
-    assert closest("qwerty", ["theta"]) == []
+@pytest.mark.parametrize(("word", "meant"), [("x0", "initial"), ("tol", "rtol"), ("teval", "t_eval")])
+def test_an_argument_of_a_run(held: dict[str, Any], word: str, meant: str) -> None:
+    with pytest.raises(eg.UsageError, match=f"did you mean .*{meant}"):
+        held["Module"].simulate((0, 1), **{word: 1.0})
+
+
+def test_the_normal_force_of_a_contact_is_its_force() -> None:
+    m = eg.Model("m")
+    m.prismatic("s", m.ground, m.body("ball", mass=1.0), axis="y")
+    m.output("N", "normal(floor)")
+    with pytest.raises(eg.ModelError, match=r"unknown function 'normal'.*did you mean 'force'"):
+        m.check()
+
+
+def test_the_name_that_is_written_alike_comes_first() -> None:
+    """Letters before synonyms, among the names that there are; nothing where none is near."""
+    words = {"thetta": "theta", "Theta": "theta", "hinge": "hinges", "zzzzz": ""}
+    for word, meant in words.items():
+        m = eg.Model("m")
+        for name in ("theta", "phi", "hinges"):
+            m.parameter(name, 1.0)
+        m.prismatic("s", m.ground, m.body("a", mass=word))
+        with pytest.raises(eg.ModelError) as refused:
+            m.check()
+        assert (f"did you mean '{meant}'" in str(refused.value)) == bool(meant), refused.value
 
 
 @pytest.mark.parametrize(

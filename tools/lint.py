@@ -1,0 +1,215 @@
+"""Checks of the source text that ruff and mypy do not make; ``make lint`` runs it, and it exits 1 with what is wrong.
+
+It reads files and imports the package, and stands apart from the tests, which only look at what the package does.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import inspect
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+#: Nothing that executes or parses code by other means than eomgen's own parser is called.
+FORBIDDEN = {"eval", "exec", "sympify", "parse_expr", "lambdify"}
+#: Numbers below this are limits, which stand in eomgen/limits alone; numbers in formulas, such as 1/720, are larger.
+SMALL = 5e-4
+#: What is no limit: a default of a user's option, switches between two formulas for one thing, a step in 60 digits.
+NO_LIMITS = {
+    "numeric/closure.py": {1e-8},
+    "program/loop_blocks.py": {1e-100},
+    "robots/robot.py": {1e-11},
+    "rotations/quaternions.py": {1e-4},
+    "verification/digits.py": {1e-6},
+}
+ROLE = re.compile(r":(?:class|meth|func|mod|attr|data|exc|obj):`([^`]+)`")
+#: Folders of tests that speak to the public face alone.
+ROOMS = ("mechanics", "forces", "runs", "model", "code", "shown", "core", "attack")
+LONGEST = 800  #: lines of a file of tests
+
+
+def name_of(file: Path) -> str:
+    """The dotted name of a file."""
+    return ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+FILES = {name_of(file): file for file in sorted((ROOT / "eomgen").rglob("*.py"))}
+TEXTS = {name: file.read_text(encoding="utf-8") for name, file in FILES.items()}
+TREES = {name: ast.parse(text) for name, text in TEXTS.items()}
+NODES = {name: list(ast.walk(tree)) for name, tree in TREES.items()}
+
+
+def forbidden() -> Iterator[str]:
+    """Words that run text, as names or as texts that could become one."""
+    for name, nodes in NODES.items():
+        words = {getattr(node, part, None) for node in nodes for part in ("id", "attr", "name", "arg")}
+        words |= {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+        yield from (f"{name}: {word} is forbidden" for word in sorted(words & FORBIDDEN))
+
+
+def limits() -> Iterator[str]:
+    """Limits that do not stand in eomgen/limits; files in C take theirs from there by name."""
+    for name, nodes in NODES.items():
+        if name.startswith("eomgen.limits"):
+            continue
+        floats = {n.value for n in nodes if isinstance(n, ast.Constant) and type(n.value) is float}
+        small = {x for x in floats if 0.0 < abs(x) < SMALL}
+        if small != NO_LIMITS.get(str(FILES[name].relative_to(ROOT / "eomgen")), set()):
+            yield f"{name}: limits outside eomgen/limits, or no longer there: {small}"
+    definitions = import_module("eomgen.limits.in_c").definitions
+    for folder, pattern in (
+        ("drivers", r"\d(?:\.\d+)?e-\d+|\b0\.0\d+"),
+        ("ensembles", r"\d(?:\.\d+)?e-\d+"),  # these have tables of coefficients
+        ("steppers", r"\d(?:\.\d+)?e-\d+"),
+    ):
+        for file in sorted((ROOT / "templates" / "c" / folder).glob("*.c")):
+            text = re.sub(r"/\*.*?\*/", "", file.read_text(encoding="utf-8"), flags=re.DOTALL)
+            yield from (f"{file.name}: a limit without a name: {found}" for found in re.findall(pattern, text))
+            try:
+                definitions(text)
+            except AttributeError as error:
+                yield f"{file.name}: {error}"
+
+
+def imports_of(name: str) -> set[str]:
+    """Files of the package that a file imports anywhere: at the top, in functions, for types."""
+    package = name.split(".") if FILES.get(name, Path()).name == "__init__.py" else name.split(".")[:-1]
+    found = set()
+    for node in NODES[name]:
+        if isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            home = ".".join([*base, *([node.module] if node.module else [])])
+            found |= {f"{home}.{alias.name}" if f"{home}.{alias.name}" in FILES else home for alias in node.names}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+    return {other for other in found & FILES.keys() if other != name and not name.startswith(f"{other}.")}
+
+
+def directions() -> Iterator[str]:
+    """Imports in a circle, or against the rows of ARCHITECTURE.md."""
+    graph = {name: imports_of(name) for name in FILES}
+    calls = import_module("eomgen.api.module").CALLS  # named as text
+    graph["eomgen.api.module"] |= {f"eomgen.{home}" for home in calls.values()}
+    groups = import_module("eomgen.verification.verify").GROUPS
+    graph["eomgen.verification.verify"] |= {f"eomgen.verification.check_{group}" for group in groups}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        yield f"a circle of imports: {' -> '.join(error.args[1])}"
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    found = re.findall(r"^\| (\d+) \| ([a-z_, ]+) \|", text, re.M)
+    rows = {name: int(number) for number, names in found for name in names.split(", ")}
+    for odd in sorted(set(rows) ^ ({name.split(".")[1] for name in FILES if "." in name} - {"__main__"})):
+        yield f"ARCHITECTURE.md: {odd} has no row, or no package"
+    for name, others in graph.items():
+        for other in others:
+            here, there = ((f"{one}.").split(".")[1] for one in (name, other))
+            if here != there and here not in ("", "__main__") and there and rows[there] >= rows[here]:
+                yield f"{name} imports {other}, which stands in the same row of ARCHITECTURE.md or above"
+
+
+def follow(found: Any, names: list[str]) -> bool:
+    """Whether attributes of an object, or those that a class gives or documents for its instances, lead anywhere."""
+    for name in names:
+        if not hasattr(found, name):
+            known = getattr(found, "__annotations__", {}).keys() | getattr(found, "__dataclass_fields__", {}).keys()
+            text = "\n".join(base.__doc__ or "" for base in getattr(found, "__mro__", ())[:-1])
+            listed = re.search(rf"^ +(?:\w+, )*{name}(?:, \w+)* :", text, re.M)
+            return name == names[-1] and (name in known or listed is not None)
+        found = getattr(found, name)
+    return True
+
+
+def importable(path: str) -> bool:
+    """Whether a dotted path is a module, or something within one."""
+    names = path.split(".")
+    for k in range(len(names), 0, -1):
+        try:
+            return follow(import_module(".".join(names[:k])), names[k:])
+        except ModuleNotFoundError:
+            continue
+    return False
+
+
+def references() -> Iterator[str]:
+    """Roles of docstrings whose targets are not there."""
+    eg = import_module("eomgen")
+    general = [eg, eg.Model, eg.Module, builtins]
+    for name, text in TEXTS.items():
+        classes = [n for n in TREES[name].body if isinstance(n, ast.ClassDef)] if ROLE.search(text) else []
+        for found in ROLE.finditer(text):
+            line = text.count("\n", 0, found.start()) + 1
+            here = import_module(name)
+            around = [getattr(here, c.name) for c in classes if c.lineno <= line <= (c.end_lineno or line)]
+            target = (re.search(r"<(.+)>$", found[1]) or ["", found[1]])[1].lstrip("~").removesuffix("()")
+            if target.startswith("."):
+                dots = len(target) - len(target.lstrip("."))
+                package = [*name.split("."), ""] if FILES[name].name == "__init__.py" else name.split(".")
+                there = dots < len(package) and importable(".".join([*package[:-dots], target[dots:]]))
+            else:
+                there = any(follow(p, target.split(".")) for p in (*around, here, *general)) or importable(target)
+            if not there:
+                yield f"{name}, line {line}: {found[0]} leads nowhere"
+
+
+def packages() -> Iterator[str]:
+    """Packages that pyproject.toml does not list, and folders without __init__.py."""
+    setuptools = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
+    folders = {file.parent for file in FILES.values()}
+    yield from (f"{folder} has no __init__.py" for folder in folders if not (folder / "__init__.py").exists())
+    there = {".".join(folder.relative_to(ROOT).parts) for folder in folders} | set(setuptools["package-dir"])
+    yield from (f"pyproject.toml: packages: {name}" for name in sorted(there ^ set(setuptools["packages"])))
+
+
+def keywords() -> Iterator[str]:
+    """Options that type checkers know (``TypedDict``), where they are not those that there are."""
+    types = import_module("eomgen.runtime.option_types")
+
+    def arguments(home: str, name: str, *others: str) -> set[str]:
+        return set(inspect.signature(getattr(import_module(f"eomgen.{home}"), name)).parameters) - {*others}
+
+    bound, robot = set(types.BoundValues.__annotations__), set(types.RobotKeywords.__annotations__)
+    shown = {"module", "file", "format"}
+    for known, those in {
+        "BuildOptions": arguments("compilation", "Options"),
+        "StepOptions": bound | set(import_module("eomgen.ensembles.simulate_many").OPTIONS),
+        "ReducedOptions": bound | set(import_module("eomgen.simulation.sensitivities").OPTIONS),
+        "RobotKeywords": arguments("robots", "RobotOptions", "check_inertia"),
+        "LoadOptions": arguments("loading", "load", "path", "robot") | robot,
+        "AnimationOptions": arguments("show.animate", "animate", "trajectory", "states", "columns", *shown) | {"model"},
+        "FilmOptions": arguments("show.mode_shapes", "animate_mode", "x", "shape", *shown),
+    }.items():
+        for name in sorted(those ^ set(getattr(types, known).__annotations__)):
+            yield f"eomgen.runtime.option_types: {known}: {name}"
+
+
+def public_tests() -> Iterator[str]:
+    """Tests that import what no page of the documentation names, or that are too long to be read."""
+    pages = [*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")]
+    named = {word for page in pages for word in re.findall(r"\beomgen(?:\.\w+)+", page.read_text(encoding="utf-8"))}
+    for file in sorted(file for room in ROOMS for file in (ROOT / "tests" / room).rglob("*.py")):
+        text, place = file.read_text(encoding="utf-8"), file.relative_to(ROOT)
+        if (count := text.count("\n")) > LONGEST:
+            yield f"{place}: {count} lines, more than {LONGEST}"
+        for node in ast.walk(ast.parse(text)):
+            homes = {node.module or ""} if isinstance(node, ast.ImportFrom) else set()
+            homes |= {alias.name for alias in node.names} if isinstance(node, ast.Import) else set()
+            inner = {home for home in homes if home.startswith("eomgen.") and not home.endswith(".__main__")}
+            for home in sorted(inner):
+                if "._" in home or not any(f"{word}.".startswith(f"{home}.") for word in named):
+                    yield f"{place}: imports {home}, which is not documented"
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+    wrong = [line for check in (forbidden, limits, directions, references, packages, keywords) for line in check()]
+    print("\n".join(wrong) or "source text: nothing wrong")
+    sys.exit(bool(wrong))
