@@ -6,7 +6,7 @@ from mutations.fault import Fault
 
 SHOWN = "tests/reading/test_shown_is_compiled.py::test_of_every_example[slider_crank]"
 VIEWS = "tests/reading/test_methods_and_views.py"
-FORMS = "tests/simplify/test_simplify.py"
+FORMS = "tests/core/test_simplified.py"
 
 FAULTS = (
     Fault(
@@ -70,20 +70,20 @@ FAULTS = (
         'angle = less if (made == "cos") == alike else both',
         'angle = both if (made == "cos") == alike else less',
         "cos a cos b - sin a sin b is joined to cos(a - b)",
-        (f"{FORMS}::test_as_by_hand",),
+        (f"{FORMS}::test_as_by_hand[cos(A)*cos(B) - sin(A)*sin(B)-cos(A + B)]",),
     ),
     Fault(
         "form-half-turn", "eomgen/simplify/joined_angles.py",
         'sign = {("sin", 2): -1, ("sin", 3): -1, ("cos", 1): -1, ("cos", 2): -1}.get((kind, quarters), 1)',
         'sign = {("sin", 2): -1, ("sin", 3): -1, ("cos", 2): -1}.get((kind, quarters), 1)',
         "cos(a + pi/2) becomes sin a",
-        (f"{FORMS}::test_quarter_turns",),
+        (f"{FORMS}::test_as_by_hand[cos(A + pi/2)--sin(A)]",),
     ),
     Fault(
         "form-signed-root", "eomgen/simplify/expansion.py",
         'return self.atoms.poly("abs", (freeze({base: 1}),))',
         "return {base: 1}",
         "the root of a square has the sign of what is squared",
-        (f"{FORMS}::test_roots_of_squares_have_no_sign",),
+        (f"{FORMS}::test_roots_of_squares_and_magnitudes_have_no_sign[sqrt(1 - sin(A)**2)]",),
     ),
 )  # fmt: skip

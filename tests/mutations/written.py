@@ -10,14 +10,14 @@ FAULTS = (
         'return _PAIRS.sub(" ", shown)',
         "return shown",
         "a text with */ or ??/ ends a comment of C",
-        ("tests/test_texts.py::test_no_character_reaches_a_comment_but_printable_ascii",),
+        ("tests/core/test_texts.py::test_a_compiler_sees_nothing_of_them",),
     ),
     Fault(
         "text-comment-joined", "eomgen/texts.py",
         r'_OUTSIDE = re.compile(r"[^ -\[\]-~]")',
         r'_OUTSIDE = re.compile(r"[^ -~]")',
         "a backslash in a comment joins lines",
-        ("tests/test_texts.py::test_no_character_reaches_a_comment_but_printable_ascii",),
+        ("tests/core/test_texts.py::test_a_compiler_sees_nothing_of_them",),
     ),
     Fault(
         "text-comment-raw", "templates/c/model.h.j2",
@@ -31,14 +31,14 @@ FAULTS = (
         """_ESCAPED = re.compile(r"[^ !#-\\[\\]-~]")""",
         """_ESCAPED = re.compile(r"[^ -\\[\\]-~]")""",
         "three quotes in a text end a docstring, one a TOML string",
-        ("tests/test_texts.py::test_a_docstring_has_the_value_of_the_text",),
+        ("tests/core/test_texts.py::test_python_and_toml_have_them_as_strings",),
     ),
     Fault(
         "text-terminal", "eomgen/texts.py",
         'return "".join(c if c.isprintable() or (lines and c in "\\n\\t") else repr(c)[1:-1] for c in text)',
         "return text",
         "escape sequences in a text reach the terminal",
-        ("tests/test_texts.py::test_only_what_prints_reaches_a_terminal",),
+        ("tests/core/test_texts.py::test_no_escape_sequence_reaches_a_terminal[type]",),
     ),
     Fault(
         "sources-looked-at", "eomgen/pipeline.py",
