@@ -67,6 +67,7 @@ def test_a_compiler_sees_nothing_of_them(tmp_path: Path) -> None:
         code = re.sub(r"\\[ \t]*\n", "", source.replace("??/", "\\"))
         code = re.sub(r"/\*.*?\*/|\"(\\.|[^\"\\\n])*\"", " ", code, flags=re.DOTALL)
         assert "broken" not in code
+        assert not any("\\" in comment for comment in re.findall(r"/\*.*?\*/", source, re.DOTALL))  # joins lines
 
 
 def test_python_and_toml_have_them_as_strings(tmp_path: Path) -> None:
