@@ -209,14 +209,14 @@ FAULTS = (
         "dv = -minimum_norm(here.C_q, r.r3_q @ dq + shift.r3, scales)",
         "dv = -minimum_norm(here.C_q, r.r3_q @ dq, scales)",
         "derivative by parameters: the constraints' own rates stay",
-        ("tests/analysis/test_kernels.py::test_derivatives_of_the_right_hand_side[slider_crank-numpy]",),
+        ("tests/runs/test_sensitivities.py::test_derivatives_of_the_right_hand_side[slider_crank-numpy]",),
     ),
     Fault(
         "shift-position", "eomgen/numeric/shifts.py",
         "dz = -minimum_norm(here.C_q[:held], shift.C, scales)",
         "dz = 0.0 * minimum_norm(here.C_q[:held], shift.C, scales)",
         "derivative by parameters: the closed position does not follow",
-        ("tests/analysis/test_kernels.py::test_derivatives_of_the_right_hand_side[slider_crank-numpy]",),
+        ("tests/runs/test_sensitivities.py::test_derivatives_of_the_right_hand_side[slider_crank-numpy]",),
     ),
     Fault(
         "dependent-rates", "eomgen/numeric/dependent.py",

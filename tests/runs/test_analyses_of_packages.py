@@ -1,0 +1,90 @@
+"""An exported package has the analyses and runs of its model, with NumPy alone where nothing is integrated."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command import run
+
+import eomgen as eg
+
+#: Calls of a package as of a module; the last three integrate, by SciPy.
+CRANK = {
+    "equilibrium": "m.equilibrium({'theta': -1.5})['theta']",
+    "linearize": "m.linearize(m.equilibrium({'theta': -1.5}).x).A",
+    "modes": "m.modes(m.equilibrium({'theta': -1.5}).x).frequencies",
+    "preload": "m.equilibrium(hold={'theta': -1.0}, unknowns=['tau'])['tau']",
+    "parameter_jacobian": "m.parameter_jacobian(0.0, m.x0())",
+    "reactions": "m.reactions(0.0, m.x0())",
+    "multipliers": "m.multipliers(0.0, m.x0())",
+    "inverse dynamics": "m.actuator_forces(0.0, m.x0()).forces",
+    "impact": "m.impact(0.0, m.x0(), lock=['s']).impulses",
+    "consistent": "m.consistent(m.x0() + 0.05)",
+    "kinematic_analysis": "m.kinematic_analysis(theta=[0.3, 0.9, 1.2])['s']",
+    "workspace": "m.workspace({'theta': (0, 3, 7)}, ['s'])['s']",
+    "motion_range": "m.motion_range('s', initial={'theta': 0.5}).upper",
+    "regressor": "m.regressor(m.x0()[:3], m.x0()[3:], [1.0, 2.0, 3.0])",
+    "simulate": "m.simulate(0.2, t_eval=[0.0, 0.2]).x",
+    "sensitivities": "m.sensitivities(['l'], 0.1)['theta', 'l'][-1]",
+    "times of impacts": "m.sensitivities(['l'], 0.3, {'theta': 1.3, 'theta_dot': 10.0}).event_times['wall']",
+}
+SERVO = {"states": "m.rhs(0.0, m.x0())", "samples": "m.simulate((0.035, 0.1), t_eval=[0.1]).x"}
+SCRIPT = """
+import importlib, json, sys
+gone = {"eomgen", "sympy", "scipy"}
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in gone:
+            raise ImportError(f"a package must not need {name}")
+sys.meta_path.insert(0, Refuse())
+import numpy as np
+m = importlib.import_module(sys.argv[1])
+found = {}
+for name, call in json.loads(sys.stdin.read()).items():
+    if name == "simulate" or sys.argv[1] == "servo":
+        gone.discard("scipy")
+    found[name] = np.asarray(eval(call)).tolist()
+print(json.dumps(found))
+"""
+
+
+def crank() -> eg.Model:
+    """A slider-crank with a wall that it strikes and an input with a signal."""
+    m = eg.load_example("slider_crank")
+    m.input("push", signal="0.1*l*sin(3*t)")
+    m.torque("drive", "theta", "push")
+    m.event("wall", "s - 0.3", restitution=0.5)
+    return m
+
+
+def servo() -> eg.Model:
+    """A mass with a state and a sampled one."""
+    m = eg.Model("servo")
+    m.prismatic("slide", m.ground, m.body("sledge", mass=2.0), axis="x", coordinate="s")
+    m.state("lag", "(1 - s - lag)/0.1", initial=0.3)
+    m.sampled("held", "1 - s", 0.02)
+    m.actuator("motor", "s", value="held + lag")
+    return m
+
+
+@pytest.mark.parametrize(("build", "calls"), [(crank, CRANK), (servo, SERVO)])
+def test_a_package_finds_what_the_module_finds(build: Any, calls: dict[str, str], tmp_path: Path) -> None:
+    model = build()
+    model.save(tmp_path / "model.yaml")
+    done = run("generate", tmp_path / "model.yaml", "--target", "numpy", "--out", tmp_path / "out")
+    assert done.code == 0, done.err
+    words = [sys.executable, "-c", SCRIPT, model.name]
+    child = subprocess.run(words, input=json.dumps(calls), cwd=tmp_path / "out", capture_output=True, text=True)
+    assert child.returncode == 0, child.stderr
+    found = json.loads(child.stdout)
+    m = model.compile(target="numpy")
+    for name, call in calls.items():
+        expected = eval(call, {"m": m})  # noqa: S307 - the calls above
+        size = max(1.0, float(np.abs(expected).max()))
+        np.testing.assert_allclose(found[name], expected, rtol=0, atol=1e-9 * size, err_msg=name)

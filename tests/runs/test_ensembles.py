@@ -1,0 +1,427 @@
+"""Many runs at once against SciPy and closed forms, and the bits of every run, however runs are shared out."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import models
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import eomgen as eg
+
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
+
+
+@cache
+def compiled(name: str, target: str = "cython", lanes: int | None = None) -> Any:
+    options: dict[str, Any] = {"optimize": 0} if target == "cython" else {}
+    return models.build(name).compile(target=target, **options, **({} if lanes is None else {"lanes": lanes}))
+
+
+@pytest.fixture
+def pendulum() -> Any:
+    """A double pendulum: a tree, run in lanes."""
+    return compiled("double_pendulum")
+
+
+@pytest.fixture
+def crank() -> Any:
+    """A slider-crank: a loop."""
+    return compiled("slider_crank")
+
+
+def angles(k: int, seed: int = 0) -> dict[str, Any]:
+    draw = np.random.default_rng(seed)
+    return {"theta1": draw.uniform(-1, 1, k), "bend": draw.uniform(-1, 1, k), "bend_dot": 0.1}
+
+
+def test_every_run_is_that_of_scipy(pendulum: Any) -> None:
+    k, times = 11, np.linspace(0, 3, 7)
+    masses = np.linspace(0.5, 2.0, k)
+    ensemble = pendulum.simulate_many((0, 3), angles(k), {"m2": masses, "g": 9.0}, t_eval=times, **TIGHT)
+    assert ensemble.ok.all()
+    assert ensemble.samples.shape == (pendulum.n_x, 7, k)
+    for j in range(k):
+        start = {name: float(np.broadcast_to(x, k)[j]) for name, x in angles(k).items()}
+        bound = pendulum.bind({"m2": masses[j], "g": 9.0})
+        judge = solve_ivp(bound.rhs, (0, 3), bound.x0(start), method="DOP853", t_eval=times, rtol=1e-12, atol=1e-13)
+        np.testing.assert_allclose(ensemble.samples[:, :, j], judge.y, rtol=0, atol=1e-7)
+        np.testing.assert_allclose(ensemble["theta2"][:, j], judge.y[0] + judge.y[1], rtol=0, atol=1e-7)
+    np.testing.assert_array_equal(ensemble.x, ensemble.samples[:, -1])
+
+
+def test_statistics_are_those_of_numpy(pendulum: Any) -> None:
+    times = np.linspace(0, 1, 4)
+    kept = pendulum.simulate_many(1, angles(700), t_eval=times)
+    made = pendulum.simulate_many(1, angles(700), t_eval=times, reduce="statistics")
+    everything = np.stack([kept[name] for name in made.names])
+    assert (made.reduced["count"] == 700).all()
+    np.testing.assert_allclose(made.reduced["mean"], everything.mean(axis=-1), rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(made.reduced["variance"], everything.var(axis=-1, ddof=1), rtol=1e-11, atol=1e-15)
+    np.testing.assert_array_equal(made.reduced["least"], everything.min(axis=-1))
+    np.testing.assert_array_equal(made.reduced["greatest"], everything.max(axis=-1))
+    assert made.x is None
+    np.testing.assert_array_equal(made["x"], made.reduced["mean"][made.names.index("x")])
+
+
+def test_what_a_function_keeps_of_each_block(pendulum: Any) -> None:
+    made = pendulum.simulate_many(1, angles(600), reduce=lambda block: {"top": block.x[0].max()}, block=256)
+    kept = pendulum.simulate_many(1, angles(600))
+    assert max(made.reduced["top"]) == kept["theta1"].max()
+    assert len(made.reduced["top"]) == 3
+    with pytest.raises(eg.UsageError, match="mapping of names"):
+        pendulum.simulate_many(1, angles(3), reduce=lambda block: block.x)
+
+
+def assert_as_good(found: Any, run: Any, exact: Any, lanes: int | None, near: float) -> None:
+    """A run of an ensemble: near to that of simulate; in lanes, which have other steps, it errs about as much."""
+    if lanes == 0:
+        np.testing.assert_allclose(found, run, rtol=0, atol=near)
+    errors = [float(np.abs(x - exact).max()) for x in (found, run)]
+    assert errors[0] < 4.0 * errors[1] + 1e-9 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("lanes", [0, None])
+def test_a_loop_is_kept_closed_and_a_run_that_cannot_begin_holds_up_none(lanes: int | None) -> None:
+    crank = compiled("slider_crank", "cython", lanes)
+    lengths = np.array([0.1, 0.5, 0.2, 0.12])  # the second is longer than the rod
+    times = [0.0, 1.0, 2.0]
+    ensemble = crank.simulate_many(2, {"theta": 1.2, "theta_dot": 10.0}, {"r": lengths}, t_eval=times, **TIGHT)
+    (failure,) = ensemble.failures()
+    assert failure.run == 1
+    assert "cannot close" in failure.message
+    assert np.isnan(ensemble.samples[:, :, 1]).all()
+    for j in (0, 2, 3):
+        bound = crank.bind({"r": lengths[j]})
+        assert np.abs(bound.constraints(ensemble.x[: crank.n_q, j], rows="all")).max() < 1e-12
+        run = bound.simulate(2, {"theta": 1.2, "theta_dot": 10.0}, t_eval=times, **TIGHT)
+        exact = bound.simulate(2, {"theta": 1.2, "theta_dot": 10.0}, t_eval=times, rtol=1e-13, atol=1e-15)
+        assert_as_good(ensemble.samples[:, :, j], run.x, exact.x, lanes, 1e-11)
+
+
+def test_runs_that_fail_are_marked_and_say_why() -> None:
+    q = eg.Model("runaway")
+    q.parameter("k", 1.0)
+    body = q.body("a", mass=1.0)
+    q.prismatic("s", q.ground, body, axis="x")
+    q.torque("pull", "s", "k*s**3")
+    module = q.compile(optimize=0)
+    # v' = k s^3 reaches infinity in finite time for k > 0 and swings for k < 0
+    ensemble = module.simulate_many(20, {"s": 1.0}, {"k": np.array([-1.0, 1.0, -2.0, 3.0])}, max_steps=5000)
+    assert ensemble.status.tolist()[0] == ensemble.status.tolist()[2] == 0
+    assert [f.run for f in ensemble.failures()] == [1, 3]
+    assert all("step size" in f.message for f in ensemble.failures())
+    # the time of escape of s' = s^2 / sqrt(2) from rest at s = 1: integral of ds / sqrt((s^4 - 1) / 2)
+    assert ensemble.t_end[1] == pytest.approx(1.8540746773013719, abs=1e-6)
+    assert ensemble.t_end[3] == pytest.approx(1.8540746773013719 / np.sqrt(3), abs=1e-6)
+    short = module.simulate_many(20, {"s": 1.0}, {"k": np.array([-1.0, -2.0])}, max_steps=3)
+    assert [f.message for f in short.failures()] == ["more than max_steps steps"] * 2
+    assert (short.steps == 3).all()
+
+
+@pytest.mark.parametrize("lanes", [0, None])
+def test_events_of_every_run(lanes: int | None) -> None:
+    """To the bits of simulate one after the other, within the tolerance side by side."""
+    pendulum = compiled("double_pendulum", "cython", lanes)
+    near = 0.0 if lanes == 0 else 1e-10
+    starts = {"theta1": np.linspace(0.2, 1.2, 7), "bend": 0.1}
+    watched = {"low": "theta1", "fast": {"expression": "theta1_dot - 2", "terminal": 2, "direction": 1}}
+    ensemble = pendulum.simulate_many(4, starts, events=watched, keep_events=40, **TIGHT)
+    t, x = ensemble.events("low")
+    assert ensemble.event_names == ("low", "fast")
+    for j in range(7):
+        run = pendulum.simulate(4, {"theta1": starts["theta1"][j], "bend": 0.1}, events=watched, **TIGHT)
+        k = len(run.t_events["low"])
+        np.testing.assert_allclose(t[:k, j], run.t_events["low"], rtol=0, atol=near)
+        np.testing.assert_allclose(x[:, :k, j], run.x_events["low"], rtol=0, atol=10 * near)
+        assert np.isnan(t[k:, j]).all()
+        assert ensemble.event_counts[j] == k + len(run.t_events["fast"])
+        assert abs(ensemble.t_end[j] - run.t[-1]) <= near
+        assert ensemble.status[j] == run.status
+    assert 1 in ensemble.status
+    assert ensemble.ok.all()
+    alone = pendulum.simulate_many(4, starts, events=watched, keep_events=2, reduce="events", **TIGHT)
+    np.testing.assert_array_equal(alone.event_counts, ensemble.event_counts)
+    assert alone.x is None
+
+
+def test_resets_of_the_model() -> None:
+    m = eg.Model("bouncing", gravity=(0, -10.0, 0))
+    m.parameter("e", 0.5)
+    m.prismatic("y", m.ground, m.body("ball", mass=1.0), axis="y")
+    m.event("floor", "y", direction=-1, reset={"y_dot": "-e*y_dot"})
+    module = m.compile(optimize=0)
+    e = np.array([0.3, 0.5, 0.9])
+    ensemble = module.simulate_many(1.2, {"y": 5.0 / 4.0}, {"e": e}, **TIGHT)
+    first = 0.5  # sqrt(2 h / g), with speed 5 m/s
+    second = first + 2 * e * 5.0 / 10.0
+    t, _ = ensemble.events("floor")
+    np.testing.assert_allclose(t[0], first, rtol=1e-9)
+    np.testing.assert_allclose(t[1, :2], second[:2], rtol=1e-9)
+    np.testing.assert_allclose(ensemble["y_dot"][2], 0.9 * 5.0 - 10.0 * 0.7, rtol=1e-8)
+
+
+def test_without_compiled_code(pendulum: Any) -> None:
+    times = [0.0, 0.5, 1.0]
+    theirs = compiled("double_pendulum", "numpy").simulate_many(1, angles(3), t_eval=times, **TIGHT)
+    np.testing.assert_allclose(
+        theirs.samples, pendulum.simulate_many(1, angles(3), t_eval=times, **TIGHT).samples, atol=1e-9
+    )
+    stiff = pendulum.simulate_many(1, angles(2), method="LSODA", **TIGHT)
+    np.testing.assert_allclose(stiff.x, pendulum.simulate_many(1, angles(2), **TIGHT).x, rtol=0, atol=1e-7)
+
+
+def test_no_runs_and_one_run(pendulum: Any) -> None:
+    assert pendulum.simulate_many(1, np.empty((4, 0))).x.shape == (4, 0)
+    assert pendulum.simulate_many(1).count == 1
+    alike = pendulum.simulate_many(1, {"theta1": 0.4}, count=5)
+    assert (alike.x == alike.x[:, :1]).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"initial": {"theta3": 1.0}}, "did you mean theta2 or theta1"),
+        ({"initial": {"theta1": [1.0, np.nan]}}, r"initial theta1 must be finite; entry \[1\] is nan"),
+        ({"initial": np.zeros((3, 5))}, r"initial must have shape \(4,\) or \(4, k\)"),
+        ({"initial": {"theta1": [1, 2]}, "parameters": {"g": [1, 2, 3]}}, "initial theta1: 2"),
+        ({"parameters": {"mass": 1.0}}, "no parameter 'mass'"),
+        ({"reduce": "mean"}, "reduce must be"),
+        ({"rtool": 1e-3}, "did you mean rtol"),
+        ({"events": {"falls": lambda t, x: x[0]}}, "event falls of simulate_many is a function"),
+        ({"t_eval": [3.0, 2.0]}, "t_eval must be times in order"),
+    ],
+)
+def test_wrong_words(pendulum: Any, options: dict[str, Any], message: str) -> None:
+    with pytest.raises(eg.UsageError, match=message):
+        pendulum.simulate_many(1, **options)
+
+
+def test_what_an_ensemble_offers(pendulum: Any, tmp_path: Path) -> None:
+    times = np.linspace(0, 1, 5)
+    ensemble = pendulum.simulate_many(1, angles(6), {"g": np.linspace(1, 9, 6)}, t_eval=times)
+    table = ensemble.to_pandas()
+    np.testing.assert_array_equal(table["g"], np.linspace(1, 9, 6))
+    np.testing.assert_array_equal(table["theta1"], ensemble.x[0])
+    starts = {name: column.tolist() for name, column in table.items() if name.startswith("initial_")}
+    assert starts == {f"initial_{name}": angles(6)[name].tolist() for name in ("theta1", "bend")}
+    rows = ensemble.to_pandas(samples=True)
+    assert len(rows) == 6 * 5
+    np.testing.assert_array_equal(rows[rows["run"] == 4]["t"], times)
+    np.testing.assert_array_equal(rows[rows["run"] == 4]["bend"], ensemble.samples[1, :, 4])
+    np.testing.assert_array_equal(rows[rows["t"] == 0.0]["initial_theta1"], rows[rows["t"] == 0.0]["theta1"])
+    with pytest.raises(eg.UsageError, match="kept no samples"):
+        pendulum.simulate_many(1, angles(6)).to_pandas(samples=True)
+    np.testing.assert_allclose(ensemble.trajectory(3).x[:, -1], ensemble.x[:, 3], rtol=0, atol=1e-7)
+    with np.load(ensemble.save(tmp_path / "runs")) as data:
+        np.testing.assert_array_equal(data["samples"], ensemble.samples)
+    axes = ensemble.plot("theta2")
+    assert len(axes.lines) == 6
+    assert axes.get_ylabel() == r"$\theta_{2}$ (rad)"
+    assert ensemble.plot("bend").get_ylabel() == "bend (rad)"
+    with pytest.raises(KeyError, match="theta2"):
+        ensemble["theta3"]
+    assert "6 runs" in repr(ensemble)
+
+
+def test_inputs_given_win_over_declared_signals_and_reach_the_outputs() -> None:
+    m = eg.Model("driven")
+    m.prismatic("s", m.ground, m.body("a", mass=2.0), axis="x")
+    m.torque("drive", "s", m.input("push", signal="5*sin(3*t)"))
+    m.input("other")
+    m.output("force", "push")
+    module = m.compile(optimize=0)
+    declared = module.simulate_many(2, {"s_dot": [0.0, 1.0]}, t_eval=[1.0, 2.0], **TIGHT)
+    np.testing.assert_allclose(declared["s_dot"][-1] - [0.0, 1.0], 5 / 3 * (1 - np.cos(6.0)) / 2, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(declared["force"], 5 * np.sin([[3.0, 3.0], [6.0, 6.0]]), rtol=1e-12)
+    again = module.simulate(2, **declared.case(1), **TIGHT)
+    np.testing.assert_allclose(again["s_dot"][-1], declared["s_dot"][-1, 1], rtol=0, atol=1e-9)
+    constant = module.simulate_many(2, inputs={"push": [1.0, 3.0]}, **TIGHT)
+    np.testing.assert_allclose(constant["s_dot"], [1.0, 3.0], rtol=1e-9)
+    np.testing.assert_array_equal(constant["force"], [1.0, 3.0])
+    again = module.simulate(2, **constant.case(1), **TIGHT)
+    np.testing.assert_allclose(again["s_dot"][-1], constant["s_dot"][1], rtol=1e-12)
+    table = ([0.0, 0.4, 2.0], [1.0, -2.0, 3.0])
+    tabled = module.simulate_many(2, {"s_dot": [0.0, 1.0]}, inputs={"push": table}, **TIGHT)
+    impulse = np.trapezoid(table[1], table[0])
+    np.testing.assert_allclose(tabled["s_dot"] - [0.0, 1.0], impulse / 2, rtol=0, atol=1e-9)
+    with pytest.raises(eg.UsageError, match="input push of simulate_many must be a number"):
+        module.simulate_many(2, inputs={"push": lambda t, x: 0.0})
+    texts = module.simulate_many(2, {"s": [0.0, 1.0]}, inputs={"push": "10*t + s"}, t_eval=[2.0], **TIGHT)
+    np.testing.assert_allclose(texts["force"][0], 20.0 + texts["s"][0], rtol=1e-12)
+
+
+def test_outputs_of_a_run_that_an_event_ended_are_those_at_the_event() -> None:
+    m = eg.Model("falling", gravity=(0, -10, 0))
+    m.prismatic("h", m.ground, m.body("a", mass=1.0), axis="y")
+    m.output("when", "t")
+    module = m.compile(optimize=0)
+    floor = {"floor": {"expression": "h", "terminal": 1}}
+    ensemble = module.simulate_many(5, {"h": [1.25, 5.0, 1000.0]}, events=floor, **TIGHT)
+    np.testing.assert_allclose(ensemble["when"], [0.5, 1.0, 5.0], rtol=1e-9)
+    np.testing.assert_allclose(ensemble.to_pandas()["when"], [0.5, 1.0, 5.0], rtol=1e-9)
+    assert ensemble.summary()["when"]["least"] == pytest.approx(0.5)
+    alone = module.simulate(5, **ensemble.case(0), **TIGHT).t[-1]
+    np.testing.assert_allclose(alone, ensemble.t_end[0], rtol=1e-14)  # lanes have bits of their own
+    statistics = module.simulate_many(5, {"h": [1.25, 5.0, 1000.0]}, events=floor, reduce="statistics", **TIGHT)
+    assert statistics["when"] == pytest.approx((0.5 + 1.0 + 5.0) / 3)
+
+
+def test_fixed_steps_and_runs_that_fail(pendulum: Any) -> None:
+    with pytest.raises(eg.UsageError, match="method RK4 needs step="):
+        pendulum.simulate_many(1, angles(3), method="RK4")
+    made = pendulum.simulate_many(1, angles(3), method="RK4", step=0.01)
+    assert (made.steps == 100).all()
+    alone = pendulum.simulate(1, **made.case(2), method="RK4", step=0.01)
+    np.testing.assert_array_equal(alone.x[:, -1], made.x[:, 2])
+    failed = pendulum.simulate_many(1, angles(3), max_steps=2)
+    assert np.isnan(failed["theta1"]).all()
+    assert np.isfinite(failed.reached).all()
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "RK23"])
+def test_a_run_without_lanes_has_the_bits_of_simulate(method: str) -> None:
+    pendulum = compiled("double_pendulum", "cython", 0)
+    options = {"rtol": 1e-6, "atol": 1e-8, "max_step": 0.2, "method": method}
+    ensemble = pendulum.simulate_many((1, -1), angles(13), **options)
+    for j in range(13):
+        run = pendulum.simulate((1, -1), **ensemble.case(j), **options)
+        np.testing.assert_array_equal(run.x[:, -1], ensemble.x[:, j])
+        assert len(run.t) - 1 == ensemble.steps[j]
+        assert run.nfev == ensemble.evaluations[j]
+
+
+def test_results_do_not_depend_on_threads_blocks_or_lanes(pendulum: Any) -> None:
+    k, times = 600, np.linspace(0, 2, 3)
+    whole = pendulum.simulate_many(2, angles(k), t_eval=times, **TIGHT)
+    one = pendulum.simulate_many(2, angles(k), t_eval=times, threads=1, block=7, **TIGHT)
+    np.testing.assert_array_equal(whole.samples, one.samples)
+    turned = {name: x[::-1] if np.ndim(x) else x for name, x in angles(k).items()}
+    np.testing.assert_array_equal(pendulum.simulate_many(2, turned, **TIGHT).x[:, ::-1], whole.x)
+    few = {name: x[5:8] if np.ndim(x) else x for name, x in angles(k).items()}
+    np.testing.assert_array_equal(pendulum.simulate_many(2, few, **TIGHT).x, whole.x[:, 5:8])
+    statistics = [
+        pendulum.simulate_many(2, angles(k), t_eval=times, reduce="statistics", **options, **TIGHT).reduced
+        for options in ({}, {"threads": 1, "block": 256})
+    ]
+    for name, value in statistics[0].items():
+        np.testing.assert_array_equal(value, statistics[1][name])
+    one = compiled("double_pendulum", "cython", 0)  # a state at a time with the steps of simulate
+    np.testing.assert_allclose(one.simulate_many(2, angles(k), **TIGHT).x, whole.x, rtol=0, atol=3e-8)
+
+
+def shares(module: Any, span: Any, columns: dict[str, Any], k: int, **options: Any) -> list[Any]:
+    """The same runs on one thread, on several, in blocks, backwards and some of them alone."""
+
+    def some(chosen: Any) -> dict[str, Any]:
+        return {name: x[chosen] if np.ndim(x) else x for name, x in columns.items()}
+
+    few = slice(k // 3, k // 3 + 3)
+    return [
+        (module.simulate_many(span, some(slice(None)), threads=1, **options), slice(None)),
+        (module.simulate_many(span, some(slice(None)), threads=3, **options), slice(None)),
+        (module.simulate_many(span, some(slice(None)), threads=2, block=5, **options), slice(None)),
+        (module.simulate_many(span, some(slice(None, None, -1)), threads=2, **options), slice(None, None, -1)),
+        (module.simulate_many(span, some(few), **options), few),
+    ]
+
+
+def compare(found: list[Any]) -> None:
+    """Compare states, samples and numbers of steps to the last bit."""
+    whole = found[0][0]
+    assert whole.ok.all()
+    for other, chosen in found[1:]:
+        np.testing.assert_array_equal(other.x, whole.x[:, chosen])
+        np.testing.assert_array_equal(other.steps, whole.steps[chosen])
+        np.testing.assert_array_equal(other.rejected, whole.rejected[chosen])
+        np.testing.assert_array_equal(other.evaluations, whole.evaluations[chosen])
+        if whole.samples is not None:
+            np.testing.assert_array_equal(other.samples, whole.samples[..., chosen])
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK23", "Radau", "Taylor"])
+def test_the_bits_of_a_tree(pendulum: Any, method: str) -> None:
+    options = {"rtol": 1e-5, "atol": 1e-7} if method == "RK23" else TIGHT
+    columns = {"theta1": np.linspace(-2.5, 2.5, 37), "bend": 0.3, "bend_dot": np.linspace(2, -2, 37)}
+    compare(shares(pendulum, 2, columns, 37, method=method, t_eval=[0.3, 1.1, 2.0], **options))
+
+
+def test_the_bits_of_a_loop(crank: Any) -> None:
+    columns = {"theta": np.linspace(0.1, 1.2, 14), "theta_dot": np.linspace(5, 12, 14)}
+    compare(shares(crank, 0.5, columns, 14, t_eval=[0.1, 0.5], **TIGHT))
+
+
+def test_what_stands_in_other_lanes_does_not_matter() -> None:
+    """Lanes that are not finite, that have failed, with denormal numbers and with angles that go to libm."""
+    m = eg.Model("lanes_apart")
+    m.parameter("k", 1.0)
+    arm = m.body("arm", mass=1.0, com=(1, 0, 0), inertia={"zz": 0.1})
+    m.revolute("hinge", m.ground, arm, coordinate="a")
+    m.torque("pull", "hinge", "k*sin(a) + k*a**3*1e-3")
+    module = m.compile(optimize=0)
+    k = np.where(np.arange(32) % 4 == 0, -1.0, 0.0)
+    start, rate = np.full(32, 0.5), np.linspace(0.1, 1.0, 32)
+    alone = module.simulate_many(3, {"a": start, "a_dot": rate}, {"k": k}, **TIGHT)
+    assert alone.ok.all()
+    wild, speed, pull = start.copy(), rate.copy(), k.copy()
+    wild[1::4], speed[1::4] = 5e-324, 5e-320  # denormal
+    wild[2::4] = 3e6  # by libm
+    pull[3::4], wild[3::4] = 1e9, 1e8  # soon infinite
+    mixed = module.simulate_many(3, {"a": wild, "a_dot": speed}, {"k": pull}, max_steps=3000, **TIGHT)
+    assert (mixed.status[3::4] < 0).all()
+    assert mixed.ok.reshape(8, 4)[:, :3].all()
+    np.testing.assert_array_equal(mixed.x[:, ::4], alone.x[:, ::4])
+    np.testing.assert_array_equal(mixed.steps[::4], alone.steps[::4])
+    np.testing.assert_allclose(mixed.x[0, 2::4], 3e6 + 3 * rate[2::4], rtol=1e-12)
+    np.testing.assert_allclose(mixed.x[0, 1::4], 5e-324 + 3 * 5e-320, rtol=1e-3)
+
+
+def test_a_run_that_fails_holds_up_no_other() -> None:
+    """s'' = 2 s^3 from s = s' = 1 ends at t = 1; from 0.5 at t = 2 (s = 1/(2 - t))."""
+    m = eg.Model("bursts")
+    body = m.body("mass", mass=1.0)
+    m.prismatic("J", m.ground, body, axis="x", coordinate="s")
+    m.torque("push", "J", "2*s**3")
+    s = np.array([0.5, 1.0, 0.5, 0.25, 1.0, 0.5, 0.25, 0.5, 0.5])
+    many = m.compile(optimize=0).simulate_many(
+        1.5, {"s": s, "s_dot": s**2}, first_step=1e-3, method="Taylor", rtol=1e-11, atol=1e-13
+    )
+    np.testing.assert_array_equal(many.ok, s < 1)
+    np.testing.assert_allclose(many.x[0, s < 1], 1 / (1 / s[s < 1] - 1.5), rtol=1e-9)
+    np.testing.assert_allclose(many.t_end[s == 1], 1.0, atol=1e-6)
+
+
+def test_what_has_no_series_is_refused() -> None:
+    with pytest.raises(eg.UsageError, match="no Taylor series"):
+        compiled("slider_crank", "cython").simulate_many(1, count=2, method="Taylor")
+
+
+def test_a_grid_has_every_combination(crank: Any) -> None:
+    grid = {"theta": (-0.5, 0.5, 3), "r": [0.09, 0.11], "tau": [0.0, 1.0]}
+    runs = crank.simulate_many(0.3, {"theta_dot": 0.2}, grid=grid, rtol=1e-9)
+    assert runs.count == 12
+    shaped = runs["theta"].reshape(3, 2, 2)
+    for i, theta in enumerate((-0.5, 0.0, 0.5)):
+        for j, r in enumerate((0.09, 0.11)):
+            for k, tau in enumerate((0.0, 1.0)):
+                start = {"theta": theta, "theta_dot": 0.2}
+                alone = crank.simulate(0.3, start, {"r": r}, {"tau": tau}, rtol=1e-10, atol=1e-12)
+                assert shaped[i, j, k] == pytest.approx(alone["theta"][-1], abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("grid", "told"),
+    [
+        ({"thta": [1]}, "no parameter, input, coordinate or rate 'thta'; did you mean theta"),
+        ({}, "grid has no names"),
+        ([1, 2], "grid must be a mapping of names to values"),
+        ({"theta_dot": [1]}, "theta_dot is given in initial too"),
+    ],
+)
+def test_faults_of_grids(crank: Any, grid: object, told: str) -> None:
+    with pytest.raises(eg.UsageError, match=told):
+        crank.simulate_many(0.1, {"theta_dot": 0.2}, grid=grid)

@@ -1,0 +1,329 @@
+"""Kinematic analysis against closed forms: times and coordinates that lead, branches, stops, change points, limits.
+
+Sources: vector loops of slider-crank and four-bar (Shabana, Computational Dynamics, ch. 3), written out here, and
+tests/reference/slider_crank_kinematics.json.
+"""
+
+from __future__ import annotations
+
+import models
+import numpy as np
+import pytest
+
+import eomgen as eg
+
+
+def slider_crank(driven: bool = True) -> eg.Model:
+    m = eg.load(models.EXAMPLES / "driven_slider_crank.yaml")
+    if not driven:
+        m.description.sections["constraints"].clear()
+        for entry in m.description.sections["bodies"]:
+            entry.values |= {"mass": 1, "inertia": {"zz": 1}}
+    return m
+
+
+def parallelogram(value: str = "0.5 + 2*pi*t") -> eg.Model:
+    m = eg.Model("parallelogram")
+    one, bar, two = (m.body(name, mass=0) for name in ("one", "bar", "two"))
+    m.revolute("A", m.ground, one, coordinate="theta")
+    m.revolute("B", one.at(0.2, 0, 0), bar, coordinate="bend")
+    m.revolute("C", bar.at(0.6, 0, 0), two.at(0.2, 0, 0))
+    m.revolute("D", m.ground.at(0.6, 0, 0), two, coordinate="psi")
+    m.output("ax", "ax(bar)")
+    m.driver("drive", "theta", value)
+    m.guess(bend=-0.5, psi=0.5)
+    return m
+
+
+@pytest.fixture(scope="module")
+def crank() -> eg.Module:
+    return slider_crank().compile(target="numpy")
+
+
+@pytest.fixture(scope="module")
+def free_crank() -> eg.Module:
+    return slider_crank(driven=False).compile(target="numpy", independent=["theta"])
+
+
+@pytest.fixture(scope="module")
+def four_bar() -> eg.Module:
+    return models.build("four_bar").compile(target="numpy")
+
+
+@pytest.mark.parametrize("case", ["inline", "offset"])
+def test_the_driven_slider_crank_equals_the_reference_rows(crank: eg.Module, case: str) -> None:
+    given = models.reference("slider_crank_kinematics")["reference"][case]
+    sizes = {key: float(given[key]) for key in ("r", "l", "e", "omega", "alpha")}
+    for degrees, row in given["rows"].items():
+        mod = crank.bind(p=sizes | {"phi": np.radians(float(degrees))})
+        found = mod.kinematic_analysis(t=[0.0, 1e-3])
+        pairs = {"x": "s", "v": "s_dot", "a": "s_ddot", "rod_angle": "rod_angle"}
+        for theirs, ours in pairs.items():
+            assert found[ours][0] == pytest.approx(float(row[theirs]), rel=1e-12, abs=1e-13), (degrees, theirs)
+        assert found["slider_acceleration"][0] == pytest.approx(float(row["a"]), rel=1e-12, abs=1e-13)
+        rod = found["theta_dot"][0] + found["bend_dot"][0], found["theta_ddot"][0] + found["bend_ddot"][0]
+        assert rod == pytest.approx((float(row["rod_omega"]), float(row["rod_alpha"])), rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.05])
+def test_twenty_turns_through_the_dead_centres(crank: eg.Module, offset: float) -> None:
+    omega, r, l = 10.0, 0.1, 0.3
+    mod = crank.bind(p={"e": offset})
+    t = np.linspace(0, 20 * 2 * np.pi / omega, 4 * 360 + 1)
+    found = mod.kinematic_analysis(t=t)
+    angle, sine = omega * t, (offset - r * np.sin(omega * t)) / l
+    rod, rod1 = np.arcsin(sine), -r * omega * np.cos(angle) / l / np.sqrt(1 - sine**2)
+    rod2 = (r * omega**2 * np.sin(angle) / l + sine * rod1**2) / np.sqrt(1 - sine**2)
+    s = r * np.cos(angle) + l * np.cos(rod)
+    s1 = -r * omega * np.sin(angle) - l * np.sin(rod) * rod1
+    s2 = -r * omega**2 * np.cos(angle) - l * (np.cos(rod) * rod1**2 + np.sin(rod) * rod2)
+    for ours, theirs in zip(("s", "s_dot", "s_ddot"), (s, s1, s2), strict=True):
+        assert np.abs(found[ours] - theirs).max() <= 1e-11 * np.abs(theirs).max(), ours
+    assert np.abs(found["theta"] - angle).max() < 1e-12
+    assert found["bend"][-1] + found["theta"][-1] == pytest.approx(rod[-1], abs=1e-11)  # twenty turns were counted
+    assert found.residuals.position < 1e-12
+    assert found.complete
+    assert found.singular == []
+    ends = found.turning_points("s")  # the dead centres: crank and rod in line
+    far, near = np.sqrt((l + r) ** 2 - offset**2), np.sqrt((l - r) ** 2 - offset**2)
+    values = np.array([value for _, value in ends])
+    assert 39 <= len(values) <= 41
+    assert np.minimum(np.abs(values - far), np.abs(values - near)).max() < 1e-6  # of cubics five degrees wide
+
+
+def test_a_parallelogram_keeps_its_branch_through_its_change_points() -> None:
+    """psi = theta, bend = -theta, the bar only translates: exact at the change points theta = k pi themselves too."""
+    mod = parallelogram().compile(target="numpy")
+    at = (np.pi * np.arange(1, 40) - 0.5) / (2 * np.pi)
+    t = np.sort(np.concatenate([np.linspace(0, 20, 67), at, at + 1e-9, at - 1e-5]))
+    found = mod.kinematic_analysis(t=t)
+    assert np.abs(found["psi"] - found["theta"]).max() < 2e-12
+    assert np.abs(found["bend"] + found["theta"]).max() < 2e-12
+    omega = 2 * np.pi
+    assert np.abs(found["psi_dot"] - omega).max() < 1e-9
+    assert np.abs(found["psi_ddot"]).max() < 1e-8 * omega**2
+    assert np.abs(found["ax"] + 0.2 * omega**2 * np.cos(found["theta"])).max() < 1e-8 * omega**2
+    assert [s.kind for s in found.singular] == ["change point"] * 40
+    np.testing.assert_allclose([s.t for s in found.singular[:39]], at, atol=1e-10)
+    first = found.singular[0]
+    assert first.moving == ("bend", "psi")
+    assert first.joints == ("C",)
+    assert "the motion may branch" in str(first)
+
+
+@pytest.mark.parametrize("t", [0.5, 7.0, -3.3])
+def test_a_state_at_a_later_time_is_on_the_branch_of_the_start(t: float) -> None:
+    """x0 follows the drivers from t = 0, through the change points of the parallelogram on the way."""
+    mod = parallelogram().compile(target="numpy")
+    angle = 0.5 + 2 * np.pi * t
+    rate = 2 * np.pi
+    np.testing.assert_allclose(mod.x0(t=t), [angle, -angle, angle, rate, -rate, rate], atol=1e-11)
+
+
+def test_starting_at_a_change_point_is_refused() -> None:
+    m = parallelogram("2*pi*t")
+    m.guess(bend=0, psi=0)
+    mod = m.compile(target="numpy")
+    with pytest.raises(eg.PartitionError, match="the initial position is singular.*branches meet there"):
+        mod.kinematic_analysis(t=[0.0, 0.1])
+    with pytest.raises(eg.PartitionError, match="the initial position is singular"):
+        mod.simulate(0.1)
+
+
+def test_a_driver_that_goes_too_far_stops_at_the_dead_centre(crank: eg.Module) -> None:
+    """With the crank longer than the rod, it stops where the rod stands across the guide: sin(theta) = l / r."""
+    mod = crank.bind(p={"r": 0.3, "l": 0.2})
+    with pytest.raises(eg.PartitionError, match=r"cannot be followed to its end: stop at t = 0.0729727.*joints C") as e:
+        mod.kinematic_analysis(t=np.linspace(0, 1, 101))
+    part = e.value.reached
+    assert (len(part), part.complete) == (8, False)
+    assert part.stop.t == pytest.approx(np.arcsin(2 / 3) / 10, abs=1e-12)
+    assert np.isfinite(part.a).all()
+    with pytest.raises(eg.SimulationError, match=r"t = 0.0729728 s.*C.r_y stays open by 0.\d+ m; change the drivers"):
+        mod.simulate(1.0)
+
+
+def test_any_coordinate_leads_and_gives_the_same_motion(four_bar: eg.Module) -> None:
+    """theta's own motion, led again by psi (tree) and by C (the cut joint's) with their rates: back comes theta."""
+    theta = np.linspace(0.8, 2.5, 35)
+    first = four_bar.kinematic_analysis(theta=theta, theta_dot=10, theta_ddot=3)
+    for name in ("psi", "C"):
+        rates = {name + suffix: first[name + suffix] for suffix in ("", "_dot", "_ddot")}
+        again = four_bar.kinematic_analysis(**rates)
+        assert again.led == (name,)
+        for suffix, value in (("", theta), ("_dot", 10.0), ("_ddot", 3.0)):
+            np.testing.assert_allclose(again["theta" + suffix], value, rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(again["P_x"], first["P_x"], atol=1e-12)
+
+
+def test_outputs_with_accelerations_follow_the_led_motion(four_bar: eg.Module) -> None:
+    m = models.build("four_bar")
+    m.output("P_ax", "ax(coupler.point)")
+    given = models.reference("four_bar_kinematics")["reference"]["crank_rocker_open"]
+    degrees = np.array([float(key) for key in given["rows"]])
+    mod = m.compile(target="numpy")
+    found = mod.kinematic_analysis(theta=np.radians(degrees), theta_dot=10, theta_ddot=3)
+    expected = [float(row["P_x"][2]) for row in given["rows"].values()]
+    np.testing.assert_allclose(found["P_ax"], expected, rtol=1e-11)
+    for k, row in enumerate(given["rows"].values()):
+        ours = found["coupler_angle"][k] - float(row["coupler"][0]), found["psi"][k] - float(row["rocker"][0])
+        assert np.abs(np.remainder(np.array(ours) + np.pi, 2 * np.pi) - np.pi).max() < 1e-12
+        rates = found["psi_dot"][k], found["psi_ddot"][k], found["P_x"][k], found["P_y"][k]
+        theirs = *row["rocker"][1:], row["P_x"][0], row["P_y"][0]
+        np.testing.assert_allclose(rates, [float(x) for x in theirs], rtol=1e-11)
+
+
+def test_both_branches_of_a_four_bar(four_bar: eg.Module) -> None:
+    """The other branch is the mirror image in the diagonal from crank pin to rocker pivot."""
+    a1, a2, a3, a4 = 0.04, 0.12, 0.08, 0.10
+    theta = np.linspace(np.pi / 3, np.pi / 3 + 2 * np.pi, 61)
+    for q in four_bar.branches():
+        found = four_bar.kinematic_analysis(theta=theta, initial=q)
+        dx, dy = a4 - a1 * np.cos(theta), -a1 * np.sin(theta)
+        d = np.hypot(dx, dy)
+        turn = np.arccos((a2**2 + d**2 - a3**2) / (2 * a2 * d))
+        side = np.sign(np.sin(found["coupler_angle"][0] - np.arctan2(dy, dx)[0]))
+        off = found["coupler_angle"] - np.arctan2(dy, dx) - side * turn
+        assert np.abs(np.remainder(off + np.pi, 2 * np.pi) - np.pi).max() < 1e-12
+        np.testing.assert_allclose(found["P_x"][-1], found["P_x"][0], atol=1e-12)  # the coupler curve closes
+        np.testing.assert_allclose(found["P_y"][-1], found["P_y"][0], atol=1e-12)
+
+
+def test_a_led_slider_stops_at_its_dead_centres(free_crank: eg.Module) -> None:
+    part = free_crank.kinematic_analysis(s=np.linspace(0.3, 0.5, 41), s_dot=1.0, partial=True)
+    stop = part.stop
+    assert stop is not None
+    assert stop.values["s"] == pytest.approx(0.4, abs=1e-14)
+    assert np.abs(stop.q[:2]).max() < 1e-7
+    assert stop.moving == ("theta", "bend")
+    assert (len(part), part["s"][-1]) == (21, pytest.approx(0.4))  # the stop itself is one of the points
+    assert np.isfinite(part.a[:, :-1]).all()
+    with pytest.raises(eg.PartitionError, match="s cannot be prescribed from the initial position.*branches meet"):
+        free_crank.kinematic_analysis(s=[0.4, 0.3], initial={"theta": 0.0})
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({}, "there is no range"),
+        ({"theta": [0, 1], "s": [0.3, 0.4]}, "theta, s cannot all be prescribed: 1 degree of freedom"),
+        ({"thet": [0, 1]}, "no coordinate or rate 'thet'.*theta"),
+        ({"theta": [0, 1], "s_dot": 1}, "s_dot is given without values of s"),
+        ({"theta": [0, 1, 2], "theta_dot": [1, 2]}, "one length, not theta: 3, theta_dot: 2"),
+        ({"t": [0, 1], "theta": [0, 1]}, "theta varies with t: give theta_dot"),
+        ({"theta": [0, 1], "initial": {"theta_dot": 1}}, "positions only, not theta_dot"),
+        ({"theta": [0, 1], "initial": [0, 1]}, r"initial must name values or have shape \(3,\)"),
+    ],
+)
+def test_what_cannot_be_asked(free_crank: eg.Module, asked: dict[str, object], said: str) -> None:
+    with pytest.raises(eg.UsageError, match=said):
+        free_crank.kinematic_analysis(**asked)
+
+
+def test_nothing_is_left_to_lead_where_drivers_move_all(crank: eg.Module) -> None:
+    with pytest.raises(eg.UsageError, match="the drivers determine the whole motion; give t"):
+        crank.kinematic_analysis(theta=[0, 1])
+
+
+def test_limits_of_every_coordinate(four_bar: eg.Module, free_crank: eg.Module) -> None:
+    swing = four_bar.motion_range("psi")
+    limits = [np.pi - np.arccos((0.08**2 + 0.1**2 - d**2) / (2 * 0.08 * 0.1)) for d in (0.08, 0.16)]
+    assert sorted((swing.lower, swing.upper)) == pytest.approx(sorted(limits), abs=1e-12)
+    assert all("C.r_" in gap and "stays open" in gap for gap in swing.gaps)
+    assert four_bar.motion_range("theta").unlimited
+    stroke = free_crank.motion_range("s", initial={"theta": 0.5})
+    assert (stroke.lower, stroke.upper) == pytest.approx((0.2, 0.4), abs=1e-14)
+    near = free_crank.motion_range("s", within=(0.3, 0.5), initial={"s": 0.35})
+    assert (near.lower, near.upper, near.stops[0]) == (0.3, pytest.approx(0.4), None)
+    with pytest.raises(eg.UsageError, match="is not within"):
+        free_crank.motion_range("s", within=(0.5, 0.6), initial={"s": 0.35})
+
+
+def test_how_long_drivers_can_go_on(crank: eg.Module) -> None:
+    found = crank.motion_range("t", parameters={"r": 0.3, "l": 0.2})
+    assert (found.lower, found.upper) == pytest.approx((-np.arcsin(2 / 3) / 10, np.arcsin(2 / 3) / 10), abs=1e-12)
+
+
+def test_a_ball_joint_led_by_three_distances() -> None:
+    """Wires to three points of a body on a ball joint set its attitude; rates against differences of the positions."""
+    m = eg.Model("gimbal")
+    body = m.body("plate", mass=1, inertia=(1, 1.2, 1.5))
+    m.spherical("S", m.ground, body, rotation="euler_parameters")
+    for k, (at, far) in enumerate([((1, 0, 0), (1.2, 0.1, 1.5)), ((0, 1, 0), (0, 1.3, 1.4)), ((0, 0, 1), (1.5, 0, 1))]):
+        rest = float(np.linalg.norm(np.subtract(far, at)))
+        m.driver(f"wire{k}", between=(m.ground.at(*far), body.at(*at)), value=f"{rest!r} + 0.2*sin({k + 1}*t)")
+    mod = m.compile(target="numpy")
+    t = np.linspace(0, 2, 41)
+    found = mod.kinematic_analysis(t=t)
+    assert found.residuals.position < 1e-12
+    np.testing.assert_allclose((found.q**2).sum(axis=0), 1.0, rtol=1e-12)
+    h = 1e-5
+    sides = [mod.kinematic_analysis(t=np.concatenate([[0.0], t[1:-1] + x])) for x in (-h, h)]
+    rates = (sides[1].q[:, 1:] - sides[0].q[:, 1:]) / (2 * h)
+    ours = np.array([found[f"S_e{k}_dot"][1:-1] for k in range(4)])
+    np.testing.assert_allclose(ours, rates, atol=1e-8)
+    np.testing.assert_allclose(found.a[:, 1:-1], (sides[1].v[:, 1:] - sides[0].v[:, 1:]) / (2 * h), atol=1e-8)
+
+
+def test_change_points_where_the_determinant_only_touches_zero() -> None:
+    """Three parallel cranks on one bar: a redundant loop, flat at 0 and pi; all cranks turn alike throughout."""
+    mod = models.build("three_cranks").compile(target="numpy")
+    theta = np.concatenate([np.linspace(-0.5, 6, 66), [6.1]])
+    found = mod.kinematic_analysis(theta1=theta, theta1_dot=2.0, theta1_ddot=1.0)
+    for name in ("theta2", "theta3"):
+        for suffix, value in (("", theta), ("_dot", 2.0), ("_ddot", 1.0)):
+            np.testing.assert_allclose(found[name + suffix], value, atol=1e-9)
+    np.testing.assert_allclose([s.values["theta1"] for s in found.singular], [0, np.pi], atol=1e-10)
+
+
+def test_values_in_any_order_are_those_of_the_sweep(four_bar: eg.Module, crank: eg.Module) -> None:
+    values = np.random.default_rng(0).normal(size=40)
+    order = np.argsort(values)
+    for found, swept in (
+        (four_bar.kinematic_analysis(theta=values), four_bar.kinematic_analysis(theta=values[order])),
+        (crank.kinematic_analysis(t=abs(values)), crank.kinematic_analysis(t=abs(values[order]))),
+    ):
+        np.testing.assert_allclose(found.x[:, order], swept.x, atol=1e-11)
+        np.testing.assert_allclose(found.a[:, order], swept.a, atol=1e-9)
+    with pytest.raises(eg.UsageError, match=r"159155 turns"):
+        four_bar.kinematic_analysis(theta=[0.0, 1e6])
+
+
+def test_solving_and_integrating_agree(crank: eg.Module) -> None:
+    t = np.linspace(0, 0.7, 29)  # a turn and more
+    solved = crank.simulate(0.7, t_eval=t)
+    integrated = crank.simulate(0.7, t_eval=t, method="DOP853", rtol=1e-11, atol=1e-12)
+    assert (solved.metadata["method"], integrated.metadata["method"]) == ("kinematic", "DOP853")
+    assert solved.nfev == 0
+    for name in ("theta", "bend", "s", "s_dot", "s_ddot", "C", "M_x", "slider_acceleration"):
+        np.testing.assert_allclose(solved[name], integrated[name], rtol=1e-8, atol=1e-8)
+    assert solved.residuals.position < 1e-14
+
+
+def test_events_of_driven_runs_are_located(crank: eg.Module) -> None:
+    """The slider passes 0.3: from cos(theta) = (r^2 + s^2 - l^2) / (2 r s)."""
+    s = 0.3
+    angle = np.arccos((0.01 + s**2 - 0.09) / (2 * 0.1 * s))
+    passing = [(angle + 0.0) / 10, (2 * np.pi - angle) / 10, (2 * np.pi + angle) / 10]
+
+    def event(t: float, x: np.ndarray) -> float:
+        return float(x[2] - s)
+
+    run = crank.simulate((0, 0.8), events=event)
+    np.testing.assert_allclose(run.t_events[0], passing, atol=1e-13)
+    assert run.x_events[0].shape == (6, 3)
+    event.direction, event.terminal = 1, True
+    run = crank.simulate((0, 0.8), events=[event])
+    assert (run.status, len(run.t_events[0])) == (1, 1)
+    assert run.t[-1] == pytest.approx(passing[1], abs=1e-13)
+    assert run["s"][-1] == pytest.approx(s, abs=1e-13)
+
+
+def test_what_driven_runs_refuse(crank: eg.Module) -> None:
+    with pytest.raises(eg.AssemblyError, match="theta = 0.5"):
+        crank.simulate(1.0, initial={"theta": 0.5})
+    with pytest.raises(eg.UsageError, match="has no option 'lband'"):
+        crank.simulate(1.0, lband=1)
+    pendulum = eg.load_example("pendulum").compile(target="numpy")
+    with pytest.raises(eg.UsageError, match="'kinematic' is for mechanisms without degrees of freedom"):
+        pendulum.simulate(1.0, method="kinematic")

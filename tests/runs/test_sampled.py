@@ -1,0 +1,295 @@
+"""Sampled states: digital controllers against their difference equations, written out by hand."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+
+MASS, TARGET = 2.0, 0.1
+
+
+GAINS = {"kp": 8.0, "ki": 5.0, "kd": 4.0}
+
+
+LAW = {"z": "z + T*(target - s)", "u": "kp*(target - s) + ki*z - kd*s_dot"}
+
+
+TEXT = """
+name: servo
+parameters: {T: {value: 100, unit: ms}, first: 0, kp: 8, ki: 5, kd: 4}
+inputs: {target: 0.1}
+bodies: {sledge: {mass: 2}}
+joints: {slide: {type: prismatic, between: [ground, sledge], axis: x, coordinate: s}}
+forces: {motor: {type: actuator, joint: s, value: u}}
+states:
+  z: {sampled: z + T*(target - s), period: T, offset: first}
+  u: {sampled: kp*(target - s) + ki*z - kd*s_dot, period: T, offset: first, doc: force of the drive}
+outputs: {push: force(motor)}
+"""
+
+
+def servo(order: str = "zu") -> eg.Model:
+    """A mass that a controller holds in place."""
+    m = eg.Model("servo")
+    for name, value in ({"T": 0.1, "first": 0.0} | GAINS).items():
+        m.parameter(name, value)
+    sledge = m.body("sledge", mass=MASS)
+    m.prismatic("slide", m.ground, sledge, axis="x", coordinate="s")
+    m.input("target", TARGET)
+    for name in order:
+        m.sampled(name, LAW[name], "T", offset="first")
+    m.actuator("motor", "s", value="u")
+    return m
+
+
+def by_hand(
+    end: float, instants: Any, T: float = 0.1, order: str = "zu", kp: float = 8.0, start: float = 0.0
+) -> np.ndarray[Any, Any]:
+    """s, s_dot, z, u: the exact motion under a force that is constant between the instants."""
+    s, v, z, u, t = 0.0, 0.0, 0.0, 0.0, start
+    for k, now in enumerate((*instants, end)):
+        h = now - t
+        s, v, t = s + h * v + 0.5 * h * h * u / MASS, v + h * u / MASS, now
+        if k < len(instants):
+            for name in order:
+                if name == "z":
+                    z += T * (TARGET - s)
+                else:
+                    u = kp * (TARGET - s) + GAINS["ki"] * z - GAINS["kd"] * v
+    return np.array([s, v, z, u])
+
+
+@pytest.fixture(scope="module")
+def module() -> Any:
+    """The servo in C."""
+    return servo().compile(optimize=0)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "Radau", "LSODA"])
+def test_runs_are_those_of_the_difference_equations(module: Any, method: str) -> None:
+    run = module.simulate(1.05, method=method)
+    exact = by_hand(1.05, 0.1 * np.arange(11))
+    loose = 1e-6 if method in ("BDF", "LSODA") else 1e-12  # the others follow a parabola exactly
+    assert np.abs(run.x[:4, -1] - exact).max() < loose
+    assert np.abs(run.t_events["z_sampled"] - 0.1 * np.arange(11)).max() < 1e-15
+    assert run["z_samples"][-1] == 11
+
+
+@pytest.mark.parametrize("order", ["zu", "uz"])
+def test_values_are_renewed_in_the_order_of_their_declaration(order: str) -> None:
+    run = servo(order).compile(target="numpy").simulate(1.05)
+    exact = by_hand(1.05, 0.1 * np.arange(11), order=order)
+    names = ("s", "s_dot", "z", "u")
+    assert np.abs([run[name][-1] for name in names] - exact).max() < 1e-12
+    other = by_hand(1.05, 0.1 * np.arange(11), order=order[::-1])
+    assert np.abs(other - exact).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("start", "first", "instants"),
+    [
+        (0.3, 0.0, 0.1 * np.arange(3, 11)),
+        (0.1 + 0.2, 0.0, 0.1 * np.arange(3, 11)),  # 0.30000000000000004
+        (0.35, 0.0, 0.1 * np.arange(4, 11)),
+        (0.0, 0.037, 0.037 + 0.1 * np.arange(11)),
+        (0.337, 0.037, 0.337 + 0.1 * np.arange(8)),
+        (-0.5, 0.0, 0.1 * np.arange(11)),  # no samples before the offset
+    ],
+)
+def test_a_run_that_begins_later_takes_the_samples_from_there(
+    module: Any, start: float, first: float, instants: Any
+) -> None:
+    run = module.simulate((start, 1.05), parameters={"first": first})
+    assert np.abs(run.t_events["z_sampled"] - instants).max() < 1e-13
+    assert np.abs(run.x[:4, -1] - by_hand(1.05, instants, start=start)).max() < 1e-12
+
+
+def test_every_start_at_a_sampling_time_samples_there(module: Any) -> None:
+    for start in (x for k in range(1, 400, 37) for x in (0.1 * k, k / 10, np.nextafter(0.1 * k, 0.0))):
+        found = module.simulate((start, start + 0.15)).t_events["z_sampled"]
+        assert np.abs(found - [start, start + 0.1]).max() < 1e-12
+
+
+@pytest.mark.parametrize("cut", [0.55, 0.30000000000000004])
+def test_a_run_in_parts_is_the_run_in_one(module: Any, cut: float) -> None:
+    whole = module.simulate(1.05)
+    second = module.simulate((cut, 1.05), initial=module.simulate(cut))
+    assert np.abs(second.x[:, -1] - whole.x[:, -1]).max() < 1e-13
+
+
+def test_many_runs(module: Any) -> None:
+    many = module.simulate_many((0.0, 1.02), parameters={"T": [0.1, 0.05, 0.13], "kp": [8.0, 7.0, 9.0]})
+    for k, (T, kp) in enumerate(((0.1, 8.0), (0.05, 7.0), (0.13, 9.0))):
+        instants = T * np.arange(int(1.02 / T) + 1)
+        assert np.abs(many.x[:4, k] - by_hand(1.02, instants, T=T, kp=kp)).max() < 1e-12
+    late = module.simulate_many((0.35, 1.02), initial={"s": [0.0, 0.0]})
+    assert np.abs(late.x[:4, 1] - by_hand(1.02, 0.1 * np.arange(4, 11), start=0.35)).max() < 1e-12
+
+
+@pytest.mark.parametrize("start", [0.0, 0.35])
+def test_sensitivities_by_gains_and_period(module: Any, start: float) -> None:
+    found = module.sensitivities(["kp", "T"], (start, 1.05))
+    count = np.arange(0 if start == 0.0 else 4, 11)
+    h = 1e-6
+    for name, middle in (("kp", 8.0), ("T", 0.1)):
+        ends = []
+        for change in (h, -h):
+            given = {"T": 0.1, "kp": 8.0} | {name: middle + change}
+            ends.append(by_hand(1.05, given["T"] * count, start=start, **given))
+        slope = (ends[0] - ends[1]) / (2 * h)
+        assert [found[state, name][-1] for state in ("s", "s_dot", "z", "u")] == pytest.approx(slope, rel=2e-7)
+
+
+def loads(text: str, folder: Path) -> eg.Model:
+    """The model of a file's text."""
+    file = folder / "model.yaml"
+    file.write_text(text)
+    return eg.load(file)
+
+
+def test_a_model_file_says_the_same(module: Any, tmp_path: Path) -> None:
+    m = loads(TEXT, tmp_path)
+    read = m.compile(target="numpy")
+    x = read.simulate(1.05).x[:, -1]
+    assert read.x_names == module.x_names
+    assert np.abs(x - module.simulate(1.05).x[:, -1]).max() < 1e-14
+    again = loads(m.to_yaml(), tmp_path).compile(target="numpy")
+    assert np.array_equal(again.simulate(1.05).x[:, -1], x)
+
+
+@pytest.mark.parametrize(("method", "target"), [("DOP853", "numpy"), ("Radau", "cython"), ("many", "cython")])
+def test_clocks_whose_times_differ_by_rounding_keep_their_order(method: str, target: str) -> None:
+    """0.3 and 3 * 0.1 are neighbouring numbers: b, declared later, takes the new a at each of its times."""
+    m = eg.Model("cascade")
+    m.prismatic("slide", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    m.sampled("a", "1 - s - 2*s_dot", 0.1)
+    m.sampled("b", "a", 0.3)
+    m.actuator("motor", "s", value="b")
+    module = m.compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    s = v = force = 0.0
+    for k in range(41):
+        force = 1 - s - 2 * v if k % 3 == 0 else force
+        h = 0.1 if k < 40 else 0.05
+        s, v = s + h * v + 0.5 * h * h * force, v + h * force
+    if method == "many":
+        found = module.simulate_many(4.05, count=2).x[0, 1]
+    else:
+        found = module.simulate(4.05, method=method)["s"][-1]
+    assert abs(found - s) < 1e-11
+
+
+def test_a_state_from_the_end_of_a_run_begins_anew_where_the_run_begins_earlier(module: Any) -> None:
+    first = module.simulate(1.0)
+    for span, wanted in ((0.32, [0.0, 0.1, 0.2, 0.3]), ((0.45, 0.62), [0.5, 0.6]), ((1.0, 1.15), [1.1])):
+        found = module.simulate(span, first.x[:, -1]).t_events["z_sampled"]
+        assert found == pytest.approx(wanted, abs=1e-13)
+    again = module.simulate((1.0, 1.5), first.x[:, -1], parameters={"T": 0.2})
+    assert again.t_events["z_sampled"][-2:] == pytest.approx([1.2, 1.4])
+    with pytest.raises(eg.UsageError, match="z_samples counts samples, so it must be a whole number, not 2.5"):
+        module.simulate(1.0, {"z_samples": 2.5})
+
+
+@pytest.mark.parametrize("call", ["equilibrium", "modes"])
+def test_analyses_of_continuous_time_are_refused(module: Any, call: str) -> None:
+    with pytest.raises(eg.UnavailableError, match=r"sampled states, and 'servo' has z, u"):
+        getattr(module, call)()
+
+
+def test_runs_backwards_and_periods_that_are_not_positive_are_refused(module: Any) -> None:
+    for call in (module.simulate, module.simulate_many):
+        with pytest.raises(eg.UsageError, match=r"forward in time, not from 1 s to 0 s"):
+            call((1.0, 0.0), {"s": 0.0})
+    for period in (0.0, -0.1):
+        with pytest.raises(eg.UsageError, match=r"states\.z\.period: .* is not positive with T = .*; give the time"):
+            module.simulate(1.0, parameters={"T": period})
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ({"sampled": "s"}, r"u\.period: is missing"),
+        ({"sampled": "s", "period": 0}, r"u\.period: 0 is not positive"),
+        ({"sampled": "s", "period": "s"}, r"u\.period: .*coordinate 's'"),
+        ({"sampled": "s", "rate": 1, "period": 1}, r"has a rate and is sampled"),
+        ({"rate": 1, "period": 1}, r"u\.period: is a key of states that are sampled"),
+        ({"offset": 1}, r"u\.rate: is missing"),
+        ({"sampled": "s_ddot", "period": 1}, r"s_ddot"),
+    ],
+)
+def test_faults_name_their_place(entry: dict[str, Any], words: str, tmp_path: Path) -> None:
+    text = TEXT.split("forces:")[0] + f"states:\n  u: {json.dumps(entry)}\n"
+    with pytest.raises(eg.ModelError, match=words):
+        loads(text, tmp_path).derive()
+
+
+def outside() -> eg.Model:
+    """A mass whose drive a function of the run controls."""
+    m = eg.Model("servo")
+    m.prismatic("slide", m.ground, m.body("sledge", mass=MASS), axis="x", coordinate="s")
+    m.sampled("z", "z + 0.1*(0.1 - s)", 0.1)
+    m.sampled("u", period=0.1)
+    m.actuator("motor", "s", value="u")
+    return m
+
+
+@pytest.mark.parametrize(("method", "target"), [("Radau", "numpy"), ("DOP853", "cython")])
+def test_a_function_of_the_run_gives_what_the_model_leaves_open(target: str, method: str) -> None:
+    called: list[float] = []
+
+    def drive(t: float, x: Any) -> Any:
+        called.append(t)
+        return 8.0 * (TARGET - x[0]) + 5.0 * x[2] - 4.0 * x[1]  # x[2] is z, renewed before u
+
+    module = outside().compile(target=target, **({"optimize": 0} if target == "cython" else {}))
+    run = module.simulate(1.05, method=method, controllers={"u": drive})
+    assert np.abs(run.x[:4, -1] - by_hand(1.05, 0.1 * np.arange(11))).max() < 1e-12
+    assert np.abs(called - 0.1 * np.arange(11)).max() < 1e-15
+    assert np.abs(module.simulate(1.05)["s"]).max() == 0.0  # without one it keeps its value
+
+
+def test_controllers_that_cannot_be_are_refused(module: Any, tmp_path: Path) -> None:
+    with pytest.raises(eg.UsageError, match="without a law, and 'servo' has none"):
+        module.simulate(1.0, controllers={"u": lambda t, x: 0.0})
+    module = outside().compile(target="numpy")
+    for given, words in (
+        ({"w": lambda t, x: 0.0}, "sampled state"),
+        ({"z": lambda t, x: 0.0}, "sampled state without a law"),
+        ({"z_samples": lambda t, x: 0.0}, "sampled state"),
+        ({"u": 3.0}, "controller of u must be a function"),
+        ({"u": lambda t: 0.0}, "controller of u"),
+        (["u"], "controllers"),
+    ):
+        with pytest.raises(eg.UsageError, match=words):
+            module.simulate(1.0, controllers=given)
+    with pytest.raises(eg.SimulationError, match=r"controller of u .* returned nan at t = 0 s"):
+        module.simulate(1.0, controllers={"u": lambda t, x: float("nan")})
+    with pytest.raises(eg.UsageError, match="checkpoint"):
+        module.simulate(1.0, controllers={"u": lambda t, x: 0.0}, checkpoint=tmp_path / "run.npz")
+    with pytest.raises(eg.UsageError, match="has none"):
+        eg.load_example("pendulum").compile(target="numpy").simulate(1.0, controllers={"u": lambda t, x: 0.0})
+
+
+def test_ida_samples_too(module: Any) -> None:
+    pytest.importorskip("sksundae")
+    run = module.dae.solve((0.0, 1.05), rtol=1e-9, atol=1e-11)
+    assert np.abs(run.x[:4, -1] - by_hand(1.05, 0.1 * np.arange(11))).max() < 1e-6
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_a_held_input_beside_a_controller_has_the_value_of_its_own_time(target: str) -> None:
+    """Where the compiled loop asks Python for a new state, a law of its clock must not see the run's first part."""
+    m = eg.Model("mixed")
+    m.prismatic("slide", m.ground, m.body("sledge", mass=1.0), axis="x", coordinate="s")
+    u = m.input("u")
+    m.sampled("seen", u, 0.3, offset=0.05)
+    m.sampled("given", period=0.3, offset=0.05)
+    table = eg.Signal([0.0, 0.5, 1.0, 1.5], [1.0, -2.0, 3.0, 5.0], "zero-order")
+    asked = [0.1, 0.7, 1.0, 1.3, 1.9]
+    run = m.compile(target=target).simulate(2, inputs={"u": table}, controllers={"given": lambda t, x: t}, t_eval=asked)
+    np.testing.assert_array_equal(run["seen"], [1.0, -2.0, -2.0, 3.0, 5.0])  # renewed at 0.05, 0.65, 0.95, 1.25, 1.85
