@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import small_models
 
 import eomgen as eg
 
@@ -272,5 +273,108 @@ BUILT: dict[str, Callable[[], eg.Model]] = {
 
 
 def build(name: str) -> eg.Model:
-    """A model by name: one of this file, or an example from its YAML file."""
-    return BUILT[name]() if name in BUILT else eg.load(EXAMPLES / f"{name}.yaml")
+    """A model by name: one of this file or of small_models, or an example from its YAML file."""
+    made = BUILT.get(name) or small_models.MODELS.get(name)
+    return made() if made else eg.load(EXAMPLES / f"{name}.yaml")
+
+
+class Known(NamedTuple):
+    """A model of the registry."""
+
+    build: Callable[[], eg.Model]
+    freedoms: int  #: counted by hand: Kutzbach, less the rows that are redundant
+    features: frozenset[str] = frozenset()
+    inputs: dict[str, Any] | None = None  #: of its run
+    span: float = 0.2  #: of its run (s)
+
+
+#: Of the example files: name -> freedoms and features.
+_EXAMPLES: dict[str, tuple[int, str]] = {
+    "andrews_squeezer": (1, "loops plane stiff"),
+    "bicycle": (3, "nonholonomic loops space"),
+    "bricard": (1, "loops redundant space"),
+    "cam_follower": (1, "loops plane"),
+    "car_axis": (2, "loops driven plane"),
+    "cart_pendulum": (2, "tree plane"),
+    "chain": (3, "tree plane"),
+    "chebyshev": (0, "loops driven plane fixed"),
+    "compass_gait": (5, "tree plane states switched"),
+    "delta_robot": (3, "loops space"),
+    "double_pendulum": (2, "tree plane"),
+    "double_wishbone": (1, "loops space"),
+    "driven_slider_crank": (0, "loops driven plane fixed"),
+    "engine": (1, "loops plane"),
+    "excavator": (3, "loops plane"),
+    "flyball_governor": (4, "tree space"),
+    "four_bar": (1, "loops plane"),
+    "furuta_pendulum": (2, "tree space"),
+    "gait_leg": (3, "tree plane muscle"),
+    "gear_train": (1, "gears plane"),
+    "half_car": (4, "tree plane"),
+    "hoecken": (0, "loops driven plane fixed"),
+    "hydraulic_boom": (1, "tree states plane"),
+    "jansen_leg": (0, "loops driven plane fixed"),
+    "kapitza_pendulum": (1, "driven plane"),
+    "n_four_bar": (1, "loops plane"),
+    "peaucellier": (1, "loops redundant plane"),
+    "pendulum": (1, "tree plane"),
+    "planetary_gear": (1, "gears plane"),
+    "puma560": (6, "tree space"),
+    "quadrotor_load": (8, "tree space"),
+    "rimless_wheel": (3, "tree plane states switched"),
+    "rolling_disc": (3, "nonholonomic space"),
+    "satellite": (11, "tree space parameters"),
+    "shaper": (1, "loops plane"),
+    "slider_crank": (1, "loops plane"),
+    "spatial_four_bar": (1, "loops space"),
+    "spatial_slider_crank": (1, "loops space"),
+    "spherical_pendulum": (2, "tree space"),
+    "stewart_platform": (6, "loops space components large"),
+    "two_link_manipulator": (2, "tree plane"),
+    "v_engine": (1, "loops plane components"),
+    "v_twin": (0, "loops driven plane fixed"),
+    "watt_six_bar": (1, "loops plane"),
+    "wheelset": (3, "driven massless space"),
+}
+_BUILT = {
+    "offset_slider_crank": (1, "loops plane"),
+    "free_slider_crank": (1, "loops plane"),
+    "point_chain": (3, "tree plane massless"),
+    "tilted_four_bar": (1, "loops redundant space"),
+    "skewed_four_bar": (1, "loops redundant space"),
+    "three_cranks": (1, "loops redundant plane"),
+    "spatial_loop": (1, "loops space"),
+    "powered_slider_crank": (1, "loops plane"),
+    "powered_arm": (6, "tree space"),
+}
+_SMALL = {
+    "every_joint": (21, "tree space parameters"),
+    "sampled_servo": (1, "tree states sampled"),
+    "clutch": (2, "tree states switched nonholonomic"),
+    "heap": (12, "tree plane contacts"),
+    "solids": (18, "tree space contacts parameters"),
+    "pebbles": (6, "tree plane contacts rigid"),
+    "bouncing_ball": (3, "tree plane events"),
+    "swinging_mass": (1, "lagrangian driven"),
+    "skate": (2, "lagrangian nonholonomic"),
+    "sleigh": (2, "equations nonholonomic"),
+    "engine_torque": (1, "tree tables"),
+    **{name: (1, "tree inputs") for name in small_models.MODELS if name.startswith("cart_")},
+}
+_SPANS = {"heap": 0.01, "solids": 0.005, "stewart_platform": 0.02, "andrews_squeezer": 0.005}
+
+
+def _registry() -> dict[str, Known]:
+    found = {}
+    for table in (_EXAMPLES, _BUILT, _SMALL):
+        for name, (freedoms, features) in table.items():
+            kind = name.removeprefix("cart_")
+            inputs = {"u": small_models.INPUTS[kind]} if kind in small_models.INPUTS else None
+            found[name] = Known(
+                partial(build, name), freedoms, frozenset(features.split()), inputs, _SPANS.get(name, 0.2)
+            )
+    return found
+
+
+#: The registry: models by name, which tests share.
+MODELS: dict[str, Known] = _registry()

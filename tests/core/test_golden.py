@@ -1,0 +1,64 @@
+"""Golden recordings: every model of the registry computes what the version before the rebuilding computed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import golden
+import models
+import numpy as np
+import pytest
+
+import eomgen as eg
+
+#: Models whose compiled code is recorded too, one of each kind that the code generator tells apart.
+COMPILED = (
+    "slider_crank", "bricard", "rolling_disc", "satellite", "compass_gait", "hydraulic_boom", "sampled_servo", "heap",
+    "cart_cubic", "skate", "driven_slider_crank", "every_joint",
+)  # fmt: skip
+CASES = [(name, "numpy") for name in models.MODELS] + [(name, "cython") for name in COMPILED]
+
+
+def beyond(old: dict[str, object], new: dict[str, object]) -> dict[str, float]:
+    return {key: gap for key, gap in golden.differences(old, new).items() if not gap <= 1.0}
+
+
+@pytest.mark.parametrize(("name", "target"), CASES, ids=[f"{name}-{target}" for name, target in CASES])
+def test_as_recorded(name: str, target: str) -> None:
+    old = golden.read(name)
+    assert not beyond(old, golden.recording(name, target, old["states"]))
+
+
+@pytest.mark.parametrize("name", models.MODELS)
+def test_degrees_of_freedom_are_those_counted_by_hand(name: str) -> None:
+    assert golden.read(name)["freedoms"] == models.MODELS[name].freedoms
+
+
+def test_faulty_files_name_the_same_places() -> None:
+    assert golden.faults() == golden.read("faults")
+
+
+def test_the_schema_of_model_files() -> None:
+    assert golden.schema() == golden.read("schema")
+
+
+def test_a_difference_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    old = golden.read("slider_crank")
+    for folder in ("old", "new"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "slider_crank.json").write_text(json.dumps(old))
+    assert golden.compare(tmp_path / "old", tmp_path / "new") == 0
+    old["bias"][1][2] *= 1 + 1e-8
+    (tmp_path / "new" / "slider_crank.json").write_text(json.dumps(old))
+    assert golden.compare(tmp_path / "old", tmp_path / "new") == 1
+    assert "slider_crank.bias" in capsys.readouterr().out
+    del old["rhs"]
+    assert beyond(golden.read("slider_crank"), old)["rhs"] == np.inf
+
+
+def test_every_example_is_recorded() -> None:
+    shipped = {path.stem for path in Path(models.EXAMPLES).glob("*.yaml")}
+    assert shipped <= models.MODELS.keys()
+    assert {path.stem for path in golden.RECORDINGS.glob("*.json")} == models.MODELS.keys() | {"faults", "schema"}
+    assert isinstance(models.build("cart_table"), eg.Model)
