@@ -69,14 +69,12 @@ def compare(method: Any) -> dict[str, Any]:
 
     Where eomgen refuses a motion without inertia: the least singular value of SymPy's own matrix instead.
     """
-    model = eg.from_sympy(method)
+    constants = list(eg.from_sympy(method).parameters)
     for seed in range(TRIES):  # not every number is the inertia of a body, nor every place regular
         random = np.random.default_rng(seed)
-        values = {}
-        for entry in model.description.sections["parameters"]:
-            entry.values["value"] = values[entry.name] = float(10.0 ** random.uniform(-1.0, 0.5))
-            if re.search(r"xy|xz|yz|zx$", entry.name):  # products of inertia beside moments
-                entry.values["value"] = values[entry.name] = 0.02
+        values = {key: float(10.0 ** random.uniform(-1.0, 0.5)) for key in constants}
+        values |= {key: 0.02 for key in constants if re.search(r"xy|xz|yz|zx$", key)}  # products of inertia
+        model = eg.from_sympy(method, parameters=values)
         try:
             model.guess(**dict(zip((name(x) for x in method.q), random.uniform(0.2, 0.9, len(method.q)), strict=True)))
             mod = model.compile(target="numpy")

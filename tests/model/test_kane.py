@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import sympy
 from bicycle_matrix import state_matrix
+from model_files import described
 from sympy.physics.mechanics import KanesMethod, Particle, Point, ReferenceFrame, RigidBody, dynamicsymbols, inertia
-from sympy_systems import double_pendulum, pulled_pendulum, rolling_disc
+from sympy_systems import bicycle, bicycle_numbers, double_pendulum, pulled_pendulum, rolling_disc
 
 import eomgen as eg
 
@@ -43,7 +44,13 @@ def disc() -> eg.Model:
     )
 
 
-@pytest.mark.parametrize("target", ["numpy", pytest.param("cython", marks=pytest.mark.slow)])
+@pytest.fixture(scope="module")
+def whipple() -> eg.Model:
+    """The Whipple bicycle of SymPy's own test, which takes SymPy seconds."""
+    return eg.from_sympy(bicycle(), "bicycle", parameters=bicycle_numbers())
+
+
+@pytest.mark.parametrize("target", ["numpy", pytest.param("cython", marks=pytest.mark.thorough)])
 def test_rolling_disc(disc: eg.Model, target: str) -> None:
     module = disc.compile(target=target)
     assert module.q_names == ("q1", "q2", "q3", "q4", "q5")
@@ -91,11 +98,9 @@ EIGENVALUES = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("target", ["numpy", pytest.param("cython", marks=pytest.mark.thorough)])
 def test_bicycle(whipple: eg.Model, target: str) -> None:
     equations = whipple.derive()
-    assert equations.operations["mass_matrix and bias"].total < 2500  # SymPy: 1.6 million before common subexpressions
     module = equations.compile(target=target)
     assert module.n_dof == 3
     chosen = [module.x_names.index(name) for name in ("q2", "q5", "u2", "u5")]
@@ -112,13 +117,16 @@ def test_bicycle(whipple: eg.Model, target: str) -> None:
         basis = basis @ np.linalg.inv(basis[free])
         found = (jacobian @ basis)[np.ix_(chosen, [free.index(k) for k in chosen])]
         assert np.abs(found - state_matrix(speed)).max() < 1e-7
+        near = module.linearize(x, independent=["q1", "q2", "q5", "u2", "u3", "u5"])
+        places = [near.states.index(name) for name in ("q2", "q5", "u2", "u5")]
+        np.testing.assert_allclose(near.A[np.ix_(places, places)], state_matrix(speed), atol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_bicycle_far_from_upright(whipple: eg.Model, tmp_path: Path) -> None:
     whipple.save(tmp_path / "bicycle.yaml")  # with intermediates: entries are longer than a file may have them
     again = eg.load(tmp_path / "bicycle.yaml")
-    assert len(again.description.values["equations"]["intermediates"]) > 100
+    assert len(described(again)["equations"]["intermediates"]) > 100
     module = whipple.compile(target="numpy")
     x = module.x0(q1=0.2, q2=0.1, q5=0.2, u2=0.3, u5=-0.2, u3=5.0)
     assert abs(module.constraints(x[:4])[0]) < 1e-12
@@ -130,6 +138,39 @@ def test_bicycle_far_from_upright(whipple: eg.Model, tmp_path: Path) -> None:
     off = module.project(x + 1e-3 * np.arange(1.0, len(x) + 1.0))
     assert abs(module.constraints(off[:4])[0]) < 1e-12
     assert np.abs(module.velocity_constraints(off)).max() < 1e-11
+
+
+DISC_NUMBERS = {"g": 9.81, "r": 0.26, "m": 3.43}
+
+
+def sympy_matrix(kane: object, steady: dict[str, float]) -> np.ndarray:
+    """A of SymPy's Linearizer in q1 .. q5, u1 .. u3 at a steady motion."""
+    t = dynamicsymbols._t
+    names = [*(f"q{k}" for k in range(1, 6)), *(f"u{k}" for k in range(1, 6))]
+    symbols = {name: dynamicsymbols(name) for name in names}
+    point = {symbols[name]: steady.get(name, 0.0) for name in names}
+    point |= {symbols[name].diff(t): 0 for name in names if name.startswith("u")}
+    point |= {symbols[name].diff(t): steady.get(name + "_dot", 0.0) for name in names if name.startswith("q")}
+    numbers = {sympy.Symbol(name): value for name, value in DISC_NUMBERS.items()}
+    A, _, _ = kane.linearize(A_and_B=True, op_point=[point, numbers])  # type: ignore[attr-defined]
+    return np.array(A.subs(numbers), dtype=float)
+
+
+def test_the_rolling_disc_as_sympy_linearizes_it() -> None:
+    kane = rolling_disc("CRAMER")
+    mod = eg.from_sympy(kane, "disc", parameters=DISC_NUMBERS).compile(target="numpy")
+    x = mod.x0(u2=-6.0)
+    state = dict(zip(mod.x_names, x.tolist(), strict=True))
+    rates = dict(zip((f"{n}_dot" for n in mod.q_names), mod.rhs(0.0, x)[: mod.n_q].tolist(), strict=True))
+    near = mod.linearize(x, independent=["q1", "q2", "q3", "q4", "q5", "u1", "u2", "u3"])
+    assert near.states == ("q1", "q2", "q3", "q4", "q5", "u1", "u2", "u3")
+    assert near.is_steady
+    assert not near.is_equilibrium
+    expected = sympy_matrix(kane, state | rates)
+    assert np.abs(expected).max() > 1.0
+    np.testing.assert_allclose(near.A, expected, atol=1e-10)
+    with pytest.raises(eg.UsageError, match="no second-order form"):
+        near.second_order()
 
 
 def reference() -> eg.Model:
