@@ -29,7 +29,7 @@ def slopes(call: Any, x: np.ndarray, h: float = 1e-6) -> np.ndarray:
 
 def tied(**more: Any) -> eg.Model:
     """Three coordinates, two speeds that move one each and one that moves two; a surface and a blade, both moving."""
-    rows: dict[str, Any] = dict(  # noqa: C408
+    rows: dict[str, Any] = dict(
         coordinates=["a", "b", "c"],
         velocities=["r", "v", "s", "z"],
         rates={"a": "w*cos(c)*r + 0.1*sin(t)", "b": "v + r*sin(a)", "c": "s + 0.2*b"},
