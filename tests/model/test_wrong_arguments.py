@@ -1,0 +1,308 @@
+"""Every argument of the builder given as what it cannot be: a named error that says what is allowed, or taken."""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+from collections.abc import Callable, Iterator
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+import pytest
+from model_files import described
+from sympy import symbols
+from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
+
+import eomgen as eg
+
+WRONG: tuple[Any, ...] = (
+    None, 3, "x", "", [], {}, object(), float("nan"), b"x", [[["x"], {"a": [None]}]], {1}, {3: None}, int, True, 1j,
+    np.zeros((2, 2)), [None],
+)  # fmt: skip
+#: What an argument is given as while another of the same call is wrong.
+RIGHT: dict[str, Any] = {
+    "name": "z", "first": "a", "second": "b", "predecessor": "ground", "successor": "b", "body": "b", "joint": "ja",
+    "value": 1.0, "expression": "qa", "at": (0, 0, 0), "x": [0, 1, 2, 3], "y": [0, 1, 2, 3], "source": "f.c",
+    "rate": "-z", "terms": {"qa": 1, "qb": -1}, "ratio": 2,
+}  # fmt: skip
+#: Not of the builder, or makers of whole models, which have cases of their own.
+OTHERS = ("from_lagrangian", "from_equations", "from_sympy", "from_description", "check", "derive", "compile", "draw",
+          "mechanism", "to_yaml", "save")  # fmt: skip
+#: Of these the arguments are tried always, of all others by ``make thorough``.
+SOME = ("body", "parameter", "input", "output", "state", "table", "native", "event", "add", "revolute", "free", "spring",
+        "torque", "friction", "coupling", "rolling", "driver")  # fmt: skip
+METHODS = [n for n in dir(eg.Model) if n[0] != "_" and n not in OTHERS and callable(getattr(eg.Model, n))]
+MAKERS: dict[str, tuple[Callable[..., eg.Model], dict[str, Any]]] = {
+    "from_lagrangian": (eg.Model.from_lagrangian, {"name": "m", "L": "q_dot**2/2 - q**2", "coordinates": ["q"]}),
+    "from_equations": (
+        eg.Model.from_equations,
+        {"name": "m", "coordinates": ["q"], "velocities": ["v"], "rates": {"q": "v"}, "mass_matrix": [["1"]],
+         "forcing": ["0"], "intermediates": None, "constraints": (), "multipliers": (), "kinetic_energy": None,
+         "potential_energy": None, "parameters": None, "inputs": None, "latex": None},
+    ),
+}  # fmt: skip
+
+
+def base() -> eg.Model:
+    m = eg.Model("m", gravity=(0, -9.81, 0))
+    m.parameter("k", 1.0)
+    m.revolute("ja", m.ground, m.body("a", mass=1, com=(0.1, 0, 0), inertia={"zz": 0.1}), coordinate="qa")
+    m.prismatic("jb", m.ground, m.body("b", mass=1, inertia=(0.1, 0.1, 0.1)), coordinate="qb")
+    m.spring("s", "a", "b", stiffness=1.0, length=0.1)
+    return m
+
+
+def arguments(of: Any) -> list[inspect.Parameter]:
+    every = inspect.signature(of).parameters.values()
+    return [p for p in every if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD) and p.name != "self"]
+
+
+def refused_or_taken(call: Callable[[], Any], what: str) -> None:
+    """What Python says of a missing argument, and a file that is not there, are no fault of a type."""
+    try:
+        call()
+    except (eg.EomgenError, FileNotFoundError) as error:
+        assert str(error)
+    except TypeError as error:
+        assert "missing" in str(error), f"{what}: {error}"
+
+
+def each(parameters: list[inspect.Parameter]) -> Iterator[tuple[str, dict[str, Any], list[Any]]]:
+    """Keywords and places of a call for every argument and every wrong value."""
+    required = {p.name: RIGHT[p.name] for p in parameters if p.default is p.empty and p.name in RIGHT}
+    for p in parameters:
+        for value in WRONG:
+            keys, only = {**required, p.name: value}, p.kind is p.POSITIONAL_ONLY
+            yield f"{p.name} = {value!r}", {n: x for n, x in keys.items() if not only or n != p.name}, [value] * only
+
+
+@pytest.mark.parametrize("name", [n if n in SOME else pytest.param(n, marks=pytest.mark.thorough) for n in METHODS])
+def test_methods(name: str) -> None:
+    for what, keys, places in each(arguments(getattr(base(), name))):
+        m = base()
+
+        def call(m: eg.Model = m, keys: Any = keys, places: Any = places) -> None:
+            getattr(m, name)(*places, **keys)
+            m.check()
+
+        refused_or_taken(call, what)
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_makers_of_models(name: str) -> None:
+    make, right = MAKERS[name]
+    for key in right if name == "from_equations" else [p.name for p in arguments(make)]:
+        for value in WRONG:
+            refused_or_taken(lambda key=key, value=value: make(**right | {key: value}).check(), f"{key} = {value!r}")
+
+
+def test_from_sympy() -> None:
+    q, m, g = dynamicsymbols("q"), *symbols("m g")
+    method = LagrangesMethod(m * q.diff() ** 2 / 2 - g * q, [q])
+    method.form_lagranges_equations()
+    for p in arguments(eg.from_sympy)[1:]:
+        for value in WRONG:
+            refused_or_taken(lambda p=p, value=value: eg.from_sympy(method, **{p.name: value}).check(), p.name)
+
+
+@pytest.mark.parametrize("name", ["gravity", "initial", "guess", "independent", "simulation", "check_inertia"])
+def test_settings(name: str) -> None:
+    for value in WRONG:
+        m = base()
+        refused_or_taken(lambda m=m, value=value: (setattr(m, name, value), m.check()), f"{value!r}")
+
+
+def test_handles() -> None:
+    """Their methods take markers and names; a text is no marker that has a place of its own."""
+    part = eg.Model("part")
+    part.prismatic("slide", part.ground, part.body("block", mass=1))
+
+    def handles() -> list[Any]:
+        m = base()
+        return [m.ground, m.bodies["a"], m.ground.at(1, 0, 0), m.joints["ja"], m.spring("t", "a", "b", stiffness=1.0),
+                m.add(part, prefix="p_")]  # fmt: skip
+
+    for k, handle in enumerate(handles()):
+        names = [n for n in dir(type(handle)) if n[0] != "_" and inspect.isfunction(getattr(type(handle), n))]
+        for name in names:
+            for what, keys, places in each(arguments(getattr(handle, name))):
+
+                def call(k: int = k, name: str = name, keys: Any = keys, places: Any = places) -> None:
+                    getattr(handles()[k], name)(*places, **keys)
+
+                refused_or_taken(call, f"{name}: {what}")
+
+
+@pytest.mark.parametrize("key", ["method", "independent"])
+def test_derive(key: str) -> None:
+    for value in WRONG:
+        refused_or_taken(lambda value=value: base().derive(**{key: value}), f"{value!r}")
+
+
+def test_messages_name_the_argument_and_what_is_allowed() -> None:
+    with pytest.raises(eg.UsageError, match=r"rates must be a mapping of names to values, .* not \['v'\]"):
+        eg.Model.from_equations("m", ["q"], velocities=["v"], rates=["v"], mass_matrix=[["1"]], forcing=["0"])
+    with pytest.raises(eg.UsageError, match=r"initial must be a mapping of names to values, .* not 3"):
+        base().initial = 3
+    with pytest.raises(eg.UsageError, match=r"joints: a name is a text, such as 'A', not \['A'\]"):
+        base().weld(["A"], "ground", "a")
+    with pytest.raises(eg.UsageError, match=r"give a body or a marker, .* not 'a'"):
+        base().ground.distance("a")
+
+
+# -- places of arguments, and what is left out ------------------------------------------------------------------------
+#: Arguments after the name that people give by place.
+ORDERS = {
+    "revolute": "predecessor successor axis coordinate",
+    "screw": "predecessor successor pitch axis coordinate",
+    "cylindrical": "predecessor successor axis coordinates",
+    "spherical": "predecessor successor sequence coordinates rotation",
+    "free": "predecessor successor sequence coordinates rotation",
+    "distance": "predecessor successor length",
+    "force": "marker value axes",
+    "torque": "on value axes",
+    "spring": "a b stiffness length via",
+    "friction": "joint viscous coulomb static stribeck smoothing",
+    "stop": "joint stiffness lower upper exponent dissipation restitution velocity formula",
+    "bushing": "a b stiffness damping",
+    "coupling": "coordinates offset equation",
+    "gear": "a b radii teeth cones internal phase",
+    "rolling": "wheel plane radius shape tube no_spin",
+    "driver": "coordinate value between angle marker axis on",
+}
+
+
+@pytest.mark.parametrize("name", ORDERS)
+def test_arguments_keep_their_places(name: str) -> None:
+    names = [key for key in inspect.signature(getattr(eg.Model, name)).parameters if key not in ("self", "name")]
+    wanted = ORDERS[name].split()
+    assert [key for key in names if key in wanted] == wanted
+
+
+def parts() -> tuple[eg.Model, Any, Any, Any, Any]:
+    m = eg.Model("m")
+    a, b = m.body("a", mass=1.0), m.body("b", mass=1.0)
+    return m, a, b, m.revolute("J", m.ground, a), m.prismatic("S", m.ground, b)
+
+
+def last(m: eg.Model, section: str = "forces") -> dict[str, Any]:
+    """The element that was added last, as a model file has it."""
+    return list(described(m)[section].values())[-1]
+
+
+def test_what_a_force_acts_on_and_its_value() -> None:
+    m, a, b, J, S = parts()
+    for given in (lambda: m.actuator("u1", J, 5), lambda: m.actuator("u2", 5, joint=J), lambda: m.actuator(
+        "u3", joint=J, value=5), lambda: m.actuator("u4", "J", value=5)):  # fmt: skip
+        given()
+        assert last(m) == {"type": "actuator", "joint": "J", "value": 5}
+    m.actuator("u5", a, b, "2*t")
+    assert last(m) == {"type": "actuator", "between": ["a", "b"], "value": "2*t"}
+    m.torsional_spring("s1", a, b, 7)
+    assert last(m) == {"type": "torsional_spring", "between": ["a", "b"], "stiffness": 7}
+    for call in (lambda: m.torsional_spring("s2", a, b), lambda: m.actuator("u6", S)):
+        with pytest.raises(TypeError, match="missing a required argument: '(stiffness|value)'"):
+            call()
+    m.torque("t1", a, (0, 0, 1))
+    m.torque("t2", J.coordinate, 1)
+    assert (described(m)["forces"]["t1"]["body"], last(m)["joint"]) == ("a", "J")
+
+
+def test_numbers_that_hold_anyway_are_left_out() -> None:
+    m, _, b, J, _ = parts()
+    m.sphere_plane("c", m.ground, b, radius=1, stiffness=5, exponent=1.5, viscous_friction=0, formula=None)
+    assert set(last(m)) == {"type", "between", "radius", "stiffness"}
+    m.coupling("x", equation="J - t", offset=0)
+    assert set(last(m, "constraints")) == {"type", "equation"}
+    m.friction("f", J, viscous=0)  # a law all the same
+    m.check()
+
+
+def test_ends_that_are_not_there_are_told_by_the_check() -> None:
+    m, a, b, J, _ = parts()
+    m.spring("s", a, None, 5)
+    m.revolute("K", a, None)
+    m.gear("g", J, None, teeth=(1, 2))
+    m.revolute("L", a, b, "z", "phi", coordinates=["psi"])
+    with pytest.raises(eg.ModelError) as caught:
+        m.check()
+    told = {p.path: p.message for p in caught.value.problems}
+    assert told["forces.s.between[1]"] == told["joints.K.between[1]"] == "has no value"
+    assert told["joints.L.coordinates"].startswith("coordinate is given too")
+    assert "constraints.g.joints[1]" in told
+
+
+def test_calls_that_cannot_be() -> None:
+    m, a, b, J, _ = parts()
+    other = eg.Model("other")
+    ball = m.spherical("B", a, b)
+    for call, said in {
+        lambda: other.revolute("J", other.ground, a): "belongs to the model 'm'",
+        lambda: m.torsional_damper("d", b, b, b, damping=1): "one joint or two markers",
+        lambda: m.friction("f", b, 1): "is a body or marker",
+        lambda: m.point_gravity("p", m.ground, J, mu=1): "is a joint; a body or a marker is expected",
+        lambda: ball.coordinate: r"3 coordinates \(B_1, B_2, B_3\)",
+        lambda: m.spring(self=3): "no argument 'self'",
+        lambda: m.revolute("A", m.ground, b, axiss="x"): "revolute has no argument 'axiss'; did you mean 'axis'",
+        lambda: m.spring("k", m.ground, b, stifness=1): "did you mean 'stiffness'",
+        lambda: m.initial(3): r"as in initial\(theta=0.3\) or a mapping, not as 3 alone",
+        lambda: m.initial({"J": 0.4}, J=0.3): "^J: given twice in one call; give each name once",
+    }.items():
+        with pytest.raises(eg.UsageError, match=said):
+            call()
+    for name, said in (("revolut", "did you mean 'revolute'"), ("gravty", "did you mean 'gravity'")):
+        with pytest.raises(AttributeError, match=said):
+            getattr(m, name)
+        with pytest.raises(AttributeError, match=said):  # it would be set without any effect
+            setattr(m, name, 1)
+
+
+def test_calls_of_a_module_with_the_wrong_shape_of_values_are_told() -> None:
+    m = eg.Model("calls")
+    length = m.parameter("l", 1.0)
+    m.revolute("q", m.ground, m.body("a", mass=1, com=(0, "-l", 0)))
+    m.torque("law", "q", 1 / length)
+    module = m.compile(target="numpy")
+    with pytest.raises(eg.UsageError, match=r"must be a mapping of names to values"):
+        module.x0(1)
+    with pytest.raises(eg.UsageError, match=r"not finite with l = 0 \(changed"):
+        module.bind(p={"l": 0.0})
+    assert module.rhs(0, [0.1, 0.0], p={"l": 2}).tolist() == module.rhs(0, [0.1, 0.0], p=[2.0]).tolist()
+    with pytest.raises(eg.UsageError, match="ll"):
+        module.rhs(0, [0.0, 0.0], p={"ll": 1})
+
+
+def test_methods_and_models_are_copied_and_kept() -> None:
+    assert pickle.loads(pickle.dumps(eg.Model.spring)) is eg.Model.spring
+    m, a, b, *_ = parts()
+    m.spring("s", a, b, 5, via=(marker for marker in [m.ground]))
+    for other in (deepcopy(m), pickle.loads(pickle.dumps(m))):
+        assert other.to_yaml() == m.to_yaml()
+
+    class Own(eg.Model):
+        def spring(self, name: str, *given: Any, **keys: Any) -> None:
+            super().spring(name, *given, stiffness=3, **keys)
+
+    own = Own("own")
+    own.spring("s", own.ground, own.body("x", mass=1))
+    assert last(own)["stiffness"] == 3
+
+
+def test_settings_are_set_and_read() -> None:
+    m = eg.Model("s")
+    m.initial(theta=0.3)
+    m.initial["theta_dot"] = 1
+    m.independent("theta")
+    m.simulation(end=3)
+    assert (m.initial, m.independent, m.simulation) == ({"theta": 0.3, "theta_dot": 1}, ["theta"], {"end": 3})
+    m.independent = ["s"]
+    m.initial = {symbols("s"): 2}
+    m.guess = {"s": 1}
+    m.simulation = {"rtol": 1e-6}
+    m.prismatic("J", m.ground, m.body("b", mass=1), axis="z", coordinate=symbols("s"))
+    m.gravity = (0, 0, -1.625)
+    mod = m.compile(target="numpy")
+    assert mod.x0().tolist() == [2.0, 0.0]
+    assert mod.rhs(0.0, mod.x0()).tolist() == [0.0, -1.625]
+    assert described(m)["simulation"] == {"rtol": 1e-6}
