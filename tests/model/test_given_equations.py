@@ -29,15 +29,15 @@ def slopes(call: Any, x: np.ndarray, h: float = 1e-6) -> np.ndarray:
 
 def tied(**more: Any) -> eg.Model:
     """Three coordinates, two speeds that move one each and one that moves two; a surface and a blade, both moving."""
-    rows: dict[str, Any] = dict(
-        coordinates=["a", "b", "c"],
-        velocities=["r", "v", "s", "z"],
-        rates={"a": "w*cos(c)*r + 0.1*sin(t)", "b": "v + r*sin(a)", "c": "s + 0.2*b"},
-        mass_matrix=[[2, 0.1, 0, 0], [0.1, "1 + b**2", 0, 0], [0, 0, "w", 0.3], [0, 0, 0.3, 1]],
-        forcing=["-4*a - r*v", "-b + s*z", "sin(t) - c", "-0.1*z + r*s"],
-        constraints=["a**2 + b - 0.3*c - 0.1*t - 0.5", "z - 0.2*s*cos(a) - 0.1*t"],
-        kinetic_energy="r**2",
-    )
+    rows: dict[str, Any] = {
+        "coordinates": ["a", "b", "c"],
+        "velocities": ["r", "v", "s", "z"],
+        "rates": {"a": "w*cos(c)*r + 0.1*sin(t)", "b": "v + r*sin(a)", "c": "s + 0.2*b"},
+        "mass_matrix": [[2, 0.1, 0, 0], [0.1, "1 + b**2", 0, 0], [0, 0, "w", 0.3], [0, 0, 0.3, 1]],
+        "forcing": ["-4*a - r*v", "-b + s*z", "sin(t) - c", "-0.1*z + r*s"],
+        "constraints": ["a**2 + b - 0.3*c - 0.1*t - 0.5", "z - 0.2*s*cos(a) - 0.1*t"],
+        "kinetic_energy": "r**2",
+    }
     return given("tied", **rows | more)
 
 

@@ -30,7 +30,7 @@ RIGHT: dict[str, Any] = {
 OTHERS = ("from_lagrangian", "from_equations", "from_sympy", "from_description", "check", "derive", "compile", "draw",
           "mechanism", "to_yaml", "save")  # fmt: skip
 #: Of these the arguments are tried always, of all others by ``make thorough``.
-SOME = ("body", "parameter", "input", "output", "state", "table", "native", "event", "add", "revolute", "free", "spring",
+SOME = ("body", "parameter", "output", "state", "table", "native", "event", "add", "revolute", "free", "spring",
         "torque", "friction", "coupling", "rolling", "driver")  # fmt: skip
 METHODS = [n for n in dir(eg.Model) if n[0] != "_" and n not in OTHERS and callable(getattr(eg.Model, n))]
 MAKERS: dict[str, tuple[Callable[..., eg.Model], dict[str, Any]]] = {

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
-from jsonschema import Draft202012Validator
+from model_files import EXAMPLES, faults, load, schema_faults
+from scipy.spatial.transform import Rotation
 
 import eomgen as eg
-from eomgen.describe import model_schema
-from eomgen.describe.digest import model_digest
-from eomgen.describe.yaml_nodes import Document
 
-VALIDATOR = Draft202012Validator(model_schema())
-STEWART = Path(str(files("eomgen.examples"))) / "stewart_platform.yaml"
+STEWART = EXAMPLES / "stewart_platform.yaml"
 BY_HAND = Path(__file__).parents[1] / "reference" / "stewart_by_hand.yaml"
 
 LINK = """
@@ -110,15 +106,8 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def loaded(folder: Path, text: str, name: str = "arm.yaml") -> eg.Model:
-    (folder / name).write_text(text)
-    return eg.load(folder / name)
-
-
 def problems(folder: Path, text: str) -> list[str]:
-    with pytest.raises(eg.ModelError) as caught:
-        loaded(folder, text).mechanism()
-    return [str(problem).replace(f"{folder}/", "") for problem in caught.value.problems]
+    return [str(problem).replace(f"{folder}/", "") for problem in faults(folder, text, name="arm.yaml")]
 
 
 def same_numbers(a: eg.Model, b: eg.Model, names: dict[str, str] | None = None) -> None:
@@ -137,9 +126,11 @@ def same_numbers(a: eg.Model, b: eg.Model, names: dict[str, str] | None = None) 
 
 
 def test_nested_components_are_the_model_by_hand(folder: Path) -> None:
-    made, by_hand = loaded(folder, ARM), loaded(folder, BY_HAND_ARM, "hand.yaml")
+    made, by_hand = load(folder, ARM), load(folder, BY_HAND_ARM, "hand.yaml")
     same_numbers(made, by_hand)
-    assert model_digest(loaded(folder, made.to_yaml(), "again.yaml").mechanism()) == model_digest(made.mechanism())
+    written = load(folder, made.to_yaml(), "again.yaml")
+    digests = [m.compile(target="numpy", kernels=["poses"]).metadata["model_digest"] for m in (made, written)]
+    assert digests[0] == digests[1]
 
 
 def test_stewart_is_a_third_as_long_and_the_same() -> None:
@@ -174,7 +165,7 @@ def test_python_and_yaml_agree(folder: Path) -> None:
     m.initial.update({"rail": 0.1, "left.upper.hinge": 0.4, "left.lower.hinge": -0.3})
     assert sorted(right.bodies) == ["lower_rod", "upper_rod"]
     assert right.joints["upper_hinge"].coordinate == right.symbol("upper_hinge")
-    made = loaded(folder, ARM)
+    made = load(folder, ARM)
     one, other = m.compile(target="numpy"), made.compile(target="numpy")
     assert one.x_names == other.x_names
     x = other.x0() + 0.1
@@ -187,8 +178,8 @@ def test_instances_in_another_order(folder: Path) -> None:
     head, _, tail = ARM.partition("add:\n  left")
     first, second, *rest = ("  left" + tail).split("\n")
     turned = "\n".join([head + "add:", second, first, *rest])
-    a = loaded(folder, ARM).compile(target="numpy")
-    b = loaded(folder, turned, "turned.yaml").compile(target="numpy")
+    a = load(folder, ARM).compile(target="numpy")
+    b = load(folder, turned, "turned.yaml").compile(target="numpy")
     order = [a.x_names.index(name) for name in b.x_names]
     assert order != sorted(order)
     x = a.x0() + 0.1
@@ -214,14 +205,14 @@ add:
     at: {body: ground, at: [k*s, 0, 0]}
     prefix: other_
 """
-    mod = loaded(tmp_path, text).compile(target="numpy")
+    mod = load(tmp_path, text).compile(target="numpy")
     assert mod.q_names == tuple(f"{p}{k}_pin" for p, n in (("a", 3), ("other", 4)) for k in range(1, n + 1))
     wanted = [2 * np.cos(2 * np.pi * k / 3) for k in (1, 2, 3)] + [0.0, 0.2, -0.2, 0.3]
     np.testing.assert_allclose(mod.outputs(0, mod.x0()), wanted, rtol=0, atol=1e-15)
 
 
-@pytest.mark.parametrize("rpy", ["[0, 0, 0]", "[0.3, -0.2, 0.5]"])
-def test_ground_of_a_component_is_where_it_hangs(tmp_path: Path, rpy: str) -> None:
+@pytest.mark.parametrize("rpy", [[0, 0, 0], [0.3, -0.2, 0.5]])
+def test_ground_of_a_component_is_where_it_hangs(tmp_path: Path, rpy: list[float]) -> None:
     """A whole model hung on a body: its ground, markers of ground and places on ground follow the attachment."""
     (tmp_path / "swing.yaml").write_text("""
 name: swing
@@ -236,7 +227,7 @@ joints:
 outputs: {hook_x: x(ground.hook)}
 initial: {pin: 0.3, rail: 0.2}
 """)
-    made = loaded(
+    made = load(
         tmp_path,
         f"""
 name: hung
@@ -250,31 +241,12 @@ initial: {{free_1: 0.2, free_y: 1}}
     poses = dict(zip(made.body_names, made.poses(made.x0()[: made.n_q]), strict=True))
     alone = eg.load(tmp_path / "swing.yaml").compile(target="numpy")
     own = dict(zip(alone.body_names, alone.poses(alone.x0()[: alone.n_q]), strict=True))
-    roll, pitch, yaw = eval(rpy)  # noqa: S307 - the numbers above
     at = np.eye(4)
-    at[:3, :3], at[:3, 3] = turned("z", yaw) @ turned("y", pitch) @ turned("x", roll), [1, 2, 3]
+    at[:3, :3], at[:3, 3] = Rotation.from_euler("xyz", rpy).as_matrix(), [1, 2, 3]
     for name in ("bob", "other"):
         np.testing.assert_allclose(poses[f"s_{name}"], poses["car"] @ at @ own[name], rtol=0, atol=1e-14)
     hook = poses["car"] @ at @ [0, 0.5, 0, 1]
     assert made.outputs(0, made.x0())[0] == pytest.approx(hook[0], abs=1e-14)
-
-
-def turned(axis: str, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
-    R = np.eye(3)
-    R[i, i] = R[j, j] = c
-    R[i, j], R[j, i] = -s, s
-    return R
-
-
-def test_names_with_dots_at_run_time(folder: Path) -> None:
-    mod = loaded(folder, ARM).compile(target="numpy")
-    run = mod.simulate(
-        0.1, initial={"left.upper.hinge": 0.9}, parameters={"right.L": 1.5}, inputs={"left.upper.tau": 1.0}
-    )
-    np.testing.assert_array_equal(run["left.upper.hinge"], run["left_upper_hinge"])
-    assert run["left_upper_hinge"][0] == 0.9
 
 
 @pytest.mark.parametrize(
@@ -382,11 +354,11 @@ def test_python_refuses_at_once(folder: Path) -> None:
     with pytest.raises(eg.UsageError, match="there is an instance 'a' already"):
         m.add(link, "a_", at=m.ground)
     with pytest.raises(eg.ModelError, match="stand for markers of another model"):
-        link.mechanism()
+        link.check()
 
 
-def test_the_schema_accepts_them(folder: Path) -> None:
+def test_the_schema_accepts_them() -> None:
     for text in (ARM, LINK, STEWART.read_text()):
-        assert list(VALIDATOR.iter_errors(Document(text, "m.yaml").value)) == []
+        assert schema_faults(text) == []
     for old, new in (("at: root,", "at: 3,"), ("file: parts", "fil: parts"), ("component: limb, at: cart", "at: cart")):
-        assert list(VALIDATOR.iter_errors(Document(ARM.replace(old, new, 1), "m.yaml").value)), new
+        assert schema_faults(ARM.replace(old, new, 1)), new
