@@ -251,14 +251,14 @@ FAULTS = (
         "(h[0] + 2.0 * d) * h[1] * rise[0]",
         "(h[0] + 1.0 * d) * h[1] * rise[0]",
         "not-a-knot end of a spline: 2 becomes 1",
-        ("tests/functions/test_tables.py::test_a_curve_is_scipys[cubic-4-even]",),
+        ("tests/model/test_tables.py::test_a_table_is_scipys[numpy-cubic-even]",),
     ),
     Fault(
         "spline-curve", "eomgen/numeric/splines.py",
         "(rise - s[:-1]) / h - t, s[:-1], y[:-1]",
         "(rise - s[:-1]) / h + t, s[:-1], y[:-1]",
         "a table's quadratic coefficient has a wrong sign in it",
-        ("tests/functions/test_tables.py::test_a_curve_is_scipys[cubic-4-even]",),
+        ("tests/model/test_tables.py::test_a_table_is_scipys[numpy-cubic-even]",),
     ),
     Fault(
         "system-refinement", "eomgen/numeric/system.py",
