@@ -45,7 +45,7 @@ def robot(file: str, lock: tuple[str, ...]) -> Any:
     """The model of a robot's file, with a motor at every joint."""
     if str(TESTS) not in sys.path:
         sys.path.insert(0, str(TESTS))
-    from robots.shipped import EXAMPLES
+    from shipped_robots import EXAMPLES
 
     import eomgen as eg
 
@@ -116,7 +116,7 @@ class Peer:
 
     def __init__(self, file: str, lock: tuple[str, ...], folder: Path) -> None:
         import pinocchio as pin
-        from robots.shipped import EXAMPLES
+        from shipped_robots import EXAMPLES
 
         from eomgen.compilation import find_compiler
 

@@ -46,7 +46,7 @@ ROBOTS = (
 
 def load(robot: Robot, **options: Any) -> eg.Model:
     """The robot with a torque on every joint, inertias as numbers unless ``symbolic``."""
-    from robots.shipped import EXAMPLES
+    from shipped_robots import EXAMPLES
 
     settings = {"actuate": True, "lock": robot.locked, "floating": robot.floating, "rotation": "euler_parameters"}
     return eg.load(EXAMPLES / robot.file, **settings | options)
@@ -54,7 +54,7 @@ def load(robot: Robot, **options: Any) -> eg.Model:
 
 def load_pinocchio(robot: Robot) -> Any:
     """The same in Pinocchio."""
-    from robots.shipped import EXAMPLES
+    from shipped_robots import EXAMPLES
 
     pin = import_module("pinocchio")
     root = (pin.JointModelFreeFlyer(),) if robot.floating else ()

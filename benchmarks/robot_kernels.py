@@ -94,8 +94,8 @@ def contest(path: Path, floating: bool, loop: Any, rounds: int, burst: float) ->
 
 def run(quick: bool) -> Report:
     """Every robot of example-robot-data, each contestant in turns."""
-    from robots.shipped import EXAMPLES as FOLDER
-    from robots.shipped import URDF
+    from shipped_robots import EXAMPLES as FOLDER
+    from shipped_robots import URDF
 
     robots = dict([*URDF.items()][1:3]) if quick else URDF
     rounds, burst = (3, 2e-4) if quick else (60, 1e-3)

@@ -17,8 +17,8 @@ TESTS = Path(__file__).parents[1] / "tests"
 
 
 def compare(model: Any, judge: Any, states: int) -> dict[str, dict[str, Any]]:
-    """By method: operations, largest relative difference in C and in the evaluator, seconds to derive and compile."""
-    from robots.comparison import Compiled, Evaluated, largest_differences
+    """By method: operations, largest relative difference in C and in NumPy, seconds to derive and compile."""
+    from robot_comparison import Compiled, largest_differences
 
     found: dict[str, dict[str, Any]] = {}
     for method in METHODS:
@@ -27,12 +27,12 @@ def compare(model: Any, judge: Any, states: int) -> dict[str, dict[str, Any]]:
         derived = perf_counter()
         compiled = Compiled(equations)
         done = perf_counter()
-        drawn = judge.states(equations.kinematics, states, seed=1)
+        drawn = judge.states(compiled.module, states, seed=1)
         found[method] = {
-            "n": len(equations.kinematics.velocity_names),
+            "n": compiled.module.n_v,
             "operations": equations.operations[COUNTED[method]].total,
             "differences": largest_differences(model, compiled, drawn),
-            "evaluator": max(largest_differences(model, Evaluated(equations), drawn).values()),
+            "evaluator": max(largest_differences(model, Compiled(equations, "numpy"), drawn).values()),
             "derive": derived - start,
             "compile": done - derived,
             "forward dynamics": call_time(compiled.module),
@@ -76,8 +76,9 @@ def run(quick: bool) -> Report:
     import eomgen as eg
 
     try:
-        from robots import mujoco_judge, pinocchio_judge
-        from robots.shipped import mjcf_models, urdf_robots
+        import mujoco_judge
+        import pinocchio_judge
+        from shipped_robots import mjcf_models, urdf_robots
     except ImportError as error:
         raise SystemExit(f"the robots benchmark needs the test extra (pip install -e '.[test]'): {error}") from None
 
@@ -93,7 +94,7 @@ def run(quick: bool) -> Report:
         details[name] = compare(model, pinocchio_judge.Judge(path, floating, model), states)
         tables[0] += rows_of(name, "*" if floating else "", details[name])
     for name, (path, assets) in mjcf:
-        model = mujoco_judge.load_tree(path, assets, ROTATION)
+        model = eg.load(path, assets=str(assets), rotation=ROTATION)
         details[f"{name} (MJCF)"] = compare(model, mujoco_judge.Judge(path, model), states)
         tables[1] += rows_of(name, "", details[f"{name} (MJCF)"])
     columns = (
@@ -118,7 +119,7 @@ def run(quick: bool) -> Report:
         limits.append(Limit("URDF robots", len(urdf), 25, at_least=True))
         limits.append(Limit("MJCF models", len(mjcf), 5, at_least=True))
     notes = (
-        f"Largest relative differences over {states} random states, in C; the evaluator's largest beside them.",
+        f"Largest relative differences over {states} random states, in C; NumPy's largest beside them.",
         "* floats: n velocities with six of its base (Euler parameters).  Inertias are numbers.",
         "ops: of mass matrix and bias (embedding), of the accelerations (recursive).",
         "poses: link frames and centre of mass (m); derive and compile (six kernels, default options) in s.",

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped_robots import PYBULLET
 
 from benchmarks.models import symbolic_arm
 from eomgen.graph import evaluate
 from eomgen.kinematics import analyse
-from tests.robots.shipped import PYBULLET
 
 REFERENCE = Path(__file__).parent / "reference"
 #: Distances (m): the Panda's own table, the URDF of an iiwa as Bullet ships it, summed along each axis.

@@ -13,8 +13,8 @@ import pytest
 from acceptance import test_turned_frames as linkages
 from acceptance.test_puma560 import build_puma
 from powered import derived, tree
-from robots.shipped import urdf_robots
 from scipy.spatial.transform import Rotation
+from shipped_robots import urdf_robots
 
 import eomgen as eg
 from eomgen.errors import UsageError

@@ -10,9 +10,10 @@ import pinocchio as pin
 import pytest
 from acceptance.test_random_trees import CASES
 from mechanisms import _inertia, matrix
+from pinocchio_judge import Judge
 from powered import derived, tree
-from robots.pinocchio_judge import Judge, link_frames
-from robots.shipped import urdf_robots
+from robot_comparison import link_frames
+from shipped_robots import urdf_robots
 
 import eomgen as eg
 from eomgen.errors import UsageError

@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
+from shipped_robots import EXAMPLES
 
 import eomgen as eg
-from tests.robots.shipped import EXAMPLES
 
 NAMES = [f"w{axis}{suffix}" for suffix in ("", "_body", "_dot", "_body_dot") for axis in "xyz"]
 

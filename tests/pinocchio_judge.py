@@ -7,13 +7,15 @@ v' = J v'_ours + J' v_ours its equations become ours.
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from robots.state import State, draw_parameters
+from model_files import described
+from robot_comparison import State, draw_parameters
 
 SUFFIXES = {
     "euler_angles": (["x", "y", "z", "1", "2", "3"], ["x_dot", "y_dot", "z_dot", "1_dot", "2_dot", "3_dot"]),
@@ -54,9 +56,9 @@ class Judge:
             self.velocities |= {n: joint.idx_v + k for k, n in enumerate(velocities)}
         assert sum(n.startswith("base_") for n in self.velocities) >= 6 * floating
 
-    def states(self, kinematics: Any, count: int, seed: int) -> list[State]:
-        """Random states in the order of our coordinates and velocities."""
-        names, velocities = kinematics.names, kinematics.velocity_names
+    def states(self, module: Any, count: int, seed: int) -> list[State]:
+        """Random states in the order of a module's coordinates and velocities."""
+        names, velocities = module.q_names, module.v_names
         assert sorted(names) == sorted(self.positions)
         assert sorted(velocities) == sorted(self.velocities)
         random = np.random.default_rng(seed)
@@ -147,24 +149,8 @@ class Judge:
             rounds.append((perf_counter() - start) / 300)
         return 1e9 * min(rounds)
 
-    @property
+    @cached_property
     def actuated(self) -> set[str]:
         """Our coordinates that have an input."""
-        entries = self.model.description.sections["forces"]
-        return {entry.values["joint"] for entry in entries if entry.values["type"] == "actuator"}
-
-
-def link_frames(model: Any) -> dict[str, tuple[str | None, np.ndarray]]:
-    """Link of the file -> our body (None for ground) and the frame in it (4, 4), read from the description."""
-    back = {new: old for old, new in model.renamed.get("bodies", {}).items()}
-    found: dict[str, tuple[str | None, np.ndarray]] = {}
-    for entry in model.description.sections["bodies"]:
-        body = None if entry.name == "ground" else entry.name
-        if body is not None:
-            found[back.get(body, body)] = body, np.eye(4)
-        for name, placed in dict(entry.values.get("markers", {})).items():
-            frame = np.eye(4)
-            frame[:3, :3] = pin.rpy.rpyToMatrix(*placed.get("rpy", (0.0, 0.0, 0.0)))
-            frame[:3, 3] = placed.get("at", (0.0, 0.0, 0.0))
-            found[back.get(name, name)] = body, frame
-    return found
+        forces = described(self.model).get("forces", {})
+        return {entry["joint"] for entry in forces.values() if entry["type"] == "actuator"}

@@ -12,9 +12,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from robots.state import State, angle_rates, angle_rates_slope, draw_parameters
-
-import eomgen as eg
+from model_files import described
+from robot_comparison import State, angle_rates, angle_rates_slope, draw_parameters
 
 TURNS = {  # coordinates and velocities of a joint that turns freely
     "euler_angles": (["_1", "_2", "_3"], ["_1_dot", "_2_dot", "_3_dot"]),
@@ -32,13 +31,6 @@ def quaternion(angles: np.ndarray) -> np.ndarray:
         mujoco.mju_mulQuat(result, q, turn)
         q = result
     return q
-
-
-def load_tree(path: Path, assets: Path, rotation: str) -> Any:
-    """Our model without its couplings, as MuJoCo's ``qacc_smooth`` knows no equalities."""
-    model = eg.load(path, assets=str(assets), rotation=rotation)
-    model.description.sections["constraints"].clear()
-    return model
 
 
 class Judge:
@@ -63,14 +55,14 @@ class Judge:
             self.joints.append((j, [name + s for s in coordinates], [name + s for s in velocities]))
         actuators = [self.mj.actuator(k).name or f"actuator{k}" for k in range(self.mj.nu)]
         self.inputs = {inputs.get(name, name): k for k, name in enumerate(actuators)}
-        known = {entry.name for entry in model.description.sections["inputs"]}
-        for name in self.inputs.keys() - known:  # those with states of their own, which a note names
+        self.known = list(described(model).get("inputs", {}))
+        for name in self.inputs.keys() - set(self.known):  # those with states of their own, which a note names
             assert any("actuators" in note and name in note for note in model.notes), name
             self.mj.actuator_gainprm[self.inputs[name]] = self.mj.actuator_biasprm[self.inputs[name]] = 0.0
 
-    def states(self, kinematics: Any, count: int, seed: int) -> list[State]:
-        """Random states in the order of our coordinates and velocities, each with values of our inputs."""
-        names, velocities = kinematics.names, kinematics.velocity_names
+    def states(self, module: Any, count: int, seed: int) -> list[State]:
+        """Random states in the order of a module's coordinates and velocities, each with values of our inputs."""
+        names, velocities = module.q_names, module.v_names
         assert sorted(names) == sorted(name for _, group, _ in self.joints for name in group)
         assert sorted(velocities) == sorted(name for _, _, group in self.joints for name in group)
         random = np.random.default_rng(seed)
@@ -114,7 +106,7 @@ class Judge:
         moving_bodies = mj.body_weldid > 0
         masses = mj.body_mass[moving_bodies]
         com = (masses @ data.xipos[moving_bodies]) / masses.sum()
-        u = {entry.name: float(random.uniform(-1, 1)) for entry in self.model.description.sections["inputs"]}
+        u = {name: float(random.uniform(-1, 1)) for name in self.known}
         for name, value in u.items():
             data.ctrl[self.inputs[name]] = value
         mujoco.mj_forward(mj, data)

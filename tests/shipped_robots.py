@@ -71,7 +71,8 @@ def urdf_robots() -> dict[str, tuple[Path, bool]]:
     return found
 
 
-#: Model -> package and file; the folder of its assets is that of the first two parts.
+#: Model -> package and file; the folder of its assets is that of the first two parts.  None has equalities, which
+#: MuJoCo's ``qacc_smooth`` does not know.
 MJCF: dict[str, tuple[str, str]] = {
     "acrobot": ("dm_control", "suite/acrobot.xml"),
     "cart-pole": ("dm_control", "suite/cartpole.xml"),
@@ -80,7 +81,6 @@ MJCF: dict[str, tuple[str, str]] = {
     "walker": ("dm_control", "suite/walker.xml"),
     "humanoid": ("dm_control", "suite/humanoid.xml"),
     "humanoid of motion capture": ("dm_control", "suite/humanoid_CMU.xml"),
-    "quadruped": ("dm_control", "suite/quadruped.xml"),
     "fish": ("dm_control", "suite/fish.xml"),
     "ball in cup": ("dm_control", "suite/ball_in_cup.xml"),
     "jaco arm": ("dm_control", "third_party/kinova/jaco_arm.xml"),
