@@ -15,7 +15,7 @@ OF_ALL_KINDS = (
     "spatial_slider_crank", "stewart_platform", "two_link_manipulator", "wheelset",
 )  # fmt: skip
 #: Fewer examples, which together have every type of element and every section of a model file that any example has, for
-#: sweeps over methods, variants and checks (tests/examples/test_covering.py looks).
+#: sweeps over methods, variants and checks.
 COVERING = (
     "slider_crank", "cam_follower", "stewart_platform", "wheelset", "planetary_gear", "bicycle", "hydraulic_boom",
     "gait_leg", "flyball_governor", "satellite", "gear_train", "rimless_wheel", "double_wishbone",

@@ -1,6 +1,6 @@
 """Hostile robot files by fixed seeds: each ends in a model or a named error, and nothing outside its folder is read.
 
-``make fuzz`` runs many more.  The attacks that once worked are written out in tests/robots/test_contained_files.py.
+``make fuzz`` runs many more.  The attacks that once worked are written out in tests/model/test_robot_file_faults.py.
 """
 
 from __future__ import annotations

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import inspect
 import re
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from model_files import SLIDER_CRANK, faults, load
+from model_files import EXAMPLES, SLIDER_CRANK, faults, load
 
 import eomgen as eg
 
@@ -364,3 +365,85 @@ def test_a_singular_position_without_freedom_names_no_independent_coordinates() 
     module = m.compile(target="numpy")
     with pytest.raises(eg.EvaluationError, match="no degree of freedom; start a little away"):
         module.rhs(0.0, [0.0] * module.n_x)
+
+
+# -- the start: check refuses what a run refuses, by the same assembly -----------
+ARM = """
+name: arm
+gravity: [0, -9.81, 0]
+parameters: {l: {value: 1.0, unit: m}, k: {unit: rad VALUE}}
+bodies:
+  rod: {mass: 1, com: [l/2, 0, 0], inertia: {xx: 0.1, yy: 0.1, zz: 0.1}, markers: {tip: [l, 0, 0]}}
+joints:
+  A: {type: JOINT, between: [ground, rod]}
+outputs: {tip_x: x(rod.tip), tip_vx: vx(rod.tip), tip_ax: ax(rod.tip), square: vx(rod.tip)**2}
+initial: {INITIAL}
+"""
+HINGE, BALL = "revolute, coordinate: q, limits: {lower: -1, upper: 1}", "spherical, rotation: euler_parameters"
+
+
+def arm(initial: str, joint: str = HINGE, value: str = ", value: 0.3") -> str:
+    return ARM.replace("INITIAL", initial).replace("JOINT", joint).replace(" VALUE", value)
+
+
+def four_bar(initial: str) -> str:
+    text = (EXAMPLES / "four_bar.yaml").read_text(encoding="utf-8")
+    kept = [line for line in text.splitlines() if not line.startswith("initial:")]
+    return "\n".join([*kept, f"initial: {{{initial}}}"])
+
+
+FINE = [
+    arm("q: 0.3, q_dot: 1"),
+    arm("tip_x: 0.3"),
+    arm("x(rod.tip): 0.3"),
+    arm("q: 0.3, tip_vx: 1"),
+    arm("q: k"),
+    arm(f"A_e0: {sqrt(0.5)!r}, A_e1: {sqrt(0.5)!r}", BALL),
+    four_bar("theta: 1.0, theta_dot: 3"),
+    four_bar("psi: 1.0, psi_dot: 3"),
+]
+WRONG = [  # the text, and the place and the words of the fault
+    (arm("tip_x: 3"), "initial.tip_x", "cannot close with tip_x = 3"),  # the rod is 1 m long
+    (arm("x(rod.tip): 3"), "initial.x(rod.tip)", "cannot close"),
+    (arm("q: 0.3, tip_x: 0.1"), "initial.tip_x", "inconsistent"),
+    (arm("q: 0, tip_vx: 1"), "initial.tip_vx", "inconsistent"),  # it moves across x there
+    (arm("tip_ax: 1"), "initial.tip_ax", "depends on accelerations"),
+    (arm("square: 1"), "initial.square", "not linearly"),
+    (arm("q: k", value=""), "parameters.k", "has no value"),
+    (arm("A_e0: 0.5, A_e1: 0.5", BALL), "", "length 0.707107, not 1"),
+    (
+        four_bar("theta: 1.0, theta_dot: 1, psi_dot: 100"),
+        "initial.theta_dot",
+        "velocities theta_dot = 1, psi_dot = 100",
+    ),
+    (four_bar("theta: 1.0, psi: 0.1"), "joints.C", "inconsistent"),
+]
+
+
+@pytest.mark.parametrize("text", FINE)
+@pytest.mark.filterwarnings("ignore")
+def test_check_and_run_accept(text: str, tmp_path: Path) -> None:
+    m = load(tmp_path, text)
+    m.compile(target="numpy").simulate((0, 1e-3))
+    assert not any("not checked" in note for note in m.check().notes)
+
+
+@pytest.mark.parametrize(("text", "place", "said"), WRONG)
+@pytest.mark.filterwarnings("ignore")
+def test_check_and_run_refuse(text: str, place: str, said: str, tmp_path: Path) -> None:
+    m = load(tmp_path, text)
+    with pytest.raises(eg.EomgenError):
+        m.compile(target="numpy").simulate((0, 1e-3))
+    with pytest.raises((eg.AssemblyError, eg.ModelError)) as told:
+        m.check()
+    assert place in str(told.value)
+    assert said in str(told.value)
+
+
+def test_a_start_beyond_a_limit_is_noted_as_a_run_warns(tmp_path: Path) -> None:
+    mod = load(tmp_path, arm("q: 2")).compile(target="numpy")
+    with pytest.warns(UserWarning, match="passes limits of joints: q upper 1"):
+        mod.simulate((0, 1e-3))
+    (note,) = (note for note in load(tmp_path, arm("q: 2")).check().notes if "limit" in note)
+    assert note.startswith("q starts at 2, beyond its upper limit 1")
+    assert not [note for note in load(tmp_path, arm("q: 1")).check().notes if "limit" in note]

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -333,27 +329,3 @@ def test_functions_of_coordinates_are_tables() -> None:
     points = np.linspace(-2.0, 2.0, 41)
     model.table("h", points, points**2)
     assert model.compile(target="numpy").rhs(0.0, [0.5, 0.0])[1] == pytest.approx(-1.0, abs=1e-3)
-
-
-# -- what others' tests form -----
-#: Package -> folder of its tests -> objects there were at least when this was written.
-SUITES = {"sympy.physics.mechanics": ("tests", 60), "pydy": (".", 10)}
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("package", ["sympy.physics.mechanics", pytest.param("pydy", marks=pytest.mark.needs("PyDy"))])
-def test_what_their_tests_form_has_their_accelerations(package: str) -> None:
-    spec = importlib.util.find_spec(package)
-    assert spec is not None
-    assert spec.origin is not None
-    where, least = SUITES[package]
-    script = Path(__file__).parents[1] / "sympy_suites.py"
-    done = subprocess.run(
-        [sys.executable, str(script), str(Path(spec.origin).parent / where)],
-        capture_output=True, text=True, timeout=3000,
-    )  # fmt: skip
-    found: list[dict[str, Any]] = [json.loads(line) for line in done.stdout.splitlines() if line.startswith('{"test"')]
-    assert len(found) >= least, done.stderr[-2000:]
-    # a motion without inertia is refused, and there SymPy's own matrix is singular
-    wrong = [x for x in found if x.get("residual", 1.0) > 1e-12 and x.get("singular", 1.0) > 1e-12]
-    assert not wrong

@@ -16,6 +16,7 @@ from jsonschema import Draft202012Validator
 from model_files import EXAMPLES, SLIDER_CRANK, described, load, schema, schema_faults, slider_crank
 
 import eomgen as eg
+from examples.tracked_excavator import Track, build
 
 
 def digest(m: eg.Model) -> str:
@@ -295,3 +296,11 @@ def test_what_is_no_example_is_told(name: str, words: str) -> None:
 def test_the_name_of_an_example_given_as_a_file_is_told() -> None:
     with pytest.raises(eg.UsageError, match=r"the example is load_example\('four_bar'\)"):
         eg.load("four_bar")
+
+
+def test_the_tracked_excavator_is_what_its_script_writes() -> None:
+    """Its chain lies closed around the wheels, as long as its links."""
+    _, pins = Track().laid()
+    np.testing.assert_allclose(pins[-1], pins[0], atol=1e-8)
+    np.testing.assert_allclose(np.hypot(*np.diff(pins, axis=0).T), Track().pitch, atol=1e-12)
+    assert (EXAMPLES / "tracked_excavator.yaml").read_text() == build().to_yaml()

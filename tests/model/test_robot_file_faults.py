@@ -1,0 +1,421 @@
+"""Robot files that are wrong or hostile: an error with the line, nothing expanded, nothing outside read or run."""
+
+from __future__ import annotations
+
+import builtins
+import os
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import command
+import numpy as np
+import pytest
+from model_files import described, load
+
+import eomgen as eg
+
+ARM = """<robot name="arm">
+  <link name="base"/>
+  <link name="upper"><inertial><origin xyz="0 0 0.2"/><mass value="2"/>
+    <inertia ixx="0.1" iyy="0.1" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="tip"><inertial><mass value="0.5"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" velocity="2" effort="30"/></joint>
+  <joint name="slide" type="prismatic"><parent link="upper"/><child link="tip"/><origin xyz="0 0 0.4"/>
+    <axis xyz="0 0 1"/></joint>
+</robot>
+"""
+BOMB = """<?xml version="1.0"?>
+<!DOCTYPE robot [
+  <!ENTITY a "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa">
+  <!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">
+  <!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;">
+]>
+"""
+SECRET = '<!DOCTYPE robot [<!ENTITY secret SYSTEM "file://{secret}">]>\n'
+#: What is changed in the arm, and what the error must say.
+BROKEN = [
+    ('<link name="base"/>', '<link name="base"/>\n<link name="lost"/>', "arm.urdf:3: link.lost: has no parent"),
+    ('<child link="tip"/>', '<child link="tp"/>', "urdf:8: joint.slide.child: no link 'tp'; did you mean 'tip'"),
+    ('<child link="tip"/>', "", "urdf:8: joint.slide.child: is missing"),
+    ('type="prismatic"', 'type="sliding"', "urdf:8: joint.slide.type: no joint of type 'sliding'; types: rev"),
+    ('<mass value="0.5"/>', '<mass value="0"/>', "urdf:8: joint.slide: the joint moves no mass: link 'tip'"),
+    ('value="2"', 'value="-2"', "urdf:3: link.upper.inertial.mass: is -2"),
+    ('value="2"', 'value="nan"', "urdf:3: link.upper.inertial.mass.value: 'nan' is not finite"),
+    ('xyz="0 0 0.4"', 'xyz="0 0 1e999"', "urdf:8: joint.slide.origin.xyz: '1e999' is not"),
+    ('ixx="0.1"', 'ixx="a lot"', "urdf:4: link.upper.inertial.inertia.ixx: 'a lot' is not a number"),
+    ('ixx="0.1"', 'ixx="-9"', "urdf:3: bodies.upper.inertia: has a negative principal moment"),
+    ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', "urdf:6: joint.shoulder.axis: the axis has no length"),
+    ('name="tip"', 'name="upper"', "urdf:5: link.upper: the name is given twice, first in line 3"),
+    ('<parent link="base"/>', '<parent link="tip"/>', "'base'|ring"),
+    ('<link name="base"/>', "", "^[^\\n]*urdf:6: joint.shoulder.parent: no link 'base'; links: upper, tip$"),
+    (
+        '<parent link="upper"/><child link="tip"/>',
+        '<parent link="base"/><child link="upper"/>',
+        "also the child of .*<loop_joint",
+    ),
+    ("</robot>", "", "urdf:11: file: not XML: no element found"),
+    ('<link name="base"/>', '<xacro:include filename="a"/>', "is a xacro file; expand it first"),
+    ('<robot name="arm">', BOMB + '<robot name="&c;">', "urdf:2: file: declares a document type or an entity"),
+    ("robot", "machine", "urdf:1: machine: is not a robot"),
+]
+
+
+def arm(folder: Path, *changes: tuple[str, str], name: str = "arm.urdf") -> Path:
+    text, path = ARM, folder / name
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(("old", "new", "said"), BROKEN, ids=lambda text: text[:24])
+def test_a_fault_is_told_with_its_line(old: str, new: str, said: str, tmp_path: Path) -> None:
+    path = arm(tmp_path, (old, new))
+    with pytest.raises(eg.ModelError, match=said):
+        eg.load(path).check()
+
+
+def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
+    shapes = '<visual><geometry><mesh filename="a.stl" scale="1 0 1"/></geometry></visual>'
+    inertia = ('ixx="0.1" iyy="0.1" izz="0.01"', 'ixx="0.1" iyy="0.1" izz="0.9"')
+    path = arm(tmp_path, ("prismatic", "sliding"), ('"0.5"/></inertial>', f'"-1"/></inertial>{shapes}'), inertia)
+    with pytest.raises(eg.ModelError) as caught:
+        eg.load(path, check_inertia="error")
+    assert [(p.line, p.path) for p in caught.value.problems] == [
+        (3, "link.upper.inertial.inertia"),
+        (5, "link.tip.inertial.mass"),
+        (5, "link.tip.visual.mesh.scale"),
+        (8, "joint.slide.type"),
+    ]
+    found = command.run("check", path)
+    assert (found.code, found.err.count(str(path)) >= 3) == (1, True)
+
+
+def test_options_are_checked(tmp_path: Path) -> None:
+    path = arm(tmp_path)
+    for given, said in (
+        ({"floting": True}, "no option 'floting' for a robot file; did you mean 'floating'"),
+        ({"mimic": "x"}, "mimic must be one of coupling, independent, not 'x'"),
+        ({"lock": 5}, "lock must be names of joints, or a mapping of names to values, not 5"),
+        ({"lock": {"shoulder": float("nan")}}, "lock.*number"),
+        ({"actuate": 5}, "actuate must be names of joints, or True, not 5"),
+        ({"snap": -1.0}, "an angle"),
+        ({"assets": 5}, "assets must be the name of a file or folder"),
+        ({"floating": "yes"}, "floating must be True or False, not 'yes'"),
+        ({"friction": -1}, "friction must be True, or the velocity"),
+        ({"check_inertia": "maybe"}, "check_inertia must be one of error, note, off"),
+        ({"limits": "hard"}, "limits must be one of note, stop, off, not 'hard'"),
+    ):
+        with pytest.raises(eg.UsageError, match=said):
+            eg.load(path, **given)
+    with pytest.raises(eg.ModelError, match="lock.shulder: no such joint; did you mean 'shoulder'"):
+        eg.load(path, lock=["shulder"])
+    eg.load(path).save(tmp_path / "model.yaml")
+    with pytest.raises(eg.UsageError, match="only robot files take the options floating"):
+        eg.load(tmp_path / "model.yaml", floating=True)
+
+
+# -- nothing outside is read ------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("suffix", [".urdf", ".xml"])
+def test_no_entity_reads_a_file(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("hidden")
+    begin = '<robot name="arm">'
+    path = arm(tmp_path, (begin, f"{SECRET.format(secret=secret)}{begin}&secret;"), name=f"arm{suffix}")
+    opened: list[str] = []
+
+    def noting(real: Callable[..., Any]) -> Callable[..., Any]:
+        def open_noted(file: Any, *args: Any, **keys: Any) -> Any:
+            opened.append(os.fspath(file) if not isinstance(file, int) else "")
+            return real(file, *args, **keys)
+
+        return open_noted
+
+    for module in (builtins, os):
+        monkeypatch.setattr(module, "open", noting(module.open))
+    with pytest.raises(eg.ModelError, match="expands no entities") as caught:
+        eg.load(path)
+    assert "hidden" not in str(caught.value)
+    assert str(secret) not in opened
+    assert str(path) in opened
+
+
+BALL = '<worldbody><body name="ball"><joint name="j"/><geom size="1"/></body></worldbody>'
+SHAPE = '<worldbody><body name="shape"><joint name="j"/><geom type="mesh" mesh="m"/></body></worldbody>'
+ABSOLUTE = "{out}"  # the folder outside, from the root
+
+
+def tetrahedron(size: float) -> bytes:
+    """A binary STL file."""
+    corners = np.vstack([np.zeros(3), size * np.eye(3)])
+    faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    body = b"".join(struct.pack("<12fH", 0, 0, 0, *corners[list(face)].ravel(), 0) for face in faces)
+    return b"\0" * 80 + struct.pack("<I", len(faces)) + body
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Any:
+    """Writes a model into a folder with meshes, beside a folder ``out`` that it must not reach."""
+    folder, out = tmp_path / "model", tmp_path / "out"
+    for place in (folder / "sub", out):
+        place.mkdir(parents=True)
+        (place / "x.stl").write_bytes(tetrahedron(1.0))
+    (folder / "a.stl").write_bytes(tetrahedron(2.0))
+    (out / "x.xml").write_text(f"<mujoco>{BALL.replace('ball', 'hidden')}</mujoco>")
+    os.symlink(out, folder / "link")
+    os.mkfifo(folder / "pipe.stl")
+
+    def write(text: str, name: str = "model.xml") -> Path:
+        path: Path = folder / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(f"<mujoco>\n{text.replace(ABSOLUTE, str(out))}\n</mujoco>")
+        return path
+
+    return write
+
+
+def mesh(name: str, compiler: str = "") -> str:
+    return f'{compiler}<asset><mesh name="m" file="{name}"/></asset>{SHAPE}'
+
+
+OUTSIDE = [
+    *(
+        mesh(name)
+        for name in (
+            *("../out/x.stl", "..\\out\\x.stl", "sub\\..\\..\\out\\x.stl", "sub/../../out/x.stl", "./..//out/x.stl"),
+            *("{out}/x.stl", "\\etc\\passwd", "/etc/passwd", "link/x.stl", "link\\x.stl", "C:\\x.stl"),
+            *("file:///etc/passwd", "file:/{out}/x.stl", "http://127.0.0.1:9/x.stl", "\\\\server\\share\\x.stl"),
+        )
+    ),
+    *(
+        mesh("x.stl", f'<compiler {key}="{folder}"/>')
+        for key in ("meshdir", "assetdir")
+        for folder in ("../out", "..\\out", "{out}", "link", "sub\\..\\..\\out")
+    ),
+    mesh("x.stl", '<compiler meshdir="sub"/><compiler meshdir="..\\out"/>'),
+    mesh("y\\..\\x.stl", '<compiler meshdir="../out" strippath="true"/>'),
+    *(
+        f"{start}{BALL}"
+        for start in (
+            *('<include file="..\\out\\x.xml"/>', '<Include file="../out/x.xml"/>', '<include file="link\\x.xml"/>'),
+            '<asset><model name="p" file="..\\out\\x.xml"/></asset>',
+            '<worldbody><body name="f"><flexcomp name="f" type="mesh" file="..\\out\\x.stl"/></body></worldbody>',
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize("text", OUTSIDE)
+def test_no_spelling_of_a_path_leads_out_of_the_folder(text: str, model: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: Any, **__: Any) -> None:
+        raise AssertionError("MuJoCo was asked")
+
+    monkeypatch.setattr("subprocess.Popen", never)
+    with pytest.raises(eg.ModelError, match=r"model.xml:2: .*is outside the folder") as caught:
+        eg.load(model(text))
+    assert "hidden" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["pipe.stl", "none.stl", ".", "%2e%2e/out/x.stl", "~/x.stl", "A.STL", "a" * 2000])
+def test_what_is_no_file_of_the_folder_is_told(name: str, model: Any) -> None:
+    with pytest.raises(eg.ModelError, match=r"model.xml:2: mesh.file: .*(no plain file|names no file|too long)"):
+        eg.load(model(mesh(name)))
+
+
+def mass_of(path: Path) -> float:
+    (mass,) = (body["mass"] for body in described(eg.load(path))["bodies"].values() if "mass" in body)
+    return float(mass)
+
+
+@pytest.mark.parametrize(
+    ("name", "compiler", "size"),
+    [
+        ("sub\\x.stl", "", 1.0),
+        ("x.stl", '<compiler meshdir="sub\\"/>', 1.0),
+        ("..\\out\\a.stl", '<compiler strippath="true"/>', 2.0),
+        ("sub/../a.stl", '<compiler meshdir="none"/><compiler assetdir="."/>', 2.0),
+    ],
+)
+def test_names_with_backslashes_are_read_inside(name: str, compiler: str, size: float, model: Any) -> None:
+    assert mass_of(model(mesh(name, compiler))) == pytest.approx(1000 * size**3 / 6)
+
+
+# -- sizes and cycles -------------------------------------------------------------------------------------------------
+CYCLES = {
+    "itself": ({}, '<include file="model.xml"/>', "'model.xml' includes itself"),
+    "each other": (
+        {"a.xml": '<include file="b.xml"/>', "b.xml": '<include file="a.xml"/>'},
+        '<include file="a.xml"/>',
+        "'a.xml' includes itself",
+    ),
+    "twice": ({"a.xml": "<option/>"}, '<include file="a.xml"/><include file="./a.xml"/>', "part of the model already"),
+    "attached": ({}, '<asset><model name="p" file="model.xml"/></asset>', "'model.xml' attaches itself"),
+    "attached in turn": (
+        {"a.xml": '<asset><model name="p" file="b.xml"/></asset>', "b.xml": '<include file="model.xml"/>'},
+        '<asset><model name="p" file="a.xml"/></asset>',
+        "'a.xml' attaches itself",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("cycle", CYCLES)
+def test_no_file_is_part_of_itself(cycle: str, model: Any) -> None:
+    others, start, said = CYCLES[cycle]
+    for name, text in others.items():
+        model(text, name)
+    with pytest.raises(eg.ModelError, match=said):
+        eg.load(model(start + BALL))
+
+
+SIZES = {
+    '<size nkey="100000000"/>': "size.nkey: 100000000 is too large; at most 1,000,000",
+    '<size nuser_body="1000000000"/>': "size.nuser_body: 1000000000 is too large",
+    '<asset><hfield name="h" nrow="16385" ncol="2" size="1 1 1 1"/></asset>': "hfield.nrow: 16385 is too large",
+    '<worldbody><replicate count="99999999999999999999999"><body/></replicate></worldbody>': "makes too many bodies",
+    '<worldbody><body name="a"><flexcomp name="f" count="1e3 1e3 1e3"/></body></worldbody>': "makes too many bodies",
+    '<worldbody><body pos="1e308 0 0"><joint/><geom size="1"/></body></worldbody>': "places of bodies .* most 1e\\+100",
+    '<worldbody><body><joint stiffness="nan"/><geom size="1"/></body></worldbody>': "stiffnesses of joints|nan",
+    '<worldbody><replicate count="900" offset="3 0 0"><body><joint/><geom size="1"/></body></replicate></worldbody>': (
+        "has 901 coordinates of joints; at most 800"
+    ),
+}
+
+
+@pytest.mark.parametrize("text", SIZES)
+def test_sizes_of_mjcf_are_bounded(text: str, model: Any) -> None:
+    with pytest.raises(eg.ModelError, match=SIZES[text]):
+        eg.load(model(text + BALL))
+
+
+def test_what_is_no_part_of_the_motion_costs_nothing(model: Any) -> None:
+    for text in (
+        '<asset><texture name="t" type="cube" builtin="flat" width="16384" height="16384"/></asset>',
+        '<asset><texture type="2d" file="/nowhere/x.png"/></asset>',
+        '<size memory="900T" nkey="999999" nuser_body="999999"/><keyframe><key qpos="1 2 3 4 5 6 7"/></keyframe>',
+    ):
+        assert mass_of(model(text + BALL)) == pytest.approx(4000 * np.pi / 3)
+
+
+def test_copies_are_counted_by_siblings_nesting_and_includes(model: Any) -> None:
+    """Each attaches the one before it ten times: a hundred thousand bodies from six files."""
+    model(BALL, "m0.xml")
+    for k in range(1, 6):
+        attach = "".join(f'<attach model="m" body="ball" prefix="p{n}"/>' for n in range(10))
+        asset = f'<asset><model name="m" file="m{k - 1}.xml"/></asset>'
+        model(f'{asset}<worldbody><body name="ball">{attach}</body></worldbody>', f"m{k}.xml")
+    model('<replicate count="150"><body><freejoint/><geom size="0.1"/></body></replicate>', "part.xml")
+    twice = '<worldbody><replicate count="2000"><replicate count="2000"/></replicate></worldbody>'
+    inside = '<worldbody><replicate count="150"><include file="part.xml"/></replicate></worldbody>'
+    for path in (model("").parent / "m5.xml", model(twice), model(inside)):
+        with pytest.raises(eg.ModelError, match="makes too many bodies"):
+            eg.load(path)
+    row = '<replicate count="30" offset="0 0 1"><geom size="0.1"/></replicate>'
+    path = model(f'<worldbody><body name="b"><joint/>{3 * row}</body></worldbody>')
+    assert mass_of(path) == pytest.approx(90 * 1000 * 4 / 3 * np.pi * 0.1**3)
+
+
+@pytest.mark.thorough
+def test_a_model_that_never_compiles_is_given_up(model: Any) -> None:
+    text = (
+        '<compiler><lengthrange mode="all" inttotal="1e9" interval="1e8" timestep="1e-6"/></compiler>'
+        f'{BALL}<actuator><muscle joint="j"/></actuator>'
+    )
+    start = time.monotonic()
+    with pytest.raises(eg.ModelError, match=r"model.xml:1: mujoco: MuJoCo needs more time for it than the .* s"):
+        eg.load(model(text))
+    assert time.monotonic() - start < 300
+
+
+def test_refusals_of_mujoco_name_the_file_and_line_of_the_user(model: Any) -> None:
+    part = model('\n\n<worldbody>\n<body name="b">\n<joint type="screw"/></body></worldbody>', "sub/part.xml")
+    path = model('\n<include file="sub/part.xml"/>' + BALL)
+    with pytest.raises(
+        eg.ModelError, match=r"sub/part.xml:6: mujoco: MuJoCo refuses it: .*line 6 of part.xml"
+    ) as caught:
+        eg.load(path)
+    assert caught.value.problems[0].file == os.path.realpath(part)
+    other = model('<worldbody>\n<body name="b"><geom size="1" shape="round"/></body></worldbody>', "sub/other.xml")
+    path = model('<asset><model name="o" file="sub/other.xml"/></asset>' + BALL)
+    with pytest.raises(eg.ModelError, match=rf"{other}:3: mujoco: .*unrecognized attribute: 'shape'"):
+        eg.load(path)
+
+
+def test_included_files_pass_the_same_parser(tmp_path: Path) -> None:
+    (tmp_path / "part.xml").write_text(BOMB + "<mujocoinclude/>")
+    path = tmp_path / "model.xml"
+    path.write_text('<mujoco><include file="part.xml"/></mujoco>')
+    with pytest.raises(eg.ModelError, match=r"part.xml:2: file: declares a document type"):
+        eg.load(path)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (
+            '<asset><texture name="a" builtin="flat" width="999999" height="9"/></asset>',
+            "texture.width: 999999 is too large",
+        ),
+        ('<worldbody><body><joint type="screw"/></body></worldbody>', r"xml:2: mujoco: MuJoCo refuses it: .*'screw'"),
+        ("<worldbody><body><joint/></body></worldbody>", r"xml:2: mujoco: MuJoCo refuses it: .*mass and inertia"),
+        ('<worldbody><body name="a"/>', r"xml:3: file: not XML: mismatched tag"),
+        ('<worldbody><geom size="1"/></worldbody>', "no link can move"),
+    ],
+)
+def test_mjcf_faults(line: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "model.xml"
+    path.write_text(f"<mujoco>\n{line}\n</mujoco>")
+    with pytest.raises(eg.ModelError, match=said):
+        eg.load(path)
+
+
+URDF = """<robot name="r"><link name="base"/><link name="l"><inertial>{origin}<mass value="{mass}"/>
+<inertia ixx="{xx}" iyy="1" izz="1" ixy="{xy}"/></inertial></link>
+<joint name="j" type="continuous"><parent link="base"/><child link="l"/></joint>{more}</robot>"""
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"xx": "1e308"}, r"urdf:2: link.l.inertial.inertia.ixx: 1e\+308 is too large; at most 1e\+100"),
+        ({"xx": "1e308", "more": '<link name="lost"/>'}, "1e\\+308 is too large"),
+        ({"xy": "1e100"}, "negative principal moment"),
+        ({"origin": '<origin xyz="1e308 1e308 0"/>'}, "too large"),
+        ({"mass": "1e308"}, "too large"),
+        ({"xx": "nan"}, "not finite"),
+        ({"more": "<a " + "x" * 2_100_000 + "/>"}, "has a tag, a comment or a text of 2,100,"),
+        ({"more": "<a>" * 100_000}, "nested too deeply"),
+    ],
+)
+def test_numbers_of_urdf_are_bounded(given: dict[str, str], said: str, tmp_path: Path) -> None:
+    path = tmp_path / "r.urdf"
+    path.write_text(URDF.format(**({"xx": "1", "xy": "0", "mass": "1", "origin": "", "more": ""} | given)))
+    with pytest.raises(eg.ModelError, match=said):
+        eg.load(path).check()
+
+
+@pytest.mark.parametrize("suffix", [".urdf", ".xml"])
+def test_pipes_folders_and_names_that_are_none_end_at_once(suffix: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / f"pipe{suffix}")
+    with pytest.raises(eg.UsageError, match="is not a plain file but a pipe"):
+        eg.load(tmp_path / f"pipe{suffix}")
+    (tmp_path / f"folder{suffix}").mkdir()
+    with pytest.raises(eg.UsageError, match="is not a plain file but a folder"):
+        eg.load(tmp_path / f"folder{suffix}")
+
+
+def test_meshes_of_model_files_with_names_that_are_none_are_faults(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.stl")
+    for name, said in {
+        "a\\0.stl": "contains a character that file names cannot have",
+        "\\ud800.stl": "character|surrogate",
+        "pipe.stl": "is not a plain file",
+        "../a.stl": "outside the folder",
+    }.items():
+        text = f'name: m\nbodies: {{b: {{solids: [{{type: mesh, file: "{name}", density: 1}}]}}}}\n'
+        with pytest.raises(eg.ModelError, match=said):
+            load(tmp_path, text).check()
