@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
-from mechanisms import PITCH, Random
+from random_models import PITCH
 
 #: Type of joint -> Pinocchio's joints, one after the other.
 STEPS = {
@@ -21,7 +23,7 @@ STEPS = {
 }
 
 
-def pinocchio_model(made: Random, bodies: list[int]) -> tuple[pin.Model, dict[int, int]]:
+def pinocchio_model(made: Any, bodies: list[int]) -> tuple[pin.Model, dict[int, int]]:
     """The same tree in Pinocchio, its bodies in the given order (depth first, as it demands), and their frames."""
     model = pin.Model()
     model.gravity.linear = made.gravity

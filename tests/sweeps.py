@@ -7,6 +7,12 @@ from typing import Any
 
 import pytest
 
+#: Every method of derivation.
+METHODS = (
+    "embedding", "lagrange", "recursive", "augmented", "newton_euler", "amalgamated", "gibbs_appell", "hamilton",
+)  # fmt: skip
+#: Both targets of a test: NumPy's functions always, compiled code by ``make thorough``.
+TARGETS = ["numpy", pytest.param("cython", marks=pytest.mark.thorough)]
 #: Examples that together have every type of joint, force, constraint and shape of all of them, every description of
 #: rotations, every function in an expression, and events, inputs and outputs (tests/emit/test_traced.py looks).
 OF_ALL_KINDS = (

@@ -1,0 +1,319 @@
+"""Random trees of every joint type by every method: Pinocchio, MuJoCo, Newton and Euler from poses, power."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import judges
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+from pinocchio_trees import STEPS, pinocchio_model
+from random_models import SPATIAL, SUFFIXES, Judge, Random, energy_rate, random_model, seed_with, states_of
+from scipy.spatial.transform import Rotation
+from sweeps import METHODS, TARGETS, part_of
+
+import eomgen as eg
+
+KERNELS = ["rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "poses", "project"]
+
+
+# -- Pinocchio ---------------------------------------------------------------------------------------------------------
+class InPinocchio:
+    """A tree in Pinocchio; ``order`` gives its velocities in the order of ours."""
+
+    def __init__(self, made: Random, names: tuple[str, ...]) -> None:
+        bodies: list[int] = []
+
+        def add(parent: int) -> None:  # depth first, as Pinocchio demands
+            for k, above in enumerate(made.parents):
+                if above == parent:
+                    bodies.append(k)
+                    add(k)
+
+        add(-1)
+        self.model, self.frames = pinocchio_model(made, bodies)
+        self.data = self.model.createData()
+        places = {
+            f"q{k}{suffix}": self.model.joints[self.model.getJointId(f"j{k}_{s}")].idx_v
+            for k, kind in enumerate(made.kinds)
+            for s, suffix in enumerate(SUFFIXES[kind])
+        }
+        self.order = [places[name] for name in names]
+
+    def theirs(self, values: np.ndarray) -> np.ndarray:
+        found = np.empty(len(values))
+        found[self.order] = values
+        return found
+
+
+CASES = list(product(range(8), (False, True), METHODS))
+
+
+def always(case: tuple[int, bool, str]) -> bool:
+    """Embedding and articulated bodies of three trees in space and one in a plane, each method of another one."""
+    seed, planar, method = case
+    if method in ("embedding", "recursive") and seed in (1, 2, 3):
+        return not planar or seed == 3
+    return seed == 4 + METHODS.index(method) % 4 and not planar
+
+
+@pytest.mark.parametrize(("seed", "planar", "method"), part_of(CASES, always))
+def test_tree_equals_pinocchio(seed: int, planar: bool, method: str) -> None:
+    """Mass matrix, bias, inverse dynamics, accelerations, energies and poses."""
+    made = random_model(seed, bodies=1 + seed % 6, planar=planar, types=tuple(STEPS))
+    mod = made.model.compile(method, target="numpy", kernels=KERNELS)
+    other = InPinocchio(made, mod.q_names)
+    model, data, order = other.model, other.data, other.order
+    n = mod.n_v
+    assert n == model.nv
+    random = np.random.default_rng(seed + 1000)
+    offsets: list[float] = []
+    for _ in range(3):
+        q, v, a = random.uniform(-1, 1, (3, n))
+        there = [other.theirs(x) for x in (q, v, a)]
+        M = pin.crba(model, data, there[0])
+        M = (np.triu(M) + np.triu(M, 1).T)[np.ix_(order, order)]
+        assert np.abs(mod.mass_matrix(q) - M).max() <= 1e-13 * np.abs(M).max()
+        x = np.concatenate([q, v])
+        h = pin.nonLinearEffects(model, data, *there[:2])[order]
+        for ours, theirs in (
+            (mod.bias(0.0, x), h),
+            (mod.inverse_dynamics(q, v, a), pin.rnea(model, data, *there)[order]),
+        ):
+            assert np.abs(ours - theirs).max() <= 1e-12 * max(1.0, np.abs(theirs).max())
+        judges.agree(mod.rhs(0.0, x)[n:], np.linalg.solve(M, -h), 1e-11, float(np.linalg.cond(M)))
+        kinetic, potential = mod.energy(x)
+        assert kinetic == pytest.approx(pin.computeKineticEnergy(model, data, *there[:2]), rel=1e-12, abs=1e-12)
+        # Pinocchio leaves out bodies welded to ground, a constant
+        offsets.append(potential - pin.computePotentialEnergy(model, data, there[0]))
+        assert offsets[-1] == pytest.approx(offsets[0], abs=1e-11)
+        pin.framesForwardKinematics(model, data, there[0])
+        poses = mod.poses(q)
+        for k, index in other.frames.items():
+            np.testing.assert_allclose(poses[k], data.oMf[index].homogeneous, rtol=0, atol=1e-12)
+
+
+def held_by_ground(made: Random) -> bool:
+    """Whether a body is welded to ground; Pinocchio leaves such bodies out of its sums."""
+    return any(kind == "weld" and parent < 0 for kind, parent in zip(made.kinds, made.parents, strict=True))
+
+
+@pytest.mark.parametrize("seed", [1, 3, 4])
+def test_sums_over_bodies_equal_pinocchio(seed: int) -> None:
+    """Centre of mass and its Jacobian, momenta and the inertia about the centre of mass."""
+    made = random_model(seed, bodies=3 + seed % 3, types=tuple(STEPS))
+    assert not held_by_ground(made)
+    mod = made.model.compile(target="numpy")
+    other = InPinocchio(made, mod.q_names)
+    model, data = other.model, other.data
+    random = np.random.default_rng(seed + 2000)
+    for _ in range(2):
+        q, v = random.uniform(-1, 1, (2, mod.n_v))
+        there = [other.theirs(x) for x in (q, v)]
+        x = np.concatenate([q, v])
+        pin.centerOfMass(model, data, *there)
+        pin.ccrba(model, data, *there)
+        h = pin.computeCentroidalMomentum(model, data, *there)
+        J = pin.jacobianCenterOfMass(model, data, there[0])[:, other.order]
+        for ours, theirs in (
+            (mod.center_of_mass(q), data.com[0]),
+            (mod.com_jacobian(q), J),
+            (mod.momentum(x)[:3], h.linear),
+            (mod.momentum(x)[3:], h.angular),
+            (mod.centroidal_inertia(q), data.Ig.inertia),
+        ):
+            assert np.abs(ours - theirs).max() <= 1e-12 * max(1.0, np.abs(theirs).max())
+
+
+# -- MuJoCo ------------------------------------------------------------------------------------------------------------
+def mujoco_text(made: Random) -> str:
+    """A random tree of hinges and slides, in MuJoCo's format: body frames stand at the outer markers."""
+
+    def numbers(*values: Any) -> str:
+        return " ".join(repr(float(x)) for x in np.concatenate([np.atleast_1d(v) for v in values]))
+
+    def body(k: int, base_R: np.ndarray, base_r: np.ndarray) -> str:
+        R, r = base_R @ made.outer[k].rotation, base_r + base_R @ made.outer[k].position
+        inner = made.inner[k]  # body frame seen from the joint frame
+        R_b, r_b = inner.rotation.T, -inner.rotation.T @ inner.position
+        I = R_b @ made.inertias[k] @ R_b.T
+        full = numbers(np.diag(I), I[0, 1], I[0, 2], I[1, 2])
+        kind = {"revolute": "hinge", "prismatic": "slide"}[made.kinds[k]]
+        children = "".join(body(j, R_b, r_b) for j, parent in enumerate(made.parents) if parent == k)
+        turn = numbers(np.roll(Rotation.from_matrix(R).as_quat(), 1))
+        return (
+            f'<body pos="{numbers(r)}" quat="{turn}"><joint name="q{k}" type="{kind}" axis="0 0 1"/>'
+            f'<inertial pos="{numbers(r_b + R_b @ made.centers[k])}" mass="{numbers(made.masses[k])}" '
+            f'fullinertia="{full}"/>{children}</body>'
+        )
+
+    roots = "".join(body(k, np.eye(3), np.zeros(3)) for k, parent in enumerate(made.parents) if parent < 0)
+    gravity = numbers(made.gravity)
+    return f'<mujoco><option gravity="{gravity}"/><compiler angle="radian"/><worldbody>{roots}</worldbody></mujoco>'
+
+
+@pytest.mark.parametrize("method", ["embedding", "lagrange"])
+def test_an_arm_of_hinges_and_slides_equals_mujoco(method: str) -> None:
+    made = random_model(2, bodies=5, types=("revolute", "prismatic"))
+    assert set(made.kinds) == {"revolute", "prismatic"}
+    assert len(set(made.parents)) > 3
+    mod = made.model.compile(method, target="numpy", kernels=KERNELS)
+    model = mujoco.MjModel.from_xml_string(mujoco_text(made))
+    data = mujoco.MjData(model)
+    n = mod.n_q
+    order = [model.joint(name).dofadr[0] for name in mod.q_names]
+    random = np.random.default_rng(2)
+    for _ in range(4):
+        x = random.uniform(-1, 1, 2 * n)
+        data.qpos[order], data.qvel[order] = x[:n], x[n:]
+        mujoco.mj_forward(model, data)
+        full = np.zeros((n, n))
+        for row, unit in zip(full, np.eye(n), strict=True):  # M is symmetric; mj_mulM is there in every version
+            mujoco.mj_mulM(model, data, row, unit)
+        M, h = full[np.ix_(order, order)], data.qfrc_bias[order]
+        np.testing.assert_allclose(mod.mass_matrix(x[:n]), M, rtol=0, atol=1e-11 * np.abs(M).max())
+        np.testing.assert_allclose(mod.bias(0.0, x), h, rtol=0, atol=1e-11 * np.abs(h).max())
+        judges.agree(mod.rhs(0.0, x)[n:], data.qacc[order], 1e-11, float(np.linalg.cond(M)))
+
+
+# -- Newton and Euler from differences of poses ------------------------------------------------------------------------
+GROUPS = [
+    ("revolute", "screw", "spherical"),
+    ("continuous", "universal", "free"),
+    ("prismatic", "constant_velocity", "point_on_curve"),
+    ("cylindrical", "planar", "weld", "curve_slider"),
+    ("surface_slider", "point_on_surface", "spherical"),
+    ("revolute", "translational", "spherical"),
+]
+ROTATIONS = ("euler_angles", "euler_parameters")
+TREES = [(group, len(group), ROTATIONS[k % 2]) for k, group in enumerate(GROUPS)]
+TREES += [
+    (group, len(group), ROTATIONS[1 - k % 2]) for k, group in enumerate(GROUPS) if {"spherical", "free"} & {*group}
+]
+TREES += [(("revolute", "spherical", "universal", "free", "cylindrical"), 9, "euler_parameters")]
+
+
+def test_every_joint_type_is_there() -> None:
+    assert {kind for group in GROUPS for kind in group} == set(SPATIAL)
+
+
+@pytest.mark.parametrize(("group", "bodies", "rotation"), part_of(TREES, lambda case: TREES.index(case) < 9))
+def test_methods_equal_newton_and_euler_and_balance_power(group: tuple[str, ...], bodies: int, rotation: str) -> None:
+    """M, h, accelerations, velocities of the bodies as outputs, energies and the power of each wrench."""
+    made = random_model(seed_with(group, bodies), bodies, reverse=True, forces="judged", types=group, rotation=rotation)
+    assert set(made.kinds) == set(group)
+    for k in range(bodies):
+        for name in ("wx", "wy", "wz", "vx", "vy", "vz"):
+            made.model.output(f"{name}{k}", f"{name}(b{k})")
+    which = TREES.index((group, bodies, rotation))
+    methods = {"embedding", METHODS[which % len(METHODS)], METHODS[(which + 3) % len(METHODS)]}
+    kernels = [*KERNELS, "outputs"]
+    modules = {method: made.model.compile(method, target="numpy", kernels=kernels) for method in sorted(methods)}
+    one = modules["embedding"]
+    n = one.n_q
+    for x in states_of(one, 8, 2):
+        judge = Judge(one, made, x)
+        q, v = x[:n], x[n:]
+        cond, size = float(np.linalg.cond(judge.M)), np.abs(judge.M).max()
+        expected = np.linalg.solve(judge.M, -judge.h)
+        for module in modules.values():
+            M = module.mass_matrix(q)
+            np.testing.assert_allclose(M, M.T, rtol=0, atol=1e-15 * size)
+            assert np.linalg.eigvalsh(M)[0] > 0.0
+            np.testing.assert_allclose(M, judge.M, rtol=0, atol=1e-10 * size)
+            assert module.energy(x)[0] == pytest.approx(0.5 * v @ M @ v, rel=1e-12)
+            np.testing.assert_allclose(module.bias(0.0, x), judge.h, rtol=0, atol=1e-9 * np.abs(judge.h).max())
+            x_dot = module.rhs(0.0, x)
+            np.testing.assert_allclose(x_dot[:n], judge.q_dot, rtol=0, atol=1e-13)
+            judges.agree(x_dot[n:], expected, 1e-9, cond)
+            judges.agree(x_dot[n:], one.rhs(0.0, x)[n:], 1e-11, cond)
+            change, parts = energy_rate(module, judge.q_dot, x, x_dot[n:])
+            assert abs(change - judge.power) <= 1e-9 * max(abs(judge.power), parts)
+        twists = one.outputs(0.0, x).reshape(bodies, 6)
+        np.testing.assert_allclose(twists[:, :3], judge.bodies.w, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(twists[:, 3:], judge.bodies.v, rtol=0, atol=1e-10)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("case", range(len(TREES)))
+def test_every_method_and_target_gives_the_same_accelerations(case: int) -> None:
+    group, bodies, rotation = TREES[case]
+    model = random_model(
+        seed_with(group, bodies), bodies, reverse=True, forces="more", types=group, rotation=rotation
+    ).model
+    one = model.compile(target="numpy", kernels=KERNELS)
+    states = states_of(one, 5, 3)
+    for method in METHODS:
+        for target in ("numpy", "cython"):
+            options = {"optimize": 0} if target == "cython" else {}
+            mod = model.compile(method, target=target, kernels=KERNELS, **options)
+            for x in states:
+                M = one.mass_matrix(x[: one.n_q])
+                judges.agree(mod.rhs(0.4, x), one.rhs(0.4, x), 1e-11, float(np.linalg.cond(M)))
+                np.testing.assert_allclose(mod.mass_matrix(x[: one.n_q]), M, rtol=0, atol=1e-11 * np.abs(M).max())
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_drives_add_their_inertia(method: str) -> None:
+    """A rotor that turns with a coordinate (gear included in J) adds J v^2 / 2, J on the diagonal of M and no more."""
+    group = ("revolute", "prismatic", "screw", "free")
+    seed = seed_with(group, 5)
+    kinds = random_model(seed, 5, types=group).kinds
+    drives = {f"q{k}": 0.2 + 0.3 * k for k, kind in enumerate(kinds) if len(SUFFIXES[kind]) == 1}
+    made = random_model(
+        seed, 5, reverse=True, forces="judged", types=group, rotation="euler_parameters", armature=drives
+    )
+    mod = made.model.compile(method, target="numpy", kernels=KERNELS)
+    (x,) = states_of(mod, 8, 1)
+    judge, q, v = Judge(mod, made, x), x[: mod.n_q], x[mod.n_q :]
+    J = np.array([drives.get(name.removesuffix("_dot"), 0.0) for name in mod.v_names])
+    assert (J > 0.0).sum() == len(drives) >= 3
+    M = judge.M + np.diag(J)
+    np.testing.assert_allclose(mod.mass_matrix(q), M, rtol=0, atol=1e-10 * np.abs(M).max())
+    judges.agree(mod.rhs(0.0, x)[mod.n_q :], np.linalg.solve(M, -judge.h), 1e-9, float(np.linalg.cond(M)))
+    assert mod.energy(x)[0] == pytest.approx(0.5 * v @ M @ v, rel=1e-9)
+
+
+# -- large trees -------------------------------------------------------------------------------------------------------
+def branched(n: int) -> eg.Model:
+    """A tree too large to be unrolled: a free trunk, chains of hinges, slides and spherical joints on it."""
+    m = eg.Model("branched", gravity=(0.2, -0.4, "-g"))
+    m.parameter("g", 9.81)
+    push = m.input("push", 0.7)
+    trunk = m.body("trunk", mass=4.0, com=(0.1, 0, 0.2), inertia=(0.3, 0.5, 0.4))
+    m.free("base", m.ground, trunk, rotation="euler_parameters")
+    bodies = [trunk]
+    for k in range(n):
+        body = m.body(f"b{k}", mass=1 + 0.1 * (k % 5), com=(0.2, 0.01 * k, 0.03), inertia=(0.1, 0.2, 0.25))
+        outer = bodies[max(0, k - (3 if k % 4 == 0 else 1)) + (0 if k == 0 else 1) - 1].at(0.4, 0, 0.1 * (k % 3))
+        kind = (m.revolute, m.revolute, m.prismatic, m.revolute, m.spherical)[k % 5]
+        kind(f"j{k}", outer, body, **({} if k % 5 == 4 else {"axis": "zyx"[k % 3]}))
+        bodies.append(body)
+    m.torque("motor", "j0", push)
+    m.output("tip", f"az(b{n - 1})")
+    return m
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_large_trees_answer_every_call_as_embedding_does(target: str) -> None:
+    one = branched(16).compile("recursive", target=target, **({"optimize": 0} if target == "cython" else {}))
+    other = branched(16).compile("embedding", target="numpy")
+    n, random = one.n_v, np.random.default_rng(3)
+    assert n > 24
+    for _ in range(2):
+        x = other.project(random.uniform(-1, 1, one.n_x))
+        q, v, a, t = x[: one.n_q], x[one.n_q :], random.uniform(-1, 1, n), 0.3
+        for ours, theirs in (
+            (one.rhs(t, x), other.rhs(t, x)),
+            (one.jacobian(t, x), other.jacobian(t, x)),
+            (one.mass_matrix(q), other.mass_matrix(q)),
+            (one.embedded_mass_matrix(q), other.embedded_mass_matrix(q)),
+            (one.bias(t, x), other.bias(t, x)),
+            (one.inverse_dynamics(q, v, a), other.inverse_dynamics(q, v, a)),
+            (one.outputs(t, x), other.outputs(t, x)),
+            (one.energy(x), other.energy(x)),
+        ):
+            assert np.abs(np.subtract(ours, theirs)).max() <= 1e-10 * max(1.0, np.abs(theirs).max())
