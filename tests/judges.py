@@ -50,15 +50,15 @@ class RigidBodies:
     gravity: np.ndarray
 
 
-def described(model: Any) -> RigidBodies:
+def described(model: Any, p: Mapping[str, float] | None = None) -> RigidBodies:
     """The numbers of a model's bodies, from the standard parameters of a module and the model's gravity."""
     module = model.compile(target="numpy", kernels=["inertial_terms"])
-    rows = np.array(list(module.standard_parameters().values())).reshape(-1, 10)
+    rows = np.array(list(module.standard_parameters(p).values())).reshape(-1, 10)
     masses, moments = rows[:, 0], rows[:, 1:4]
     centers = np.divide(moments, masses[:, None], out=np.zeros_like(moments), where=masses[:, None] > 0)
     about = rows[:, [4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(-1, 3, 3)  # their origins: xx, yy, zz, xy, xz, yz
     shift = [m * (np.eye(3) * (c @ c) - np.outer(c, c)) for m, c in zip(masses, centers, strict=True)]
-    values = dict(zip(module.p_names, module.p.tolist(), strict=True))
+    values = dict(zip(module.p_names, module.p.tolist(), strict=True)) | dict(p or {})
     gravity = [float(sympy.sympify(g, locals=sympy_names(values)).subs(values)) for g in model.gravity]
     return RigidBodies(masses, centers, about - np.array(shift).reshape(-1, 3, 3), np.array(gravity))
 

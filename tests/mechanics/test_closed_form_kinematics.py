@@ -1,0 +1,250 @@
+"""Slider-crank and four-bar over a full turn against closed forms, to 1e-10 of the largest value of each quantity."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import models
+import numpy as np
+import pytest
+from sweeps import TARGETS
+
+import eomgen as eg
+
+OMEGA, ALPHA = 10.0, 3.0
+TURN = np.linspace(0.0, 2 * np.pi, 73)
+# a planar quantity as (value, rate, second rate), each (k,) or a number
+Triple = tuple[Any, Any, Any]
+
+
+def arm(length: float, angle: Triple, turn: float = 0.0) -> tuple[Triple, Triple]:
+    """x and y of a vector that turns with an angle, with their derivatives."""
+    f, w, a = angle
+    c, s = np.cos(f + turn), np.sin(f + turn)
+    return (length * c, -length * s * w, -length * (s * a + c * w**2)), (
+        length * s,
+        length * c * w,
+        length * (c * a - s * w**2),
+    )
+
+
+def add(*parts: Triple) -> Triple:
+    return tuple(sum(terms) for terms in zip(*parts, strict=True))  # type: ignore[return-value]
+
+
+def crank_angle(theta: Any) -> Triple:
+    ones = np.ones_like(theta)
+    return theta, OMEGA * ones, ALPHA * ones
+
+
+def slider_crank(crank: Triple, r: float, l: float, e: float = 0.0) -> dict[str, Triple]:
+    """Rod angle b and slider x from r sin th + l sin b = e, x = r cos th + l cos b."""
+    x, y = arm(r, crank)
+    sine = [(e - y[0]) / l, -y[1] / l, -y[2] / l]
+    b = np.arcsin(sine[0])
+    w = sine[1] / np.cos(b)
+    rod = (b, w, (sine[2] + np.sin(b) * w**2) / np.cos(b))
+    along, up = arm(l, rod)
+    return {"rod": rod, "s": add(x, along), "height": add(y, up), "pin_x": x, "pin_y": y}
+
+
+def four_bar(crank: Triple, a1: float, a2: float, a3: float, a4: float) -> dict[str, Triple]:
+    """Coupler and rocker angles of the open branch from the diagonal crank pin - rocker pivot, rates from the loop."""
+    x, y = arm(a1, crank)
+    dx, dy = a4 - x[0], -y[0]
+    diagonal = np.hypot(dx, dy)
+    coupler = np.arctan2(dy, dx) + np.arccos((a2**2 + diagonal**2 - a3**2) / (2 * a2 * diagonal))
+    rocker = np.arctan2(y[0] + a2 * np.sin(coupler), x[0] + a2 * np.cos(coupler) - a4)
+    # a2 e(c) w2 - a3 e(r) w3 = -x', with e the vector normal to each link, and its derivative
+    matrix = np.array([[-a2 * np.sin(coupler), a3 * np.sin(rocker)], [a2 * np.cos(coupler), -a3 * np.cos(rocker)]])
+    D = np.moveaxis(matrix, (0, 1), (-2, -1))
+
+    def solved(right: np.ndarray) -> np.ndarray:
+        return np.linalg.solve(D, np.moveaxis(right, 0, -1)[..., None])[..., 0].T
+
+    w = solved(np.array([-x[1], -y[1]]))
+    pull = np.array([-a2 * np.cos(coupler) * w[0] ** 2 + a3 * np.cos(rocker) * w[1] ** 2,
+                     -a2 * np.sin(coupler) * w[0] ** 2 + a3 * np.sin(rocker) * w[1] ** 2])  # fmt: skip
+    a = solved(np.array([-x[2], -y[2]]) - pull)
+    return {"coupler": (coupler, w[0], a[0]), "rocker": (rocker, w[1], a[1]), "pin_x": x, "pin_y": y}
+
+
+def close(ours: Any, theirs: Any, digits: float = 1e-10, angle: bool = False) -> None:
+    """Equal to 1e-10 of the largest value; angles up to full turns."""
+    ours, theirs = np.asarray(ours), np.asarray(theirs)
+    gap = ours - theirs
+    if angle:
+        gap = np.remainder(gap + np.pi, 2 * np.pi) - np.pi
+    assert np.abs(gap).max() <= digits * np.abs(theirs).max()
+
+
+def named(module: Any, motion: tuple[np.ndarray, np.ndarray, np.ndarray]) -> dict[str, Triple]:
+    return {name: tuple(part[j] for part in motion) for j, name in enumerate(module.q_names)}  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("case", ["inline", "offset"])
+def test_slider_crank_formulas_equal_the_reference(case: str) -> None:
+    given = models.reference("slider_crank_kinematics")["reference"][case]
+    r, l, e = (float(given[key]) for key in "rle")
+    for degrees, row in given["rows"].items():
+        found = slider_crank(crank_angle(np.array([np.radians(float(degrees))])), r, l, e)
+        for ours, names in ((found["s"], "x v a"), (found["rod"], "rod_angle rod_omega rod_alpha")):
+            for value, name in zip(ours, names.split(), strict=True):
+                assert abs(value[0] - float(row[name])) <= 1e-13 * max(1.0, abs(float(row[name])))
+
+
+def test_four_bar_formulas_equal_the_reference() -> None:
+    given = models.reference("four_bar_kinematics")["reference"]["crank_rocker_open"]
+    lengths = [float(given[f"a{k}"]) for k in (1, 2, 3, 4)]
+    u, v = map(float, given["coupler_point_local"])
+    for degrees, row in given["rows"].items():
+        found = four_bar(crank_angle(np.array([np.radians(float(degrees))])), *lengths)
+        reach, turn = np.hypot(u, v), np.arctan2(v, u)
+        x, y = arm(reach, found["coupler"], turn)
+        found |= {"P_x": add(found["pin_x"], x), "P_y": add(found["pin_y"], y)}
+        for name in ("coupler", "rocker", "P_x", "P_y"):
+            for level in (0, 1, 2):
+                gap = found[name][level][0] - float(row[name][level])
+                if name in ("coupler", "rocker") and not level:
+                    gap = np.remainder(gap + np.pi, 2 * np.pi) - np.pi
+                assert abs(gap) <= 1e-13 * max(1.0, abs(float(row[name][level]))), (degrees, name, level)
+
+
+def centre(module: Any, q: np.ndarray, body: str, at: tuple[float, float]) -> np.ndarray:
+    """Ground x and y of a point of a body, from the module's poses."""
+    pose = module.poses(q)[module.body_names.index(body)]
+    return np.einsum("ijk,j->ik", pose[:2, :, :], np.array([*at, 0.0, 1.0]))
+
+
+@pytest.mark.parametrize(("name", "case"), [("slider_crank", "inline"), ("offset_slider_crank", "offset")])
+def test_slider_crank_over_a_full_turn(module: Callable[..., Any], name: str, case: str) -> None:
+    given = models.reference("slider_crank_kinematics")["reference"][case]
+    r, l, e = (float(given[key]) for key in "rle")
+    mod = module(name).bind(p={"r": r, "l": l})
+    full = mod.kinematics(*(np.array(part)[None, :] for part in crank_angle(TURN)))
+    found, expected = named(mod, full), slider_crank(crank_angle(TURN), r, l, e)
+    rod = add(found["theta"], found["B"])
+    for level in range(3):
+        close(found["theta"][level], crank_angle(TURN)[level])
+        close(rod[level], expected["rod"][level])
+        close(found["s"][level], expected["s"][level])
+        # centres of mass: composed of the module's own angles, against the closed form's
+        for axis in range(2):
+            half_crank, half_rod = arm(r / 2, found["theta"])[axis], arm(l / 2, rod)[axis]
+            pin = expected["pin_x"] if axis == 0 else expected["pin_y"]
+            close(half_crank[level], pin[level] / 2)
+            close(add(arm(r, found["theta"])[axis], half_rod)[level],
+                  add(pin, arm(l / 2, expected["rod"])[axis])[level])  # fmt: skip
+    half = arm(l / 2, expected["rod"])
+    close(centre(mod, full[0], "crank", (r / 2, 0)), [expected["pin_x"][0] / 2, expected["pin_y"][0] / 2])
+    close(centre(mod, full[0], "rod", (l / 2, 0)),
+          [add(expected["pin_x"], half[0])[0], add(expected["pin_y"], half[1])[0]])  # fmt: skip
+    close(centre(mod, full[0], "slider", (0, 0)), [expected["s"][0], np.full_like(TURN, e)])
+
+
+def test_four_bar_over_a_full_turn(module: Callable[..., Any]) -> None:
+    lengths = (0.04, 0.12, 0.08, 0.10)
+    mod = module("four_bar")
+    full = mod.kinematics(*(np.array(part)[None, :] for part in crank_angle(TURN)))
+    found, expected = named(mod, full), four_bar(crank_angle(TURN), *lengths)
+    coupler = add(found["theta"], found["bend"])
+    for level in range(3):
+        close(found["theta"][level], crank_angle(TURN)[level])
+        close(coupler[level], expected["coupler"][level], angle=not level)
+        close(found["psi"][level], expected["rocker"][level], angle=not level)
+    # places of every body's centre and of the coupler point, from poses
+    for body, length, angle, base in (
+        ("crank", lengths[0], crank_angle(TURN), None),
+        ("coupler", lengths[1], expected["coupler"], "pin"),
+        ("rocker", lengths[2], expected["rocker"], "ground"),
+    ):
+        x, y = (part[0] for part in arm(length / 2, angle))
+        if base == "pin":
+            x, y = x + expected["pin_x"][0], y + expected["pin_y"][0]
+        close(centre(mod, full[0], body, (length / 2, 0)), [x + (lengths[3] if base == "ground" else 0.0), y])
+    assert np.abs(full[0][:, -1] - full[0][:, 0] - 2 * np.pi * np.array(
+        [name == "theta" for name in mod.q_names]) + 2 * np.pi * np.array(
+        [name == "bend" for name in mod.q_names])).max() <= 1e-10  # fmt: skip
+
+
+# -- Without mass ------------------------------------------------------------------------------------------------------
+LED = {"theta": np.linspace(1.0, 1.0 + 2 * np.pi, 25), "theta_dot": 10.0, "theta_ddot": 3.0}
+
+
+def light_four_bar(mass: float, second: str = "ax") -> eg.Model:
+    m = eg.Model("light_four_bar")
+    inertia = {"inertia": {"zz": mass}} if mass else {}
+    a, b, c = (m.body(name, mass=mass, **inertia) for name in ("crank", "coupler", "rocker"))
+    m.revolute("A", m.ground, a, coordinate="theta")
+    m.revolute("B", a.at(0.04, 0, 0), b, coordinate="bend")
+    m.revolute("C", b.at(0.12, 0, 0), c.at(0.08, 0, 0))
+    m.revolute("D", m.ground.at(0.1, 0, 0), c, coordinate="psi")
+    m.output("px", b.at(0.05, 0, 0).position[0])
+    point = b.at(0.05, 0, 0)
+    m.output(second, point.acceleration[0] if second == "ax" else point.velocity[0])
+    m.guess(theta=1.0, bend=-0.7, psi=1.1)
+    m.initial(theta=1.0)
+    return m
+
+
+def freudenstein(theta: np.ndarray) -> np.ndarray:
+    """The rocker's angle of a four-bar (Freudenstein, Trans. ASME 76, 1954) with the tangent of half the angle."""
+    a, b, c, d = 0.04, 0.12, 0.08, 0.1
+    A, B = a * np.sin(theta), a * np.cos(theta) - d
+    C = (c**2 - b**2 + A**2 + B**2) / (2 * c)  # B cos(psi) + A sin(psi) = C, by the coupler's length
+    return 2 * np.arctan2(A - np.sqrt(A**2 + B**2 - C**2), B + C)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_mechanism_without_mass_is_led(target: str) -> None:
+    mod = light_four_bar(0).compile(target=target)
+    motion = mod.kinematic_analysis(**LED)
+    psi = freudenstein(LED["theta"])
+    np.testing.assert_allclose(np.cos(motion["psi"]), np.cos(psi), atol=1e-9)
+    np.testing.assert_allclose(np.sin(motion["psi"]), np.sin(psi), atol=1e-9)
+    heavy = light_four_bar(1).compile(target="numpy").kinematic_analysis(**LED)
+    for name in ("psi", "psi_dot", "psi_ddot", "px", "ax"):
+        np.testing.assert_allclose(motion[name], heavy[name], rtol=1e-9, atol=1e-9)
+    assert mod.motion_range("theta").unlimited
+    assert mod.assemble(theta=1.2)[0] == 1.2
+    assert mod.kinematics([1.2], [1.0])[1][0] == 1.0
+    x = mod.x0()
+    for call in (lambda: mod.rhs(0.0, x), lambda: mod.jacobian(0.0, x), lambda: mod.simulate(0.1), mod.linearize):
+        with pytest.raises(eg.SingularMassMatrixError, match="kinematics only: .*crank, coupler, rocker; give those"):
+            call()
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_outputs_of_positions_and_velocities_need_no_mass(target: str) -> None:
+    mod = light_four_bar(0, "vx").compile(target=target)
+    motion = mod.kinematic_analysis(**LED)
+    psi = freudenstein(LED["theta"])
+    along = (0.1 + 0.08 * np.cos(psi) - 0.04 * np.cos(LED["theta"])) / 0.12  # the coupler's direction, x
+    np.testing.assert_allclose(motion["px"], 0.04 * np.cos(LED["theta"]) + 0.05 * along, atol=1e-9)
+    at = np.linspace(1.0, 1.01, 11)
+    near = mod.kinematic_analysis(theta=at, theta_dot=10.0)
+    np.testing.assert_allclose(near["vx"][5], np.gradient(near["px"], at / 10.0, edge_order=2)[5], rtol=1e-5)
+    assert mod.outputs(0.0, mod.x0(theta=1.2)).shape == (2,)
+
+
+@pytest.mark.parametrize("method", ["recursive", "newton_euler"])
+def test_by_every_method(method: str) -> None:
+    motion = light_four_bar(0).compile(method=method, target="numpy").kinematic_analysis(**LED)
+    np.testing.assert_allclose(np.cos(motion["psi"]), np.cos(freudenstein(LED["theta"])), atol=1e-9)
+
+
+def test_a_forgotten_mass_is_still_told() -> None:
+    """Where something else has mass, or a force acts, a motion without inertia is a slip of the pen."""
+    m = light_four_bar(0)
+    m.torque("motor", "A", 1.0)
+    with pytest.raises(eg.ModelError, match="no inertia behind it.*; for kinematics alone, check_inertia: note"):
+        m.check()
+    m.check_inertia = "note"
+    m.check()
+    m.compile(target="numpy").kinematic_analysis(**LED)
+    two = eg.Model("two")
+    two.revolute("A", two.ground, two.body("a", mass=1, inertia={"zz": 1}))
+    two.revolute("B", two.ground, two.body("b", mass=0))
+    with pytest.raises(eg.ModelError, match="'B' has no inertia behind it"):
+        two.compile(target="numpy")

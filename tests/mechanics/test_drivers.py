@@ -1,0 +1,269 @@
+"""Drivers: what they hold, what follows from tables, partly driven systems, published answers, contradictions."""
+
+from __future__ import annotations
+
+import models
+import numpy as np
+import pytest
+import scipy.interpolate
+from models import rotation
+from sweeps import TARGETS
+
+import eomgen as eg
+
+# -- What they hold ----------------------------------------------------------------------------------------------------
+TIMES = np.linspace(0.0, 0.9, 10)
+
+
+def arm(length: float = 2.0) -> tuple[eg.Model, object]:
+    m = eg.Model("arm")
+    body = m.body("arm", mass=0)
+    m.revolute("A", m.ground, body, coordinate="phi")
+    m.guess(phi=0.9)
+    return m, body.at(length, 0, 0)
+
+
+def run(m: eg.Model, t: np.ndarray = TIMES) -> object:
+    return m.compile(target="numpy").kinematic_analysis(t=t)
+
+
+def test_a_distance_by_the_law_of_cosines() -> None:
+    """A ram between (3, 0) and the tip of an arm of length 2: d^2 = 4 + 9 - 12 cos(phi), differentiated twice."""
+    m, tip = arm()
+    m.driver("ram", between=(m.ground.at(3, 0, 0), tip), value="2 + 0.3*sin(2*t)")
+    found = run(m)
+    d, d1, d2 = 2 + 0.3 * np.sin(2 * TIMES), 0.6 * np.cos(2 * TIMES), -1.2 * np.sin(2 * TIMES)
+    phi = np.arccos((13 - d**2) / 12)
+    phi1 = 2 * d * d1 / (12 * np.sin(phi))
+    phi2 = (2 * d1**2 + 2 * d * d2 - 12 * np.cos(phi) * phi1**2) / (12 * np.sin(phi))
+    for ours, theirs in zip((found["phi"], found["phi_dot"], found["phi_ddot"]), (phi, phi1, phi2), strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)
+
+
+def test_the_place_of_a_marker_along_an_axis_of_another() -> None:
+    """The tip's place along a slanted axis of a marker off the origin: a . R^T (tip - o) = value."""
+    m, tip = arm()
+    rpy, axis = (0.0, 0.0, 0.4), np.array([0.6, 0.8, 0.0])
+    m.driver("lift", marker=tip, axis=axis.tolist(), on=m.ground.at(0.1, -0.2, 0, rpy=rpy), value="1.2 + 0.2*t**2")
+    found = run(m)
+    way = np.array(rotation(rpy)) @ axis
+    tip_at = 2 * np.array([np.cos(found["phi"]), np.sin(found["phi"]), 0 * TIMES])
+    np.testing.assert_allclose(way @ (tip_at - np.array([[0.1], [-0.2], [0]])), 1.2 + 0.2 * TIMES**2, atol=1e-13)
+    tip_rate = way @ np.array([-tip_at[1], tip_at[0], 0 * TIMES])
+    np.testing.assert_allclose(tip_rate * found["phi_dot"], 0.4 * TIMES, atol=1e-13)
+    curve = -(way @ tip_at) * found["phi_dot"] ** 2 + tip_rate * found["phi_ddot"]
+    np.testing.assert_allclose(curve, 0.4, atol=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "ends"), [("cubic", "not-a-knot"), ("natural", "natural"), ("periodic", "periodic")])
+def test_a_table_drives_with_the_rates_of_its_spline(kind: str, ends: str) -> None:
+    x = np.linspace(0, 2, 9)
+    y = np.array([0, 0.4, 0.1, 0.7, 0.9, 0.2, -0.3, 0.1, 0.0])
+    m, _ = arm()
+    profile = m.table("profile", x, y, kind=kind)
+    m.driver("drive", "A", profile(m.t))
+    t = np.linspace(0.0, 1.99, 57)
+    found, spline = run(m, t), scipy.interpolate.CubicSpline(x, y, bc_type=ends)
+    for level, name in enumerate(("phi", "phi_dot", "phi_ddot")):
+        np.testing.assert_allclose(found[name], spline(t, level), rtol=1e-11, atol=1e-12)
+    # continuous curvature: the acceleration at a point of the table is the same from both sides
+    inner = x[1:-1]
+    before, after = run(m, inner - 1e-9)["phi_ddot"], run(m, inner + 1e-9)["phi_ddot"]
+    assert np.abs(before - after).max() < 1e-6
+
+
+def driven_pendulum(coordinate: str = "y") -> eg.Model:
+    """A pendulum whose pivot moves up and down by a spline."""
+    m = eg.Model("shaken", gravity=(0, -9.81, 0))
+    x = np.linspace(0, 2, 11)
+    lift = m.table("lift", x, 0.2 * np.sin(4 * x))
+    pivot, bob = m.body("pivot", mass=0.4), m.body("bob", mass=1.5, com=(0, -0.7, 0))
+    m.prismatic("guide", m.ground, pivot, axis="y", coordinate="y")
+    m.revolute("hinge", pivot, bob, coordinate="theta")
+    m.driver("shaker", coordinate, lift(m.t))
+    m.independent("theta")
+    return m
+
+
+@pytest.mark.parametrize("method", ["embedding", "lagrange"])
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_partly_driven_pendulum_obeys_its_own_equation(method: str, target: str) -> None:
+    """L theta'' = -(g + y'') sin(theta), y'' from SciPy's spline (Landau and Lifshitz, Mechanics, sec. 30)."""
+    mod = driven_pendulum().compile(method=method, target=target)
+    x = np.linspace(0, 2, 11)
+    spline = scipy.interpolate.CubicSpline(x, 0.2 * np.sin(4 * x))
+    assert (mod.n_dof, mod.q_names) == (1, ("y", "theta"))
+    rng = np.random.default_rng(3)
+    for t, theta, theta_dot in zip(rng.uniform(0, 2, 20), rng.uniform(-3, 3, 20), rng.uniform(-5, 5, 20), strict=True):
+        state = mod.x0(theta=theta, theta_dot=theta_dot, t=t)
+        np.testing.assert_allclose(state, [spline(t), theta, spline(t, 1), theta_dot], atol=1e-12)
+        expected = -(9.81 + spline(t, 2)) * np.sin(theta) / 0.7
+        np.testing.assert_allclose(mod.rhs(t, state), [*state[2:], spline(t, 2), expected], rtol=1e-11, atol=1e-11)
+        J = mod.jacobian(t, state)
+        for k in range(4):
+            h = np.zeros(4)
+            h[k] = 1e-6
+            slope = (mod.rhs(t, state + h) - mod.rhs(t, state - h)) / 2e-6
+            np.testing.assert_allclose(J[:, k], slope, atol=2e-8)
+
+
+def slider_crank(value: str = "10*t", l: float = 0.3, r: float = 0.1, e: float = 0.0) -> eg.Model:
+    m = eg.Model("crank")
+    crank, rod, slider = (m.body(name, mass=0) for name in ("crank", "rod", "slider"))
+    m.revolute("A", m.ground, crank)
+    m.revolute("B", crank.at(r, 0, 0), rod)
+    m.revolute("C", rod.at(l, 0, 0), slider)
+    m.prismatic("D", m.ground.at(0, e, 0), slider, axis="x")
+    m.driver("drive", "A", value)
+    m.guess(D=0.4, B=0)
+    return m
+
+
+@pytest.mark.parametrize(
+    ("second", "said"),
+    [
+        (("A", "11*t"), r"d2 is off by 0.01 rad at t = 0.01 s"),  # contradicts a little later
+        (("A", "0.2 + 10*t"), r"d2 is off by 0.2 rad at t = 0 s"),
+        (("D", "0.3 + 0.1*t"), r"d2 is off by 0.1 m at t = 0 s"),
+    ],
+)
+def test_contradictory_drivers_are_told_by_name_and_residual(second: tuple[str, str], said: str) -> None:
+    m = slider_crank()
+    m.driver("d2", *second)
+    with pytest.raises(
+        eg.ModelError, match=f"constraints.d2: .*over-driven: it has 1 degree.*drive moves it.*{said}"
+    ) as e:
+        m.check()
+    assert "remove one of drive, d2" in str(e.value)
+
+
+def test_a_driver_out_of_reach_is_told() -> None:
+    with pytest.raises(
+        eg.AssemblyError, match=r"constraints.drive: .*C.r_y 0.09.*off \(drive by .* rad\); give the drivers"
+    ):
+        slider_crank("1.5 + t", l=0.2, r=0.3).check()
+
+
+# -- Published ---------------------------------------------------------------------------------------------------------
+LINES = models.reference("linkages_straight_line")
+
+
+@pytest.mark.parametrize("method", ["embedding", "lagrange"])
+def test_car_axis(method: str) -> None:
+    """Rheonomic and stiff; published to 21 digits, which the INDEX rates as good to 2e-13 and 5e-12."""
+    given = models.reference("caraxis")
+    mod = eg.load(models.EXAMPLES / "car_axis.yaml").compile(method=method, optimize=0)
+    assert mod.n_dof == 2
+    start = mod.outputs(0.0, mod.x0())
+    np.testing.assert_allclose(start, [*given["initial_conditions"]["q"], *given["initial_conditions"]["qdot"]])
+    run = mod.simulate(float(given["t_end"]))
+    published = {name: float(x) for name, x in given["reference_published"].items()}
+    for name in ("xl", "yl", "xr", "yr"):
+        assert abs(run[name][-1] - published[name]) < 2e-12
+        assert abs(run["v" + name][-1] - published[name + "_dot"]) < 5e-11
+    # the constraints as published
+    r, omega, L = (float(given["parameters"][key]) for key in ("r", "omega", "L"))
+    yb = r * np.sin(omega * run.t)
+    xb = np.sqrt(L**2 - yb**2)
+    assert np.abs(xb * run["xl"] + yb * run["yl"]).max() < 1e-13
+    assert np.abs((run["xl"] - run["xr"]) ** 2 + (run["yl"] - run["yr"]) ** 2 - L**2).max() < 1e-13
+
+
+def test_kapitza_pendulum() -> None:
+    given = models.reference("kapitza_pendulum")
+    mod = eg.load(models.EXAMPLES / "kapitza_pendulum.yaml").compile(optimize=0)
+    times = sorted(given["trajectory"], key=float)
+    run = mod.simulate((0, 1), t_eval=[float(t) for t in times])
+    for k, t in enumerate(times):
+        angle, rate = map(float, given["trajectory"][t])
+        assert abs(run["theta"][k] - angle) < 1e-11
+        assert abs(run["theta_dot"][k] - rate) < 1e-10
+    # slower than the threshold of the averaged equation it falls over
+    end = [mod.simulate(20.0, parameters={"Omega": f * float(given["threshold_Omega"])}) for f in (0.9, 1.25)]
+    fell = [np.abs(run["theta"] - np.pi).max() > 2.0 for run in end]
+    assert fell == [True, False]
+
+
+def linkage(
+    name: str, start: float, pivots: tuple[float, float], crank: float, coupler: float, rocker: float, point: float
+) -> eg.Model:
+    """A massless four-bar with the left crank at (0, 0) driven, and a point on the line of its coupler."""
+    m = eg.Model(name)
+    one, bar, two = (m.body(part, mass=0) for part in ("crank", "coupler", "rocker"))
+    m.revolute("A", m.ground, one, coordinate="theta")
+    m.revolute("B", one.at(crank, 0, 0), bar, coordinate="bend")
+    m.revolute("C", bar.at(coupler, 0, 0), two.at(rocker, 0, 0))
+    m.revolute("D", m.ground.at(*pivots, 0), two, coordinate="psi")
+    p = bar.marker("P", at=(point, 0, 0))
+    m.output("P_x", p.position[0])
+    m.output("P_y", p.position[1])
+    m.parameter("start", start)
+    m.driver("drive", "theta", "start + t")
+    return m
+
+
+@pytest.mark.parametrize("name", ["chebyshev", "hoecken", "watt"])
+def test_straight_line_linkages(name: str) -> None:
+    rows = LINES[name]["rows"]
+    angles = np.array(sorted(float(key) for key in rows))
+    if name != "chebyshev":
+        angles = np.radians(angles)
+    if name == "chebyshev":
+        m = linkage(name, angles[0], (4, 0), 5, 2, 5, 1)
+        m.guess(theta=angles[0], bend=np.pi - 0.6, psi=2.3)
+    elif name == "hoecken":
+        m = linkage(name, angles[0], (2, 0), 1, 2.5, 2.5, 5)
+        m.guess(theta=angles[0], bend=-0.5, psi=1.6)
+    else:
+        m = linkage(name, angles[0], (2, 0.5), 1, 0.5, 1, 0.25)
+        m.guess(theta=angles[0], bend=np.pi / 2, psi=np.pi)
+    mod = m.compile(target="numpy")
+    keys = sorted(rows, key=float)
+    found = mod.kinematic_analysis(t=angles - angles[0])
+    expected = np.array([[float(x) for x in rows[key]] for key in keys])
+    np.testing.assert_allclose(np.array([found["P_x"], found["P_y"]]).T, expected, atol=1e-12)
+    fine = mod.kinematic_analysis(t=np.linspace(0, angles[-1] - angles[0], 201))
+    off = {"chebyshev": fine["P_y"] - 4, "hoecken": fine["P_y"] - 4, "watt": fine["P_x"] - 1}[name]
+    assert np.abs(off).max() < 0.02 * np.hypot(np.ptp(fine["P_x"]), np.ptp(fine["P_y"]))  # nearly a straight line
+
+
+# -- What cannot act ---------------------------------------------------------------------------------------------------
+def lever() -> tuple[eg.Model, eg.Body]:
+    m = eg.Model("lever")
+    a = m.body("a", mass=1, inertia=(1, 1, 1))
+    m.revolute("A", m.ground, a, coordinate="th")
+    return m, a
+
+
+def test_a_driver_of_a_distance_that_no_motion_changes() -> None:
+    m, a = lever()
+    m.driver("d", between=[m.ground.at(0, 0, 0), a.at(1, 0, 0)], value="1 + 0.1*t")
+    with pytest.raises(
+        eg.ModelError, match="has no effect: no motion of the mechanism changes the quantity that it prescribes"
+    ):
+        m.check()
+
+
+# -- Corners and ends --------------------------------------------------------------------------------------------------
+def driven(value: str) -> eg.Model:
+    m = eg.Model("driven")
+    arm = m.body("arm", mass=1.0, com=(0.1, 0, 0), inertia={"zz": 0.1})
+    m.revolute("A", m.ground, arm, coordinate="theta")
+    m.driver("motor", "A", value)
+    return m
+
+
+@pytest.mark.parametrize(
+    ("value", "word"), [("max(0, t - 0.5)", "max"), ("abs(t - 0.5)", "abs"), ("where(t < 1, 0, t - 1)", "where")]
+)
+def test_corners_are_noted(value: str, word: str) -> None:
+    (note,) = driven(value).check().notes
+    assert f"motor: {word} in a driver's value can make a corner" in str(note)
+
+
+def test_a_motion_that_ends_is_told_as_such() -> None:
+    mod = driven("sqrt(1 - t)").compile(target="numpy")
+    with pytest.raises(
+        eg.SimulationError, match=r"at t = 1 s .*motor has no finite value: look for a division by zero, or a root"
+    ):
+        mod.simulate((0, 2))

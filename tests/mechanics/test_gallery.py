@@ -1,0 +1,271 @@
+"""Machines of the gallery beside closed forms, published equations and circles that are cut by hand."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import models
+import numpy as np
+import pytest
+import scipy.integrate
+import sympy as sp
+from scipy.optimize import brentq
+
+import eomgen as eg
+
+
+# -- Craft -------------------------------------------------------------------------------------------------------------
+@cache
+def compiled(name: str) -> tuple[Any, dict[str, float]]:
+    mod = eg.load(models.EXAMPLES / f"{name}.yaml").compile(target="numpy")
+    return mod, dict(zip(mod.p_names, mod.p.tolist(), strict=True))
+
+
+def turn(axis: int, angle: Any) -> np.ndarray:
+    """Rotation about x (0), y (1) or z (2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    rows = np.eye(3, dtype=np.asarray(angle).dtype if np.iscomplexobj(angle) else float)
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    rows[j, j], rows[j, k], rows[k, j], rows[k, k] = c, -s, s, c
+    return rows
+
+
+def test_furutas_pendulum_accelerates_as_published() -> None:
+    """Cazzolato and Prime, On the dynamics of the Furuta pendulum, 2011, equations 33 and 34."""
+    mod, p = compiled("furuta_pendulum")
+    m, L, l, b1, b2 = p["m_2"], p["L_1"], p["l_2"], p["b_1"], p["b_2"]
+    J0 = p["J_1"] + p["m_1"] * p["l_1"] ** 2 + m * L**2
+    J2 = p["J_2"] + m * l**2
+    random = np.random.default_rng(3)
+    for _ in range(5):
+        x = random.uniform(-3, 3, 4)
+        _, q, v, w = x
+        tau = random.uniform(-1, 1)
+        matrix = [[J0 + J2 * np.sin(q) ** 2, m * L * l * np.cos(q)], [m * L * l * np.cos(q), J2]]
+        force = [
+            tau - b1 * v + m * L * l * np.sin(q) * w**2 - v * w * np.sin(2 * q) * J2,
+            -b2 * w + 0.5 * v**2 * np.sin(2 * q) * J2 - p["g"] * m * l * np.sin(q),
+        ]
+        assert mod.rhs(0.0, x, u=[tau])[2:] == pytest.approx(np.linalg.solve(matrix, force), rel=1e-11, abs=1e-11)
+
+
+def test_a_quadrotor_and_its_load_accelerate_as_published() -> None:
+    """Sreenath, Lee and Kumar (CDC 2013): with q from the quadrotor to the load and F = f R e3,
+
+    (m_Q + m_L) (a_L + g e3) = (q . F - m_Q l q' . q') q, and I w' + w x I w = M.
+    """
+    mod, p = compiled("quadrotor_load")
+    m, ml, l, g = p["m"], p["m_l"], p["l"], p["g"]
+    e3, eps = np.array([0.0, 0.0, 1.0]), 1e-30
+    inertia = np.diag([p["I"], p["I"], p["I_z"]])
+
+    def attitude(a: np.ndarray) -> np.ndarray:
+        return turn(0, a[0]) @ turn(1, a[1]) @ turn(2, a[2])
+
+    def down(a: np.ndarray) -> np.ndarray:
+        return attitude(a) @ turn(0, a[3]) @ turn(1, a[4]) @ -e3
+
+    def spin(a: np.ndarray, v: np.ndarray) -> np.ndarray:
+        rates = attitude(a).T @ (attitude(a + 1j * eps * v).imag / eps)  # R^T R'
+        return np.array([rates[2, 1], rates[0, 2], rates[1, 0]])
+
+    random = np.random.default_rng(5)
+    for _ in range(4):
+        x = random.uniform(-0.5, 0.5, 16)
+        place, a, v = x[:3], x[3:8], x[8:]
+        roll, pitch, yaw, sx, sy = a
+        q, rate = down(a), down(a + 1j * eps * v[3:]).imag / eps
+        lift = (m + ml) * (g + 4 * p["omega"] ** 2 * (p["goal_z"] - place[2]) - 4 * p["omega"] * v[2])
+        F = lift / (np.cos(roll) * np.cos(pitch)) * attitude(a) @ e3
+        load = ((q @ F - m * l * rate @ rate) * q) / (m + ml) - g * e3
+        tension = -ml * (load + g * e3) @ q
+        expected = (F + tension * q) / m - g * e3
+        found = mod.rhs(0.0, x)[8:]
+        assert found[:3] == pytest.approx(expected, rel=1e-10, abs=1e-10)
+        w, k = p["omega"], p["omega_a"]
+        asked_roll = -(w**2 * (p["goal_y"] - place[1]) - 2 * w * v[1]) / g + p["k_s"] * (sx + roll)
+        asked_pitch = (w**2 * (p["goal_x"] - place[0]) - 2 * w * v[0]) / g + p["k_s"] * (sy + pitch)
+        moment = inertia @ [
+            k**2 * (asked_roll - roll) - 2 * k * v[3],
+            k**2 * (asked_pitch - pitch) - 2 * k * v[4],
+            -(k**2) / 25 * yaw - k * 2 / 5 * v[5],
+        ]
+        body = spin(a, v[3:])
+        h = 1e-6
+        ahead, behind = (spin(a + s * h * v[3:], v[3:] + s * h * found[3:]) for s in (1, -1))
+        assert inertia @ (ahead - behind) / (2 * h) + np.cross(body, inertia @ body) == pytest.approx(
+            moment, rel=1e-6, abs=1e-8
+        )
+
+
+def test_a_wheel_turns_a_satellite_from_rest() -> None:
+    """(I + J) w = -J Omega, as in tests/reference/spacecraft_analytic.json; the panels are out and at rest."""
+    given = models.reference("spacecraft_analytic")["reaction_wheel"]
+    Ib, Jw, Omega = (float(given[key]) for key in ("Ib", "Jw", "from_rest_wheel_relative_speed"))
+    assert -Jw * Omega / (Ib + Jw) == pytest.approx(float(given["body_rate"]), rel=1e-14)
+    mod, p = compiled("satellite")
+    traj = mod.simulate(38.0, initial={"left": 0.0, "right": 0.0}, parameters={"tau_x": 0.0, "tau_y": 0.0})
+    panel = p["m_p"] * (p["l"] ** 2 + p["w"] ** 2) / 12 + p["m_p"] * (0.5 + p["w"] / 2) ** 2
+    wheels = 2 * p["J"] / 2 + 2 * 4 * 0.25**2  # of the other two, 4 kg at 0.25 m
+    total = 4 * 3 + 2 * p["m_p"] + 200
+    off = 4 * np.array([0.25, 0.25]) / total  # centre of mass off the axis
+    inertia = p["I"] + 2 * panel + wheels - total * off @ off
+    expected = -p["J"] * traj["spin_z_dot"] / (inertia + p["J"])
+    assert traj["flight_wz"][-1] == pytest.approx(expected[-1], rel=1e-6)  # the axis nods by the offset wheels
+    assert expected[-1] > 0.1
+
+
+# -- Machines ----------------------------------------------------------------------------------------------------------
+def test_a_gear_train_starts_as_a_first_order_lag() -> None:
+    """J w' = tau_0 (1 - w/w_0) - m g r / 12, all inertias and the load reduced to the motor by the ratios 3 and 4."""
+    mod, p = compiled("gear_train")
+    ratio = 60 / 20 * 72 / 18
+    inertia = p["J_1"] + p["J_2"] / 9 + (p["J_3"] + p["m"] * p["r"] ** 2) / ratio**2
+    last = p["omega_0"] * (1 - p["m"] * p["g"] * p["r"] / ratio / p["tau_0"])
+    lag = inertia * p["omega_0"] / p["tau_0"]
+    traj = mod.simulate(0.5)
+    assert traj["motor_angle_dot"] == pytest.approx(last * (1 - np.exp(-traj.t / lag)), rel=1e-8, abs=1e-9)
+    assert traj["height"] == pytest.approx(p["r"] / ratio * traj["motor_angle"], rel=1e-12, abs=1e-14)
+
+
+# -- Jansen's leg ------------------------------------------------------------------------------------------------------
+def both_points(a: np.ndarray, ra: float, b: np.ndarray, rb: float) -> list[np.ndarray]:
+    """Both points at distances ra of a and rb of b."""
+    way = b - a
+    length = np.hypot(*way)
+    along = (ra**2 - rb**2 + length**2) / (2 * length)
+    off = np.sqrt(ra**2 - along**2)
+    u = way / length
+    return [a + along * u + side * off * np.array([-u[1], u[0]]) for side in (1.0, -1.0)]
+
+
+def test_jansens_foot_is_where_the_circles_meet() -> None:
+    a, b, c, d, e, f, g, h, i, j, k, l, m = np.array(
+        [38, 41.5, 39.3, 40.1, 55.8, 39.4, 36.7, 65.7, 49, 50, 61.9, 7.8, 15]
+    )
+    mod = eg.load(models.EXAMPLES / "jansen_leg.yaml").compile(target="numpy")
+    traj = mod.simulate(1.0, t_eval=np.linspace(0.0, 1.0, 25))
+    for t, x, y in zip(traj.t, traj["foot_x"], traj["foot_y"], strict=True):
+        P, B = m * np.array([np.cos(2 * np.pi * t), np.sin(2 * np.pi * t)]), np.array([-a, -l])
+        C = max(both_points(P, j, B, b), key=lambda p: p[1])
+        E = min(both_points(P, k, B, c), key=lambda p: p[1])
+        D = min(both_points(B, d, C, e), key=lambda p: p[0])
+        F = min(both_points(D, f, E, g), key=lambda p: p[0])
+        G = min(both_points(E, i, F, h), key=lambda p: p[1])
+        assert [100 * x, 100 * y] == pytest.approx(G, abs=1e-9)
+    # flat for half a turn: the lower part of the path is straight within a unit, over more than 40
+    low = traj["foot_y"] < traj["foot_y"].min() + 0.01
+    assert low.sum() >= 10
+    assert np.ptp(traj["foot_x"][low]) > 0.4
+
+
+# -- Engines -----------------------------------------------------------------------------------------------------------
+def gas(p: dict[str, float], after: sp.Expr) -> sp.Expr:
+    """Force on a piston at the crank's angle after the dead centre at which it fires."""
+    r, l, e = p["r"], p["l"], p["ratio"]
+    volume = 2 * r / (e - 1) + r + l - r * sp.cos(after) - sp.sqrt(l**2 - (r * sp.sin(after)) ** 2)
+    largest = 2 * r / (e - 1) + 2 * r
+    shut = (1 + sp.tanh(p["sharp"] * sp.cos(after / 2))) / 2
+    burnt = (1 + sp.tanh(p["sharp"] * sp.sin((after - p["delay"]) / 2))) / 2
+    pressure = p["p_0"] * (largest / volume) ** p["kappa"] * (1 + (p["rise"] - 1) * burnt)
+    return shut * (pressure - p["p_0"]) * sp.pi * p["bore"] ** 2 / 4
+
+
+def acceleration(mod: Any, cylinders: list[tuple[float, float]]) -> Any:
+    """theta'' = (Q - V' - I' omega^2 / 2) / I of an engine with cylinders (angle of the axis, angle when it fires)."""
+    p = dict(zip(mod.p_names, mod.p, strict=True))
+    theta, omega = sp.symbols("theta omega")
+    r, l, g, mass = p["r"], p["l"], p["g"], 0.4
+    pin = sp.Matrix([r * sp.cos(theta), r * sp.sin(theta)])
+    inertia, potential = p["J"] + 6 * (r / 10) ** 2, -6 * g * pin[1] / 10
+    force = -p["c"] * omega**2
+    for axis, fires in cylinders:
+        way = r * sp.cos(theta - axis) + sp.sqrt(l**2 - (r * sp.sin(theta - axis)) ** 2)
+        piston = way * sp.Matrix([sp.cos(axis), sp.sin(axis)])
+        rod = pin + 0.3 * (piston - pin)
+        swing = sp.asin(r / l * sp.sin(theta - axis))
+        inertia += mass * (rod.diff(theta).dot(rod.diff(theta)) + way.diff(theta) ** 2)
+        inertia += mass * l**2 / 12 * swing.diff(theta) ** 2
+        potential += mass * g * (rod[1] + piston[1])
+        force -= gas(p, theta - fires) * way.diff(theta)
+    found = (force - potential.diff(theta) - inertia.diff(theta) * omega**2 / 2) / inertia
+    return sp.lambdify((theta, omega), found, cse=True)
+
+
+ENGINES = {
+    "engine": [(np.pi / 2, np.pi / 2)],
+    "v_engine": [(np.pi / 4, np.pi / 4), (3 * np.pi / 4, 3 * np.pi / 4 + 2 * np.pi)],
+}
+
+
+@cache
+def engine(name: str) -> Any:
+    return eg.load(models.EXAMPLES / f"{name}.yaml").compile(optimize=0)
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_an_engine_runs_as_its_one_angle_does(name: str) -> None:
+    mod = engine(name)
+    traj = mod.simulate(0.1, rtol=1e-11, atol=1e-13)
+    law = acceleration(mod, ENGINES[name])
+    start = [traj["theta"][0], traj["theta_dot"][0]]
+    by_hand = scipy.integrate.solve_ivp(
+        lambda t, y: [y[1], law(*y)], (0, 0.1), start, "DOP853", rtol=1e-11, atol=1e-12, dense_output=True
+    )
+    expected = by_hand.sol(traj.t)
+    assert traj["theta"] == pytest.approx(expected[0], abs=1e-8)
+    assert traj["theta_dot"] == pytest.approx(expected[1], abs=1e-6)
+    assert traj["theta"][-1] > 2.0 * np.pi
+
+
+# -- A walker and a wheelset -------------------------------------------------------------------------------------------
+def test_a_wheel_without_a_rim_walks_at_the_published_speed() -> None:
+    mod = eg.load(models.EXAMPLES / "rimless_wheel.yaml").compile(optimize=0)
+    p = dict(zip(mod.p_names, mod.p, strict=True))
+    run = mod.simulate(25.0)
+    times = np.sort(np.concatenate([run.t_events[f"step{k}_closes"] for k in range(6)]))
+    ends = [np.flatnonzero(np.abs(run.t - time) < 1e-9)[[0, -1]] for time in times]
+    before, after = (np.array([run["speed"][pair[k]] for pair in ends]) for k in (0, 1))
+    a, turning = np.pi / 6, p["I"] + p["m"] * p["l"] ** 2
+    eta = (p["I"] + p["m"] * p["l"] ** 2 * np.cos(2 * a)) / turning
+    assert len(times) > 15
+    assert after / before == pytest.approx(eta, rel=1e-7)
+    gained = 2 * p["m"] * p["g"] * p["l"] * (np.cos(p["slope"] - a) - np.cos(p["slope"] + a)) / turning
+    assert after[-1] == pytest.approx(np.sqrt(eta**2 * gained / (1 - eta**2)), rel=1e-6)
+
+
+def critical(p: dict[str, float]) -> float:
+    """The speed at which M z'' + D/V z' + K z = 0 of the lateral place and the yaw loses its stability."""
+
+    def growth(V: float) -> float:
+        M = np.diag([p["m"], p["I"]])
+        D = np.diag([2 * p["f22"], 2 * p["f11"] * p["b"] ** 2]) / V
+        K = np.array([[p["k_y"], -2 * p["f22"]], [2 * p["f11"] * p["b"] * p["cone"] / p["r"], p["k_psi"]]])
+        zero, one = np.zeros((2, 2)), np.eye(2)
+        A = np.block([[zero, one], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+        return float(np.linalg.eigvals(A).real.max())
+
+    return float(brentq(growth, 10.0, 200.0))
+
+
+def test_a_wheelset_hunts_above_its_critical_speed() -> None:
+    mod = eg.load(models.EXAMPLES / "wheelset.yaml").compile(optimize=0)
+    p = dict(zip(mod.p_names, mod.p, strict=True))
+    limit = critical(p)
+
+    def swing(V: float, start: float) -> tuple[float, float]:
+        run = mod.simulate(
+            8.0, {"y": start, "phi_dot": V / p["r"]}, parameters={"V": V}, t_eval=np.linspace(0, 8, 4001)
+        )
+        early, late = run.t < 2.0, run.t > 6.0
+        return float(np.ptp(run["y"][early])), float(np.ptp(run["y"][late]))
+
+    early, late = swing(0.93 * limit, 1e-4)
+    assert late < 0.5 * early
+    early, late = swing(1.07 * limit, 1e-4)
+    assert late > 2.0 * early
+    early, late = swing(1.07 * limit, 0.02)  # it stays on the rails by the limit of friction
+    assert late < 0.2
+    loads = mod.outputs(0.0, mod.x0())
+    assert loads[mod.y_names.index("wheel_load")] == pytest.approx((p["m"] * p["g"] + p["load"]) / 2, rel=1e-12)

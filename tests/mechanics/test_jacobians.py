@@ -1,0 +1,145 @@
+"""``jacobian`` is the derivative of the complete ``rhs``, its projection included, in every direction of x."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+from typing import Any
+
+import judges
+import models
+import numpy as np
+import pytest
+from models import EXAMPLES
+from sweeps import part_of
+
+import eomgen as eg
+from benchmarks.large_loops import closed_chain, four_bars
+
+# -- Models ------------------------------------------------------------------------------------------------------------
+LOOPS = ["offset_slider_crank", "powered_slider_crank", "spatial_loop"]
+#: By embedding and one by other methods, the rest by ``make thorough``.
+ALWAYS = [
+    *product(
+        ("slider_crank", "rolling_disc", "spatial_loop", "powered_arm", "skewed_four_bar", "three_cranks", "car_axis"),
+        ["embedding"],
+    ),
+    ("slider_crank", "lagrange"),
+    ("spatial_loop", "recursive"),
+    ("spherical_pendulum", "recursive"),
+]
+REDUNDANT = ["tilted_four_bar", "skewed_four_bar", "three_cranks"]
+
+
+def compare(mod: Any, x: np.ndarray, t: float, h: float = 1e-5) -> None:
+    n = mod.n_q
+    kinds = mod.metadata["coordinate_kinds"]
+    sizes = np.tile([mod.metadata["length_scale"] if kind == "length" else 1.0 for kind in kinds], 2)
+
+    def rhs(columns: np.ndarray) -> np.ndarray:
+        return mod.rhs(t, columns)
+
+    expected = np.stack([judges.first(rhs, x, d * s, h=h) / s for d, s in zip(np.eye(2 * n), sizes, strict=True)], 1)
+    found = mod.jacobian(t, x)
+    assert found.shape == (2 * n, 2 * n)
+    # each of the four blocks by its own largest entry, in units that do not favour metres or radians
+    weigh = sizes[None, :] / sizes[:, None]
+    for rows in (slice(0, n), slice(n, 2 * n)):
+        for columns in (slice(0, n), slice(n, 2 * n)):
+            ours, theirs = (part[rows, columns] * weigh[rows, columns] for part in (found, expected))
+            floor = 1e-8 * np.abs(expected * weigh).max()  # a block that vanishes has the noise of the others
+            assert np.abs(ours - theirs).max() <= max(1e-6 * np.abs(theirs).max(), floor)
+
+
+NAMES = [*models.EXAMPLE_NAMES, *models.DRIVEN_NAMES, *LOOPS, "powered_arm", *REDUNDANT]
+
+
+@pytest.mark.parametrize(
+    ("name", "method"), part_of(product(NAMES, ["embedding", "lagrange", "recursive"]), ALWAYS.__contains__)
+)
+def test_jacobian_of_models(module: Callable[..., Any], name: str, method: str) -> None:
+    mod = module(name, method)
+    for x in judges.random_states(mod, 31, 3):
+        # off the manifold the regularisation of redundant rows follows the residual: a kink that is of second order
+        compare(mod, x, 0.3, h=1e-6 if name == "bricard" else 1e-5)
+
+
+def test_some_directions_are_transverse(module: Callable[..., Any]) -> None:
+    """The projection is in the Jacobian: moving off the manifold changes nothing, to first order."""
+    for name in ("slider_crank", "skewed_four_bar"):
+        mod = module(name)
+        x = judges.random_states(mod, 32, 1)[0]
+        n = mod.n_q
+        J = mod.jacobian(0.0, x)
+        C_q = mod.constraint_jacobian(x[:n], rows="all")
+        lengths = [mod.metadata["length_scale"] if k == "length" else 1.0 for k in mod.metadata["coordinate_kinds"]]
+        across = np.diag(np.square(lengths)) @ C_q.T  # the minimum-norm directions, in scaled coordinates
+        assert np.abs(across).max() > 1e-3
+        assert np.abs(J[:, n:] @ across).max() <= 1e-9 * np.abs(J).max() * np.abs(across).max()
+
+
+# -- Of loops by articulated bodies, in C beside the dense system of NumPy ---------------------------------------------
+def rods(twice: bool = False) -> eg.Model:
+    """Two bodies on ball joints in Euler parameters, held together by a rod, or by two in one place."""
+    m = eg.Model("rods", gravity=(0.0, 0.0, -9.81))
+    a = m.body("a", mass=1.2, com=(0.1, 0.2, -0.5), inertia=(0.2, 0.3, 0.15))
+    b = m.body("b", mass=0.8, com=(-0.1, 0.1, -0.4), inertia=(0.1, 0.2, 0.15))
+    m.spherical("A", m.ground, a, rotation="euler_parameters")
+    m.spherical("B", m.ground.at(1.0, 0.0, 0.0), b, rotation="euler_parameters")
+    for name in ("rod", "second") if twice else ("rod",):
+        m.distance(name, a.at(0.0, 0.3, -1.0), b.at(0.2, 0.0, -0.9), length=1.1)
+    return m
+
+
+def driven() -> eg.Model:
+    """A chain whose last joint is led over time."""
+    m = closed_chain(6, False, False)
+    m.driver("lead", "j5", "0.3*sin(2*t) + 0.1")
+    return m
+
+
+CASES: dict[str, Callable[[], eg.Model]] = {
+    "closed chain": lambda: closed_chain(9, True, False),
+    "spatial chain": lambda: closed_chain(9, True, True),
+    "four-bars": lambda: four_bars(4),
+    "rods": rods,
+    "rods held twice": lambda: rods(True),
+    "driven chain": driven,
+    "slider-crank": lambda: eg.load(EXAMPLES / "slider_crank.yaml"),
+}
+
+
+def on_constraints(module: Any, seed: int, t: float) -> np.ndarray:
+    random = np.random.default_rng(seed)
+    x = module.x0(t=t) if "driven" in module.name else module.x0()
+    x = module.project(x + 0.02 * random.uniform(-1, 1, len(x)), t=t)
+    x[module.n_q :] = random.uniform(-1, 1, module.n_v)
+    return np.asarray(module.project(x, t=t))
+
+
+@pytest.mark.parametrize("name", part_of(CASES, {"spatial chain", "rods held twice"}.__contains__))
+def test_jacobians_are_those_of_the_dense_system(name: str) -> None:
+    equations = CASES[name]().derive("recursive")
+    module = equations.compile(kernels=["rhs", "jacobian"], optimize=0)
+    dense = equations.compile(target="numpy")
+    for seed in range(3):
+        x, t = on_constraints(dense, seed, 0.3), 0.3
+        found, expected = module.jacobian(t, x), dense.jacobian(t, x)
+        assert np.abs(found - expected).max() <= 1e-10 * np.abs(expected).max()
+
+
+def test_a_jacobian_does_not_need_the_preferred_coordinates_to_move() -> None:
+    """At a dead centre the slider stands still: the columns are taken one by one."""
+    equations = eg.load(EXAMPLES / "slider_crank.yaml").derive("recursive", independent=["s"])
+    module = equations.compile(target="numpy")
+    for angle in (1e-3, 3e-3, 0.02):
+        x = module.x0(theta=angle, theta_dot=4.0)
+        d = np.eye(module.n_x)
+        h = 1e-4
+        slopes = [
+            (8 * (module.rhs(0.0, x + h * e) - module.rhs(0.0, x - h * e))
+             - (module.rhs(0.0, x + 2 * h * e) - module.rhs(0.0, x - 2 * h * e))) / (12 * h)
+            for e in d
+        ]  # fmt: skip
+        found = module.jacobian(0.0, x)
+        assert np.abs(found - np.array(slopes).T).max() <= 1e-6 * np.abs(found).max()

@@ -1,0 +1,149 @@
+"""A bare Lagrangian that depends on time, on inputs, with dissipation and gyroscopic terms: closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy
+
+import eomgen as eg
+
+OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")
+STATES = [(0.3, -1.1, 0.4), (-2.0, 0.7, 1.3)]
+
+
+@pytest.mark.parametrize("method", OF_LAGRANGIANS)
+def test_a_pendulum_whose_support_swings(method: str) -> None:
+    """The support is at a sin(w t): l theta'' = -g sin(theta) + a w^2 sin(w t) cos(theta) (Landau, sec. 5)."""
+    speed = "(l*th_dot*cos(th) + a*w*cos(w*t))**2 + (l*th_dot*sin(th))**2"
+    values = {"m": 1.3, "l": 0.7, "a": 0.4, "w": 3.0, "g": 9.81}
+    mod = eg.Model.from_lagrangian(
+        "support", f"m*({speed})/2 + m*g*l*cos(th)", ["th"], parameters=values
+    ).compile(method=method, target="numpy")  # fmt: skip
+    for th, rate, t in STATES:
+        push = 0.4 * 9.0 * np.sin(3.0 * t) * np.cos(th)
+        expected = (-9.81 * np.sin(th) + push) / 0.7
+        assert mod.rhs(t, np.array([th, rate])) == pytest.approx([rate, expected], rel=1e-12)
+        forces = mod.inverse_dynamics(np.array([th]), np.array([rate]), np.array([expected]), t=t)
+        assert forces == pytest.approx([0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("method", OF_LAGRANGIANS)
+def test_a_mass_that_grows(method: str) -> None:
+    """d/dt (m v) = -k x with m = m0 (1 + r t): v' = -(k x + m0 r v) / m."""
+    values = {"m0": 2.0, "r": 0.3, "k": 5.0}
+    mod = eg.Model.from_lagrangian("growing", "m0*(1 + r*t)*x_dot**2/2 - k*x**2/2", ["x"], parameters=values).compile(
+        method=method, target="numpy"
+    )
+    for x, v, t in STATES:
+        expected = -(5.0 * x + 0.6 * v) / (2.0 * (1.0 + 0.3 * t))
+        assert mod.rhs(t, np.array([x, v])) == pytest.approx([v, expected], rel=1e-12)
+
+
+@pytest.mark.parametrize("method", OF_LAGRANGIANS)
+def test_dissipation_brakes(method: str) -> None:
+    """Rayleigh's function c (v - w)^2 / 2 of two masses brakes their relative motion (Goldstein, sec. 1.5)."""
+    mod = eg.Model.from_lagrangian(
+        "brake", "m*v_dot**2/2 + n*w_dot**2/2", ["v", "w"], ["push", 0], dissipation="c*(v_dot - w_dot)**2/2",
+        parameters={"m": 2.0, "n": 0.5, "c": 0.8, "push": 1.5},
+    ).compile(method=method, target="numpy")  # fmt: skip
+    x = np.array([0.0, 0.0, 1.2, -0.4])
+    assert mod.rhs(0.0, x)[2:] == pytest.approx([(1.5 - 0.8 * 1.6) / 2.0, 0.8 * 1.6 / 0.5], rel=1e-12)
+
+
+@pytest.mark.parametrize("method", OF_LAGRANGIANS)
+def test_a_length_that_an_input_prescribes(method: str) -> None:
+    """(l^2 theta')' = 0 on a turntable with l = 1 + t: theta' = theta'(0) / l^2, so theta'(1) = 1/4."""
+    mod = eg.Model.from_lagrangian("reel", "l**2*th_dot**2/2", ["th"], inputs={"l": 1.0}).compile(
+        method=method, target="numpy"
+    )
+    assert mod.u_names == ("l", "l_dot")
+    assert mod.rhs(0.0, np.array([0.0, 3.0]), u=[2.0, 0.5]) == pytest.approx([3.0, -2 * 0.5 / 2.0 * 3.0], rel=1e-13)
+    run = mod.simulate(1.0, {"th": 0.0, "th_dot": 1.0}, inputs={"l": "1 + t"}, rtol=1e-10, atol=1e-12)
+    assert run["th_dot"][-1] == pytest.approx(0.25, rel=1e-8)
+
+
+@pytest.mark.parametrize("method", OF_LAGRANGIANS)
+def test_a_constraint_that_an_input_moves(method: str) -> None:
+    """A bead on a rod through the origin that is turned by a(t): r'' = r a'^2 - g sin(a) (Goldstein, sec. 1.6)."""
+    mod = eg.Model.from_lagrangian(
+        "rod", "(x_dot**2 + y_dot**2)/2 - g*y", ["x", "y"], constraints=["x*sin(a) - y*cos(a)"],
+        parameters={"g": 9.81}, inputs={"a": 0.4},
+    ).compile(method=method, target="numpy")  # fmt: skip
+    assert mod.u_names == ("a", "a_dot", "a_ddot")
+    a, rate, bend, r, slide = 0.4, 0.7, -1.1, 1.3, 0.5
+    along, across = np.array([np.cos(a), np.sin(a)]), np.array([-np.sin(a), np.cos(a)])
+    x = np.concatenate([r * along, slide * along + r * rate * across])
+    expected = (-9.81 * np.sin(a)) * along + (2 * slide * rate + r * bend) * across
+    assert mod.rhs(0.0, x, u=[a, rate, bend])[2:] == pytest.approx(expected, rel=1e-11)
+
+
+def in_rotating_axes() -> tuple[eg.Model, sympy.Expr, list[sympy.Symbol], dict[str, float]]:
+    """A charge on a spring in rotating axes and in a magnetic field: terms linear in the velocities of both kinds."""
+    x, y, x_dot, y_dot, m, b, w, k = sympy.symbols("x y x_dot y_dot m b w k")
+    L = m * ((x_dot - w * y) ** 2 + (y_dot + w * x) ** 2) / 2 - k * (x**2 + y**2) / 2 + b * (x * y_dot - y * x_dot) / 2
+    values = {"m": 1.3, "b": 2.0, "w": 0.7, "k": 5.0}
+    return eg.Model.from_lagrangian("charge", L, [x, y], parameters=values), L, [x_dot, y_dot], values
+
+
+@pytest.mark.parametrize("method", ["lagrange", "hamilton", "augmented"])
+def test_terms_linear_in_the_velocities_are_no_energy(method: str) -> None:
+    """T + V is v . dL/dv - L, which is kept; p is dL/dv all the same."""
+    model, L, rates, values = in_rotating_axes()
+    eqs = model.derive(method)
+    momenta = [L.diff(rate) for rate in rates]
+    assert [sympy.simplify(p - q) for p, q in zip(eqs.momenta, momenta, strict=True)] == [0, 0]
+    assert sympy.simplify(eqs.lagrangian - L) == 0
+    mod = eqs.compile(target="numpy")
+    run = mod.simulate((0, 3), initial={"x": 0.3, "y": 0.2, "x_dot": 0.5, "y_dot": 0.4}, rtol=1e-10, atol=1e-12)
+    energy = sum(v * p for v, p in zip(rates, momenta, strict=True)) - L
+    start = dict(zip(mod.x_names, run.x[:, 0], strict=True)) | values
+    assert run["energy"][0] == pytest.approx(float(energy.subs(start)), rel=1e-14)
+    assert run["T"][0] == pytest.approx(1.3 * 0.41 / 2, rel=1e-14)
+    assert np.ptp(run["energy"]) < 1e-8
+    explanation = eqs.explain()
+    assert "of second degree in the velocities" in explanation.markdown
+    assert explanation.difference < 1e-12
+    if method == "hamilton":
+        z = mod.canonical.of(run.x[:, 0])
+        assert z[2:] == pytest.approx([float(p.subs(start)) for p in momenta])
+        assert mod.canonical.hamiltonian(z) == pytest.approx(run["energy"][0])
+        p_values = dict(zip(map(str, eqs.momentum_symbols), z[2:], strict=True))
+        assert float(eqs.hamiltonian.subs(start | p_values)) == pytest.approx(run["energy"][0])
+
+
+# -- The embedded system that is shown in SymPy ------------------------------------------------------------------------
+R, L, CRANK, SLIDER = 0.2, 0.5, 0.03, 1.4
+
+
+def advance(angle: float) -> float:
+    """ds/dtheta of s = r cos(theta) + sqrt(l^2 - r^2 sin^2(theta))."""
+    return float(-R * np.sin(angle) - R**2 * np.sin(2 * angle) / (2 * np.sqrt(L**2 - (R * np.sin(angle)) ** 2)))
+
+
+@pytest.mark.parametrize("method", ["embedding", "lagrange", "recursive"])
+@pytest.mark.parametrize("angle", [0.8, 2.5])
+def test_one_equation_in_the_crank_angle(method: str, angle: float) -> None:
+    """(J + m s'^2) theta'' = tau - m s' s'' theta'^2, s' and s'' derivatives by theta."""
+    m = eg.Model("press", gravity=(0, 0, 0))
+    crank, rod = m.body("crank", mass=0, inertia={"zz": CRANK}), m.body("rod", mass=0)
+    slider = m.body("slider", mass=SLIDER)
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.revolute("B", crank.at(R, 0, 0), rod, coordinate="phi")
+    m.revolute("C", rod.at(L, 0, 0), slider)
+    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    m.torque("motor", "A", m.input("tau", 0.7))
+    m.guess = {"theta": angle, "phi": -1.2 * angle, "s": 0.6}
+    equations = m.derive(method, independent=["theta"])
+    rate = 3.0
+    module = equations.compile(target="numpy")
+    x = module.x0({"theta": angle, "theta_dot": rate})
+    values = dict(zip((*module.x_names, "tau"), (*x, 0.7), strict=True))
+    mass, force = (
+        float(matrix[0].subs({s: values[s.name] for s in matrix.free_symbols}))
+        for matrix in (equations.mass_matrix, equations.force)
+    )
+    slope, d = advance(angle), 1e-5
+    bend = (advance(angle + d) - advance(angle - d)) / (2 * d)
+    assert mass == pytest.approx(CRANK + SLIDER * slope**2, rel=1e-11)
+    assert force == pytest.approx(0.7 - SLIDER * slope * bend * rate**2, rel=1e-8)

@@ -1,0 +1,332 @@
+"""Mobility: rank, freedoms, redundant rows by name, candidates, contradictions; what is said of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from sweeps import TARGETS
+
+import eomgen as eg
+from benchmarks.linkages import n_four_bar
+
+
+# -- Counts ------------------------------------------------------------------------------------------------------------
+def crank_rocker(tilt: tuple[float, float, float] = (0, 0, 0), **sizes: float) -> eg.Model:
+    """A crank-rocker of spatial revolute joints in a plane turned by ``tilt``."""
+    a, b, c, d = (sizes.get(k, x) for k, x in zip("abcd", (0.04, 0.12, 0.08, 0.10), strict=True))
+    m = eg.Model("crank_rocker", gravity=(0, -9.81, 0))
+    crank = m.body("crank", mass=1, com=(a / 2, 0, 0), inertia=(1e-4, 1e-4, 1e-4))
+    coupler = m.body("coupler", mass=1, com=(b / 2, 0, 0), inertia=(1e-4, 1e-4, 1e-4))
+    rocker = m.body("rocker", mass=1, com=(c / 2, 0, 0), inertia=(1e-4, 1e-4, 1e-4))
+    m.revolute("A", m.ground.at(0, 0, 0, rpy=tilt), crank, coordinate="theta")
+    m.revolute("B", crank.at(a, 0, 0), coupler)
+    m.revolute("C", coupler.at(b, 0, 0), rocker.at(c, 0, 0))
+    x, y, z = eg_rotate(tilt, (d, 0.0, 0.0))
+    m.revolute("D", m.ground.at(x, y, z, rpy=tilt), rocker, coordinate="phi")
+    m.initial(theta=0.9)
+    m.guess(phi=2.0, B=0.0)
+    return m
+
+
+def eg_rotate(rpy: tuple[float, float, float], x: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Fixed-axis roll, pitch, yaw applied to a vector."""
+    from scipy.spatial.transform import Rotation
+
+    return tuple(Rotation.from_euler("xyz", rpy).apply(x).tolist())
+
+
+def test_planar_four_bar_of_spatial_joints_loses_the_rows_that_vanish() -> None:
+    report = crank_rocker().derive().report
+    assert report.degrees_of_freedom == 1
+    assert report.gruebler_kutzbach == -2
+    assert report.gruebler_kutzbach_planar == 1
+    assert (report.constraints_declared, report.constraints, report.rank) == (5, 2, 2)
+    assert report.redundant == []
+
+
+def test_open_loop_is_an_assembly_error_that_names_the_joint() -> None:
+    with pytest.raises(eg.AssemblyError, match=r"[ABCD]\.r_"):
+        crank_rocker(d=0.5).derive()
+
+
+def test_bad_independent_coordinates_are_refused() -> None:
+    with pytest.raises(eg.ModelError, match=r"independent.*'thet'.*did you mean 'theta'"):
+        crank_rocker().derive(independent=["thet"])
+    with pytest.raises(eg.ModelError, match="1 degree of freedom;"):
+        crank_rocker().derive(independent=["theta", "phi"])
+
+
+def four_bar_and_wheel() -> eg.Model:
+    m = eg.Model("two", gravity=(0, -9.81, 0))
+    crank = m.body("a", mass=1, com=(0.2, 0, 0), inertia={"zz": 0.1})
+    coupler = m.body("b", mass=1, com=(0.55, 0, 0), inertia={"zz": 0.1})
+    rocker = m.body("c", mass=1, com=(0.4, 0, 0), inertia={"zz": 0.1})
+    m.revolute("A", m.ground, crank, coordinate="q")
+    m.revolute("B", crank.at(0.4, 0, 0), coupler, coordinate="s")
+    m.revolute("C", coupler.at(1.1, 0, 0), rocker.at(0.8, 0, 0))
+    m.revolute("D", m.ground.at(1.2, 0, 0), rocker, coordinate="r")
+    m.revolute("E", m.ground, m.body("w", mass=1, inertia={"zz": 0.3}), coordinate="e")
+    m.guess(q=0.6, s=-0.2, r=1.5)
+    m.initial(q=0.6)
+    return m
+
+
+def test_coordinates_that_cannot_be_independent_together_are_refused() -> None:
+    model = four_bar_and_wheel()
+    model.revolute("F", model.ground, model.body("x", mass=1, inertia={"zz": 0.3}), coordinate="f")
+    with pytest.raises(eg.ModelError, match="q, s cannot vary independently of each other"):
+        model.derive(independent=["q", "s"])
+    with pytest.raises(eg.ModelError, match="e: named twice"):
+        model.derive(independent=["e", "e_dot"])
+    model.independent("C_dot", "f")  # as linearize takes them
+    assert model.derive().independent == ("C", "e", "f")
+
+
+def test_rank_needs_no_parameter_values() -> None:
+    m = eg.Model("slider_crank", gravity=(0, -9.81, 0))
+    r, length = m.parameter("r"), m.parameter("l")
+    crank, rod, slider = (m.body(n, mass=1, inertia={"zz": 0.1}) for n in ("crank", "rod", "slider"))
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.revolute("B", crank.at(r, 0, 0), rod)
+    m.revolute("C", rod.at(length, 0, 0), slider)
+    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    equations = m.derive()
+    assert equations.report.assumed
+    assert equations.report.degrees_of_freedom == 1
+    assert equations.mass_matrix.shape == (1, 1)
+    with pytest.raises(eg.ModelError, match=r"parameters\.l: has no value") as caught:
+        equations.compile()
+    assert [p.path for p in caught.value.problems] == ["parameters.r", "parameters.l"]
+
+
+# -- The report --------------------------------------------------------------------------------------------------------
+def test_flat_parallelograms_have_more_freedoms_at_once() -> None:
+    m = n_four_bar(3)
+    m.initial(**{f"theta{k}": 0 for k in range(4)} | {f"bend{k}": 0 for k in (1, 2, 3)})
+    report = m.derive(independent=["theta0"]).report
+    assert (report.degrees_of_freedom, report.instantaneous_freedoms) == (1, 4)
+    assert any(note.startswith("change point: 4 degrees of freedom") for note in report.notes)
+    assert "start a little away from this configuration" in str(report)
+
+
+def test_candidates_are_rated_by_how_well_they_move_the_mechanism() -> None:
+    """Of a four-bar: the smallest singular value of J without the column over the largest of J."""
+    equations = four_bar((0.3, 0.9, 0.7, 0.8)).derive()
+    report = equations.report
+    mod = equations.compile(target="numpy")
+    J = mod.constraint_jacobian(np.array([report.reference[name] for name in mod.q_names])) / report.length_scale
+    largest = np.linalg.svd(J)[1][0]
+    for k, name in enumerate(mod.q_names):
+        expected = np.linalg.svd(np.delete(J, k, axis=1))[1][-1] / largest
+        assert report.candidates[name] == pytest.approx(expected, rel=1e-10)
+    assert list(report.candidates.values()) == sorted(report.candidates.values(), reverse=True)
+    assert "can be independent" in str(report)
+
+
+def truss() -> eg.Model:
+    """A four-bar with a further rod across: nothing moves."""
+    m = four_bar((0.3, 0.9, 0.7, 0.8))
+    q = m.derive().report.reference
+    x = 0.15 * np.cos(q["theta"]), 0.15 * np.sin(q["theta"])
+    y = 0.8 + 0.35 * np.cos(q["psi"]), 0.35 * np.sin(q["psi"])
+    m.distance(
+        "stay",
+        m.bodies["crank"].at(0.15, 0, 0),
+        m.bodies["rocker"].at(0.35, 0, 0),
+        float(np.hypot(y[0] - x[0], y[1] - x[1])),
+    )
+    return m
+
+
+def test_a_locked_mechanism_says_what_holds_it() -> None:
+    m = truss()
+    report = m.derive().report
+    assert report.degrees_of_freedom == 0
+    note = next(note for note in report.notes if note.startswith("locked"))
+    assert "held by C, stay" in note
+    assert "if it should move, remove a constraint, or replace a joint by one with more freedom" in note
+
+
+def test_contradictory_constraints_are_named_with_their_gap() -> None:
+    m = four_bar((0.3, 0.9, 0.7, 0.8))
+    for name, length in (("one", 0.8), ("two", 0.9)):
+        m.distance(name, m.bodies["crank"].at(0.15, 0, 0), m.bodies["rocker"].at(0.35, 0, 0), length)
+    with pytest.raises(eg.AssemblyError, match="contradict each other") as caught:
+        m.derive()
+    assert "one.length" in str(caught.value)
+    assert "two.length" in str(caught.value)
+    assert "remove one of them" in str(caught.value)
+
+
+# -- Other independent coordinates -------------------------------------------------------------------------------------
+def four_bar(lengths: Sequence[float], rocker: float = 1.2, bend: float = -1.0) -> eg.Model:
+    """Uniform rods a (crank), b (coupler), c (rocker) on a ground link d."""
+    a, b, c, d = lengths
+    m = eg.Model("four_bar", gravity=(0, -9.81, 0))
+    rods = [
+        m.body(name, mass=size, com=(size / 2, 0, 0), inertia={"zz": size**3 / 12})
+        for name, size in (("crank", a), ("coupler", b), ("rocker", c))
+    ]
+    m.revolute("A", m.ground, rods[0], coordinate="theta")
+    m.revolute("B", rods[0].at(a, 0, 0), rods[1], coordinate="bend")
+    m.revolute("D", m.ground.at(d, 0, 0), rods[2], coordinate="psi")
+    m.revolute("C", rods[1].at(b, 0, 0), rods[2].at(c, 0, 0))
+    m.initial(theta=1.0)
+    m.guess(psi=rocker, bend=bend)
+    return m
+
+
+def multiplier_solve(mod: eg.Module, x: np.ndarray) -> np.ndarray:
+    """Accelerations of the augmented equations, C_q' v by central differences of C_q along v."""
+    n = mod.n_q
+    q, v = x[:n], x[n:]
+    C_q = mod.constraint_jacobian(q)
+    step = 1e-6
+    rate = (mod.constraint_jacobian(q + step * v) - mod.constraint_jacobian(q - step * v)) / (2 * step)
+    m = len(C_q)
+    K = np.block([[mod.mass_matrix(q), C_q.T], [C_q, np.zeros((m, m))]])
+    return np.linalg.solve(K, np.concatenate([-mod.bias(0.0, x), -rate @ v]))[:n]
+
+
+@pytest.mark.parametrize("preferred", ["theta", "bend", "psi"])
+def test_a_crank_rocker_turns_whichever_coordinate_is_preferred(preferred: str) -> None:
+    """psi turns back twice a turn: a dead centre for it each time."""
+    mod = four_bar((0.3, 0.9, 0.7, 0.8)).compile(independent=[preferred], optimize=0)
+    x0 = mod.x0(theta=1.0, theta_dot=9.0)
+    run = mod.simulate((0, 3), initial=x0, rtol=1e-11, atol=1e-13)
+    assert np.ptp(run["theta"]) > 6 * np.pi
+    assert np.count_nonzero(np.diff(np.sign(run["psi_dot"]))) >= 6
+    assert run.energy_drift <= 1e-8
+    assert run.residuals.position <= 1e-13
+    for k in np.linspace(0, len(run) - 1, 25).astype(int):
+        x = run.x[:, k]
+        expected = multiplier_solve(mod, x)
+        assert np.abs(mod.rhs(0.0, x)[mod.n_q :] - expected).max() <= 1e-6 * np.abs(expected).max()
+    assert run.change_points == []
+
+
+def test_the_users_choice_is_kept_while_it_is_good() -> None:
+    """embedded_mass_matrix is that of the chosen coordinate: 2 T / rate^2 of a motion."""
+    for name in ("theta", "bend", "psi"):
+        mod = four_bar((0.3, 0.9, 0.7, 0.8)).compile(independent=[name], target="numpy")
+        x = mod.x0(theta=1.0, theta_dot=2.0)
+        rate = x[mod.n_q + mod.q_names.index(name)]
+        kinetic = mod.energy(x)[0]
+        assert mod.embedded_mass_matrix(x[: mod.n_q])[0, 0] == pytest.approx(2 * kinetic / rate**2, rel=1e-10)
+
+
+# -- Rows that hold whatever the motion --------------------------------------------------------------------------------
+def arm_and_plate(name: str, l3: float = 0.3) -> tuple[eg.Model, Any, Any]:
+    """A pendulum and a plate that is still free."""
+    m = eg.Model(name, gravity=(0, -9.81, 0))
+    for length, value in (("l1", 0.1), ("l2", 0.2), ("l3", l3)):
+        m.parameter(length, value)
+    arm = m.body("arm", mass=1.0, com=(0.5, 0, 0), inertia={"zz": 0.1})
+    plate = m.body("plate", mass=0.5, com=(0.1, 0.1, 0), inertia={"zz": 0.02})
+    m.revolute("A", m.ground, arm, coordinate="theta")
+    return m, arm, plate
+
+
+def twice_welded(l3: float = 0.3) -> eg.Model:
+    """The plate, held at two places that agree where l1 + l2 = l3."""
+    m, arm, plate = arm_and_plate("twice_welded", l3)
+    m.weld("W0", arm.at(0.3, 0.1, 0), plate)
+    m.weld("W1", arm.at("0.3 + l3", 0.1, 0), plate.at("l1 + l2", 0, 0))
+    return m
+
+
+def once_welded() -> eg.Model:
+    """The same without the second weld."""
+    m, arm, plate = arm_and_plate("once_welded")
+    m.weld("W0", arm.at(0.3, 0.1, 0), plate)
+    return m
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_it_moves_as_with_one_weld(target: str) -> None:
+    one, two = once_welded().compile(target=target), twice_welded().compile(target=target)
+    assert two.layout.n_dof == 1
+    start = {"theta": 0.3}
+    a, b = one.simulate(1.0, initial=start), two.simulate(1.0, initial=start)
+    np.testing.assert_allclose(b["theta"][-1], a["theta"][-1], rtol=1e-9)
+    x = np.array([0.3, 2.0])
+    np.testing.assert_allclose(two.jacobian(0, x), one.jacobian(0, x), atol=1e-12)
+    loads = two.reactions(0, x)[:, :3]  # the two welds share what one takes, in the axes of the arm
+    np.testing.assert_allclose(loads[1] + loads[2], one.reactions(0, x)[1, :3], atol=1e-10)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_late_values_that_open_it_are_refused(target: str) -> None:
+    mod = twice_welded().compile(target=target)
+    with pytest.raises(eg.AssemblyError, match=r"W1\.r_x \(off by 0\.1\) can never hold: no coordinate changes it"):
+        mod.simulate(0.1, initial={"theta": 0.3}, parameters={"l3": 0.4})
+    bound = mod.bind(p={"l3": 0.4})
+    for call in (lambda: bound.rhs(0, np.zeros(2)), lambda: bound.project(np.zeros(2))):
+        with pytest.raises(eg.ProjectionError, match=r"largest residual at W1\.r_x, 0\.1"):
+            call()
+    agreeing = mod.bind(p={"l3": 0.4, "l1": 0.2})
+    assert np.isfinite(agreeing.rhs(0, np.zeros(2))).all()
+
+
+x, x_dot, d, t, u = sp.symbols("x x_dot d t u")
+
+
+@pytest.mark.parametrize(("row", "what"), [(sp.sin(t) - d * t, "depends on t"), (u - 1, "depends on u")])
+def test_rows_of_time_or_inputs_alone_are_refused(row: sp.Expr, what: str) -> None:
+    m = eg.Model.from_lagrangian(
+        "of_time", x_dot**2 / 2, [x], constraints=[row], parameters={"d": 1.0} if row.has(d) else {}, inputs={"u": 1.0}
+    )
+    with pytest.raises(eg.ModelError, match=f"{what} but on no coordinate, so no motion can satisfy it"):
+        m.check()
+
+
+@pytest.mark.parametrize("start", [{}, {"x_1": 1.0, "y_2": 0.5}])
+@pytest.mark.parametrize("distance", ["(x_1 - x_2)**2 + (y_1 - y_2)**2", "x_1**2 - 2*x_1*x_2 + x_2**2"])
+def test_a_constraint_that_is_a_square_is_named(distance: str, start: dict[str, float]) -> None:
+    """Of coincident points |r|^2 is least where it is 0: it is no change point, and its components hold."""
+    names = ["x_1", "x_2", "y_1", "y_2"]
+    kinetic = " + ".join(f"{name}_dot**2/2" for name in names)
+    model = eg.Model.from_lagrangian("points", kinetic, names, constraints=[distance])
+    model.initial(**start)
+    with pytest.raises(eg.ModelError, match=r"constraint_1 is 0 only where it is least.*write each component"):
+        model.check()
+    components = eg.Model.from_lagrangian("points", kinetic, names, constraints=["x_1 - x_2", "y_1 - y_2"])
+    assert components.check().degrees_of_freedom == 2
+
+
+# -- Gaps across the plane ---------------------------------------------------------------------------------------------
+def out_of_plane(offset: float) -> eg.Model:
+    m = eg.Model("bars", gravity=(0, -9.81, 0))
+    crank, rod, rocker = (m.body(name, mass=1.0, inertia={"zz": 0.1}) for name in ("crank", "rod", "rocker"))
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.revolute("B", crank.at(0.3, 0, 0), rod)
+    m.revolute("C", rod.at(1.0, 0, offset), rocker.at(0.8, 0, 0))
+    m.revolute("D", m.ground.at(0.9, 0, 0), rocker)
+    m.guess = {"theta": 1.0}
+    return m
+
+
+@pytest.mark.parametrize("offset", [1e-9, 1e-4, 5e-3])
+def test_a_gap_across_the_plane_is_told(offset: float) -> None:
+    with pytest.raises(eg.AssemblyError, match=r"C\.r_z"):
+        out_of_plane(offset).derive()
+
+
+# -- Bodies out of the plane -------------------------------------------------------------------------------------------
+def body_on(axis: str, inertia: dict[str, float], turned: list[str] | None = None) -> list[str]:
+    m = eg.Model("m")
+    b = m.body("b", mass=1, com=[0, 0.1, 0], inertia=inertia)
+    place = b.marker("p", at=[0, 0, 0], rpy=turned) if turned else b
+    m.revolute("j", m.ground, place, axis=axis, coordinate="q")
+    return [note for note in m.derive().report.notes if "turns about axes" in note]
+
+
+@pytest.mark.parametrize("axis", "xy")
+def test_it_is_told(axis: str) -> None:
+    (note,) = body_on(axis, {"zz": 1.0})
+    assert note.startswith("b turns about axes without a given moment of inertia")
+    assert body_on(axis, {"xx": 1.0, "yy": 1.0, "zz": 1.0}) == []
