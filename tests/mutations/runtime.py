@@ -10,14 +10,14 @@ FAULTS = (
         'return {graph.symbol("t"): graph.one, **rates}',
         'return {graph.symbol("t"): graph.one}',
         "rates of inputs are dropped from d/dt",
-        ("tests/equations/test_bare_lagrangian.py::test_a_length_that_an_input_prescribes[lagrange]",),
+        ("tests/mechanics/test_lagrangians.py::test_a_length_that_an_input_prescribes[lagrange]",),
     ),
     Fault(
         "input-second-rates", "eomgen/describe/input_rates.py",
         '(positions, 2, "a constraint", section)',
         '(positions, 1, "a constraint", section)',
         "second rates of inputs in constraints are taken for 0",
-        ("tests/equations/test_bare_lagrangian.py::test_a_constraint_that_an_input_moves[lagrange]",),
+        ("tests/mechanics/test_lagrangians.py::test_a_constraint_that_an_input_moves[lagrange]",),
     ),
     Fault(
         "table-rate", "eomgen/runtime/signal_rates.py",
@@ -163,8 +163,8 @@ FAULTS = (
         "np.eye(n)])",
         "dF/dy + cj dF/dy' of the differential-algebraic form: cj is taken for 1",
         (
-            ("tests/forms/test_dae.py::test_consistent_values_leave_no_residual_and_the_jacobian_is_exact[double_pe"
-            "ndulum]"),
+            ("tests/mechanics/test_forms.py::test_consistent_values_leave_no_residual_and_the_jacobian_is_exact[double"
+             "_pendulum]"),
         ),
     ),
     Fault(
@@ -173,8 +173,8 @@ FAULTS = (
         "da = system.solve(right)[:n]",
         "the Jacobian of a stabilised right-hand side has the wrong sign",
         (
-            ("tests/forms/test_baumgarte.py::test_the_jacobian_is_that_of_the_stabilised_right_hand_side[slider_cra"
-            "nk-numpy]"),
+            ("tests/mechanics/test_forms.py::test_the_jacobian_is_that_of_the_stabilised_right_hand_side[slider_crank-"
+             "numpy]"),
         ),
     ),
     Fault(
@@ -190,8 +190,8 @@ FAULTS = (
         "q_i, v_i = x[:k], 0.0 * x[k:]",
         "the minimal form forgets the velocities",
         (
-            ("tests/acceptance/test_minimal.py::test_minimal_form_equals_the_tree_form[slider_crank-1.0-given0-embe"
-            "dding]"),
+            ("tests/mechanics/test_published_loops.py::test_minimal_form_equals_the_tree_form[slider_crank-1.0-given0-"
+             "embedding]"),
         ),
     ),
     Fault(
@@ -199,7 +199,7 @@ FAULTS = (
         "bool((np.asarray(self.alignment(q, self.t)) > 0.0).all())",
         "bool(np.isfinite(np.asarray(self.alignment(q, self.t))).all())",
         "positions with flipped axes are accepted",
-        ("tests/numeric/test_assembly.py::test_flipped_positions_are_refused",),
+        ("tests/mechanics/test_redundant_loops.py::test_flipped_solutions_are_rejected_by_the_module[numpy]",),
     ),
     Fault(
         "momenta-place", "eomgen/runtime/momenta.py",

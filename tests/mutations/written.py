@@ -45,7 +45,7 @@ FAULTS = (
         "kinematics, mobility, tree = equations.fresh()",
         "kinematics, mobility, tree = equations.kinematics, equations.mobility, equations.tree",
         "sources depend on what was read before",
-        ("tests/acceptance/test_canonical_sources.py::test_reading_changes_neither_sources_nor_key",),
+        ("tests/mechanics/test_tolerances.py::test_reading_the_equations_changes_no_source",),
     ),
     Fault(
         "wheel-native", "eomgen/compilation/wheel.py",
