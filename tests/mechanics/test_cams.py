@@ -171,19 +171,6 @@ def test_the_follower_touches_the_cam(kind: str, motion: str) -> None:
             assert n @ p == pytest.approx(reach_of_contour(n, phi), abs=1e-12)
 
 
-def test_an_eccentric_circle_is_a_slider_crank() -> None:
-    """A circle of radius a about a point e from the axis: the roller's centre keeps a + R from the circle's centre."""
-    e, a, R = 0.008, 0.04, 0.01
-    text = "0.008*cos(theta) + sqrt(0.04**2 - (0.008*sin(theta))**2)"
-    mod = cam_model("roller", "translating", text, radius=R).compile(target="numpy").bind(p={"e": 0.0})
-    at = mod.q_names.index("s")
-    for phi in (0.3, 1.7, 3.0, 5.0):
-        q, v, _ = mod.kinematics([phi], [1.0], [0.0])
-        root = np.sqrt((a + R) ** 2 - (e * np.cos(phi)) ** 2)
-        assert q[at] == pytest.approx(e * np.sin(phi) + root, rel=1e-12)
-        assert v[at] == pytest.approx(e * np.cos(phi) + e**2 * np.cos(phi) * np.sin(phi) / root, rel=1e-11)
-
-
 @pytest.mark.parametrize(
     ("kind", "motion"), [("roller", "oscillating"), ("flat_face", "translating"), ("knife_edge", "oscillating")]
 )

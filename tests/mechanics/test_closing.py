@@ -105,19 +105,6 @@ def test_grasp_in_space_keeps_momenta(target: str) -> None:
     assert np.asarray(poses).size
 
 
-def test_verify_file_and_component(tmp_path: Path) -> None:
-    m = carts(opens="multiplier(latch)")
-    m.save(tmp_path / "carts.yaml")
-    assert "closes: x2 - x1" in (tmp_path / "carts.yaml").read_text()
-    read = eg.load(tmp_path / "carts.yaml")
-    whole = eg.Model("whole")
-    whole.add(eg.load(tmp_path / "carts.yaml"), prefix="left_")
-    mod = whole.compile(target="numpy")
-    x, y = read.compile(target="numpy").simulate(6.0), mod.simulate(6.0)
-    assert y["left_x1"][-1] == pytest.approx(x["x1"][-1], rel=1e-9)
-    assert read.compile(target="numpy").verify().ok
-
-
 def test_closing_by_ida() -> None:
     """The same latch as by the steppers: a plastic impact, then both swing together."""
     mod = carts().compile(target="numpy")
@@ -254,21 +241,6 @@ def test_a_door_falls_into_its_latch(target: str) -> None:
     assert np.abs(torque) == pytest.approx(2.0, rel=1e-9)
     late = run.t > 2.0 + 1e-9
     assert run["phi"][late] == pytest.approx(-0.5 + 0.5 * np.cos(w * (run.t[late] - 2.0)), abs=1e-7)
-
-
-def test_a_joint_that_closes_a_loop_is_locked_as_one_of_the_tree() -> None:
-    """A four-bar stands still as any of its joints is locked, with the same impact."""
-    states = []
-    for name in ("A", "B", "C", "D"):
-        m = eg.load_example("four_bar")
-        m.lock("brake", name, closes="0.2 - t")
-        mod = m.compile(target="numpy")
-        run = mod.simulate(0.5)
-        after = run.t > 0.2 + 1e-9
-        assert np.abs(run.x[mod.n_q : mod.n_q + mod.n_v, after]).max() < 1e-7
-        states.append(run.x[: mod.n_q, -1])
-    for other in states[1:]:
-        assert other == pytest.approx(states[0], abs=1e-6)
 
 
 def test_a_file_says_it_at_the_joint(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import Any
 
 import judges
@@ -129,21 +128,6 @@ def test_momenta_change_as_their_derivative_says(name: str) -> None:
         found = form.rhs(0.0, form.of(x))[n:]
         assert np.abs(found - expected).max() <= 1e-9 * max(1.0, np.abs(expected).max())
         assert form.hamiltonian(form.of(x)) == pytest.approx(float(np.sum(other.energy(x))), rel=1e-12, abs=1e-12)
-
-
-def test_other_methods_have_no_momenta() -> None:
-    mod = models.build("pendulum").compile("embedding", target="numpy")
-    with pytest.raises(eg.UsageError, match="derive it with method='hamilton'"):
-        _ = mod.canonical
-    assert not hasattr(mod, "canonical")
-    assert not hasattr(mod, "Taylor")
-    found = {name for name, _ in inspect.getmembers(mod)}  # as notebooks do to complete names
-    assert {"rhs", "simulate", "minimal", "dae"} <= found
-    with pytest.raises(AttributeError, match="there are DOP853|there are .*simulate, "):
-        _ = mod.nothing
-    form = models.build("pendulum").compile("hamilton", target="numpy").canonical
-    with pytest.raises(eg.UsageError, match=r"z must have shape \(2,\) \[theta, p_theta\]"):
-        form.rhs(0.0, np.zeros(3))
 
 
 # -- Differential-algebraic --------------------------------------------------------------------------------------------

@@ -99,23 +99,6 @@ def test_a_quadrotor_and_its_load_accelerate_as_published() -> None:
         )
 
 
-def test_a_wheel_turns_a_satellite_from_rest() -> None:
-    """(I + J) w = -J Omega, as in tests/reference/spacecraft_analytic.json; the panels are out and at rest."""
-    given = models.reference("spacecraft_analytic")["reaction_wheel"]
-    Ib, Jw, Omega = (float(given[key]) for key in ("Ib", "Jw", "from_rest_wheel_relative_speed"))
-    assert -Jw * Omega / (Ib + Jw) == pytest.approx(float(given["body_rate"]), rel=1e-14)
-    mod, p = compiled("satellite")
-    traj = mod.simulate(38.0, initial={"left": 0.0, "right": 0.0}, parameters={"tau_x": 0.0, "tau_y": 0.0})
-    panel = p["m_p"] * (p["l"] ** 2 + p["w"] ** 2) / 12 + p["m_p"] * (0.5 + p["w"] / 2) ** 2
-    wheels = 2 * p["J"] / 2 + 2 * 4 * 0.25**2  # of the other two, 4 kg at 0.25 m
-    total = 4 * 3 + 2 * p["m_p"] + 200
-    off = 4 * np.array([0.25, 0.25]) / total  # centre of mass off the axis
-    inertia = p["I"] + 2 * panel + wheels - total * off @ off
-    expected = -p["J"] * traj["spin_z_dot"] / (inertia + p["J"])
-    assert traj["flight_wz"][-1] == pytest.approx(expected[-1], rel=1e-6)  # the axis nods by the offset wheels
-    assert expected[-1] > 0.1
-
-
 # -- Machines ----------------------------------------------------------------------------------------------------------
 def test_a_gear_train_starts_as_a_first_order_lag() -> None:
     """J w' = tau_0 (1 - w/w_0) - m g r / 12, all inertias and the load reduced to the motor by the ratios 3 and 4."""

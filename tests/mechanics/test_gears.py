@@ -29,6 +29,7 @@ def pair(**keys: Any) -> eg.Model:
     return m
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("keys", "ratio"),
     [

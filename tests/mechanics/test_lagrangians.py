@@ -40,6 +40,7 @@ def test_a_mass_that_grows(method: str) -> None:
         assert mod.rhs(t, np.array([x, v])) == pytest.approx([v, expected], rel=1e-12)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("method", OF_LAGRANGIANS)
 def test_dissipation_brakes(method: str) -> None:
     """Rayleigh's function c (v - w)^2 / 2 of two masses brakes their relative motion (Goldstein, sec. 1.5)."""

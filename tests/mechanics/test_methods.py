@@ -128,7 +128,7 @@ def test_a_model_without_inertia_is_refused_by_both_methods() -> None:
 
 
 # -- Models with outputs and inputs, cut joints, skates ----------------------------------------------------------------
-OLDER = ("embedding", "lagrange", "recursive")  # which tests/acceptance and tests/equations compare_all
+OLDER = ("embedding", "lagrange", "recursive")
 OTHER_FORMS = [method for method in METHODS if method not in OLDER]
 AGREED = 1e-10
 KERNELS = ["rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "outputs"]

@@ -9,7 +9,7 @@ import models
 import numpy as np
 import pytest
 import sympy as sp
-from sweeps import METHODS, TARGETS
+from sweeps import METHODS
 
 import eomgen as eg
 
@@ -61,70 +61,6 @@ def test_accelerations_are_those_of_the_indefinite_matrix(method: str, target: s
     assert signs == {(-1.0, 1.0)}
 
 
-def differences(f: Any, x: np.ndarray, h: float = 1e-4) -> np.ndarray:
-    columns = []
-    for e in np.eye(len(x)):
-        one, two = (f(x + k * h * e) - f(x - k * h * e) for k in (1, 2))
-        columns.append((8 * one - two) / (12 * h))
-    return np.array(columns).T
-
-
-def five_bar(I: float) -> eg.Model:
-    """A four-bar whose coupler has a negative moment, and a fifth bar on it: two freedoms."""
-    m = eg.Model("five", gravity=(0, -G, 0), check_inertia="note")
-    m.input("tau")
-    a, b, c, d = (m.body(n, mass=1, com=(0.1, 0, 0), inertia={"zz": I if n == "b" else 0.02}) for n in "abcd")
-    m.revolute("A", m.ground, a, coordinate="theta")
-    m.revolute("B", a.at(0.2, 0, 0), b, coordinate="bend")
-    m.revolute("C", b.at(0.5, 0, 0), c.at(0.4, 0, 0))
-    m.revolute("D", m.ground.at(0.5, 0, 0), c, coordinate="psi")
-    m.revolute("E", b.at(0.25, 0.1, 0), d, coordinate="swing")
-    m.torque("motor", "A", "tau")
-    m.guess(theta=1.0, bend=-0.7, psi=1.1)
-    m.initial(theta=1.0, swing=0.4)
-    return m
-
-
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize(
-    "build", [lambda: double_pendulum(-0.2, check_inertia="off"), lambda: five_bar(-2.0)], ids=["tree", "loop"]
-)
-def test_jacobian_and_linearize_are_exact(build: Any, target: str) -> None:
-    module = build().compile(target=target, **({"optimize": 0} if target == "cython" else {}))
-    x = module.project(module.x0() + np.linspace(0.1, 0.4, module.n_x) * (0.1 if module.n_c else 1.0))
-    q, v = x[: module.n_q], x[module.n_q :]
-    sizes = np.linalg.eigvalsh(module.embedded_mass_matrix(q))
-    assert sizes[0] < -1e-3
-    assert sizes[-1] > 1e-3
-    # the equations of motion by multipliers, with NumPy
-    M, C_q = module.mass_matrix(q), module.constraint_jacobian(q)
-    m = len(C_q)
-    ahead = [module.constraint_jacobian(q + k * 1e-5 * v) for k in (1, -1)]
-    rate = (ahead[0] - ahead[1]) / 2e-5
-    K = np.block([[M, C_q.T], [C_q, np.zeros((m, m))]])
-    expected = np.linalg.solve(K, np.concatenate([-module.bias(0.0, x), -rate @ v]))[: module.n_v]
-    np.testing.assert_allclose(module.rhs(0.0, x)[module.n_q :], expected, rtol=1e-6 if m else 1e-10)
-    J = module.jacobian(0.0, x)
-    np.testing.assert_allclose(J, differences(lambda y: module.rhs(0.0, y), x), atol=1e-8 * np.abs(J).max())
-    by_input = module.input_jacobian(0.0, x)[:, 0]
-    given = [module.rhs(0.0, x, u=[tau]) for tau in (1.0, -1.0)]
-    np.testing.assert_allclose(by_input, (given[0] - given[1]) / 2, rtol=1e-9, atol=1e-9)
-    linear = module.linearize(x)
-    assert np.isfinite(linear.eigenvalues).all()
-    if not m:
-        np.testing.assert_allclose(linear.A, J, atol=1e-12)
-    else:
-        assert linear.A.shape == (4, 4)
-        free = module.minimal
-        z = np.concatenate([linear_part(module, x, linear.states)])
-        slope = differences(lambda y: free.rhs(0.0, y), z, 1e-4)
-        np.testing.assert_allclose(linear.A, slope, atol=1e-5 * np.abs(slope).max())
-
-
-def linear_part(module: Any, x: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    return x[[module.x_names.index(name) for name in names]]
-
-
 def test_it_must_be_asked_for() -> None:
     with pytest.raises(eg.ModelError, match="moment about the centre of mass is -0.2.*check_inertia"):
         double_pendulum(-0.2).check()
@@ -133,6 +69,27 @@ def test_it_must_be_asked_for() -> None:
     m.revolute("A", m.ground, m.body("b", mass=1, com=(0.5, 0, 0), inertia={"zz": -0.4}, check_inertia=False))
     module = m.compile(target="numpy")  # the body's own word is enough
     assert module.rhs(0.0, [0.3, 0.0])[1] == pytest.approx(-0.5 * G * np.cos(0.3) / (0.25 - 0.4))
+
+
+# -- Lengths far apart -------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("ratio", "kept"), [(1e4, 7), (1e6, 3)])
+def test_check_says_how_many_digits_are_lost(ratio: float, kept: int) -> None:
+    """A first rod that is so short leaves that many; free bodies keep them all."""
+    m = eg.Model("chain", gravity=(0, -9.81, 0))
+    above: Any = m.ground
+    for k, length in enumerate((1 / ratio, 1.0)):
+        rod = m.body(f"b{k}", mass=1, com=(length / 2, 0, 0), inertia={"zz": length**2 / 12})
+        m.revolute(f"q{k}", above, rod)
+        above = rod.at(length, 0, 0)
+    (note,) = (note for note in m.check().notes if "digits" in note)
+    assert f"rounding leaves about {kept} of 16 digits of the accelerations" in note
+    assert "newton_euler and amalgamated keep all digits" in note
+    x = np.array([0.3, 0.7, 1.0, -2.0])
+    found = [m.compile(method, target="numpy", kernels=["rhs"]).rhs(0.0, x)[2:]
+             for method in ("embedding", "newton_euler", "amalgamated")]  # fmt: skip
+    size = np.abs(found[1]).max()
+    assert np.abs(found[2] - found[1]).max() < 1e-13 * size
+    assert 10.0 ** -(kept + 3) < np.abs(found[0] - found[1]).max() / size < 10.0 ** (1 - kept)
 
 
 # -- Lengths by a hair -------------------------------------------------------------------------------------------------

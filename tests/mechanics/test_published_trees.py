@@ -212,21 +212,6 @@ def test_equations_after_the_change_of_coordinates(equations: Callable[..., Any]
     assert same_in_symbols(CHANGE.T * in_absolute_angles(eqs.force), book("force"))
 
 
-def test_equations_from_the_lagrangian_in_absolute_angles() -> None:
-    l2, c2, c3, m2, m3, I2, I3, g, tau2, tau3 = sympy.symbols("l2 c2 c3 m2 m3 I2 I3 g tau2 tau3")
-    r2, r3 = sympy.symbols("th2_dot th3_dot")
-    T = (I2 + m2 * c2**2 + m3 * l2**2) * r2**2 / 2 + (I3 + m3 * c3**2) * r3**2 / 2
-    T += m3 * l2 * c3 * sympy.cos(th2 - th3) * r2 * r3
-    V = (m2 * c2 + m3 * l2) * g * sympy.sin(th2) + m3 * g * c3 * sympy.sin(th3)
-    model = eg.Model.from_lagrangian(
-        "book", T - V, [th2, th3], forces={th2: tau2 - tau3, th3: tau3}, inputs={tau2: 0, tau3: 0}
-    )
-    eqs = model.derive()
-    rates = {r2: w2, r3: w3}
-    assert same_in_symbols(eqs.mass_matrix.subs(rates), book("mass_matrix"))
-    assert same_in_symbols(eqs.force.subs(rates), book("force"))
-
-
 @pytest.mark.parametrize("method", BY)
 def test_compiled_outputs_equal_the_book(module: Callable[..., Any], method: str) -> None:
     mod = module("two_link_manipulator", method)

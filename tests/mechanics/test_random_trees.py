@@ -155,6 +155,7 @@ def mujoco_text(made: Random) -> str:
     return f'<mujoco><option gravity="{gravity}"/><compiler angle="radian"/><worldbody>{roots}</worldbody></mujoco>'
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("method", ["embedding", "lagrange"])
 def test_an_arm_of_hinges_and_slides_equals_mujoco(method: str) -> None:
     made = random_model(2, bodies=5, types=("revolute", "prismatic"))

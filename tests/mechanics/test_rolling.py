@@ -256,54 +256,6 @@ def test_accelerations_of_kane_and_levinson(method: str) -> None:
     np.testing.assert_allclose(found[1::2], case["omega_dot"], rtol=1e-10)
 
 
-def lopsided_ball(**rolling: Any) -> eg.Model:
-    m = eg.Model("lopsided_ball", gravity=(0.4, -0.3, -9.81))
-    body = m.body("body", mass=MASS, com=(0.01, 0.02, -0.03), inertia=INERTIA)
-    base = m.ground.at(0.1, 0.2, 0.3, rpy=(0.1, -0.2, 0.3))
-    m.free("fly", m.ground, body, sequence="zxy")
-    m.rolling("roll", body.at(0.01, 0, 0, rpy=(0.2, 0.3, -0.1)), base, **rolling)
-    m.guess(fly_z=0.4)
-    return m
-
-
-SAME = {
-    "sphere": (
-        {"shape": "sphere", "radius": 0.1},
-        {"shape": "ellipsoid", "semi_axes": (0.1, 0.1, 0.1)},
-        {"shape": "convex", "support": "0.1"},
-        {"shape": "convex", "support": "0.1*sqrt(nx**2 + ny**2 + nz**2)"},
-    ),
-    "disc": (
-        {"radius": 0.1, "tube": 0.02},
-        {"shape": "convex", "support": "0.02 + 0.08*sqrt(nx**2 + ny**2)"},
-        {"shape": "convex", "support": "0.02 + 0.08*sqrt(1 - nz**2)"},
-    ),
-    "spheroid": (
-        {"shape": "ellipsoid", "semi_axes": (0.1, 0.1, 0.06)},
-        {"shape": "convex", "support": "sqrt(0.01 - 0.0064*nz**2)"},
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", SAME)
-def test_the_same_body_in_other_words(kind: str) -> None:
-    """Height, slip, reactions and accelerations; a formula may go on beyond unit vectors in any way."""
-    mods = [lopsided_ball(**rolling).compile(target="numpy") for rolling in SAME[kind]]
-    rng = np.random.default_rng(8)
-    for _ in range(5):
-        values = {name: rng.uniform(-0.6, 0.6) for name in mods[0].q_names if name not in ("fly_z",)}
-        values |= {name: rng.uniform(-2, 2) for name in ("fly_yaw_dot", "fly_roll_dot") if name in mods[0].v_names}
-        x = mods[0].x0(**values)
-        x[mods[0].n_q :] = rng.standard_normal(mods[0].n_v)
-        x = mods[0].project(x)
-        rates = [mod.rhs(0.0, x) for mod in mods]
-        assert np.abs(rates[0]).max() > 1
-        for one in rates[1:]:
-            np.testing.assert_allclose(one, rates[0], rtol=1e-9, atol=1e-9)
-        for one in mods[1:]:
-            np.testing.assert_allclose(one.jacobian(0.0, x), mods[0].jacobian(0.0, x), rtol=1e-7, atol=1e-6)
-
-
 @pytest.mark.parametrize(
     ("keys", "place", "told"),
     [

@@ -146,16 +146,6 @@ def test_the_error_is_that_of_the_closed_equation(n: int, method: str) -> None:
         assert found.passes == 10
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("method", ["DOP853", "Radau"])
-@pytest.mark.parametrize("n", [1, 2, 10])
-def test_so_it_is_at_every_tolerance(n: int, method: str) -> None:
-    for rtol in TOLERANCES:
-        found = compare(compiled(n), Motion(n), n, method, rtol)
-        assert found.factor <= FACTOR, (rtol, found)
-        assert found.passes == 10
-
-
 @pytest.mark.parametrize(("target", "method"), [("cython", "DOP853"), ("cython", "Radau"), ("cython", "LSODA")])
 def test_change_points_are_those_of_the_run_not_of_the_times_stored(target: str, method: str) -> None:
     """The loop in C, SciPy's over C, SciPy's over NumPy."""

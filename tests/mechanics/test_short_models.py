@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import models
@@ -105,40 +104,3 @@ def test_arm() -> None:
 
     found = [rates["biceps_activation"], rates["triceps_activation"]]
     assert found == pytest.approx([published(0.8, 0.3), published(0.05, 0.1)], rel=1e-13)
-
-
-# -- A half car and a leg ----------------------------------------------------------------------------------------------
-@cache
-def compiled(name: str) -> tuple[Any, dict[str, float]]:
-    mod = eg.load(models.EXAMPLES / f"{name}.yaml").compile(target="numpy")
-    return mod, dict(zip(mod.p_names, mod.p.tolist(), strict=True))
-
-
-def test_a_half_car_has_the_eigenvalues_of_its_matrices() -> None:
-    """M z'' + C z' + K z = 0 of bounce, pitch (nose down) and both wheels"""
-    mod, p = compiled("half_car")
-    a, b = p["a"], p["b"]
-    front, rear = np.array([1, -a, -1, 0]), np.array([1, b, 0, -1])  # how far the springs are stretched
-    M = np.diag([p["m"], p["I"], p["m_u"], p["m_u"]])
-    K = p["k_f"] * np.outer(front, front) + p["k_r"] * np.outer(rear, rear) + np.diag([0, 0, p["k_t"], p["k_t"]])
-    C = p["c_f"] * np.outer(front, front) + p["c_r"] * np.outer(rear, rear)
-    system = np.block([[np.zeros((4, 4)), np.eye(4)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
-    assert list(mod.q_names) == ["z", "theta", "z_f", "z_r"]
-    level = np.zeros(8)
-    flat = mod.bind(p={"h": 0.0})
-    assert flat.rhs(0.0, level) == pytest.approx(np.zeros(8), abs=1e-10)  # the springs bear the weight
-    found, expected = np.linalg.eigvals(flat.jacobian(0.0, level)), np.linalg.eigvals(system)
-    for value in expected:
-        assert np.abs(found - value).min() < 1e-9 * abs(value)
-    wheels = [np.sqrt((p["k_t"] + k) / p["m_u"]) for k in (p["k_f"], p["k_r"])]  # the chassis stands still
-    assert np.sort(np.abs(found))[-4::2] == pytest.approx(np.sort(wheels), rel=0.01)
-
-
-def test_a_leg_has_the_mass_matrix_of_the_gait_model() -> None:
-    """The right leg's block of tests/reference/gait2d_autolev.json, whose accelerations are those of Autolev's code."""
-    case = models.reference("gait2d_autolev")["cases"][0]
-    mod, _ = compiled("gait_leg")
-    trunk, *leg = case["q"][2:6]
-    q = np.array([leg[0] + trunk, leg[1], leg[2]])
-    expected = np.array(case["mass_matrix_own"])[3:6, 3:6]
-    assert mod.mass_matrix(q) == pytest.approx(expected, rel=1e-12)

@@ -55,6 +55,7 @@ def test_chosen_coordinates_may_move_others_fast() -> None:
         slides({"x": 1, "y": 3e-9}).compile(target="numpy", independent=["x", "z"], kernels=kernels)
 
 
+@pytest.mark.quick
 def test_rows_that_repeat_earlier_ones_are_redundant() -> None:
     a, b = {"x": 1, "z": 2}, {"x": 0.3, "y": 0.2, "z": 0.6}
     report = slides(a, {"x": 3, "z": 6}, b, "x + 2*z - 2*(0.3*x + 0.2*y + 0.6*z)").check()
