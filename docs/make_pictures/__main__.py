@@ -15,6 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import plotted  # noqa: F401
 from PIL import Image
+
 from tools import DOCS, PICTURES
 
 LARGEST = 60_000  #: bytes of one picture

@@ -9,9 +9,9 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
-from tools import example, of_page, panels, picture
 
 import eomgen as eg
+from tools import example, of_page, panels, picture
 
 
 @picture

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
-from tools import DOCS, example, panels, picture
 
 import eomgen as eg
+from tools import DOCS, example, panels, picture
 
 
 @picture

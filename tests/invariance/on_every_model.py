@@ -1,6 +1,6 @@
 """A plugin of pytest: every model that the chosen tests compile is compared with variants of itself.
 
-``PYTHONPATH=tests python -m pytest -p invariance.on_every_model tests/mechanics`` ends with a table of breaches; the tests
+``PYTHONPATH=tests python -m pytest -p invariance.on_every_model tests/mechanics`` ends with a table of breaches; tests
 themselves run as always.  The published cases are models of such tests.
 """
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import distribution
 from pathlib import Path
 
 import numpy as np
@@ -58,8 +57,7 @@ def test_a_disc_that_spins_on_a_turning_arm(tmp_path: Path) -> None:
 
 
 def test_a_robot_turns_as_pinocchio_says() -> None:
-    robots = distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots")
-    path = Path(str(robots)) / "panda_description" / "urdf" / "panda.urdf"
+    path = EXAMPLES / "panda_description" / "urdf" / "panda.urdf"
     m = eg.load(path, lock=["panda_finger_joint1", "panda_finger_joint2"])
     for name in NAMES:
         m.output(name, f"{name}(panda_link6)")

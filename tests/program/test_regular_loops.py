@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 import eomgen as eg
+from benchmarks.large_loops import closed_chain
 from benchmarks.large_loops import four_bars as four_bars_in_a_row
+from benchmarks.linkages import n_four_bar
 from benchmarks.loop_robots import ROBOTS
 from eomgen import pipeline
 from eomgen.graph.count import count
@@ -20,8 +22,6 @@ from eomgen.limits.constraints import NEARBY
 from eomgen.limits.crossings import NEAR
 from eomgen.program import regular_loops, straight_loops
 from eomgen.program.block_groups import REGULAR, USUAL
-from tests.kinematics.test_row_groups import closed_chain
-from tests.mobility.test_n_four_bar import n_four_bar
 
 KERNELS = ("rhs", "project", "constraints", "constraint_jacobian", "velocity_constraints")
 
