@@ -18,6 +18,7 @@ from .traverse import LEAVES
 
 #: Of a node, as bits: it need not be Lipschitz; it may jump.  From ROOT on, a bit for each root that may vanish in it.
 ROUGH, JUMPS, ROOT = 1, 2, 4
+_SUMS = ("mul", "add", "sub")
 _INFINITE = ("asin", "acos", "acosh")  #: with slopes that are infinite at the ends of their domain
 
 
@@ -37,10 +38,22 @@ class Roots:
     def look(self, g: Graph) -> None:
         """Take in the nodes that came since."""
         found, poles = self.of, self._poles
-        for i in range(self._seen, len(g.nodes)):
-            operation, *operands = g.nodes[i]
+        bits_of, pole_of, nodes = found.get, poles.get, g.nodes
+        for i in range(self._seen, len(nodes)):
+            node = nodes[i]
+            operation = node[0]
+            if operation in _SUMS:  # most nodes
+                if found:
+                    first, second = node[1], node[2]
+                    pole = (pole_of(first, 0) | pole_of(second, 0)) if poles else 0
+                    if bits := (bits_of(first, 0) | bits_of(second, 0)) & ~pole:
+                        found[i] = bits
+                    if pole:
+                        poles[i] = pole
+                continue
             if operation in LEAVES:
                 continue
+            operands = node[1:]
             bits, pole = _of_operation(g, operation, operands), 0
             if bits & ROOT:
                 self.own[i] = ROOT << len(self.own)

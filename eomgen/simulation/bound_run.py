@@ -70,7 +70,7 @@ class Run:
         from .stalling import StallCheck
 
         first, kept = self._first
-        return StallCheck(*first, partial(_troubled, self.module), self.watched(None), kept)
+        return StallCheck(*first, partial(_troubled, self.module), lambda t, x: self.watched(None)(t, x), kept)
 
     def look(self, t: float, x: Array, steps: int = 1) -> None:
         """Take note of further steps."""
