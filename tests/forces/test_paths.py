@@ -1,20 +1,21 @@
-"""Paths over via points and around cylinders: lengths, loads, pulleys; judged by closed forms, SymPy and a search."""
+"""Paths over via points and around cylinders, with friction or not; judged by closed forms, SymPy and a search."""
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-import force_bench as bench
+import force_judges as bench
 import judges
+import models
 import numpy as np
 import pytest
-from force_bench import Seen, Wrench
+from force_judges import Seen, Wrench, differences, problems
 from scipy.optimize import minimize
+from sympy.physics.mechanics import Point, ReferenceFrame
+from sympy.physics.mechanics.wrapping_geometry import WrappingCylinder
 
 import eomgen as eg
-from eomgen.errors import ModelError, NonFiniteError
 
 
 def test_a_spring_over_a_via_point_of_a_third_place(tmp_path: Path) -> None:
@@ -95,9 +96,6 @@ def test_lengths_against_geometry_and_a_search(sense: str) -> None:
 
 def test_a_geodesic_of_sympy() -> None:
     """Both ends on the cylinder: SymPy's own WrappingCylinder."""
-    from sympy.physics.mechanics import Point, ReferenceFrame
-    from sympy.physics.mechanics.wrapping_geometry import WrappingCylinder
-
     N, O = ReferenceFrame("N"), Point("O")
     cylinder = WrappingCylinder(0.2, O, N.z)
     ends = []
@@ -146,8 +144,7 @@ def test_loads_of_a_wrapped_path_by_virtual_work(sense: str, tmp_path: Path) -> 
         for mod in (embedded, lagrange):
             found = bare.bias(0.0, x) - mod.bias(0.0, x)
             assert np.abs(found - expected).max() <= 1e-8 * np.abs(expected).max()
-            rhs = partial(mod.rhs, 0.0)
-            slopes = np.stack([judges.first(rhs, x, d, h=1e-5) for d in np.eye(24)], axis=1)
+            slopes = bench.fine_differences(mod, x, 1e-5)
             assert np.abs(mod.jacobian(0.0, x) - slopes).max() <= 1e-6 * np.abs(slopes).max()
     assert 2 <= wrapped <= 11
 
@@ -155,7 +152,6 @@ def test_loads_of_a_wrapped_path_by_virtual_work(sense: str, tmp_path: Path) -> 
 def test_the_length_has_no_kink_where_the_string_lifts_off() -> None:
     """Sliding the end past the tangent: the slope is the same on both sides."""
     r = 0.3
-    mod = string((-1.0, r, 0), (0.0, 0.0, 0), r, "negative")
     # the end moves along y = const: at x = 1, y = r the string is straight and just touches
     m = eg.Model("lift")
     body = m.body("b", mass=1)
@@ -174,7 +170,7 @@ def test_an_end_inside_the_cylinder_is_an_error_that_names_the_element() -> None
     m.spring("cord", m.ground.at(-1, 0, 0), body, stiffness=1, via=[{"around": m.ground, "radius": 0.3}])
     mod = m.compile(target="numpy")
     assert np.isfinite(mod.rhs(0.0, np.array([0.4, 0.0]))).all()
-    with pytest.raises(NonFiniteError, match="the loads of cord are not"):
+    with pytest.raises(eg.NonFiniteError, match="the loads of cord are not"):
         mod.rhs(0.0, np.array([0.2, 0.0]))
 
 
@@ -209,8 +205,6 @@ def test_atwoods_machine() -> None:
 
 def test_a_muscle_over_a_joint_reproduces_the_published_arm() -> None:
     """An arm on a lever with biceps and triceps (SymPy's tutorial), the triceps wrapped around the elbow."""
-    import models
-
     given = models.reference("muscle_lever_sympy")
     p = given["parameters_SI"]
     lA, lC, lD, r = p["lA"], p["lC"], p["lD"], p["r"]
@@ -269,9 +263,7 @@ def test_faults_of_paths_are_told_by_place() -> None:
     m.element("e2", m.ground, b, law="k*angle")
     m.parameter("rate", 1)
     m.element("e3", m.ground, b, law="rate")
-    with pytest.raises(ModelError) as error:
-        m.mechanism()
-    told = {p.path: f"{p.message}; {p.remedy}" for p in error.value.problems}
+    told = problems(m)
     assert "follows another cylinder" in told["forces.k1.via[1]"]
     assert told["forces.k2.via[0].radius"].startswith("is -0.1")
     assert "allowed: positive, negative" in told["forces.k2.via[0].sense"]
@@ -280,3 +272,108 @@ def test_faults_of_paths_are_told_by_place() -> None:
     assert "a joint's coordinate has no path" in told["forces.a1.via"]
     assert "unknown name 'angle'" in told["forces.e2.law"]
     assert "'rate' is a variable of the element and also the parameter at parameters.rate" in told["forces.e3.law"]
+
+
+G, MU, R = 9.81, 0.25, 0.1
+
+
+def band(sense: str = "positive", target: str = "numpy", **keys: Any) -> Any:
+    """A drum with a band of half a turn about it, whose ends are held by sledges that move along y."""
+    m = eg.Model("band", gravity=(0, 0, 0))
+    drum = m.body("drum", mass=1, inertia={"zz": 0.01})
+    m.revolute("turn", m.ground, drum)
+    x = R if sense == "positive" else -R
+    for name, at in (("a", x), ("b", -x)):
+        m.body(name, mass=2.0)
+        m.prismatic(name, m.ground.at(at, -1, 0), name, axis="y")
+    rope = {"around": drum, "radius": R, "sense": sense, "friction": MU, "smoothing": 0.001, **keys}
+    rope = {key: value for key, value in rope.items() if value is not None}
+    m.actuator("rope", "a", "b", value=-50.0, via=[rope])
+    return m.compile(target=target)
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+@pytest.mark.parametrize("sense", ["positive", "negative"])
+def test_a_band_brake(target: str, sense: str) -> None:
+    """T_a / T_b = exp(mu pi) where the drum turns one way, exp(-mu pi) the other; the drum feels the difference."""
+    mod = band(sense, target)
+    for spin in (3.0, -3.0):
+        x = np.array([0.0, 0.0, 0.0, spin, 0.0, 0.0])
+        drum, a, b = mod.rhs(0.0, x)[3:]
+        assert 2 * a == pytest.approx(50.0, rel=1e-12)  # the pull at the first end is the given one
+        along = spin if sense == "positive" else -spin  # the surface runs from a to b, and so drags the rope to b
+        assert 2 * b == pytest.approx(50.0 * np.exp(-MU * np.pi * np.sign(along)), rel=1e-9)
+        brake = R * abs(2 * a - 2 * b)
+        assert 0.01 * drum == pytest.approx(-np.sign(spin) * brake, rel=1e-9)
+    rest = mod.rhs(0.0, np.zeros(6))
+    np.testing.assert_allclose(rest[3:], [0, 25, 25], atol=1e-12)
+
+
+def test_the_smoothed_ratio() -> None:
+    """exp(mu pi tanh(v / smoothing)) of the slip v, and 1 where the rope runs with the drum."""
+    mod = band()
+    for c in (-2e-3, -3e-4, 4e-4, 1.5e-3):  # a goes down, b up
+        for spin in (0.0, 0.004):
+            x = np.array([0.0, 0.0, 0.0, spin, -c, c])
+            _, a, b = mod.rhs(0.0, x)[3:]
+            slip = c + spin * R  # toward a
+            assert np.log(a / b) == pytest.approx(MU * np.pi * np.tanh(slip / 0.001), rel=1e-9)
+
+
+def test_two_weights_over_a_fixed_drum() -> None:
+    """They move where their ratio is above exp(mu pi), with (m1 - m2 e) g / (m1 + m2 e)."""
+    ratio = np.exp(MU * np.pi)
+    for m1 in (1.05 * ratio, 0.95 * ratio):
+        m = eg.Model("atwood", gravity=(0, -G, 0))
+        for name, at, mass in (("a", R, m1), ("b", -R, 1.0)):
+            m.body(name, mass=mass)
+            m.prismatic(name, m.ground.at(at, -1, 0), name, axis="y")
+        drum = {"around": m.ground, "radius": R, "friction": MU, "smoothing": 1e-4}
+        length = 2.0 + np.pi * R
+        m.spring("rope", "a", "b", stiffness=1e5, length=length, via=[drum])
+        m.damper("inner", "a", "b", damping=50.0, via=[{"around": m.ground, "radius": R}])
+        mod = m.compile()
+        start = {"a": -m1 * G / 2e5, "b": -m1 * G / 2e5}
+        times = [0.0, 0.2, 0.6]
+        traj = mod.simulate(0.6, initial=start, method="Radau", rtol=1e-8, atol=1e-11, t_eval=times)
+        gained = (traj["a_dot"][2] - traj["a_dot"][1]) / 0.4
+        if m1 > ratio:
+            assert -gained == pytest.approx((m1 - ratio) * G / (m1 + ratio), rel=2e-2)
+        else:
+            creep = 1e-4 * np.arctanh(np.log(m1) / (MU * np.pi))
+            assert -traj["a_dot"][2] == pytest.approx(creep, rel=1e-3)
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_slopes_and_a_helix(target: str) -> None:
+    """A rope that climbs turns less: mu w cos(pitch); the Jacobian is that of rhs."""
+    m = eg.Model("helix", gravity=(0, 0, 0))
+    m.parameter("mu", 0.2)
+    b = m.body("b", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    m.translational("j", m.ground.at(-R, -1, 0.7), b)
+    drum = {"around": m.ground, "radius": R, "friction": "mu", "smoothing": 0.01}
+    m.actuator("rope", m.ground.at(R, -1, 0), b, value=-10.0, via=[drum])
+    mod = m.compile(target=target)
+    pitch = np.arctan2(0.7, 2.0 + np.pi * R)
+    x = np.array([0, 0, 0, 0, -1.0, 0.0])
+    pull = np.linalg.norm(mod.rhs(0.0, x)[3:])
+    slip = 0.5 * np.cos(pitch)  # half of the rate of the end, as the other end stands still
+    wanted = 10 * np.exp(0.2 * np.pi * np.cos(pitch) * np.tanh(slip / 0.01))
+    assert pull == pytest.approx(wanted, rel=1e-9)
+    x = np.array([0.01, 0.02, -0.03, 4e-3, -6e-3, 3e-3])
+    found = mod.jacobian(0.0, x)
+    np.testing.assert_allclose(found, differences(mod, x), rtol=1e-5, atol=1e-6 * np.abs(found).max())
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"friction": -0.1}, r"via\[0\].friction: is -0.1; must be 0 or greater"),
+        ({"smoothing": 0}, r"via\[0\].smoothing: is 0; must be greater than 0"),
+        ({"frction": 1}, "frction"),
+        ({"smoothing": None}, "give friction and smoothing together"),
+    ],
+)
+def test_what_is_wrong_with_a_rubbing_cylinder_is_told(keys: dict[str, Any], told: str) -> None:
+    with pytest.raises(eg.ModelError, match=told):
+        band(**keys)

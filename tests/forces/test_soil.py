@@ -1,19 +1,25 @@
-"""Soil under plates: sinkage, unloading and shear against closed forms and published examples of Wong."""
+"""Soil under plates and wheels: sinkage, unloading, shear, drawbar against closed forms and published numbers."""
 
 from __future__ import annotations
 
+import itertools
+import json
 import math
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from force_judges import differences, problems
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
+from scipy.special import beta
 
 import eomgen as eg
-from eomgen.errors import ModelError
-from eomgen.forces.soils import SOILS
 
-G = 9.81
+G, INCH, POUND = 9.81, 0.0254, 4.4482216152605
+PSI = POUND / INCH**2
 #: The soil of Wong, Theory of Ground Vehicles (2008), example 2.3, in SI units.
 EXAMPLE = {
     "soil": "own", "sinkage_exponent": 1.6, "cohesive_modulus": 4.37e3, "frictional_modulus": 196.72e3,
@@ -44,21 +50,28 @@ def wong(z: Any, deepest: Any, k: float, n: float, rebound: float = 0.1) -> Any:
     return np.maximum(top - top / (rebound * most) * (most - z), 0.0)
 
 
-def test_table_in_two_units() -> None:
-    """Wong's table gives kc and kphi in lb and inches too; a slip of a digit in one of them would show."""
-    imperial = {  # kc lb/in^(n+1), kphi lb/in^(n+2), c lb/in^2
-        "dry_sand": (0.1, 3.9, 0.15), "sandy_loam_15": (2.3, 16.8, 0.25), "sandy_loam_22": (7, 3, 0.2),
-        "sandy_loam_michigan_11": (11, 6, 0.7), "sandy_loam_michigan_23": (15, 27, 1.4),
-        "sandy_loam_hanamoto_26": (5.3, 6.8, 2.0), "sandy_loam_hanamoto_32": (0.7, 1.2, 0.75),
-        "clayey_soil_38": (12, 16, 0.6), "clayey_soil_55": (7, 14, 0.3), "heavy_clay_25": (45, 140, 10),
-        "heavy_clay_40": (7, 10, 3), "lean_clay_22": (45, 120, 10), "lean_clay_32": (5, 10, 2),
+def test_table_of_soils_in_imperial_units() -> None:
+    """Wong's table gives n, kc, kphi and c in lb and inches too; a slip of a digit in one of them would show."""
+    imperial = {  # n, kc lb/in^(n+1), kphi lb/in^(n+2), c lb/in^2
+        "dry_sand": (1.1, 0.1, 3.9, 0.15), "sandy_loam_15": (0.7, 2.3, 16.8, 0.25), "sandy_loam_22": (0.2, 7, 3, 0.2),
+        "sandy_loam_michigan_11": (0.9, 11, 6, 0.7), "sandy_loam_michigan_23": (0.4, 15, 27, 1.4),
+        "sandy_loam_hanamoto_26": (0.3, 5.3, 6.8, 2.0), "sandy_loam_hanamoto_32": (0.5, 0.7, 1.2, 0.75),
+        "clayey_soil_38": (0.5, 12, 16, 0.6), "clayey_soil_55": (0.7, 7, 14, 0.3), "heavy_clay_25": (0.13, 45, 140, 10),
+        "heavy_clay_40": (0.11, 7, 10, 3), "lean_clay_22": (0.2, 45, 120, 10), "lean_clay_32": (0.15, 5, 10, 2),
     }  # fmt: skip
-    pound, inch = 4.4482216, 0.0254
-    for name, (kc, kphi, c) in imperial.items():
-        soil = SOILS[name]
-        assert soil.cohesive == pytest.approx(kc * pound / inch ** (soil.exponent + 1), rel=0.1), name
-        assert soil.frictional == pytest.approx(kphi * pound / inch ** (soil.exponent + 2), rel=0.1), name
-        assert soil.cohesion == pytest.approx(c * pound / inch**2, rel=0.02), name
+    for name, (n, kc, kphi, c) in imperial.items():
+        law = {"soil": name, "lateral": False, "shear_modulus": 0.01, "friction_angle": 0.0}
+        m = plate(law, 1.0, (1.0, "w"))
+        m.parameter("w", 1.0)
+        mod, found = m.compile(target="numpy"), {}
+        for depth, width in ((1.0, 1.0), (1.0, 0.5), (2.0, 1.0)):
+            x = mod.x0(y=-depth, soil_shear_1=0.01, soil_shear_2=0.01)
+            found[depth, width] = (mod.rhs(0.0, x, p={"w": width})[2:4] + np.array([0.0, G])) / width
+        (shear, one), (_, narrow), (_, deep) = found.values()
+        assert np.log2(deep / one) == pytest.approx(n, rel=1e-9)
+        assert narrow - one == pytest.approx(kc * POUND / INCH ** (n + 1), rel=0.1), name
+        assert 2.0 * one - narrow == pytest.approx(kphi * POUND / INCH ** (n + 2), rel=0.1), name
+        assert -shear == pytest.approx(c * PSI, rel=0.02), name
 
 
 @pytest.mark.parametrize(("width", "length", "sinkage"), [(1.0, 3.6, 0.227), (0.8, 4.5, 0.226)])
@@ -81,9 +94,7 @@ def test_sinkage_of_tracks_in_a_published_example(width: float, length: float, s
 
 def test_pressed_unloaded_and_reloaded() -> None:
     """A load that rises and falls twice: the force follows the closed form of the greatest sinkage so far."""
-    soil = SOILS["clayey_soil_38"]
-    m = plate({"soil": "clayey_soil_38", "lateral": False})
-    mod = m.compile()
+    mod = plate({"soil": "clayey_soil_38", "lateral": False}).compile(optimize=0)
     load = "-500*t - (1500 + 600*t)*(1 - cos(2*pi*t))"
     times = np.linspace(0, 2, 401)
     traj = mod.simulate((0, 2), initial={"y": 1e-4}, inputs={"N": load}, t_eval=times, rtol=1e-9, atol=1e-11)
@@ -91,14 +102,14 @@ def test_pressed_unloaded_and_reloaded() -> None:
     fine = mod.simulate((0, 2), initial={"y": 1e-4}, inputs={"N": load}, rtol=1e-9, atol=1e-11)
     held = traj["soil_sinkage_1"]
     assert np.all(np.diff(held[5:]) >= -1e-10)
-    k = soil.cohesive / 0.3 + soil.frictional
+    k = 13.19e3 / 0.3 + 692.15e3  # of Wong's table
     area = 0.5 * 0.3
     applied = np.array([-500 * t - (1500 + 600 * t) * (1 - np.cos(2 * np.pi * t)) for t in times])
     states = np.array([mod.rhs(t, x, u=[0.0, a]) for t, x, a in zip(times, traj.x.T.copy(), applied, strict=True)])
     found = 100.0 * (states[:, 3] + G) - applied
     deepest = np.array([max(-fine["y"][fine.t <= t].min(initial=0.0), z[: i + 1].max()) for i, t in enumerate(times)])
     inside = z > 0
-    wanted = area * wong(z[inside], deepest[inside], k, soil.exponent)
+    wanted = area * wong(z[inside], deepest[inside], k, 0.5)
     assert np.abs(found[inside] - wanted).max() < 2e-3 * wanted.max()
     assert np.count_nonzero(z < 0.99 * deepest) > 40
     assert np.abs(found[~inside]).max(initial=0.0) < 1e-9
@@ -146,32 +157,6 @@ def test_thrust_of_a_track_against_slip() -> None:
         assert found == pytest.approx(whole * (1 - K / (slip * L) * (1 - math.exp(-slip * L / K))), rel=1e-6)
 
 
-@pytest.mark.parametrize("name", ["dry_sand", "clayey_soil_38", "lete_sand", "upland_sandy_loam_51"])
-def test_drawbar_of_a_track_on_tabulated_soils(name: str) -> None:
-    """F = (A c + W tan phi) (1 - K / (i L) (1 - exp(-i L / K))) against slip, with Wong's numbers of the soils.
-
-    K is in his table of none of them; 0.01 m of firm sand stands for the last two.
-    """
-    soil, L, width, z = SOILS[name], 2.0, 0.4, 0.03
-    K, phi = soil.shear or 0.01, math.radians(soil.angle)
-    law = {"soil": name, "lateral": False, **({} if soil.shear else {"shear_modulus": K})}
-    mod = plate(law, 500.0, (0.2, width)).compile(target="numpy")
-    names = list(mod.x_names)
-    places, shears = ([names.index(f"soil_{what}_{j}") for j in (1, 2)] for what in ("sinkage", "shear"))
-    load = 0.2 * width * (soil.cohesive / width + soil.frictional) * z**soil.exponent
-    for slip in (0.05, 0.2, 0.6):
-
-        def rates(t: float, s: np.ndarray, slip: float = slip) -> np.ndarray:
-            x = mod.x0(y=-z, x_dot=slip)
-            x[places], x[shears] = z, s[:2]
-            out = mod.rhs(0.0, x)
-            return np.array([*out[shears], -500.0 * out[2]])
-
-        found = solve_ivp(rates, (0, L), np.zeros(3), rtol=1e-9, atol=1e-10).y[2, -1] / L
-        whole = 0.2 * width * soil.cohesion + load * math.tan(phi)
-        assert found == pytest.approx(whole * (1 - K / (slip * L) * (1 - math.exp(-slip * L / K))), rel=1e-6)
-
-
 def test_shear_turns_back_within_its_strength() -> None:
     """Stress falls and rises the other way with the same modulus, and never exceeds c + p tan phi."""
     mod = plate({**EXAMPLE, "lateral": False}).compile(target="numpy")
@@ -191,6 +176,21 @@ def test_shear_turns_back_within_its_strength() -> None:
     assert back / K == pytest.approx(-1 + (1 + s) * math.exp(-0.06 / K), rel=1e-8)
 
 
+def test_exact_derivatives() -> None:
+    """Of a plate of which one point loads and the other unloads, and of wheels that roll and stand."""
+    mod = plate({"soil": "dry_sand", "dissipation": 0.5, "lateral": False}).compile(target="numpy")
+    x = mod.x0(y=-0.06, x_dot=0.3, y_dot=-0.1)
+    x[4:] = [0.004, 0.02, -0.003, 0.08]
+    cases = [(mod, x, 1e-7)]
+    for peak in ({}, {"peak_angle": PEAK}):
+        mod = wheel({**SOIL, "dissipation": 0.5, **peak}).compile(target="numpy")
+        cases += [(mod, mod.x0(j_y=R - 0.06, j_x_dot=1.0, j_y_dot=-0.05, j_3_dot=-2.4), 1e-6)]
+        cases += [(mod, mod.x0(j_y=R - 0.06), 1e-9)]
+    for mod, x, h in cases:
+        wanted = differences(mod, x, h)
+        np.testing.assert_allclose(mod.jacobian(0.0, x), wanted, rtol=1e-5, atol=1e-5 * np.abs(wanted).max())
+
+
 def test_a_lifted_plate_forgets() -> None:
     mod = plate({**EXAMPLE, "recovery": 0.02}).compile(target="numpy")
     names = list(mod.x_names)
@@ -202,222 +202,244 @@ def test_a_lifted_plate_forgets() -> None:
     assert rates[3] == pytest.approx(-G)
 
 
-@pytest.mark.parametrize("count", [2, 3, 5])
-def test_force_and_moment_of_a_tilted_plate(count: int) -> None:
-    """A linear soil: p = k z; force and moment are those of a trapezoid of pressure, whatever the number of points."""
-    m = eg.Model("tilted", gravity=(0, 0, 0))
-    body = m.body("sole", mass=10.0, inertia={"zz": 2.0})
-    m.planar("j", m.ground, body)
-    law = {**EXAMPLE, "sinkage_exponent": 1.0, "rebound": 1.0, "cohesion": 0.0, "friction_angle": 0.0}
-    shape = {"shape": "plate", "on": body, "length": 0.6, "width": 0.3, "points": count}
-    m.contacts("soil", shape, {"shape": "half_plane", "on": m.ground}, law)
-    mod = m.compile(target="numpy")
-    turn, z = 0.1, 0.06
-    rates = mod.rhs(0.0, mod.x0(j_y=-z, j_3=turn))
-    k, area = 4.37e3 / 0.3 + 196.72e3, 0.6 * 0.3
-    assert rates[4] == pytest.approx(k * z * area / 10.0, rel=1e-12)
-    moment = -k * math.sin(turn) * math.cos(turn) * 0.3 * 0.6**3 / 12
-    assert rates[5] == pytest.approx(moment / 2.0, rel=1e-12)
-
-
-@pytest.mark.parametrize("target", ["numpy", "cython"])
-def test_exact_derivatives(target: str) -> None:
-    m = eg.Model("tilted", gravity=(0, -G, 0))
-    phi = m.parameter("phi", 0.5)
-    body = m.body("sole", mass=10.0, inertia={"zz": 2.0})
-    m.planar("j", m.ground, body)
-    shape = {"shape": "plate", "on": body, "length": 0.6, "width": 0.3}
-    law = {"soil": "dry_sand", "friction_angle": phi, "dissipation": 0.5}
-    m.contacts("soil", shape, {"shape": "half_plane", "on": m.ground}, law)
-    mod = m.compile(target=target)
-    x = mod.x0(j_y=-0.06, j_3=0.05, j_x_dot=0.3, j_y_dot=-0.1, j_3_dot=0.2)
-    x[6:] = [0.004, 0.001, 0.02, -0.003, 0.0, 0.08]  # one point loads, the other unloads
-    units, step = np.eye(len(x)), 1e-7
-    wanted = np.array([(mod.rhs(0.0, x + step * e) - mod.rhs(0.0, x - step * e)) / (2 * step) for e in units]).T
-    found = mod.jacobian(0.0, x)
-    np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-8 * np.abs(wanted).max())
-    by = (mod.rhs(0.0, x, p={"phi": 0.5 + 1e-6}) - mod.rhs(0.0, x, p={"phi": 0.5 - 1e-6})) / 2e-6
-    np.testing.assert_allclose(mod.parameter_jacobian(0.0, x)[:, 0], by, rtol=1e-7, atol=1e-8)
-
-
-def test_on_uneven_ground_and_in_turned_frames() -> None:
-    """A straight profile is a half-plane; a half-plane that is turned with gravity and plate is the same ground."""
-    flat = {"shape": "profile", "points": [[-3, 0], [0.1, 0], [3, 0]]}
-    values = []
-    for turn, ground in ((0.0, {"shape": "half_plane"}), (0.0, flat), (0.7, {"shape": "half_plane"})):
-        c, s = math.cos(turn), math.sin(turn)
-        m = eg.Model("turned", gravity=(G * s, -G * c, 0))
-        body = m.body("sole", mass=10.0, inertia={"zz": 2.0})
-        m.planar("j", m.ground, body)
-        at = m.ground.at(0, 0, 0, rpy=(0, 0, turn))
-        shape = {"shape": "plate", "on": body, "length": 0.6, "width": 0.3}
-        m.contacts("soil", shape, {**ground, "on": at}, {"soil": "dry_sand"})
-        mod = m.compile(target="numpy")
-        x = mod.x0(j_x=c * 0.2 + s * 0.05, j_y=s * 0.2 - c * 0.05, j_3=turn + 0.02)
-        v = (0.4, -0.1)
-        x[3:6] = [c * v[0] - s * v[1], s * v[0] + c * v[1], 0.1]
-        x[6:] = [0.004, 0.001, 0.02, -0.003, 0.0, 0.08]
-        rates = mod.rhs(0.0, x)
-        values.append([c * rates[3] + s * rates[4], -s * rates[3] + c * rates[4], *rates[5:]])
-    np.testing.assert_allclose(values[1], values[0], rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(values[2], values[0], rtol=1e-11, atol=1e-12)
-
-
-def test_file_and_verify(tmp_path: Any) -> None:
-    m = plate({"soil": "dry_sand", "lateral": False})
-    file = tmp_path / "plate.yaml"
-    file.write_text(m.to_yaml())
-    a, b = m.compile(target="numpy"), eg.load(file).compile(target="numpy")
-    x = a.x0(y=-0.03, x_dot=0.2)
-    x[4:] = [0.002, 0.03, 0.001, 0.05]
-    np.testing.assert_array_equal(a.rhs(0.0, x), b.rhs(0.0, x))
-    assert a.verify().ok  # the numbers of a published soil have no other units
-    assert plate({**EXAMPLE, "lateral": False}).compile(target="numpy").verify().ok
-
-
 @pytest.mark.parametrize(
     ("law", "place", "told"),
     [
         ({"soil": "dry_sent"}, "soil", "dry_sand"),
         ({"soil": "lete_sand"}, "shear_modulus", "is missing of soil: lete_sand; K is 0.01 m in firm sand"),
-        ({**EXAMPLE, "cohesion": -1.0}, "cohesion", "is -1; must be 0 or greater"),
-        ({**EXAMPLE, "shear_modulus": 0}, "shear_modulus", "is 0; must be greater than 0"),
         ({**EXAMPLE, "friction_angle": 29}, "friction_angle", "is 29; is 0 or greater and below pi/2; it is in rad"),
-        ({**EXAMPLE, "rebound": 1.5}, "rebound", "is 1.5; is above 0 and at most 1"),
         ({**EXAMPLE, "rebound": 0.2, "unloading_rise": 1e6}, "rebound", "follows from unloading_stiffness and"),
         ({**EXAMPLE, "stiffness": 1e4}, "stiffness", "is of another law than soil"),
-        ({**EXAMPLE, "friction": 0.3}, "friction", "is of another law than soil"),
         ({"soil": "own"}, "cohesion", "is missing of soil: own"),
         ({"stiffness": 1e4, "cohesion": 1e3}, "cohesion", "belongs to contacts that have soil"),
     ],
 )
-def test_what_is_wrong_is_told(law: dict[str, Any], place: str, told: str) -> None:
-    with pytest.raises(ModelError) as error:
-        plate(law).mechanism()
-    found = {p.path: f"{p.message}; {p.remedy}" for p in error.value.problems}
-    assert told in found.get(f"forces.soil.{place}", f"nothing there: {found}"), found
+def test_what_is_wrong_with_a_soil_is_told(law: dict[str, Any], place: str, told: str) -> None:
+    assert told in problems(plate(law))[f"forces.soil.{place}"]
 
 
-def test_shapes_that_do_not_lie_on_soil() -> None:
-    m = plate(EXAMPLE)
-    ground, thin = {"shape": "half_plane", "on": m.ground}, {"shape": "plate", "on": "sole", "length": 1}
-    m.contacts("wheel", {"shape": "circle", "on": "sole", "radius": 0.2}, ground, EXAMPLE)
-    m.contacts("thin", {**thin, "width": 0}, ground, EXAMPLE)
-    m.contacts("many", {**thin, "width": 1, "points": 99}, ground, EXAMPLE)
-    with pytest.raises(ModelError) as error:
-        m.mechanism()
-    told = str(error.value)
-    assert "a circle does not lie on soil" in told
-    assert "width: is 0; must be greater than 0" in told
-    assert "is 99; give a whole number from 1 to 8" in told
-    bare = plate(EXAMPLE)
-    bare.contacts("s", thin, {**ground, "on": bare.ground}, EXAMPLE)
-    with pytest.raises(ModelError, match=r"s\.first\[0\]\.width: is missing"):
-        bare.mechanism()
+R, B = 0.5, 0.3
+SOIL = {
+    "soil": "own", "sinkage_exponent": 0.8, "cohesive_modulus": 2e4, "frictional_modulus": 1.5e6,
+    "cohesion": 1e3, "friction_angle": 0.5, "shear_modulus": 0.025,
+}  # fmt: skip
+SMOOTH = {**SOIL, "cohesion": 0.0, "friction_angle": 0.0, "rebound": 1e-9}
+PEAK = (0.18, 0.32)
+WORST = 5e-4  #: Gauss's rule of 8 nodes on z^n at the edge of the arc; it is 2e-5 where n is 0.8
 
 
-def sled(initial: bool = False) -> eg.Model:
-    m = eg.Model("sled", gravity=(0, -G, 0))
-    body = m.body("sole", mass=400.0, inertia={"zz": 30.0})
+def stiffness(law: dict[str, Any]) -> float:
+    return law["cohesive_modulus"] / B + law["frictional_modulus"]
+
+
+def wheel(law: dict[str, Any], mass: Any = 300.0, ground: Any = None) -> eg.Model:
+    m = eg.Model("wheel", gravity=(0, -G, 0))
+    body = m.body("wheel", mass=mass, inertia={"zz": 20.0})
     m.planar("j", m.ground, body)
-    shape = {"shape": "plate", "on": body, "length": 1.0, "width": 0.3}
-    law = {"soil": "dry_sand", "friction_angle": m.parameter("phi", 0.5), "dissipation": 1.0, "lateral": False}
-    m.contacts("sand", shape, {"shape": "half_plane", "on": m.ground}, law)
-    if initial:
-        m.initial(j_x_dot=1.0, j_y=-0.001)
+    shape = {"shape": "circle", "on": body, "radius": R, "width": B}
+    m.contacts("soil", shape, ground or {"shape": "half_plane", "on": m.ground}, law)
     return m
 
 
-def test_runs_ensembles_and_sensitivities() -> None:
-    """The way of a sled that slides to rest: runs of an ensemble are single runs, derivatives are differences."""
-    mod = sled().compile()
-    start = {"j_x_dot": 1.0, "j_y": -0.001}
-    ends = {phi: mod.simulate(0.2, initial=start, parameters={"phi": phi}) for phi in (0.499, 0.5, 0.501)}
-    assert ends[0.5]["j_x_dot"][-1] < 0.7
-    assert ends[0.5]["sand_shear_1"][-1] > 0.005
-    many = mod.simulate_many(0.2, initial=start, parameters={"phi": [0.499, 0.501]})
-    for k, phi in enumerate((0.499, 0.501)):
-        assert np.ravel(many["j_x"])[k] == pytest.approx(ends[phi]["j_x"][-1], rel=1e-7)
-    slope = mod.sensitivities(["phi"], 0.2, initial=start)
-    wanted = (ends[0.501]["j_x"][-1] - ends[0.499]["j_x"][-1]) / 0.002
-    assert slope["j_x", "phi"][-1] == pytest.approx(wanted, rel=1e-3)
+def forces(mod: Any, depth: float, forward: float, spin: float, sink: float = 0.0) -> np.ndarray:
+    """Force along and up and the moment about z, of a wheel that rolls along x with a spin about -z."""
+    return many_forces(mod, np.array([[depth], [forward], [spin], [sink]]))[:, 0]
 
 
-def test_momentum_is_kept_and_no_plate_pulls() -> None:
-    """Two free bodies, plates on a profile: the soil's force is that on the other body, and its normal part pushes."""
-    m = eg.Model("pair", gravity=(0, 0, 0))
-    bodies = [m.body(f"b{k}", mass=2.0 + k, inertia={"zz": 0.3 + k}) for k in range(2)]
-    for k, body in enumerate(bodies):
-        m.planar(f"j{k}", m.ground, body)
-    ground = {"shape": "profile", "on": bodies[0], "points": [[-2, 0], [0, 0.1], [2, -0.1]], "depth": 0.5}
-    shape = {"shape": "plate", "on": bodies[1], "length": 0.8, "width": 0.3}
-    m.contacts("soil", ground, shape, {"soil": "dry_sand", "lateral": False})
-    mod = m.compile(target="numpy")
-    rng, pressed = np.random.default_rng(8), 0
-    for _ in range(200):
-        x = np.concatenate([rng.uniform(-0.1, 0.1, 6), rng.standard_normal(6), rng.uniform(-0.02, 0.05, mod.n_x - 12)])
-        force = -mod.bias(0.0, x)[:6]
-        if not np.abs(force).max():
-            continue
-        pressed += 1
-        size = np.abs(force).max()
-        assert np.abs(force[:2] + force[3:5]).max() <= 1e-11 * size
-        moment = x[0] * force[1] - x[1] * force[0] + force[2] + x[3] * force[4] - x[4] * force[3] + force[5]
-        assert abs(moment) <= 1e-11 * size
-        up = x[2] + math.pi / 2  # y of the ground
-        assert force[3] * math.cos(up) + force[4] * math.sin(up) > -0.6 * np.hypot(force[3], force[4])
-    assert pressed > 30
+def many_forces(mod: Any, motions: np.ndarray) -> np.ndarray:
+    """The same of many wheels at once: columns of depth, forward, spin, sink."""
+    x = np.zeros((6, motions.shape[1]))
+    names = list(mod.x_names)
+    x[[names.index(name) for name in ("j_y", "j_x_dot", "j_3_dot", "j_y_dot")]] = motions * [[-1], [1], [-1], [-1]]
+    x[names.index("j_y")] += R
+    return np.array(-mod.bias(0.0, x) + np.array([[0.0], [300.0 * G], [0.0]]))
 
 
-def test_a_plate_that_starts_sunk_has_its_memory() -> None:
-    """From 1.5 times the depth at which it stands it rises as on the line of unloading: by 2 (F - W) / (k_u A)."""
-    m = eg.Model("sunk", gravity=(0, -G, 0))
-    body = m.body("sole", mass=400.0, inertia={"zz": 30.0})
+def by_quadrature(law: dict[str, Any], depth: float, forward: float, spin: float) -> np.ndarray:
+    """The same by adaptive quadrature of the formulas of Bekker, Wong and Reece."""
+    n, K, c = law["sinkage_exponent"], law["shear_modulus"], law["cohesion"]
+    k, phi = stiffness(law), math.tan(law["friction_angle"])
+    a1 = math.acos(1 - depth / R)
+    top, drop = k * depth**n, 0.1 * depth
+    peak = None
+    if "peak_angle" in law:
+        c1, c2 = law["peak_angle"]
+        slip = abs(R * spin - forward) / max(abs(R * spin), abs(forward))
+        peak = min(a1, (c1 + c2 * slip) * a1)
+
+    def pressure(a: float) -> float:
+        if peak is not None and a < peak:
+            a = a1 - (a1 - peak) * a / peak
+        if a < 0:
+            return top - top / drop * R * (1 - math.cos(a))
+        return k * max(0.0, R * (math.cos(a) - math.cos(a1))) ** n
+
+    def shear(a: float) -> float:
+        j = R * ((a1 - a) - forward / (R * spin) * (math.sin(a1) - math.sin(a)))
+        return (c + pressure(a) * phi) * (1 - math.exp(-abs(j) / K)) * math.copysign(1, j)
+
+    ends = [-math.acos(1 - drop / R), 0.0, a1] if peak is None else [0.0, peak, a1]
+
+    def over(f: Any) -> float:
+        parts = itertools.pairwise(ends)
+        return B * R * sum(quad(f, low, high, epsabs=1e-9, epsrel=1e-11, limit=300)[0] for low, high in parts)
+
+    return np.array(
+        [
+            over(lambda a: shear(a) * math.cos(a) - pressure(a) * math.sin(a)),
+            over(lambda a: pressure(a) * math.cos(a) + shear(a) * math.sin(a)),
+            R * over(shear),
+        ]
+    )
+
+
+@pytest.mark.parametrize("n", [0.2, 0.8, 1.6])
+def test_compaction_resistance_of_bekker(n: float) -> None:
+    """R_c = b k z^(n+1) / (n+1), the work that presses a rut of the depth z; at any depth of the wheel."""
+    law = {**SMOOTH, "sinkage_exponent": n}
+    mod = wheel(law).compile(target="numpy")
+    for depth in (0.002, 0.03, 0.2):
+        along, _, moment = forces(mod, depth, 1.0, 2.0)
+        assert -along == pytest.approx(B * stiffness(law) * depth ** (n + 1) / (n + 1), rel=1e-4)
+        assert abs(moment) < 1e-6
+
+
+@pytest.mark.parametrize("n", [0.2, 0.5, 1.0, 1.6])
+def test_sinkage_of_bekker(n: float) -> None:
+    """W = b k z^n sqrt(z D) I, I = (3 - n) / 3 of Bekker, exact for n = 1; else B(1/2, n+1) / 2."""
+    law = {**SMOOTH, "sinkage_exponent": n}
+    mod = wheel(law).compile(target="numpy")
+    depth = 2e-4 * R
+    _, up, _ = forces(mod, depth, 1.0, 2.0)
+    whole = B * stiffness(law) * depth**n * math.sqrt(2 * R * depth)
+    assert up == pytest.approx(0.5 * beta(0.5, n + 1) * whole, rel=3e-4)
+    if n == 1:
+        load = up
+        sunk = (3 * load / (B * (3 - n) * stiffness(law) * math.sqrt(2 * R))) ** (2 / (2 * n + 1))
+        assert sunk == pytest.approx(depth, rel=3e-4)
+
+
+@pytest.mark.parametrize("law", [SOIL, {**SOIL, "peak_angle": PEAK}, {**SOIL, "sinkage_exponent": 0.2},
+                                 {**SOIL, "sinkage_exponent": 1.6, "shear_modulus": 0.01}])  # fmt: skip
+def test_forces_by_another_quadrature(law: dict[str, Any]) -> None:
+    mod = wheel(law).compile(target="numpy")
+    for depth in (0.01, 0.06, 0.2):
+        for slip in (-0.5, -0.1, 0.05, 0.2, 0.6):
+            forward, spin = (1.0, 1.0 / (1 - slip) / R)
+            found, wanted = forces(mod, depth, forward, spin), by_quadrature(law, depth, forward, spin)
+            np.testing.assert_allclose(found, wanted, rtol=0, atol=WORST * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("law", [SOIL, {**SOIL, "peak_angle": PEAK}])
+def test_a_wheel_that_rolls_back_is_its_mirror_image(law: dict[str, Any]) -> None:
+    mod = wheel(law).compile(target="numpy")
+    there, back = forces(mod, 0.05, 0.7, 1.9), forces(mod, 0.05, -0.7, -1.9)
+    np.testing.assert_allclose(back * [-1, 1, -1], there, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "law", [SOIL, {**SOIL, "peak_angle": PEAK}, {**SOIL, "sinkage_exponent": 0.2, "cohesion": 5e3}]
+)
+def test_no_motion_gains_energy(law: dict[str, Any]) -> None:
+    """Of random motions along the ground and spins, from creeping to rolling, slipping, locked and opposed."""
+    mod = wheel(law).compile(target="numpy")
+    rng, motions = np.random.default_rng(5), []
+    for _ in range(1500):
+        depth = rng.uniform(1e-3, 0.3)
+        forward, spin = rng.standard_normal(2) * 10 ** rng.uniform(-4, 1, 2)
+        if rng.random() < 0.5:
+            spin = forward / R * (1 + 0.1 * rng.standard_normal())
+        motions.append((depth, forward, spin, 0.0))
+    _, forward, spin, _ = rows = np.array(motions).T
+    along, _, moment = many_forces(mod, rows)
+    assert (along * forward - moment * spin < 0).all()
+
+
+@pytest.mark.parametrize("law", [SOIL, {**SOIL, "sinkage_exponent": 1.6, "rebound": 1.0}])
+def test_no_bounce_gains_energy(law: dict[str, Any]) -> None:
+    """Of random motions with a rate of sinkage: beside what the load of a wheel at rest would take, all power is lost.
+
+    That load is a function of the sinkage, so that its work of a closed cycle is 0.
+    """
+    mod = wheel(law).compile(target="numpy")
+    rng = np.random.default_rng(6)
+    for _ in range(120):
+        depth, sink = rng.uniform(1e-3, 0.3), rng.standard_normal() * 10 ** rng.uniform(-3, 1)
+        forward, spin = rng.standard_normal(2) * 10 ** rng.uniform(-3, 1, 2)
+        if rng.random() < 0.5:
+            spin = forward / R * (1 + 0.3 * rng.standard_normal())
+        along, up, moment = forces(mod, depth, forward, spin, sink)
+        rest = forces(mod, depth, 0.0, 0.0)[1]
+        size = rest * (abs(forward) + abs(sink) + R * abs(spin))
+        assert along * forward - moment * spin - (up - rest) * sink <= 1e-12 * size
+
+
+@pytest.mark.parametrize(
+    ("law", "place", "told"),
+    [
+        ({**SOIL, "peak_angle": [0.4]}, "peak_angle", "two"),
+        ({**SOIL, "peak_angle": [0, 0.3]}, "peak_angle[0]", "is 0; is above 0 and at most 1"),
+        ({**SOIL, "peak_angle": [0.4, 0.3], "rebound": 0.1}, "rebound", "is of the rear of wheels without peak_angle"),
+        ({**SOIL, "recovery": 0.1}, "recovery", "has no meaning for wheels"),
+    ],
+)
+def test_what_is_wrong_with_a_wheel_is_told(law: dict[str, Any], place: str, told: str) -> None:
+    assert told in problems(wheel(law))[f"forces.soil.{place}"]
+
+
+REFERENCE = Path(__file__).parents[1] / "reference"
+MEASURED = json.loads((REFERENCE / "ding_2011_smooth_wheel.json").read_text("utf-8"))
+RADIUS, LOAD = MEASURED["radius"], MEASURED["load"]
+PREDICTED = json.loads((REFERENCE / "wong_reece_1967_driven_wheels.json").read_text("utf-8"))["wheels"]
+
+
+def rolling(radius: float, width: float, law: dict[str, Any], speed: float) -> Callable[[float, float], np.ndarray]:
+    """Force forwards and upwards and moment on a rolling at a depth and a slip."""
+    m = eg.Model("wheel", gravity=(0, 0, 0))
+    body = m.body("b", mass=1.0, inertia={"zz": 1.0})
     m.planar("j", m.ground, body)
-    shape = {"shape": "plate", "on": body, "length": 1.0, "width": 0.3}
-    m.contacts("sand", shape, {"shape": "half_plane", "on": m.ground}, {"soil": "dry_sand", "lateral": False})
+    rim = {"shape": "circle", "on": body, "radius": radius, "width": width}
+    m.contacts("s", rim, {"shape": "half_plane", "on": m.ground}, law)
     mod = m.compile(target="numpy")
-    k, n = 0.99e3 / 0.3 + 1528.43e3, 1.1
-    deep = 1.5 * (400.0 * G / (0.3 * k)) ** (1 / n)
-    rise = 2 * (1 - 1.5**-n) * 0.1 * deep
-    traj = mod.simulate((0, 0.5), initial={"j_y": -deep}, rtol=1e-9, atol=1e-11)
-    assert traj["j_y"].max() + deep == pytest.approx(rise, rel=0.005)  # the sinkage it remembers is 1e-4 less
-    assert traj["sand_sinkage_1"][-1] == pytest.approx(deep, rel=2e-4)
-    assert traj["sand_sinkage_1"].max() <= deep * (1 + 1e-9)
+    return lambda z, slip: np.array(mod.rhs(0, [0, radius - z, 0, speed, 0, -speed / (radius * (1 - slip))]))[3:6]
 
 
-RIDGE = [[-1, -1], [-0.02, 0], [0.02, 0], [1, -1]]
+@pytest.mark.parametrize("name", PREDICTED)
+def test_published_sands_by_a_program_that_others_wrote(name: str) -> None:
+    """The soils, wheels and loads of Wong and Reece (1967), table 1; the curves are of a program made to check them."""
+    w = PREDICTED[name]
+    radius, width, n, load = w["radius"] * INCH, w["width"] * INCH, w["n"], w["load"] * POUND
+    law = {
+        "soil": "own", "sinkage_exponent": n, "cohesive_modulus": 0.0,
+        "frictional_modulus": (w["k1"] + w["k2"] * w["width"]) * PSI / width**n, "cohesion": w["cohesion"] * PSI,
+        "friction_angle": math.radians(w["friction_angle"]), "shear_modulus": w["K"] * INCH,
+        "peak_angle": [w["c1"], w["c2"]],
+    }  # fmt: skip
+    at = rolling(radius, width, law, 10.0)  # no slower than `reversal` anywhere
+    for slip, angle, pull, torque in w["curve"]:
+        z = brentq(lambda z, slip=slip: at(z, slip)[1] - load, 1e-4, 0.5 * radius, xtol=1e-13)
+        found = at(z, slip)
+        assert math.degrees(math.acos(1.0 - z / radius)) == pytest.approx(angle, rel=1e-6)
+        assert found[0] == pytest.approx(pull * POUND, abs=2e-7 * load)
+        assert found[2] == pytest.approx(torque * POUND * INCH, rel=3e-7)
 
 
-def test_a_point_below_both_sides_of_a_ridge_remembers_once() -> None:
-    """Both flanks sink by z' = v cos(turn); the point remembers that, and not twice as much."""
-    m = eg.Model("ridge", gravity=(0, 0, 0))
-    body = m.body("sole", mass=10.0, inertia={"zz": 2.0})
-    m.planar("j", m.ground, body)
-    shape = {"shape": "plate", "on": body, "length": 0.02, "width": 0.3, "points": 1}
-    ridge = {"shape": "profile", "points": RIDGE, "on": m.ground, "depth": 0.3}
-    m.contacts("soil", shape, ridge, {**EXAMPLE, "lateral": False})
-    mod = m.compile(target="numpy")
-    x = mod.x0(j_y=-0.1, j_y_dot=-0.2)
-    slope = 1 / 0.98
-    assert mod.rhs(0.0, x)[7] == pytest.approx(0.2 / math.hypot(1, slope), rel=1e-12)
+def test_pull_and_torque_against_slip() -> None:
+    """With the soil's published numbers, and c1, c2 of compact sand (Wong and Reece, 1967).
 
-
-@pytest.mark.parametrize("target", ["numpy", "cython"])
-def test_exact_derivatives_below_a_ridge(target: str) -> None:
-    m = eg.Model("ridge", gravity=(0, -G, 0))
-    body = m.body("sole", mass=10.0, inertia={"zz": 2.0})
-    m.planar("j", m.ground, body)
-    shape = {"shape": "plate", "on": body, "length": 0.04, "width": 0.3}
-    ridge = {"shape": "profile", "points": RIDGE, "on": m.ground, "depth": 0.3}
-    m.contacts("soil", shape, ridge, {"soil": "dry_sand", "dissipation": 0.5, "lateral": False})
-    mod = m.compile(target=target)
-    units = np.eye(mod.n_x)
-    for rate in (-0.1, 0.1):  # sinking, and rising from where it began
-        x = mod.x0(j_x=0.003, j_y=-0.1, j_3=0.05, j_x_dot=0.01, j_y_dot=rate, j_3_dot=0.02)
-        x[6:] = [0.004, 0.0449, -0.003, 0.0449]
-        step = 1e-7 * np.array([1, 1, 1, 1, 1, 1, 1, 1e-1, 1, 1e-1])
-        wanted = np.array(
-            [(mod.rhs(0.0, x + h * e) - mod.rhs(0.0, x - h * e)) / (2 * h) for e, h in zip(units, step, strict=True)]
-        ).T
-        np.testing.assert_allclose(mod.jacobian(0.0, x), wanted, rtol=1e-6, atol=1e-8 * np.abs(wanted).max())
+    These meet the pull best of three settings tried: without `peak_angle` it is up to 20 N off.
+    """
+    soil = dict(MEASURED["soil"])
+    law = {"soil": "own", "friction_angle": math.radians(soil.pop("friction_angle_deg")), **soil}
+    at = rolling(RADIUS, MEASURED["width"], {**law, "peak_angle": [0.43, 0.32]}, 0.2)
+    found = []
+    for slip in MEASURED["slip"]:
+        z = brentq(lambda z, slip=slip: at(z, slip)[1] - LOAD, 1e-4, 0.05)
+        found.append(at(z, slip)[[0, 2]])
+    pull, torque = np.array(found).T
+    off = pull - np.array(MEASURED["drawbar_pull"])
+    assert np.abs(off).max() < 0.13 * LOAD
+    assert np.sqrt(np.mean(off**2)) < 0.07 * LOAD
+    np.testing.assert_allclose(torque[1:], MEASURED["torque"][1:], rtol=0.16)
+    assert (np.diff(pull) > 0).all()
+    assert pull[0] < 0 < pull[1]

@@ -251,7 +251,7 @@ FAULTS = (
         "vec.cross(arm, push)",
         "vec.cross(push, arm)",
         "moment of a force at a marker has the wrong sign",
-        ("tests/forces/test_loads.py::test_a_law_by_expression_along_a_line",),
+        ("tests/forces/test_force_elements.py::test_a_law_by_expression_along_a_line",),
     ),
     Fault(
         "reversed-joint", "eomgen/kinematics/tree.py",
@@ -265,7 +265,7 @@ FAULTS = (
         "vec.add(outer.position, vec.times(outer.rotation, inner.position)),",
         "vec.add(outer.position, vec.transpose_times(outer.rotation, inner.position)),",
         "the place of a marker is turned by the transposed rotation",
-        ("tests/forces/test_loads.py::test_a_law_by_expression_along_a_line",),
+        ("tests/forces/test_force_elements.py::test_a_law_by_expression_along_a_line",),
     ),
     Fault(
         "falling-link", "eomgen/kinematics/link_axes.py",

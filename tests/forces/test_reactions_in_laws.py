@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy as sp
+from force_judges import differences, read_back
 from scipy.spatial.transform import Rotation
 
 import eomgen as eg
-from eomgen.errors import ModelError, NonFiniteError
 
 G = 9.81
-TARGETS = ("numpy", "cython")
 PARTS = ("x", "y", "z", "mx", "my", "mz")
 
 
@@ -46,7 +46,7 @@ def spatial_tree(kind: str, late: bool = True) -> eg.Model:
 
 @pytest.mark.parametrize(
     ("kind", "late"),
-    [(kind, late) for kind in KINDS for late in (True, False) if late or kind != "free"],  # free carries nothing to see
+    [*((kind, True) for kind in KINDS), ("revolute", False), ("screw", False)],
 )
 def test_outputs_are_the_reactions_of_every_kind_of_joint(kind: str, late: bool) -> None:
     """Those of ``reactions`` of the module are summed up from numbers, and without what acts along coordinates."""
@@ -93,13 +93,14 @@ def engine(text: bool) -> eg.Model:
     return m
 
 
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", ["numpy", "cython"])
 def test_loop_with_friction_as_texts(target: str) -> None:
     """The same as the element, which is held against free bodies elsewhere; multipliers are those of the module."""
     m = with_all_reactions(engine(text=True), "ABCS")
     for row in ("C.r_x", "C.r_y"):
         m.output(row.replace(".", "_"), f"multiplier({row})")
-    mod, other = m.compile(target=target), engine(text=False).compile(target="numpy")
+    options = {} if target == "numpy" else {"optimize": 0}
+    mod, other = m.compile(target=target, **options), engine(text=False).compile(target="numpy")
     x = mod.x0()
     assert mod.constraint_labels == ("C.r_x", "C.r_y")
     assert mod.rhs(0.0, x) == pytest.approx(other.rhs(0.0, other.x0()), rel=1e-12)
@@ -108,54 +109,14 @@ def test_loop_with_friction_as_texts(target: str) -> None:
     assert y[24:] == pytest.approx(mod.multipliers(0.0, x), rel=1e-11)
 
 
-@pytest.mark.parametrize("target", TARGETS)
-def test_jacobian_and_sensitivities_see_the_reaction(target: str) -> None:
-    mod = engine(text=True).compile(target=target)
-    x, h = mod.x0(), 1e-5
-    steps = [(mod.rhs(0, x + h * e) - mod.rhs(0, x - h * e)) / (2 * h) for e in np.eye(6)]
-    assert mod.jacobian(0.0, x) == pytest.approx(np.array(steps).T, rel=1e-5, abs=1e-3)
-
-
-def ladder(mu_wall: float, mu_floor: float, mass: float = 5.0, length: float = 3.0) -> eg.Model:
-    """A ladder that slides down a wall: two equations, and friction at both ends by their multipliers."""
-    m = eg.Model("ladder", gravity=(0, -G, 0))
-    rod = m.body("rod", mass=mass, inertia={"zz": mass * length**2 / 12})
-    foot, top = rod.marker("foot", at=(length / 2, 0, 0)), rod.marker("top", at=(-length / 2, 0, 0))
-    m.planar("fly", m.ground, rod)
-    m.coupling("wall", equation="x(rod.top)")
-    m.coupling("floor", equation="y(rod.foot)")
-    m.force("on_foot", foot, value=(f"-{mu_floor}*abs(multiplier(floor))*tanh(vx(rod.foot)/1e-3)", 0, 0))
-    m.force("on_top", top, value=(0, f"-{mu_wall}*abs(multiplier(wall))*tanh(vy(rod.top)/1e-3)", 0))
-    m.output("floor_force", "-multiplier(floor)")
-    m.output("wall_force", "-multiplier(wall)")
-    m.initial(fly_3=-1.0, fly_x=1.5 * np.cos(1.0), fly_y=1.5 * np.sin(1.0), fly_3_dot=0.5)
-    return m
-
-
-@pytest.mark.parametrize("target", TARGETS)
-def test_sliding_ladder(target: str) -> None:
-    """The friction of each end changes the force at the other: five equations of one free body (a textbook's)."""
-    mass, length, mu_w, mu_f = 5.0, 3.0, 0.25, 0.3
-    mod = ladder(mu_w, mu_f).compile(target=target)
+def test_jacobian_sees_the_reaction() -> None:
+    mod = engine(text=True).compile(target="numpy")
     x = mod.x0()
-    angle, rate, a = 1.0, -0.5, length / 2  # of the ladder over the floor: centre at a (cos, sin)
-    # unknown: angular acceleration of the angle, N_wall, N_floor; foot slides out (+x), top down (-y)
-    c, s = np.cos(angle), np.sin(angle)
-    ax = (-a * s, -a * c * rate**2)  # = first * alpha + second
-    ay = (a * c, -a * s * rate**2)
-    # foot at a (c, -s) from the centre with (-mu N, N), top at a (-c, s) with (N, mu N); the angle grows clockwise
-    moment = -np.array([-a * c * mu_w - a * s, a * c - a * s * mu_f])
-    A = np.array([[mass * ax[0], -1.0, mu_f], [mass * ay[0], -mu_w, -1.0], [mass * length**2 / 12, *-moment]])
-    b = np.array([-mass * ax[1], -mass * ay[1] - mass * G, 0.0])
-    alpha, wall, floor = np.linalg.solve(A, b)
-    y = dict(zip(mod.y_names, mod.outputs(0.0, x), strict=True))
-    rates = dict(zip(mod.v_names, mod.rhs(0.0, x)[mod.n_q :], strict=True))
-    assert [y["wall_force"], y["floor_force"], -rates["fly_3_dot"]] == pytest.approx([wall, floor, alpha], rel=1e-9)
+    assert mod.jacobian(0.0, x) == pytest.approx(differences(mod, x, 1e-5), rel=1e-5, abs=1e-3)
 
 
 @pytest.mark.parametrize("lead_angle", [0.1, 0.4])
-@pytest.mark.parametrize("target", TARGETS)
-def test_worm_gear_efficiency(target: str, lead_angle: float) -> None:
+def test_worm_gear_efficiency(lead_angle: float) -> None:
     """Raising needs the torque r F tan(l + p); lowering holds by itself where the angle of friction p exceeds l."""
     r, phi, load = 0.02, 0.25, 300.0
     lead = r * np.tan(lead_angle)  # of the nut for one radian
@@ -171,7 +132,7 @@ def test_worm_gear_efficiency(target: str, lead_angle: float) -> None:
     rubbing = "-abs(multiplier(thread))*tanh(turn_dot/1e-4)*(up if turn_dot > 0 else down)"
     m.torque("loss", "turn", rubbing)
     m.output("F", thread.multiplier())
-    mod = m.compile(target=target)
+    mod = m.compile(target="numpy")
     torque = r * load * np.tan(lead_angle + phi)
     turning = np.array([0.0, 0.0, 5.0, 5.0 * lead])
     assert np.abs(mod.rhs(0.0, turning, u=[torque])[2:]).max() < 1e-6  # it goes on at its speed
@@ -183,54 +144,16 @@ def test_worm_gear_efficiency(target: str, lead_angle: float) -> None:
     assert brakes == (phi > lead_angle)
 
 
-@pytest.mark.parametrize("target", TARGETS)
-def test_bead_leaves_a_sphere(target: str) -> None:
+def test_bead_leaves_a_sphere() -> None:
     """A particle that slides down a sphere from rest leaves it where the cosine is 2/3."""
     m = eg.Model("bead", gravity=(0, -G, 0))
     bead = m.body("bead", mass=0.3)
     m.revolute("A", m.ground, bead.at(0, -1.2, 0), coordinate="phi")  # the bead above the centre
     m.event("off", "reaction(A, in=bead).y", direction=-1, terminal=True)
     m.initial(phi=1e-6)
-    mod = m.compile(target=target)
+    mod = m.compile(target="numpy")
     run = mod.simulate(20.0)
     assert np.cos(run.x_events["off"][0][0]) == pytest.approx(2 / 3, rel=1e-7)
-
-
-def test_weight_on_a_rolling_ball() -> None:
-    m = eg.Model("ball", gravity=(0, 0, -G))
-    ball = m.body("ball", mass=2.0, inertia=(0.01,) * 3)
-    m.free("fly", m.ground, ball)
-    roll = m.rolling("roll", ball, radius=0.1, shape="sphere")
-    m.output("normal", -roll.multiplier("height"))
-    m.output("slip", "multiplier(roll.slip_x)")
-    m.initial(fly_z=0.1, fly_x_dot=1.0)
-    mod = m.compile(target="numpy")
-    assert mod.outputs(0.0, mod.x0()) == pytest.approx([2.0 * G, 0.0], abs=1e-9)
-
-
-def jammed(mu: float) -> eg.Model:
-    """A law that is linear in the reaction: the rod's own pin presses with mu times its force."""
-    m = eg.Model("linear", gravity=(0, -G, 0))
-    cart, mass = m.body("cart", mass=2.0), m.body("mass", mass=1.0)
-    m.prismatic("x", m.ground, cart, axis="x")
-    m.prismatic("y", cart, mass, axis="y")
-    m.torque("side", "y", f"{mu}*reaction(y).x")  # the lift follows the side force
-    m.torque("pull", "x", 3.0)
-    return m
-
-
-def test_linear_law_and_where_it_has_no_solution() -> None:
-    """reaction(y).x is 1 kg times the cart's acceleration, 3/3, whatever mu is; the lift is mu times that less g."""
-    mod = jammed(0.7).compile(target="numpy")
-    assert mod.rhs(0.0, np.zeros(4))[2:] == pytest.approx([1.0, 0.7 - G], rel=1e-13)
-    m = jammed(0.7)
-    m.torque("back", "x", "c*x*reaction(y).x")  # (2 + 1 - c x) a = 3
-    m.parameter("c", 2.0)
-    mod = m.compile(target="numpy")
-    state = np.array([1.0, 0.0, 0.0, 0.0])
-    assert mod.rhs(0.0, state)[2] == pytest.approx(3.0, rel=1e-13)
-    with pytest.raises(NonFiniteError, match="side and back depend on reactions"):
-        mod.rhs(0.0, 2 * state)
 
 
 def test_file_components_and_states(tmp_path: Path) -> None:
@@ -241,14 +164,14 @@ def test_file_components_and_states(tmp_path: Path) -> None:
     m.torque("rub", "A", "-0.01*reaction(A, in=rod.end).x*tanh(A_dot/0.01)")
     m.state("worn", "abs(A_dot)*reaction(A).normal")
     m.output("N", "reaction(A).normal")
-    m.save(tmp_path / "leg.yaml")
     x = [0.7, 1.3, 0.0]
-    mod, read = m.compile(target="numpy"), eg.load(tmp_path / "leg.yaml").compile(target="numpy")
+    again = read_back(m, tmp_path)
+    mod, read = m.compile(target="numpy"), again.compile(target="numpy")
     found = mod.rhs(0.0, x)
     assert found[2] == pytest.approx(1.3 * np.linalg.norm(mod.reactions(0.0, x)[0, :2]), rel=1e-12)
     assert read.rhs(0.0, x) == pytest.approx(found, rel=1e-15)
     whole = eg.Model("whole", gravity=(0, -G, 0))
-    whole.add(eg.load(tmp_path / "leg.yaml"), prefix="left_")
+    whole.add(again, prefix="left_")
     whole.output("left", "reaction(left.A).normal")
     both = whole.compile(target="numpy")
     assert both.rhs(0.0, x) == pytest.approx(found, rel=1e-14)
@@ -261,11 +184,9 @@ def test_file_components_and_states(tmp_path: Path) -> None:
         ("reaction(B).x", "no joint 'B'.*known: A"),
         ("reaction(A)", r"a reaction has several parts.*write reaction\(joint\).part"),
         ("reaction(A).q", "a reaction has no part 'q'"),
-        ("reaction(A, in=rod.tap).x", "'rod' has no marker 'tap'"),
         ("reaction(A, in=rod).size", "the part size does not depend on axes"),
         ("multiplier(C)", "no constraint or joint 'C'"),
         ("multiplier(A)", "'A' has no equation.*joints have equations where they close a loop"),
-        ("sin(A).x", "a dot can be used only for markers"),
     ],
 )
 def test_what_is_wrong_is_told(text: str, told: str) -> None:
@@ -273,14 +194,7 @@ def test_what_is_wrong_is_told(text: str, told: str) -> None:
     rod = m.body("rod", mass=2.0, inertia={"zz": 0.3}, com=(0.4, 0, 0))
     m.revolute("A", m.ground, rod)
     m.output("N", text)
-    with pytest.raises(ModelError, match=told):
-        m.compile(target="numpy")
-
-
-def test_a_mass_cannot_be_a_reaction() -> None:
-    m = eg.Model("mass")
-    m.revolute("A", m.ground, m.body("rod", mass="reaction(A).x", inertia={"zz": 0.3}))
-    with pytest.raises(ModelError, match=r"bodies.rod.mass: reaction\(...\) cannot be used here"):
+    with pytest.raises(eg.ModelError, match=told):
         m.compile(target="numpy")
 
 
@@ -295,7 +209,7 @@ def test_a_force_that_can_let_go_is_judged_while_it_has_let_go() -> None:
     m.torque("pull", "x", m.input("pull", -1.0))
     mod = m.compile(target="numpy")
     assert mod.rhs(0.0, np.zeros(4))[2] == pytest.approx(-0.5, rel=1e-14)
-    with pytest.raises(NonFiniteError, match="Painleve"):
+    with pytest.raises(eg.NonFiniteError, match="Painleve"):
         mod.rhs(0.0, np.array([1.5, 0.0, 0.0, 0.0]))
 
 
@@ -311,11 +225,11 @@ def door() -> eg.Model:
 
 @pytest.mark.parametrize("joint", ["h1", "h2"])  # in the tree, and cut
 def test_what_two_hinges_share_is_refused_by_name(joint: str) -> None:
-    for part in ("x", "y", "z", "mx", "my", "size", "normal"):
+    for part in ("x", "z", "my", "size"):
         m = door()
         m.output("o", f"reaction({joint}).{part}")
-        with pytest.raises(ModelError, match=rf"outputs\.o.*reaction\({joint}\)\.{part} is undetermined.*spherical"):
-            m.compile(target="numpy")
+        with pytest.raises(eg.ModelError, match=rf"outputs\.o.*reaction\({joint}\)\.{part} is undetermined.*spherical"):
+            m.derive()
     m = door()
     m.output("o", f"reaction({joint}).mz")
     assert m.compile(target="numpy").outputs(0.0, [0.3, 2.0]) == pytest.approx(0.0, abs=1e-12)
@@ -332,49 +246,8 @@ def test_laws_refuse_what_two_hinges_share(place: str) -> None:
         m.event("breaks", f"{load} - 30")
     else:
         m.state("wear", load)
-    with pytest.raises(ModelError, match="h2.*undetermined"):
+    with pytest.raises(eg.ModelError, match="h2.*undetermined"):
         m.compile(target="numpy")
-
-
-@pytest.mark.parametrize("gravity", [(0.5, -G, 0), (0.5, -G, 2.0)])
-@pytest.mark.parametrize("tilt", [0.0, 0.6])
-def test_four_bar_whose_masses_leave_its_plane(gravity: tuple[float, float, float], tilt: float) -> None:
-    """What ``undetermined_reactions`` marks is refused, all else is what ``reactions`` gives; in turned axes too."""
-
-    def bar() -> eg.Model:
-        m = eg.Model("bar", gravity=gravity)
-        made = [
-            m.body(name, mass=mass, com=com, inertia=(0.03, 0.03, 0.05), markers={"e": (end, 0, 0)})
-            for name, mass, com, end in (
-                ("a", 1.2, (0.2, 0.03, 0.05), 0.4), ("b", 1.7, (0.3, 0.1, 0), 0.7), ("c", 0.9, (0.25, 0, 0), 0.6),
-            )
-        ]  # fmt: skip
-        m.revolute("A", m.ground, made[0], coordinate="qa")
-        m.revolute("B", "a.e", made[1], coordinate="qb")
-        m.revolute("C", "b.e", "c.e")
-        m.revolute("D", m.ground.at(0.8, 0.1, 0), made[2], coordinate="qd")
-        made[2].marker("tilted", at=(0, 0, 0), rpy=(0, 0, tilt))
-        m.guess(qa=0.9, qb=-0.6, qd=1.5)
-        m.initial(qa=0.9, qa_dot=2.0)
-        return m
-
-    plain = bar().compile(target="numpy")
-    x = plain.x0()
-    expected, undetermined = plain.reactions(0.0, x), plain.undetermined_reactions(0.0, x)
-    assert undetermined[:, 2:5].all()
-    assert not undetermined[:, [0, 1, 5]].any()
-    for k, joint in enumerate("ABCD"):
-        for part in ("z", "mx", "my"):
-            m = bar()
-            m.output("o", f"reaction({joint}).{part}")
-            with pytest.raises(ModelError, match="undetermined"):
-                m.compile(target="numpy")
-        m = bar()
-        for part in ("x", "y", "mz"):
-            m.output(part, f"reaction({joint}).{part}")
-        m.output("turned", f"reaction({joint}, in=c.tilted).mz")
-        found = m.compile(target="numpy").outputs(0.0, x)
-        assert found == pytest.approx([*expected[k, [0, 1, 5]], expected[k, 5]], abs=1e-9)
 
 
 def test_tension_of_a_rope_over_a_massless_pulley():
@@ -395,3 +268,110 @@ def test_tension_of_a_rope_over_a_massless_pulley():
     x = mod.x0()
     assert np.abs(mod.outputs(0.0, x)) == pytest.approx([2 * rope, rope], rel=1e-12)
     assert mod.outputs(0.0, x) == pytest.approx(mod.multipliers(0.0, x), rel=1e-9)
+
+
+def sliders(order: tuple[int, ...], turned: bool = False) -> eg.Module:
+    """Bodies in guides along x, pressed along y by sums of their reactions: N = 1 + K N, in any order of laws."""
+    m = eg.Model("sliders", gravity=(0, -1, 0))
+    n = len(order)
+    for i in range(n):
+        for j in range(n):
+            m.parameter(f"k{i}{j}", 0.0)
+    bodies = [m.body(f"b{i}", mass=1.0, inertia={"zz": 0.1}) for i in range(n)]
+    for i, body in enumerate(bodies):
+        m.prismatic(f"P{i}", m.ground, body, axis="x")
+        m.output(f"N{i}", f"reaction(P{i}).y")
+    for i in order:
+        terms = [f"k{i}{j}*reaction(P{j}).y" for j in (order[::-1] if turned else order)]
+        m.force(f"f{i}", bodies[i], (0, f"-({' + '.join(terms)})", 0))
+    return m.compile(target="numpy")
+
+
+def found(mod: eg.Module, K: np.ndarray) -> np.ndarray | None:
+    """The reactions, None where they are refused."""
+    try:
+        return mod.outputs(0.0, np.zeros(mod.n_x), p=K.ravel())
+    except eg.NonFiniteError as error:
+        assert "f0" in str(error)
+        assert "depend on reactions" in str(error)
+        return None
+
+
+def has_solution_on_the_way(K: np.ndarray) -> bool:
+    values = np.linalg.eigvals(K)
+    return not any(abs(z.imag) < 1e-12 and z.real >= 1.0 for z in values)
+
+
+@pytest.mark.parametrize("n", [2, pytest.param(3, marks=pytest.mark.thorough)])
+def test_linear_laws_beside_their_eigenvalues(n: int) -> None:
+    orders = list(permutations(range(n)))
+    modules = [sliders(order) for order in (orders if n == 2 else [orders[0], orders[3], orders[5]])]
+    random, seen = np.random.default_rng(11), {True: 0, False: 0, "turning": 0}
+    for _ in range(150):
+        K = random.normal(size=(n, n)) * random.choice([0.5, 1.0, 3.0])
+        answers = [found(mod, K) for mod in modules]
+        accepted = answers[0] is not None
+        assert all((a is not None) == accepted for a in answers)
+        values = np.linalg.eigvals(K)
+        seen[accepted] += 1
+        if accepted:
+            assert has_solution_on_the_way(K)
+            N = np.linalg.solve(np.eye(n) - K, np.ones(n))
+            for a in answers:
+                assert a == pytest.approx(N, rel=1e-9, abs=1e-9 * np.abs(N).max())
+        if np.abs(values).max() < 0.9:
+            assert accepted
+        if n == 2 and (np.abs(values.imag) > np.abs(values) / 8).all():
+            assert accepted
+            seen["turning"] += int(np.trace(K) > 2.0)
+    assert min(seen[True], seen[False]) > 20
+    assert n == 3 or seen["turning"]  # found by cutting the way
+
+
+#: Law of N -> the same in Python.
+LAWS = {
+    "{c}*max(0, {N})": lambda N, c: c * np.maximum(0, N),
+    "{c}*{N}*({N} > 0)": lambda N, c: c * N * (N > 0),
+    "({N} > 0)*{c}*{N}**2/{N}": lambda N, c: c * N * (N > 0),
+    "{c}*({N} if {N} > 0 else 0)": lambda N, c: c * N * (N > 0),
+    "{c}*({N} + abs({N}))/2*(2 - exp(-{N}**2))/2": lambda N, c: c * np.maximum(0, N) * (2 - np.exp(-(N**2))) / 2,
+    "{c}*max(0, {N})*1.0000001**{N}": lambda N, c: c * np.maximum(0, N) * 1.0000001**N,
+    "{c}*max(0, min({N}, 3))*(1 if {N} < 3 else {N}/3)": lambda N, c: c * np.maximum(0, N),
+    "{c}*sqrt(max(0, {N})**2)": lambda N, c: c * np.maximum(0, N),
+}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_pieces_count_however_they_are_written(law: str) -> None:
+    """N = law - w: where a grid finds several solutions or none the call is refused, elsewhere it finds the one."""
+    grid = np.linspace(-20.0, 20.0, 400_002)
+    m = eg.Model("law", gravity=(0, "w", 0))
+    m.parameter("c", 0.1)
+    m.parameter("w", 1.0)
+    m.prismatic("A", m.ground, m.body("b", mass=1.0, inertia={"zz": 0.1}), axis="x")
+    m.force("f", "b", (0, f"-({law.format(N='reaction(A).y', c='c')})", 0))
+    m.output("N", "reaction(A).y")
+    mod, accepted = m.compile(target="numpy"), 0
+    for c in (0.4, 0.9, 2.0):
+        for w in (1.0, -0.7):
+            gap = grid + w - LAWS[law](grid, c)
+            roots = grid[np.flatnonzero(np.diff(np.sign(gap)))]
+            try:
+                N = mod.outputs(0.0, np.zeros(2), p={"c": c, "w": w})[0]
+            except eg.NonFiniteError as error:
+                assert "the forces of f depend on reactions" in str(error)
+                assert c > 0.8
+                continue
+            accepted += 1
+            assert len(roots) == 1
+            assert pytest.approx(roots[0], abs=1e-3) == N
+    assert accepted >= 2
+
+
+def test_a_law_of_too_many_pieces_is_named() -> None:
+    m = eg.Model("many", gravity=(0, 1, 0))
+    m.prismatic("A", m.ground, m.body("b", mass=1.0, inertia={"zz": 0.1}), axis="x")
+    product = "*".join(f"max({k}, reaction(A).y)" for k in range(1, 8))
+    m.force("f", "b", (0, f"0.001*{product}", 0))
+    with pytest.raises(eg.ModelError, match=r"forces.f: its law of a reaction has more than 64 pieces.*sum of terms"):
+        m.compile(target="numpy")

@@ -1,4 +1,4 @@
-"""Two bodies in free flight with a force element between them, judged by wrenches and twists made in NumPy."""
+"""Judges of force elements: wrenches and twists made in NumPy, differences of rhs, the faults that a model reports."""
 
 from __future__ import annotations
 
@@ -8,10 +8,41 @@ from typing import Any, NamedTuple
 
 import judges
 import numpy as np
+import pytest
 from models import rotation
 
 import eomgen as eg
 
+TREE_METHODS = ("embedding", "lagrange", "recursive", "augmented", "newton_euler", "amalgamated", "gibbs_appell")
+
+
+def problems(model: eg.Model) -> dict[str, str]:
+    """What is wrong with a model: path -> message and remedy."""
+    with pytest.raises(eg.ModelError) as error:
+        model.derive()
+    return {p.path: f"{p.message}; {p.remedy}" for p in error.value.problems}
+
+
+def differences(mod: Any, x: np.ndarray, step: Any = 1e-7, t: float = 0.0) -> np.ndarray:
+    """The Jacobian of rhs by central differences; ``step`` is one number, or one of each state."""
+    steps = np.diag(np.broadcast_to(step, len(x)))
+    return np.array([(mod.rhs(t, x + d) - mod.rhs(t, x - d)) / (2 * d.sum()) for d in steps]).T
+
+
+def fine_differences(mod: Any, x: np.ndarray, step: float, t: float = 0.0) -> np.ndarray:
+    """The same to the tenth order, all at once."""
+    n, steps = len(x), step * np.kron(np.eye(len(x)), judges.OFFSETS)
+    sides = mod.rhs(t, x[:, None] + steps) - mod.rhs(t, x[:, None] - steps)
+    return np.asarray(sides.reshape(n, n, -1) @ judges.FIRST / step)
+
+
+def read_back(model: eg.Model, folder: Path) -> eg.Model:
+    """The model that its file gives."""
+    (folder / "written.yaml").write_text(model.to_yaml(), encoding="utf-8")
+    return eg.load(folder / "written.yaml")
+
+
+#: Two bodies in free flight with a force element between markers of them.
 P = {"at": (0.2, -0.1, 0.15), "rpy": (0.3, -0.4, 0.7)}
 Q = {"at": (-0.1, 0.25, 0.05), "rpy": (-0.2, 0.5, -0.6)}
 INERTIAS = ([0.12, 0.2, 0.17], [0.3, 0.25, 0.4])
@@ -95,10 +126,9 @@ def judge(
     ``lost`` part of the loads, all of them if None; the Jacobian against differences; the model against its file.
     """
     model = flyers(add)
-    (folder / "m.yaml").write_text(model.to_yaml(), encoding="utf-8")
     bare = flyers().compile(target="numpy")
     modules = [model.compile(method=method, target="numpy") for method in ("embedding", "lagrange")]
-    again = eg.load(folder / "m.yaml").compile(target="numpy")
+    again = read_back(model, folder).compile(target="numpy")
     t = 0.3
     for x in states:
         n = bare.n_q
@@ -113,9 +143,7 @@ def judge(
             rate = judges.first(lambda c, mod=mod: np.sum(mod.energy(c), axis=0), x, mod.rhs(t, x), h=2e-4)
             given = power(bodies, wrenches if lost is None else lost(*markers, bodies, t))
             assert abs(rate - given) <= 1e-8 * max(1.0, abs(power(bodies, wrenches)), np.sum(mod.energy(x)))
-            slopes = np.stack(
-                [judges.first(lambda c, mod=mod: mod.rhs(t, c), x, d, h=1e-4) for d in np.eye(2 * n)], axis=1
-            )
+            slopes = fine_differences(mod, x, 1e-4, t)
             assert np.abs(mod.jacobian(t, x) - slopes).max() <= 1e-7 * np.abs(slopes).max()
         np.testing.assert_array_equal(again.rhs(t, x), modules[0].rhs(t, x))
 
