@@ -36,19 +36,19 @@ def test_a_flat_profile_is_a_half_plane(kind: str) -> None:
         m.contacts("floor", [on(PLANAR[k], b) for k, b in zip(PLANAR, bodies, strict=True)], on(shape, base), LAW)
         mods.append(m.compile(target="numpy"))
     rng, pushed = np.random.default_rng(0), 0
-    for case in range(60):
+    for case in range(20):
         x = np.concatenate([rng.uniform(-1, 1, 12), rng.standard_normal(12)])
         x[0:12:3] = [-0.3, 0.0, 0.2, 0.7] if case == 0 else x[0:12:3]
         height = rng.uniform(0, 0.1, 4)
         along, up = x[0:12:3].copy(), height
         x[0:12:3] = 0.1 + along * np.cos(0.3) - up * np.sin(0.3)
         x[1:12:3] = 0.2 + along * np.sin(0.3) + up * np.cos(0.3)
-        for call in ("rhs", "jacobian"):
+        for call in ("rhs", "jacobian") if case < 4 else ("rhs",):
             a, b = (getattr(mod, call)(0.0, x) for mod in mods)
             limit = 1e-8 if case == 0 and call == "jacobian" else 1e-12  # exactly over points two pieces share a shape
             assert np.abs(a - b).max() <= limit * max(1.0, np.abs(a).max())
         pushed += np.abs(a).max() > 100
-    assert pushed > 30
+    assert pushed > 10
 
 
 def outline() -> np.ndarray:
@@ -166,7 +166,7 @@ def test_a_wheel_rolls_down_a_step() -> None:
     assert traj["j0_y"].min() == pytest.approx(0.1, abs=0.01)
 
 
-@pytest.mark.parametrize("kind", ["profile", "smooth_profile"])
+@pytest.mark.parametrize("kind", part_of(["profile", "smooth_profile"], ("smooth_profile",).__contains__))
 def test_targets_parameters_and_derivatives(kind: str) -> None:
     mods = []
     for target in ("numpy", "cython"):
@@ -247,11 +247,11 @@ def test_a_plane_turned_any_way(kind: str) -> None:
         m.contacts("touch", {**SHAPES[kind], "on": body.at(0.02, 0, 0.01)}, floor, FELT)
         mod = m.compile(target="numpy")
         rng, rows = np.random.default_rng(4), []
-        for _ in range(12):
+        for k in range(12):
             place = TURNED.apply([*rng.uniform(-1, 1, 2), 0]) + rng.uniform(-0.1, 0.25) * TURNED.apply(normal)
             x = state(mod, [place], [Rotation.random(random_state=rng.integers(1 << 30))])
             x[mod.n_q :] = rng.uniform(-1, 1, 6)
-            rows.append([*mod.rhs(0.0, x), *mod.jacobian(0.0, x).ravel()])
+            rows += [*mod.rhs(0.0, x), *(mod.jacobian(0.0, x).ravel() if k < 3 else ())]
         found.append(np.array(rows))
     assert np.abs(found[1]).max() > 100.0
     np.testing.assert_allclose(found[0], found[1], rtol=1e-9, atol=1e-9 * np.abs(found[1]).max())
@@ -280,7 +280,7 @@ def test_a_dome_and_a_bowl(hollow: bool) -> None:
             check_slopes(mod, x)
 
 
-@pytest.mark.parametrize("rolls", [False, True])
+@pytest.mark.parametrize("rolls", part_of([False, True], (True,).__contains__))
 def test_small_oscillations_in_a_bowl(rolls: bool) -> None:
     """A table of a paraboloid of radius R at its lowest point: (g / (R - r))^(1/2), of a ball that rolls (5/7) of g."""
     big, r, m = 1.0, 0.2, eg.Model("bowl", gravity=(0, 0, -9.81))
@@ -319,7 +319,7 @@ def test_derivatives_parameters_and_targets(kind: str) -> None:
     mods = [m.compile(optimize=0), m.compile(target="numpy")]
     other = waves(SHAPES[kind], height="1.3*land(x, y)").compile(target="numpy")
     rng, felt = np.random.default_rng(9), 0
-    for _ in range(8):
+    for _ in range(5):
         turn = Rotation.random(random_state=rng.integers(1 << 30))
         x = state(mods[0], [(*rng.uniform(-1.5, 1.5, 2), rng.uniform(0.1, 0.2))], [turn])
         x[mods[0].n_q :] = rng.uniform(-1, 1, 6)
@@ -331,7 +331,7 @@ def test_derivatives_parameters_and_targets(kind: str) -> None:
         np.testing.assert_allclose(jacobian, slopes, atol=1e-6 * np.abs(slopes).max())
         late = mods[0].rhs(0.0, x, p={"amp": 1.3})
         np.testing.assert_allclose(late, other.rhs(0.0, x), rtol=1e-9, atol=1e-9 * np.abs(value).max())
-    assert felt >= 2
+    assert felt >= 1
 
 
 def test_grids_lists_and_files_are_one(tmp_path: Any) -> None:

@@ -254,7 +254,7 @@ def test_flush_stacks_rest(widths: tuple[float, ...], turn: float, swapped: bool
         assert np.abs(run[f"j{k}_x"]).max() < 1e-8
 
 
-@pytest.mark.parametrize("widths", part_of(WIDTHS, lambda widths: widths == WIDTHS[1]))
+@pytest.mark.parametrize("widths", part_of([(widths,) for widths in WIDTHS], WIDTHS[1].__eq__))
 def test_flush_stacks_are_held_rigidly(widths: tuple[float, ...]) -> None:
     mod = tower([box(wide) for wide in widths], RIGID, 0.3)
     run = mod.simulate(0.2, method="moreau", step=1e-3)

@@ -401,6 +401,30 @@ def test_reactions_that_are_not_unique_are_refused():
         m.check()
 
 
+def test_reactions_beside_a_massless_rod():
+    """A rod without mass pulls along itself; the guide carries the weight of the piston and its pull."""
+    m = eg.Model("engine", gravity=(0, -G, 0))
+    crank = m.body("crank", mass=1.0, inertia={"zz": 0.01})
+    rod, piston = m.body("rod", mass=0.0), m.body("piston", mass=0.5)
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.revolute("B", crank.at(0.1, 0, 0), rod)
+    m.revolute("C", rod.at(0.3, 0, 0), piston)
+    m.prismatic("S", m.ground, piston, axis="x", coordinate="s")
+    m.initial(theta=0.8, theta_dot=3.0)
+    for name, text in (("pin", "reaction(B).x"), ("guide", "reaction(S).y"), ("push", "s_ddot")):
+        m.output(name, text)
+    mod = m.compile(target="numpy")
+    x = mod.x0()
+    pin, guide, push = mod.outputs(0.0, x)
+    slope = np.arcsin(0.1 * np.sin(0.8) / 0.3)  # of the rod, downwards
+    assert abs(pin) == pytest.approx(abs(0.5 * push), abs=1e-12)
+    assert guide == pytest.approx(0.5 * G + np.tan(slope) * 0.5 * push, abs=1e-12)
+    # turning of the crank by the pull at its pin
+    moment = 0.5 * push * 0.1 * (np.sin(0.8) + np.cos(0.8) * np.tan(slope))
+    turn = dict(zip(mod.x_names, mod.rhs(0.0, x), strict=True))["theta_dot"]
+    assert 0.01 * turn == pytest.approx(moment, abs=1e-12)
+
+
 def test_a_motor_overcomes_friction():
     """Torque times rate is the rate of energy and what friction takes, in a mechanism that its motor moves."""
     m = slider_crank(0.15, 0.3)
