@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from contact_scenes import ELASTIC, LAW, PLANAR, on
 from force_judges import differences, problems, read_back
+from sweeps import part_of
 
 import eomgen as eg
 
@@ -124,30 +125,30 @@ def test_no_work_around_closed_paths(kind: str) -> None:
         assert abs(work.sum()) < 5e-3 * np.abs(work).sum()
 
 
-def test_forces_and_jacobians_in_both_targets() -> None:
+@pytest.mark.parametrize("kind", part_of(OUTLINES, ("outline",).__contains__))
+def test_forces_and_jacobians_in_both_targets(kind: str) -> None:
     """With corners of boxes and ends of segments deep in every shape; Jacobians are those of differences."""
     others = [{"shape": "circle", "radius": 0.08}, {"shape": "box", "size": (0.1, 0.3)}]
     others.append({"shape": "segment", "length": 0.3, "radius": 0.04})
     law = {"stiffness": STIFFNESS, "dissipation": 0.3, "friction": 0.3, "smoothing": 0.1}
-    for shape in (OUTLINES["outline"], OUTLINES["sprocket"]):
-        m, (solid, *bodies) = scenes.planar("deep", 4, (0, 0, 0))
-        m.contacts("mesh", [on(x, b) for x, b in zip(others, bodies, strict=True)], on(shape, solid), law)
-        plain, quick = m.compile(target="numpy"), m.compile(optimize=0)
-        rng, met = np.random.default_rng(3), 0
-        for k in range(8):
-            x = np.concatenate([rng.uniform(-0.2, 0.2, 12), rng.standard_normal(12)])
-            a, b = plain.rhs(0.0, x), quick.rhs(0.0, x)
-            np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(a).max())
-            J = quick.jacobian(0.0, x)
-            if k < 2:
-                np.testing.assert_allclose(plain.jacobian(0.0, x), J, rtol=1e-7, atol=1e-9 * np.abs(J).max())
-            h = 1e-7 * np.eye(24)
-            apart = [np.abs(quick.rhs(0.0, x + d) - 2 * b + quick.rhs(0.0, x - d)).max() for d in h]
-            if max(apart) > 1e-7 * np.abs(b).max():
-                continue  # a corner of the law between the differences
-            np.testing.assert_allclose(differences(quick, x), J, rtol=1e-5, atol=1e-6 * np.abs(J).max())
-            met += 1
-        assert met > 3
+    m, (solid, *bodies) = scenes.planar("deep", 4, (0, 0, 0))
+    m.contacts("mesh", [on(x, b) for x, b in zip(others, bodies, strict=True)], on(OUTLINES[kind], solid), law)
+    plain, quick = m.compile(target="numpy"), m.compile(optimize=0)
+    rng, met = np.random.default_rng(3), 0
+    for k in range(8):
+        x = np.concatenate([rng.uniform(-0.2, 0.2, 12), rng.standard_normal(12)])
+        a, b = plain.rhs(0.0, x), quick.rhs(0.0, x)
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(a).max())
+        J = quick.jacobian(0.0, x)
+        if k < 2:
+            np.testing.assert_allclose(plain.jacobian(0.0, x), J, rtol=1e-7, atol=1e-9 * np.abs(J).max())
+        h = 1e-7 * np.eye(24)
+        apart = [np.abs(quick.rhs(0.0, x + d) - 2 * b + quick.rhs(0.0, x - d)).max() for d in h]
+        if max(apart) > 1e-7 * np.abs(b).max():
+            continue  # a corner of the law between the differences
+        np.testing.assert_allclose(differences(quick, x), J, rtol=1e-5, atol=1e-6 * np.abs(J).max())
+        met += 1
+    assert met > 3
 
 
 def test_points_and_radius_that_come_late() -> None:

@@ -47,12 +47,17 @@ def test_no_method_steps_over_a_wall(target: str, method: str, way: float) -> No
     assert run["j_x"].max() < 2.0
 
 
-def test_ensembles_integrators_and_solvers_of_scipy() -> None:
+@pytest.mark.thorough
+def test_ensembles_step_over_no_wall() -> None:
     module = wall("cython")
     speeds = np.concatenate([np.linspace(5.0, SPEED, 11), [-SPEED]])
     many = module.simulate_many((0, 0.6), initial={"j_x_dot": speeds})
     wanted = np.where(speeds > 0.0, -speeds, speeds)
     assert np.allclose(np.asarray(many.x)[3], wanted, rtol=1e-4)
+
+
+def test_integrators_and_solvers_of_scipy_step_over_no_wall() -> None:
+    module = wall("cython")
     x = module.x0(j_x_dot=SPEED)
     assert module.integrator()(0.0, x, 0.3)[3] == pytest.approx(-SPEED, rel=1e-5)
     found = solve_ivp(module.rhs, (0, 0.3), x, method=module.DOP853, rtol=1e-8, atol=1e-10)

@@ -74,7 +74,7 @@ def test_depth_and_force_against_geometry(kinds: tuple[str, str]) -> None:
     m.contacts("touch", on(PLANAR[kinds[0]], a), on(PLANAR[kinds[1]], b), ELASTIC)
     mod = m.compile(target="numpy")
     rng, met = np.random.default_rng(5), 0
-    for _ in range(200):
+    for _ in range(90):
         q = np.concatenate([rng.uniform(-0.05, 0.05, 2), [rng.uniform(-3, 3)], np.zeros(3)])
         way = rng.uniform(-3, 3)
         q[3:5] = q[:2] + rng.uniform(0.1, 0.25) * np.array([np.cos(way), np.sin(way)])
@@ -91,7 +91,7 @@ def test_depth_and_force_against_geometry(kinds: tuple[str, str]) -> None:
         assert np.abs(force[:2] + force[3:5]).max() <= 1e-12 * np.abs(force).max()
         moment = q[0] * force[1] - q[1] * force[0] + q[3] * force[4] - q[4] * force[3] + force[2] + force[5]
         assert abs(moment) <= 1e-12 * np.abs(force).max()
-    assert met >= 20
+    assert met >= 8
 
 
 def test_depth_of_a_bouncing_ball() -> None:
@@ -342,7 +342,7 @@ def test_energy_is_continuous(name: str) -> None:
     mod, swapped = (touching(name, {"stiffness": 1e7, "exponent": 1.5}, order) for order in (False, True))
     rng = np.random.default_rng(11)
     starts, ends, most = [], [], []
-    for q, depth in poses(name, rng, 120):
+    for q, depth in poses(name, rng, 60):
         step = np.concatenate([np.zeros(3), rng.standard_normal(2), rng.choice([0, 10]) * rng.standard_normal(1)])
         line = q + np.linspace(-2, 2, 129)[:, None] * depth * step * rng.choice([0.1, 1.0])
         energy = mod.energy(states(line))[1]
@@ -368,7 +368,7 @@ def test_forces_are_slopes_of_the_energy_of_the_geometry(name: str) -> None:
     mod, compiled = (touching(name, {"stiffness": k, "exponent": n}, False, target) for target in ("numpy", "cython"))
     first, second = (np.array(points) for points in PAIRS[name])
     second_spots = kinks = 0
-    for q, depth in poses(name, np.random.default_rng(12), 120):
+    for q, depth in poses(name, np.random.default_rng(12), 60):
         x = np.concatenate([q, np.zeros(6)])
         found = scenes.facing(first, scenes.placed(q[3:], second))
         second_spots += found[1][0] > 0.0 and found[1][1] > 0.0
@@ -388,5 +388,5 @@ def test_forces_are_slopes_of_the_energy_of_the_geometry(name: str) -> None:
             kinks += 1
             continue
         assert np.all(np.abs(force - slopes) < 1e-4 * scale), (q, depth)
-    assert second_spots >= 10
-    assert kinks < 20
+    assert second_spots >= 4
+    assert kinks < 10

@@ -98,7 +98,11 @@ def chain(links: int, mu: float) -> eg.Model:
 
 @pytest.mark.parametrize(
     ("method", "target"),
-    [("embedding", "cython"), *((m, "numpy") for m in ("recursive", "newton_euler", "lagrange", "gibbs_appell"))],
+    [
+        ("embedding", "cython"),
+        ("recursive", "numpy"),
+        *(pytest.param(m, "numpy", marks=pytest.mark.thorough) for m in ("newton_euler", "lagrange", "gibbs_appell")),
+    ],
 )
 def test_chain_of_four(method, target):
     mu, n = 0.35, 4
