@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from shown_numbers import number
+from shown_numbers import METHODS, number
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 
 import eomgen as eg
-from eomgen.equations import METHODS
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 t = dynamicsymbols._t
