@@ -153,17 +153,13 @@ def test_the_block_system_has_the_compiled_accelerations_and_multipliers(name: s
         np.testing.assert_allclose(found[c.module.n_v :], multipliers, rtol=1e-7, atol=1e-8 * np.abs(multipliers).max())
 
 
-@pytest.mark.parametrize("name", ["double_pendulum", "car_axis", "satellite"])
+@pytest.mark.parametrize("name", ["double_pendulum", "satellite"])
 def test_momenta_and_their_rates_are_those_of_the_canonical_form(name: str) -> None:
     c = Compared(name, "hamilton", 3)
+    form = c.module.canonical
     momenta, rates = (number(c.equations, quantity, c.values)[:, 0] for quantity in ("momenta", "momentum_rates"))
-    agree(momenta, c.module.mass_matrix(c.q) @ c.v)
-    h = 1e-6  # of p = M v by central differences along the motion, of which the parts at rotations are left out
-    p = [c.module.mass_matrix(x[: c.module.n_q]) @ x[c.module.n_q :] for x in (
-        c.module.project(c.x + s * h * c.module.rhs(0.0, c.x), t=s * h) for s in (-1, 1)
-    )]  # fmt: skip
-    if name == "double_pendulum":
-        np.testing.assert_allclose(rates, (p[1] - p[0]) / (2 * h), rtol=1e-6)
+    agree(momenta, form.momenta(c.x))
+    agree(rates, form.rhs(0.0, form.of(c.x))[c.module.n_q :])
 
 
 @pytest.mark.parametrize(
