@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from mutations.fault import Fault
 
-SHOWN = "tests/reading/test_shown_is_compiled.py::test_of_every_example[slider_crank]"
-VIEWS = "tests/reading/test_methods_and_views.py"
+SHOWN = "tests/shown/test_shown_is_compiled.py"
 FORMS = "tests/core/test_simplified.py"
 
 FAULTS = (
@@ -14,56 +13,56 @@ FAULTS = (
         "slope = [-x for x in gradient(potential, list(kinematics.q))]",
         "slope = [x for x in gradient(potential, list(kinematics.q))]",
         "generalized forces that are shown push up the potential",
-        (SHOWN,),
+        (f"{SHOWN}::test_of_every_example[slider_crank]",),
     ),
     Fault(
         "read-velocity-offset", "eomgen/equations/reduction.py",
         "tuple(b for _, b in rest), tuple(c for c, _ in rest)",
         "tuple(c for c, _ in rest), tuple(c for c, _ in rest)",
         "b of v = B v_i + b is that of accelerations",
-        ("tests/reading/test_shown_is_compiled.py::test_of_every_example[car_axis]",),
+        (f"{SHOWN}::test_of_every_example[car_axis]",),
     ),
     Fault(
         "read-hamiltonian-half", "eomgen/reading/of_methods.py",
         "found = 0.5 * total - at_rest",
         "found = total - at_rest",
         "the Hamiltonian has twice its kinetic part",
-        ("tests/reading/test_against_sympy.py::test_open_chains[cart_pendulum-hamilton]",),
+        ("tests/shown/test_against_sympy.py::test_open_chains[cart_pendulum-hamilton]",),
     ),
     Fault(
         "read-block-gamma", "eomgen/reading/of_methods.py",
         "*(-g for g in quantities.gamma)",
         "*quantities.gamma",
         "the block system that is shown turns the right side of its constraints round",
-        ("tests/reading/test_against_sympy.py::test_a_loop_with_multipliers",),
+        ("tests/shown/test_against_sympy.py::test_a_loop_with_multipliers",),
     ),
     Fault(
         "read-free-body-reaction", "eomgen/reading/bodies_apart.py",
         "force, moment = vec.neg(force), vec.neg(moment)",
         "force, moment = force, vec.neg(moment)",
         "a joint pushes both of its bodies the same way",
-        (f"{VIEWS}::test_free_bodies_hold_at_the_compiled_accelerations[slider_crank]",),
+        (f"{SHOWN}::test_free_bodies_hold_at_the_compiled_accelerations[slider_crank-newton_euler]",),
     ),
     Fault(
         "read-near-turning", "eomgen/reading/near_state.py",
         "result[j : j + 3] = vec.add(own, vec.cross(r, w))",
         "result[j : j + 3] = vec.sub(own, vec.cross(r, w))",
         "small rotations about turning axes change the wrong way in A",
-        (f"{VIEWS}::test_equations_near_a_state_are_those_of_the_module[satellite]",),
+        (f"{SHOWN}::test_equations_near_a_state_are_those_of_the_module[satellite]",),
     ),
     Fault(
         "read-near-velocities", "eomgen/reading/near_state.py",
         "return _Move(dq, tuple(jvp(v, dq)) if dq else (graph.zero,) * len(v))",
         "return _Move(dq, (graph.zero,) * len(v))",
         "dependent velocities stay where a displacement of a loop moves them",
-        (f"{VIEWS}::test_equations_near_a_state_are_those_of_the_module[slider_crank]",),
+        (f"{SHOWN}::test_equations_near_a_state_are_those_of_the_module[slider_crank]",),
     ),
     Fault(
         "read-quarter-turn", "eomgen/reading/put_in.py",
         "(0.0, 1.0, 0.0, -1.0)[k]",
         "(0.0, -1.0, 0.0, 1.0)[k]",
         "the sine of a quarter turn that is put in has the wrong sign",
-        (f"{VIEWS}::test_values_put_in_one_after_the_other",),
+        ("tests/shown/test_views.py::test_values_put_in_one_after_the_other",),
     ),
     Fault(
         "form-angle-sum", "eomgen/simplify/joined_angles.py",
