@@ -24,14 +24,14 @@ FAULTS = (
         "self.pieces[:, [1, 2, 3, 3]] * (1.0, 2.0, 3.0, 0.0)",
         "self.pieces[:, [1, 2, 3, 3]] * (1.0, 1.0, 1.0, 0.0)",
         "rates of cubic tables lack the factors 2 and 3",
-        ("tests/runtime/test_rates_of_tables.py::test_cubic_tables_and_their_rates_are_those_of_scipy",),
+        ("tests/runs/test_inputs.py::test_cubic_tables_and_their_rates_are_those_of_scipy",),
     ),
     Fault(
         "table-coefficients", "eomgen/runtime/signals.py",
         "(slope[:-1] + slope[1:] - 2.0 * rise) / h",
         "(slope[:-1] + slope[1:] - rise) / h",
         "cubic tables: a factor 2",
-        ("tests/runtime/test_rates_of_tables.py::test_cubic_tables_and_their_rates_are_those_of_scipy",),
+        ("tests/runs/test_inputs.py::test_cubic_tables_and_their_rates_are_those_of_scipy",),
     ),
     Fault(
         "table-held", "eomgen/runtime/signals.py",
@@ -40,28 +40,28 @@ FAULTS = (
         "k = np.clip(np.searchsorted(self.times, t, side=\"right\"), 0, len(self.times) - 1)\n        if self.order "
         "== 0:",
         "held tables give the next value instead of the last",
-        ("tests/runtime/test_rates_of_tables.py::test_cubic_tables_and_their_rates_are_those_of_scipy",),
+        ("tests/runs/test_inputs.py::test_cubic_tables_and_their_rates_are_those_of_scipy",),
     ),
     Fault(
         "event-reset-projection", "eomgen/simulation/events.py",
         "after = np.asarray(module.project(after, t=t, u=forcing(t, after)))",
         "after = np.asarray(after)",
         "a reset state is not brought back onto the loops",
-        ("tests/runtime/test_events.py::test_a_reset_in_a_loop_is_brought_back_onto_it[numpy]",),
+        ("tests/runs/test_events.py::test_a_reset_in_a_loop_is_brought_back_onto_it[numpy]",),
     ),
     Fault(
         "event-direction-scipy", "eomgen/simulation/events.py",
         "self.direction = int(np.sign(given)) if",
         "self.direction = 0 if",
         "the direction of an event is ignored",
-        ("tests/runtime/test_events.py::test_texts_functions_and_mappings[DOP853]",),
+        ("tests/runs/test_events.py::test_texts_functions_and_mappings[DOP853]",),
     ),
     Fault(
         "gap-rate-in-time", "eomgen/analysis/impact.py",
         "rates = rows @ v + drift(",
         "rates = rows @ v + 0.0 * drift(",
         "impacts of the model's events: the rate of a gap that moves by itself is dropped",
-        ("tests/runtime/test_moving_floors.py",),
+        ("tests/runs/test_event_corners.py::test_a_floor_that_rises",),
     ),
     Fault(
         "gap-rate-of-racket", "eomgen/analysis/impact_gaps.py",
@@ -75,7 +75,7 @@ FAULTS = (
         "rates[base] = u[rate]",
         "rates[base] = 0.0",
         "impacts: the rate of a gap that an input moves is dropped",
-        ("tests/runtime/test_moving_floors.py",),
+        ("tests/runs/test_event_corners.py::test_a_floor_that_rises",),
     ),
     Fault(
         "restitution", "eomgen/analysis/impact_law.py",
@@ -206,6 +206,6 @@ FAULTS = (
         'self._part("momentum", 3 + 3 * self.kernels.layout.n_v, 6, rates=True)',
         'self._part("momentum", 9 + 3 * self.kernels.layout.n_v, 6, rates=True)',
         "momentum is read from the place of the inertia",
-        ("tests/runtime/test_momenta.py::test_calls_and_outputs_equal_mujoco[numpy]",),
+        ("tests/runs/test_momenta.py::test_calls_and_outputs_equal_mujoco[numpy]",),
     ),
 )  # fmt: skip

@@ -1,0 +1,333 @@
+"""Events: found where closed forms put them, with resets and impacts, by every method and both targets."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import models
+import numpy as np
+import pytest
+from scipy.integrate import DOP853, solve_ivp
+
+import eomgen as eg
+
+G = 9.81
+METHODS = ("DOP853", "RK45", "RK23", "LSODA", "Radau")
+TIGHT = {"rtol": 1e-9, "atol": 1e-12}
+
+
+def ball(**floor: Any) -> eg.Model:
+    m = eg.Model("ball", gravity=(0, -G, 0))
+    e = m.parameter("e", 0.9)
+    body = m.body("ball", mass=1.0)
+    m.prismatic("J", m.ground, body, axis="y", coordinate="h")
+    m.initial(h=1.0)
+    m.event("floor", "h", **({"direction": -1, "reset": {"h_dot": -e * m.coordinate("h_dot")}} | floor))
+    m.event("apex", "h_dot", direction=-1)
+    return m
+
+
+def bounces(e: float, end: float) -> np.ndarray:
+    """Times at which a ball dropped from 1 m hits the floor."""
+    times, v = [np.sqrt(2 / G)], np.sqrt(2 * G)
+    while len(times) < 30 and times[-1] + 2 * e * v / G < end:
+        v *= e
+        times.append(times[-1] + 2 * v / G)
+    return np.array(times)
+
+
+@pytest.fixture(scope="module")
+def bouncing() -> Any:
+    return ball().compile()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_ball_bounces_as_in_closed_form(bouncing: Any, method: str) -> None:
+    end = 4.0
+    run = bouncing.simulate((0, end), method=method, dense_output=True, **TIGHT)
+    expected = bounces(0.9, end)
+    np.testing.assert_allclose(run.t_events["floor"], expected, rtol=0, atol=1e-10)
+    assert run.t_events["apex"][0] == 0.0  # SciPy's rule: a value that leaves zero, in its direction
+    np.testing.assert_allclose(run.t_events["apex"][1:], (expected[:-1] + expected[1:]) / 2, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(run.x_events["floor"][0], 0.0, atol=1e-11)
+    speeds = np.sqrt(2 * G) * 0.9 ** np.arange(len(expected))
+    np.testing.assert_allclose(run.x_events["floor"][1], -speeds, rtol=1e-8)  # before each reset
+    assert run["h"].min() > -1e-12
+    twice = np.flatnonzero(np.diff(run.t) == 0.0)
+    np.testing.assert_allclose(run["h_dot"][twice + 1], -0.9 * run["h_dot"][twice], rtol=1e-12)
+    times = np.linspace(0, end, 201)
+    asked = bouncing.simulate((0, end), method=method, t_eval=times, **TIGHT)
+    np.testing.assert_array_equal(asked.t, times)
+    last = np.searchsorted(expected, times) - 1
+    after = times - np.where(last < 0, 0.0, expected[last])
+    up = np.where(last < 0, 0.0, np.sqrt(2 * G) * 0.9 ** (last + 1.0))
+    height = np.where(last < 0, 1.0, 0.0) + up * after - G * after**2 / 2
+    np.testing.assert_allclose(asked["h"], height, atol=1e-8)
+    np.testing.assert_allclose(run.at(times)["h"], height, atol=1e-8)
+
+
+def test_events_are_a_mapping_by_name_and_a_list_by_number(bouncing: Any) -> None:
+    run = bouncing.simulate((0, 1.0))
+    for found in (run.t_events, run.x_events):
+        assert "floor" in found
+        assert "ceiling" not in found
+        assert tuple(found.keys()) == ("floor", "apex")
+        for k, (name, values) in enumerate(found.items()):
+            assert values is found[name] is found[k] is found.values()[k]
+            assert values in found
+        assert found.get("ceiling") is None
+    assert "floor" in pickle.loads(pickle.dumps(run.t_events))
+    with pytest.raises(eg.UsageError, match="did you mean floor"):
+        run.t_events["flor"]
+
+
+def two_bars() -> eg.Model:
+    """A double pendulum whose lower end hits a wall: the impulse reaches both joints."""
+    m = eg.Model("wall", gravity=(0, -G, 0))
+    upper = m.body("upper", mass=1.0, com=(0, -0.5, 0), inertia={"zz": 0.08})
+    lower = m.body("lower", mass=0.7, com=(0, -0.4, 0), inertia={"zz": 0.05})
+    m.revolute("A", m.ground, upper, coordinate="a")
+    m.revolute("B", upper.at(0, -1, 0), lower, coordinate="b")
+    tip = lower.marker("tip", at=(0, -0.8, 0))
+    m.event("wall", tip.position[0] + 0.3, restitution=0.6)
+    m.output("gap", tip.position[0] + 0.3)
+    m.output("rate", tip.velocity[0])
+    m.initial(a=0.9, b=0.2)
+    return m
+
+
+def test_an_impact_obeys_newtons_law_and_momentum() -> None:
+    mod = two_bars().compile()
+    run = mod.simulate((0, 2.0), rtol=1e-10, atol=1e-12)
+    hits = run.t_events["wall"]
+    assert len(hits) >= 2
+    assert run["gap"].min() > -1e-9
+    for t, before in zip(hits, run.x_events["wall"].T, strict=True):
+        after = run.x[:, np.flatnonzero(run.t == t)[-1]]
+        h, q = 1e-6, before[:2]
+        slope = np.array([(gap(mod, q + h * e) - gap(mod, q - h * e)) / (2 * h) for e in np.eye(2)])
+        jump, M = (after - before)[2:], mod.mass_matrix(q)
+        assert slope @ after[2:] == pytest.approx(-0.6 * (slope @ before[2:]), rel=1e-6)
+        impulse = M @ jump
+        assert abs(impulse @ np.array([-slope[1], slope[0]])) < 1e-7 * np.linalg.norm(impulse)  # along the gap alone
+    again = mod.simulate((0, 2.0), rtol=1e-10, atol=1e-12, method="LSODA")
+    np.testing.assert_allclose(again.t_events["wall"][:2], hits[:2], atol=1e-7)
+    other = mod.simulate_impacts((0, hits[1] + 0.01), {"gap": 0.6}, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose([t for t, _ in other.impacts], hits[:2], atol=1e-8)
+
+
+def gap(mod: Any, q: np.ndarray) -> float:
+    return float(mod.outputs(0.0, np.concatenate([q, np.zeros(2)]))[0])
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_a_reset_in_a_loop_is_brought_back_onto_it(target: str) -> None:
+    m = models.build("slider_crank")
+    m.event("kick", "sin(theta)", direction=1, reset={"theta_dot": "1.1*theta_dot"})
+    mod = m.compile(target=target)
+    run = mod.simulate((0, 2), {"theta": 0.3, "theta_dot": 10.0}, rtol=1e-9, atol=1e-11)
+    assert len(run.t_events["kick"]) >= 2
+    assert run.residuals.raw_velocity < 1e-6
+    k = int(np.flatnonzero(np.diff(run.t) == 0.0)[0])
+    assert run["theta_dot"][k + 1] == pytest.approx(1.1 * run["theta_dot"][k], rel=0.1)
+    theta = run.x_events["kick"][mod.q_names.index("theta")]
+    np.testing.assert_allclose(theta, 2 * np.pi * np.round(theta / (2 * np.pi)), atol=1e-9)
+    assert np.abs(mod.velocity_constraints(run.x[:, k + 1])).max() < 1e-9
+
+
+@pytest.fixture(scope="module")
+def swing() -> Any:
+    return models.build("pendulum").compile()
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "LSODA"])
+def test_texts_functions_and_mappings(swing: Any, method: str) -> None:
+    name = swing.q_names[0]
+
+    def through(t: float, x: np.ndarray) -> float:
+        return float(x[0])
+
+    options = {"method": method, **TIGHT}
+    texts = swing.simulate((0, 10), events=[name, f"{name}_dot", through], **options)
+    theirs = solve_ivp(
+        swing.rhs, (0, 10), swing.x0(), method="DOP853", events=[through, lambda t, x: x[1]], rtol=1e-11, atol=1e-13
+    )
+    np.testing.assert_allclose(texts.t_events[name], theirs.t_events[0], atol=1e-7)
+    np.testing.assert_allclose(texts.t_events["through"], texts.t_events[name], atol=1e-10)
+    first = texts.t_events[1]
+    np.testing.assert_allclose(first[first > 1e-6], theirs.t_events[1][theirs.t_events[1] > 1e-6], atol=1e-6)
+    rising = {"up": {"expression": f"{name} - 0*t", "direction": 1, "terminal": 2}}
+    run = swing.simulate((0, 10), events=rising, **options)
+    up = [t for t in theirs.t_events[0] if theirs.y_events[0][list(theirs.t_events[0]).index(t)][1] > 0]
+    assert run.status == 1
+    assert run.t[-1] == run.t_events["up"][-1] == pytest.approx(up[1], abs=1e-7)
+
+
+@pytest.mark.parametrize(("times", "count"), [(True, 1), (2, 2), (2.0, 2), (np.int64(3), 3), (False, 4), (None, 4)])
+def test_a_run_ends_at_the_times_asked_for(swing: Any, times: Any, count: int) -> None:
+    """As often as that, in compiled code and with a function of Python."""
+
+    def height(t: float, x: np.ndarray) -> float:
+        return float(x[0])
+
+    height.terminal = times  # type: ignore[attr-defined]
+    for events in (height, {"low": {"expression": swing.q_names[0], "terminal": 0 if times is None else times}}):
+        run = swing.simulate((0, 4.2), {swing.q_names[0]: 0.5}, events=events)
+        assert (len(run.t_events[0]), run.status) == (count, int(count < 4))
+
+
+@pytest.mark.parametrize("method", ["DOP853", "BDF"])
+def test_an_event_without_a_value_is_told_of(swing: Any, method: str) -> None:
+    q = swing.q_names[0]
+    with pytest.warns(UserWarning, match="event gap: the value was not a number") as told:
+        run = swing.simulate((0, 1.5), {q: 0.5}, events={"gap": f"log(-1 - {q}**2)", "low": q}, method=method)
+    assert told[0].filename == __file__
+    assert [len(run.t_events[k]) for k in ("gap", "low")] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("events", "words"),
+    [
+        ("thteta", "no name in event"),
+        ("__import__('os')", "not allowed in an expression"),
+        (3.0, "must be a name, an expression or a function"),
+        ({"a": {"expression": "t - 1", "direction": 2}}, "direction must be 1, -1 or 0"),
+        ({"a": {"expresion": "t - 1"}}, "did you mean expression"),
+    ],
+)
+def test_wrong_events(swing: Any, events: Any, words: str) -> None:
+    with pytest.raises(eg.UsageError, match=words):
+        swing.simulate((0, 1), events=events)
+
+
+def test_a_zero_at_the_start_is_as_in_scipy(swing: Any) -> None:
+    x0 = swing.x0()
+    for sign in (1.0, -1.0):
+        for direction in (-1, 0, 1):
+
+            def leaves(t: float, x: np.ndarray, sign: float = sign) -> float:
+                return sign * t
+
+            leaves.direction = direction  # type: ignore[attr-defined]
+            theirs = solve_ivp(swing.rhs, (0, 1), x0, method="DOP853", events=leaves)
+            ours = swing.simulate((0, 1), x0, events=leaves)
+            np.testing.assert_allclose(ours.t_events[0], theirs.t_events[0], atol=1e-14)
+
+
+def test_what_a_function_raises_comes_out(swing: Any) -> None:
+    def broken(t: float, x: np.ndarray) -> float:
+        raise LookupError("no table here")
+
+    with pytest.raises(LookupError, match="no table here"):
+        swing.simulate((0, 1), events=broken)
+
+
+def test_a_reset_at_the_very_end_and_at_a_corner() -> None:
+    m = eg.Model("kicked")
+    m.prismatic("s", m.ground, m.body("a", mass=1.0), axis="x")
+    m.torque("f", "s", m.input("u"))
+    m.event("kick", "t - 1", reset={"s_dot": "s_dot + 2"})
+    mod = m.compile(target="numpy")
+    assert mod.simulate(1.0)["s_dot"][-1] == 2.0
+    table = ([0.0, 1.0, 2.0], [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(mod.simulate(2.0, inputs={"u": table})["s_dot"][-1], 2.5, rtol=1e-9)
+
+
+def test_a_single_step_passes_over_no_reset(bouncing: Any) -> None:
+    with pytest.raises(eg.UsageError, match="events of ball reset its state, and a single step finds no events"):
+        bouncing.step(0.0, bouncing.x0(), 0.5)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "LSODA"])
+@pytest.mark.parametrize("law", ["reset", "impact"])
+def test_scipys_methods_find_all_events_of_one_instant(law: str, method: str) -> None:
+    """solve_ivp tells of the first alone; the other bodies fell through the floor."""
+    m = eg.Model("three", gravity=(0, -G, 0))
+    for name in "abc":
+        m.prismatic(f"J{name}", m.ground, m.body(name, mass=1.0), axis="y", coordinate=name)
+        reset = {"direction": -1, "reset": {f"{name}_dot": f"-0.5*{name}_dot"}}
+        m.event(f"floor_{name}", name, **(reset if law == "reset" else {"restitution": 0.5}))
+    run = m.compile(target="numpy").simulate(0.8, dict.fromkeys("abc", 1.0), method=method, **TIGHT)
+    fall = np.sqrt(2 / G)
+    after = 0.8 - fall
+    np.testing.assert_allclose(run.x[:3, -1], 0.5 * G * fall * after - 0.5 * G * after**2, atol=1e-7)
+    assert [len(times) for times in run.t_events] == [1, 1, 1]
+
+
+@pytest.mark.parametrize(("speed", "target"), [(-0.1, "cython"), (0.0, "numpy"), (0.1, "numpy")])
+def test_an_input_that_jumps_over_an_event_against_the_motion_is_no_zeno(speed: float, target: str) -> None:
+    """A push of 0.25 m/s when the lever goes from 0 to 1, whichever way the motion changes the value; closed form."""
+    m = eg.Model("switched")
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    m.torque("nothing", "J", 0 * m.input("lever"))
+    m.initial(s=0.0, s_dot=speed)
+    m.event("on", "lever - 0.5 + s", direction=1, reset={"s_dot": "s_dot + 0.25"})
+    lever = eg.Signal([0.0, 0.5], [0.0, 1.0], "zero-order")
+    run = m.compile(target=target).simulate(2.0, inputs={"lever": lever}, t_eval=[0.5, 1.0, 2.0], **TIGHT)
+    np.testing.assert_allclose(run["s"], np.array([0.0, 0.125, 0.375]) + speed * run.t, atol=1e-9)
+
+
+def spring() -> eg.Model:
+    m = eg.Model("spring")
+    m.prismatic("slide", m.ground, m.body("bob", mass=2.0), axis="x", coordinate="q")
+    u = m.input("u")
+    m.torque("pull", "slide", u - 0.1 * m.coordinate("q_dot") - 3 * m.coordinate("q"))
+    m.initial(q=1)
+    m.sampled("given", period=0.25)
+    m.output("gap", "q + 5")
+    return m
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_functions_that_change_what_they_are_given_change_no_run(target: str) -> None:
+    mod = spring().compile(target=target)
+    truth = mod.simulate((0, 1), **TIGHT).x
+
+    def changing(t: float, x: Any) -> float:
+        x *= 0.9
+        return 1.0 + 0.0 * float(x[0])
+
+    def untouched(t: float, x: Any) -> float:
+        assert x[0] != 5.0  # by the one before
+        x[0] = 5.0
+        return 1.0
+
+    plain = {"u": lambda t, x: 1.0}
+    pushed = mod.simulate((0, 1), inputs=plain, **TIGHT).x[:, -1]
+    slopes = mod.simulate_impacts((0, 1), {"gap": 1.0}, inputs=plain).x[:, -1]
+    for method in ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA", type("Own", (DOP853,), {})):
+        loose = 1e-5 if method in ("BDF", "LSODA") else 1e-7
+        run = mod.simulate((0, 1), events=[untouched, untouched], method=method, **TIGHT)
+        np.testing.assert_allclose(run.x[:2, -1], truth[:2, -1], atol=loose, err_msg=str(method))
+        run = mod.simulate((0, 1), inputs={"u": changing}, method=method, **TIGHT)
+        np.testing.assert_allclose(run.x[:2, -1], pushed[:2], atol=loose, err_msg=str(method))
+    run = mod.simulate((0, 1), controllers={"given": changing}, **TIGHT)
+    np.testing.assert_allclose(run.x[:2, -1], truth[:2, -1], atol=1e-7)
+    assert run["given"][-1] == 1.0
+    run = mod.simulate_impacts((0, 1), {"gap": 1.0}, inputs={"u": changing})
+    np.testing.assert_allclose(run.x[:2, -1], slopes[:2], atol=1e-7)
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_a_function_that_gives_no_number_is_refused_by_name(target: str) -> None:
+    """As an input is; one that is no number only beyond the end of the run, where rates are taken, is not."""
+    mod = spring().compile(target=target)
+
+    def broken(t: float, x: Any) -> float:
+        return np.nan if x[0] < 0.5 else x[0] - 0.4
+
+    methods = ("DOP853", "RK45", "RK23", "Radau", "LSODA")
+    for method in methods:
+        with pytest.raises(eg.UsageError, match=r"event broken is nan at t = [\d.]+ s; its function must return"):
+            mod.simulate((0, 1), events=[broken], method=method)
+        run = mod.simulate((0, 1), events=[lambda t, x: t - 0.75 if t <= 1 else np.nan], method=method)
+        assert run.t_events[-1] == pytest.approx([0.75], abs=1e-9)
+    with pytest.raises(eg.UsageError, match="event broken is nan"):
+        mod.dae.solve((0, 1), events=[broken])
+    for value, text in ((None, "None"), (1j, "1j"), (np.ones(2), r"array\(\[1"), ("a", "'a'")):
+        for method in ("DOP853", "LSODA"):
+            with pytest.raises(eg.UsageError, match=f"event odd is {text}"):
+                mod.simulate((0, 1), events={"odd": lambda t, x, value=value: value}, method=method)
+        with pytest.raises(eg.UsageError, match=f"event odd is {text}"):
+            mod.dae.solve((0, 1), events={"odd": lambda t, x, value=value: value})

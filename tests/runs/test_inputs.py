@@ -1,0 +1,274 @@
+"""Inputs over time: numbers, texts, held values, lines, splines and functions mean the same in every call."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+import eomgen as eg
+
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
+
+
+@pytest.fixture(scope="module")
+def cart() -> Any:
+    """A mass on a line, pushed: x'' = u, so that x is the input integrated twice."""
+    m = eg.Model("cart")
+    body = m.body("cart", mass=1.0)
+    m.prismatic("J", m.ground, body, axis="x", coordinate="s")
+    u = m.input("u")
+    m.parameter("k", 2.0)
+    m.torque("push", "J", u)
+    return m.compile()
+
+
+TIMES, VALUES = np.array([0.0, 0.3, 0.5, 1.1, 2.0]), np.array([0.0, 1.0, -0.5, 2.0, 0.2])
+
+
+def twice(function: Any, times: np.ndarray, n: int = 200_001) -> np.ndarray:
+    """The second integral by the trapezoidal rule on a fine grid between the knots, where the input is smooth."""
+    grid = np.unique(np.concatenate([np.linspace(0, 2, n), TIMES]))
+    middle = function((grid[1:] + grid[:-1]) / 2)
+    h = np.diff(grid)
+    speed = np.concatenate([[0.0], np.cumsum(h * middle)])
+    place = np.concatenate([[0.0], np.cumsum(h * (speed[:-1] + h * middle / 2))])
+    return np.interp(times, grid, place)
+
+
+@pytest.mark.parametrize("method", ["RK45", "Radau"])
+@pytest.mark.parametrize("interpolation", ["zero-order", "linear", "cubic"])
+def test_tables_between_their_times(cart: Any, method: str, interpolation: str) -> None:
+    signal = eg.Signal(TIMES, VALUES, interpolation)
+    expected = {
+        "zero-order": lambda t: VALUES[np.searchsorted(TIMES, t, side="right") - 1],
+        "linear": lambda t: np.interp(t, TIMES, VALUES),
+        "cubic": CubicSpline(TIMES, VALUES),
+    }[interpolation]
+    asked = np.linspace(0, 2, 41)
+    run = cart.simulate((0, 2), inputs={"u": signal}, method=method, t_eval=asked, **TIGHT)
+    np.testing.assert_allclose(run["s"], twice(expected, asked), atol=1e-8)
+    inside = np.linspace(0.01, 1.99, 37)
+    np.testing.assert_allclose(signal(inside), expected(inside), rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(run["u"], signal(asked))
+    back = cart.simulate((2, 0), run.x[:, -1], inputs={"u": signal}, method=method, **TIGHT)
+    np.testing.assert_allclose(back.x[:, -1], 0.0, atol=1e-7)
+
+
+def test_a_held_table_is_exact_because_the_run_stops_at_its_jumps(cart: Any) -> None:
+    times = np.arange(0, 2, 0.01)
+    values = np.random.default_rng(3).normal(size=len(times))
+    held = cart.simulate((0, 2), inputs={"u": eg.Signal(times, values, "zero-order")}, rtol=1e-6, atol=1e-8)
+    speed = np.concatenate([[0.0], np.cumsum(0.01 * values)])
+    place = np.cumsum(0.01 * speed[:-1] + 0.01**2 / 2 * values)[-1]
+    assert held["s_dot"][-1] == pytest.approx(speed[-1], abs=1e-12)
+    assert held["s"][-1] == pytest.approx(place, abs=1e-12)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK23", "LSODA", "Radau"])
+def test_texts_of_time_state_and_parameters(cart: Any, method: str) -> None:
+    options = {"rtol": 1e-7, "atol": 1e-9} if method == "RK23" else TIGHT
+    run = cart.simulate((0, 3), {"s": 1.0}, {"k": 4.0}, inputs={"u": "-k*s"}, method=method, **options)
+    np.testing.assert_allclose(run["s"], np.cos(2 * run.t), atol=1e-5 if method == "RK23" else 1e-7)
+    np.testing.assert_allclose(run["u"], -4.0 * run["s"], atol=1e-12)
+
+
+def test_every_operation_means_the_same_on_a_tape(cart: Any) -> None:
+    text = (
+        "sqrt(1 + t) + exp(-t) + log(2 + t) + sin(t)*cos(t) + tan(t/2) + asin(t/3) + acos(t/3) + atan(t) + sinh(t) "
+        "+ cosh(t) + tanh(t) + asinh(t) + acosh(1 + t) + atanh(t/3) "
+        "+ atan2(t, 2) + hypot(t, 2) + abs(t - 1) + sign(t - 1) + min(t, 1, 2*t) + max(t, 1) + (t < 1) "
+        "+ (t <= 1) + (t == 1) + (t != 1) + (not t) + (t > 1 and t < 1.5 or t > 1.7) + (3 if t > 0.5 else 2) "
+        "+ t**3 - -t + t**2.5 / 7"
+    )
+    forced = cart.simulate((0, 2), inputs={"u": text}, method="RK4", step=0.05)
+    called = cart.simulate((0, 2), inputs={"u": text}, method="Radau", t_eval=forced.t, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(forced["u"], called["u"], rtol=1e-13)
+    rates = cart.simulate((0, 2), inputs={"u": text}, method="RK4", step=0.01)
+    middle = (rates.t[1:] + rates.t[:-1]) / 2
+    smooth = np.all([np.abs(middle - t) > 0.02 for t in (0.0, 0.5, 1.0, 1.5, 1.7)], axis=0)
+    u = np.interp(middle, rates.t, rates["u"])  # Simpson's rule is what RK4 does with a pure input
+    simpson = 0.01 * u
+    np.testing.assert_allclose(np.diff(rates["s_dot"])[smooth], simpson[smooth], rtol=1e-3)
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_signals_that_the_model_declares(target: str, tmp_path: Path) -> None:
+    m = eg.Model("cart")
+    body = m.body("cart", mass=1.0)
+    m.prismatic("J", m.ground, body, axis="x", coordinate="s")
+    m.parameter("k", 4.0)
+    m.torque("push", "J", m.input("u", signal="where(t > 100, sqrt(t), -k*s)"))
+    m.initial(s=1.0)
+    file = tmp_path / "cart.yaml"
+    file.write_text(m.to_yaml(), encoding="utf-8")
+    mod = eg.load(file).compile(target=target)
+    method = "DOP853" if target == "cython" else "RK45"
+    run = mod.simulate((0, 3), method=method, **TIGHT)
+    np.testing.assert_allclose(run["s"], np.cos(2 * run.t), atol=1e-8)
+    np.testing.assert_allclose(run["u"], -4.0 * run["s"])
+    stiffer = mod.simulate((0, 3), None, {"k": 9.0}, method="Radau", rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(stiffer["s"], np.cos(3 * stiffer.t), atol=1e-5)
+    free = mod.simulate((0, 3), inputs={"u": 0.0}, method=method)
+    np.testing.assert_allclose(free["s"], 1.0)
+    other = eg.Model("cart")
+    other.prismatic("J", other.ground, other.body("cart", mass=1.0), axis="x", coordinate="s")
+    other.input("w")
+    other.input("u", signal="w + s_ddot")
+    with pytest.raises(eg.ModelError, match="the acceleration 's_ddot' cannot(.|\n)*the input 'w' cannot be used here"):
+        other.compile()
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("k*r", "no name in input u 'r'"),
+        ("u + 1", "no name in input u 'u'"),
+        ("k*", "input u: .*not a valid expression"),
+        ("().__class__", "input u"),
+        (([0, 1], [1, 2, 3]), "input u: times and values"),
+        ([1, 2, 3], "a Signal, an expression as text"),
+        (([0.0, 0.0], [1.0, 2.0]), "times must increase, not go from 0.0 to 0.0"),
+        (([0, 1], [1, np.nan]), "must be finite"),
+        (lambda t, x: x, "one number at each time"),
+        (
+            lambda t: t,
+            r"input u: its function must be callable as f\(t, x\), and .*lambda>\(t\) is not; write it with both",
+        ),
+        (lambda t, x, gain: gain, "bind its other arguments"),
+        (lambda t, x: np.nan, "input u is nan at t = 0 s"),
+        (lambda t, x: None if t > 0.25 else 0.0, "input u .* returned None at t = 0.[23]"),
+    ],
+)
+def test_wrong_inputs(cart: Any, value: Any, words: str) -> None:
+    with pytest.raises(eg.UsageError, match=words):
+        cart.simulate((0, 1), inputs={"u": value})
+
+
+def test_wrong_signals_and_names(cart: Any) -> None:
+    with pytest.raises(eg.UsageError, match="no interpolation 'quintic'; there are linear, zero-order, cubic"):
+        eg.Signal([0, 1], [1, 2], "quintic")
+    for inputs, words in (({"v": 1.0}, "'v'"), (3.0, "mapping")):
+        with pytest.raises(eg.UsageError, match=words):
+            cart.simulate(1.0, inputs=inputs)
+    with pytest.raises(ZeroDivisionError) as caught:
+        cart.simulate(1.0, inputs={"u": lambda t, x: 1 / 0})
+    assert caught.value.__notes__ == ["raised by the function of input u, called as f(0, x)"]
+    with pytest.raises(eg.SimulationError, match=r"stopped near .*input u is inf at t = 0.[23]"):
+        cart.simulate(1.0, inputs={"u": lambda t, x: 0.0 if t < 0.25 else np.inf}, method="LSODA", max_step=0.1)
+
+
+class Rising:
+    """An input 1 + 3 t that says its rate, as docs/inputs.md allows: a number, or a function."""
+
+    def __init__(self, rate: Any) -> None:
+        self.rate = rate
+
+    def __call__(self, t: float, x: Any) -> float:
+        return 1.0 + 3.0 * t
+
+    def derivative(self) -> Any:
+        return self.rate
+
+
+KNOTS, POINTS = np.array([0.0, 0.5, 1.0, 1.5, 2.0]), np.array([1.0, -2.0, 3.0, 5.0, 7.0])
+SPLINE = CubicSpline(KNOTS, POINTS)
+ASKED = np.array([0.1, 0.7, 1.2, 1.9])
+FORMS: dict[str, tuple[Any, Any]] = {
+    "number": (2.0, lambda t: 2.0 + 0.0 * t),
+    "pair": ((KNOTS, POINTS), lambda t: np.interp(t, KNOTS, POINTS)),
+    "held": (eg.Signal(KNOTS, POINTS, "zero-order"), lambda t: POINTS[np.searchsorted(KNOTS, t, side="right") - 1]),
+    "cubic": (eg.Signal(KNOTS, POINTS, "cubic"), SPLINE),
+    "text": ("1 + sin(3*t)", lambda t: 1 + np.sin(3 * t)),
+    "function": (lambda t, x: 1 + np.sin(3 * t), lambda t: 1 + np.sin(3 * t)),
+    "object": (Rising(3.0), lambda t: 1 + 3 * t),
+    "spline": (SPLINE, SPLINE),
+}
+
+CALLS: dict[str, Any] = {
+    "simulate": lambda m, u: m.simulate(2, inputs={"u": u}, t_eval=ASKED)["y"],
+    "Radau": lambda m, u: m.simulate(2, inputs={"u": u}, t_eval=ASKED, method="Radau")["y"],
+    "at": lambda m, u: m.simulate(2, inputs={"u": u}, dense_output=True).at(ASKED)["y"],
+    "sensitivities": lambda m, u: 2 * m.sensitivities(["k"], 2, inputs={"u": u}, t_eval=ASKED)["y", "k"],
+    "with an event": lambda m, u: (
+        2 * m.sensitivities(["k"], 2, inputs={"u": u}, t_eval=ASKED, events=["t - 0.3"])["y", "k"]
+    ),
+    "impacts": lambda m, u: m.simulate_impacts(2, {"wall": 0.5}, inputs={"u": u}).at(ASKED)["y"],
+    "dae": lambda m, u: m.dae.solve(2, inputs={"u": u}, t_eval=ASKED)["y"],
+    "ensemble": lambda m, u: m.simulate_many(2, {"s": np.zeros(1)}, inputs={"u": u}, t_eval=ASKED)["y"].ravel(),
+    "power": lambda m, u: 2 * (r := m.simulate(2, inputs={"u": u}, t_eval=ASKED))["power_in"] / r["s_dot"],
+}
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_every_form_of_an_input_means_the_same_in_every_call(target: str) -> None:
+    """y = k u: after a run each call must take the input of each time, not of the run's last part."""
+    m = eg.Model("cart")
+    m.prismatic("J", m.ground, m.body("cart", mass=1.0), axis="x", coordinate="s")
+    k, u = m.parameter("k", 2.0), m.input("u")
+    push = m.torque("push", "J", u)
+    m.output("y", k * u)
+    m.output("wall", "50 + k*u")  # a gap that moves with the input and stays open
+    m.output("power_in", push.power)
+    mod = m.compile(target=target)
+    for form, (given, value) in FORMS.items():
+        for name, call in CALLS.items():
+            if name == "ensemble" and callable(given) and not isinstance(given, eg.Signal):
+                continue  # which docs/ensembles.md leaves out
+            np.testing.assert_allclose(call(mod, given), 2 * value(ASKED), atol=1e-6, err_msg=f"{form}: {name}")
+        found = mod.fit({"t": ASKED, "y": 3.0 * value(ASKED)}, ["k"], inputs={"u": given}, initial={"s": 0, "s_dot": 0})
+        assert found.values["k"] == pytest.approx(3.0, rel=1e-6), form
+
+
+KNOWN, GIVEN = [0.0, 0.4, 1.0, 1.7, 2.0], [1.0, -0.5, 0.3, 0.2, 2.0]
+INSIDE = np.linspace(0.013, 1.99, 41)  #: none of the times
+
+
+@pytest.mark.quick
+def test_cubic_tables_and_their_rates_are_those_of_scipy() -> None:
+    judge, table = CubicSpline(KNOWN, GIVEN), eg.Signal(KNOWN, GIVEN, "cubic")
+    first = table.derivative()
+    second = first.derivative()
+    for order, one in enumerate((table, first, second)):
+        np.testing.assert_allclose(one(INSIDE), judge(INSIDE, order), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose([one(t) for t in INSIDE], one(INSIDE), rtol=1e-14, atol=1e-14)
+    assert [float(first(t)) for t in (-0.5, 2.5)] == [0.0, 0.0]
+    assert [float(table(t)) for t in (-0.5, 2.5)] == [1.0, 2.0]
+
+
+def test_linear_tables_have_the_slopes_of_their_pieces() -> None:
+    table = eg.Signal(KNOWN, GIVEN)
+    slopes = np.diff(GIVEN) / np.diff(KNOWN)
+    np.testing.assert_allclose(table(INSIDE), np.interp(INSIDE, KNOWN, GIVEN))
+    np.testing.assert_allclose(table.derivative()(INSIDE), slopes[np.searchsorted(KNOWN, INSIDE) - 1])
+
+
+@pytest.mark.parametrize("t", [0.0, 0.39, 0.4, 0.999, 1.0, 1.99, 2.0, 3.0])
+def test_held_tables_keep_the_last_value(t: float) -> None:
+    expected = [value for time, value in zip(KNOWN, GIVEN, strict=True) if time <= t][-1]
+    assert eg.Signal(KNOWN, GIVEN, "zero-order")(t) == expected
+
+
+def test_a_short_pulse_is_not_stepped_over(cart: Any) -> None:
+    pulse = ([1.0, 1.001, 1.002], [0.0, 1000.0, 0.0])  # an impulse of 1 N s on 1 kg
+    run = cart.simulate(3.0, {"s_dot": 0.0}, inputs={"u": pulse})
+    assert run["s_dot"][-1] == pytest.approx(1.0, rel=1e-8)
+    assert (np.diff(run.t) > 0).all()
+    back = cart.simulate((3.0, 0.0), {"s_dot": 1.0}, inputs={"u": pulse}, dense_output=True)
+    np.testing.assert_allclose(back.at([2.9, 0.1])["s_dot"], [1.0, 0.0], atol=1e-8)
+
+
+def test_feedback_enters_the_jacobian(cart: Any) -> None:
+    """A stiff controller as an input: Radau needs its slope, else it takes tiny steps."""
+    given = {"inputs": {"u": lambda t, x: -1e5 * x[1]}, "rtol": 1e-6, "atol": 1e-9}
+    run = cart.simulate(5.0, {"s_dot": 1.0}, method="Radau", **given)
+    assert run.nfev < 2000
+    assert np.abs(run["s_dot"][-1]) < 1e-3
+
+
+def test_a_long_linear_table_is_stepped_on_at_every_corner(cart: Any) -> None:
+    t, u = np.linspace(0, 3, 3001), np.random.default_rng(0).normal(size=3001)
+    assert cart.simulate(3, inputs={"u": (t, u)})["s_dot"][-1] == pytest.approx(np.trapezoid(u, t), abs=1e-12)

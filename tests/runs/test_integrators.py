@@ -1,0 +1,273 @@
+"""Integrators held ready, single steps and steps of one size: the results of whole runs, each call as if the first."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import command
+import models
+import numpy as np
+import pytest
+
+import eomgen as eg
+
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
+
+
+def spring(**options: Any) -> Any:
+    """x'' = (F - k x) / m, which has a closed form."""
+    m = eg.Model("spring")
+    k, force = m.parameter("k", 9.0), m.input("F", 0.0)
+    m.prismatic("J", m.ground, m.body("cart", mass=2), axis="x", coordinate="x")
+    m.torque("push", "J", force - k * m.coordinate("x"))
+    m.initial = {"x": 0.3}
+    return m.compile(**options)
+
+
+@pytest.fixture(scope="module", params=["cython", "numpy"])
+def cart(request: pytest.FixtureRequest) -> Any:
+    return spring(target=request.param)
+
+
+@pytest.fixture(scope="module")
+def compiled() -> Any:
+    return spring()
+
+
+@pytest.fixture(scope="module")
+def four_bar() -> Any:
+    return models.build("four_bar").compile()
+
+
+def closed_form(x: Any, h: float, k: float = 9.0, force: float = 0.0) -> np.ndarray:
+    w, rest = np.sqrt(k / 2.0), force / k
+    a, b = x[0] - rest, x[1] / w
+    return np.array([rest + a * np.cos(w * h) + b * np.sin(w * h), w * (b * np.cos(w * h) - a * np.sin(w * h))])
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "Radau", "LSODA"])
+def test_the_closed_form(cart: Any, method: str) -> None:
+    go = cart.integrator(method=method, **TIGHT)
+    x = [0.3, -0.2]
+    for h in (1.7, 0.01, -2.5, 0.0):
+        np.testing.assert_allclose(go(5.0, x, h), closed_form(x, h), atol=2e-8)
+        assert go.evaluations > 0 or h == 0.0
+
+
+def test_parameters_and_inputs_of_a_call(cart: Any) -> None:
+    go = cart.integrator(**TIGHT)
+    x = np.array([0.3, 0.0])
+    np.testing.assert_allclose(go(0.0, x, 1.0, u=[2.0]), closed_form(x, 1.0, force=2.0), atol=1e-8)
+    np.testing.assert_allclose(go(0.0, x, 1.0, p=[4.0]), closed_form(x, 1.0, k=4.0), atol=1e-8)
+    np.testing.assert_allclose(go(0.0, x, 1.0), closed_form(x, 1.0), atol=1e-8)  # and none stays behind
+    held = cart.integrator({"k": 4.0}, {"F": 2.0}, **TIGHT)
+    np.testing.assert_allclose(held(0.0, x, 1.0), closed_form(x, 1.0, 4.0, 2.0), atol=1e-8)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK23", "Taylor", "Radau"])
+def test_calls_have_the_bits_of_whole_runs_and_forget_each_other(compiled: Any, method: str) -> None:
+    go, x = compiled.integrator(method=method, **TIGHT), compiled.x0()
+    first = go(0.0, x, 2.0)
+    run = compiled.simulate((0.0, 2.0), x, t_eval=[2.0], method=method, **TIGHT)
+    np.testing.assert_array_equal(first, run.x[:, -1])
+    assert go.evaluations == run.nfev
+    go(1.0, first, -30.0)
+    np.testing.assert_array_equal(go(0.0, x, 2.0), first)
+
+
+def test_steps_of_one_size(compiled: Any) -> None:
+    go, x = compiled.integrator(method="RK4", step=0.01), compiled.x0()
+    by_hand = x
+    for k in range(10):
+        by_hand = compiled.step(k * 0.01, by_hand, 0.01)
+    np.testing.assert_allclose(go(0.0, x, 0.1), by_hand, rtol=1e-14)
+    short = compiled.simulate((0.0, 1e-3), x, method="RK4", step=0.01)  # a run shorter than a step
+    np.testing.assert_array_equal(short.x[:, -1], go(0.0, x, 1e-3))
+    with pytest.raises(eg.UsageError, match="would not end"):
+        go(0.0, x, 1e12)
+
+
+def test_calls_of_loops_have_the_bits_of_whole_runs(four_bar: Any) -> None:
+    go, x = four_bar.integrator(**TIGHT), four_bar.x0()
+    np.testing.assert_array_equal(go(0.0, x, 1.5), four_bar.simulate((0.0, 1.5), x, t_eval=[1.5], **TIGHT).x[:, -1])
+
+
+def test_states_off_the_constraints_are_brought_onto_them_first(four_bar: Any) -> None:
+    off = four_bar.x0()
+    off[: four_bar.n_q] += 0.1
+    go = four_bar.integrator(**TIGHT)
+    found = four_bar.simulate((0.0, 0.5), off, t_eval=[0.5], **TIGHT).x[:, -1]
+    np.testing.assert_array_equal(go(0.0, off, 0.5), found)
+    np.testing.assert_allclose(go(0.0, off, 0.0), four_bar.project(off), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (((0.0, [1.0], 1.0), {}), r"x must have shape \(2,\), not \(1,\)"),
+        (((0.0, [1.0, 2.0], 1.0), {"p": [1.0, 2.0]}), r"p.* shape \(1,\)"),
+        (((0.0, [1.0, 2.0], float("nan")), {}), "finite"),
+        (((0.0, {"x": 1.0}, 1.0), {}), "integrator of spring"),
+        (((0.0, [1j, 2.0], 1.0), {}), "real numbers"),
+        (((0.0, [1.0, 2.0], 1.0), {"out": np.zeros(3)}), r"out.* shape \(2,\)"),
+        (((0.0, [1.0, 2.0], 1.0), {"out": np.broadcast_to(0.0, (2,))}), "out must be a contiguous writeable"),
+        (((0.0, [1.0, 2.0], 1.0), {"out": np.zeros(2, dtype=np.float32)}), "float64"),
+        (((0.0, [1.0, 2.0], 1.0), {"p": {"kk": 1.0}}), "kk"),
+        (((1e16, [1.0, 2.0], 1.0), {}), "too small at t"),
+        (((1e308, [1.0, 2.0], 1e308), {}), "finite"),
+    ],
+)
+def test_wrong_calls_are_told(cart: Any, call: Any, words: str) -> None:
+    positional, named = call
+    with pytest.raises(eg.UsageError, match=words):
+        cart.integrator()(*positional, **named)
+
+
+def test_a_state_that_is_reset_needs_a_run() -> None:
+    m = eg.Model("ball", gravity=(0, -9.81, 0))
+    m.prismatic("J", m.ground, m.body("ball", mass=1), axis="y", coordinate="y")
+    m.initial = {"y": 1.0}
+    m.event("bounce", "y", direction=-1, reset={"y_dot": -m.coordinate("y_dot")})
+    with pytest.raises(eg.UsageError, match=r"events of ball reset its state.*simulate"):
+        m.compile(target="numpy").integrator()
+
+
+@pytest.mark.parametrize("method", ["DOP853", "Radau"])
+def test_what_stops_a_call_is_named(method: str) -> None:
+    m = eg.Model("wall")
+    m.prismatic("J", m.ground, m.body("cart", mass=1), axis="x", coordinate="x")
+    m.torque("pull", "J", -1 / (m.coordinate("x") * m.coordinate("x") ** 0.5))
+    m.initial = {"x": 1.0}
+    mod = m.compile()
+    go = mod.integrator(method=method)
+    with pytest.raises(eg.SimulationError, match=rf"{method} stopped at t = 2\.1781 s of 11 s"):
+        go(1.0, mod.x0(), 10.0)
+    m = eg.Model("root")  # a force that is no number where x < 0
+    m.prismatic("J", m.ground, m.body("cart", mass=1), axis="x", coordinate="x")
+    m.torque("pull", "J", -(m.coordinate("x") ** 0.5))
+    root = m.compile().integrator(method=method)
+    with pytest.raises(eg.SimulationError, match=r"stopped near t = .* of 10 s. Last failure: rhs at .*x = ") as caught:
+        root(0.0, [1.0, -1.0], 10.0)
+    assert isinstance(caught.value.__cause__, eg.EvaluationError)
+    x = np.array([1.0, -1.0])
+    with pytest.raises(eg.SimulationError):
+        root(0.0, x, 10.0, out=x)
+    np.testing.assert_array_equal(x, [1.0, -1.0])  # a call that fails leaves it as it was
+    np.testing.assert_allclose(go(1.0, mod.x0(), 0.1), mod.simulate((1.0, 1.1), method=method).x[:, -1], rtol=1e-6)
+
+
+def test_an_interrupt_stops_a_long_call(compiled: Any) -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        go = compiled.integrator(**TIGHT)
+        with pytest.raises(KeyboardInterrupt):
+            threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+            go(0.0, compiled.x0(), 1e9)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    np.testing.assert_allclose(go(0.0, [0.3, 0.0], 1.0), closed_form([0.3, 0.0], 1.0), atol=1e-8)
+
+
+def test_one_thread_at_a_time(compiled: Any) -> None:
+    go, refused = compiled.integrator(**TIGHT), []
+
+    def disturb() -> None:
+        while not refused:  # not at work yet
+            try:
+                go(0.0, compiled.x0(), 1e-3)
+            except eg.UsageError as error:
+                refused.append(str(error))
+        os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            threading.Timer(0.1, disturb).start()
+            while True:  # unless the other was at work for a moment
+                with suppress(eg.UsageError):
+                    go(0.0, compiled.x0(), 1e9)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert refused == [
+        "integrator of spring: it is already working in another thread; make one integrator for each thread"
+    ]
+
+
+FILE = """
+name: swing
+bodies: {bob: {mass: 1.0, com: [0, -1, 0]}}
+gravity: [0, -9.81, 0]
+joints: {q: {type: revolute, between: [ground, bob]}}
+initial: {q: 1.0}
+simulation: {end: 1, method: RK4, step: 0.01}
+"""
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("steps") / "swing.yaml"
+    path.write_text(FILE)
+    return path
+
+
+def test_a_run_takes_the_declared_steps(path: Path) -> None:
+    swing, h = eg.load(path).compile(), 0.01
+    run, x = swing.simulate(), swing.x0()
+    for _ in range(100):  # Kutta's classical formula
+        a = swing.rhs(0.0, x)
+        b = swing.rhs(0.0, x + h / 2 * a)
+        c = swing.rhs(0.0, x + h / 2 * b)
+        x = x + h / 6 * (a + 2 * b + 2 * c + swing.rhs(0.0, x + h * c))
+    np.testing.assert_allclose(run.t, np.linspace(0, 1, 101), atol=1e-12)
+    np.testing.assert_allclose(run.x[:, -1], x, rtol=1e-12)
+    assert len(swing.simulate(step=0.1).t) == 11
+    assert len(swing.simulate(method="RK4").t) == 101
+    assert len(swing.simulate(method="RK45", rtol=1e-3).t) < 50
+    many = swing.simulate_many(initial={"q": [1.0, 0.5]})
+    np.testing.assert_allclose(many.x[:, 0], run.x[:, -1], rtol=1e-12)
+
+
+def test_the_command_line_takes_them(path: Path) -> None:
+    def run(*words: object) -> Any:
+        return command.run("run", *words, "--json").json
+
+    declared, given = run(path), run(path, "--solver", "rk4", "--step", "0.01")
+    assert declared["final"] == given["final"]
+    other = run(path, "--solver", "DOP853")
+    assert other["final"] != declared["final"]
+    assert other["final"]["q"] == pytest.approx(declared["final"]["q"], abs=1e-7)
+    assert run(path, "--step", "0.02")["final"] != declared["final"]
+    refused = command.run("run", path, "--solver", "RK45", "--step", "0.1")
+    assert refused.code == 2
+    assert "RK4" in refused.err
+
+
+def test_steps_are_of_order_four() -> None:
+    """Order 4, whole steps, and the same steps one by one."""
+    mod = models.build("double_pendulum").compile()
+    x0 = mod.x0()
+    exact = mod.simulate((0, 1), x0, rtol=1e-13, atol=1e-14).x[:, -1]
+    errors = []
+    for n in (100, 200, 400):
+        run = mod.simulate((0, 1), x0, method="RK4", step=1 / n)
+        assert len(run.t) == n + 1
+        x, same = x0.copy(), x0
+        for k in range(n):
+            assert mod.step(k / n, x, 1 / n, out=x) is x
+            same = mod.step(k / n, same, 1 / n)
+        np.testing.assert_array_equal(x, same)
+        np.testing.assert_allclose(run.x[:, -1], x, atol=1e-12)
+        errors.append(np.abs(run.x[:, -1] - exact).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.3)
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(4, abs=0.3)
+    between = mod.simulate((0, 1), x0, method="RK4", step=0.0025, t_eval=[0.12345, 0.9]).x
+    np.testing.assert_allclose(
+        between, mod.simulate((0, 1), x0, t_eval=[0.12345, 0.9], rtol=1e-10, atol=1e-12).x, atol=1e-7
+    )
+    with pytest.raises(eg.UsageError, match="no other method takes it"):
+        mod.simulate((0, 1), step=0.1)

@@ -1,0 +1,276 @@
+"""Calls of a module: shapes, batches, arguments by place, by name, as text, in memory of the result, from threads."""
+
+from __future__ import annotations
+
+import functools
+import math
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import models
+import numpy as np
+import pytest
+
+import eomgen as eg
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_shapes_of_every_call_for_one_state_and_a_batch(target: str) -> None:
+    """Of a linkage with a redundant row; strided, lists and other real types mean the same."""
+    m = models.build("three_cranks")
+    m.torque("motor", "A1", m.input("tau")), m.output("angle", "theta2")
+    mod = m.compile(target=target)
+    n, n_q, n_rows = mod.n_x, mod.n_q, len(mod.constraints(mod.x0()[: mod.n_q], rows="all"))
+    assert n_rows == mod.n_c + 1
+    x = mod.x0()
+    batch = np.repeat(x[:, None], 4, axis=1)
+    timed = {"rhs": (n,), "jacobian": (n, n), "bias": (mod.n_v,), "outputs": (mod.n_y,), "input_jacobian": (n, mod.n_u)}
+    state = {"energy": (2,), "project": (n,), "velocity_constraints": (mod.n_c,), "momentum": (6,)}
+    position = {
+        "mass_matrix": (mod.n_v, mod.n_v), "embedded_mass_matrix": (1, 1), "poses": (mod.n_bodies, 4, 4),
+        "constraints": (mod.n_c,), "constraint_jacobian": (mod.n_c, mod.n_v), "center_of_mass": (3,),
+    }  # fmt: skip
+    for name, shape in (timed | state | position).items():
+        call, before = getattr(mod, name), (0.0,) if name in timed else ()
+        one, many = (x[:n_q], batch[:n_q]) if name in position else (x, batch)
+        result, every = call(*before, one), call(*before, many)
+        assert (result.shape, every.shape) == (shape, (*shape, 4)), name
+        np.testing.assert_allclose(every[..., 2], result, rtol=1e-12, atol=1e-12)
+        wide = np.zeros((len(one), 8))
+        wide[:, ::2] = many
+        np.testing.assert_array_equal(call(*before, wide[:, ::2]), every)
+        np.testing.assert_array_equal(call(*before, one.tolist()), result)
+        out = np.empty(shape)
+        assert call(*before, one, out=out) is out
+        np.testing.assert_array_equal(out, result)
+        with pytest.raises(eg.UsageError):
+            call(*before, np.zeros(n + 1))
+        for wrong in ([0.0] * max(1, result.size), np.zeros(shape, np.float32), np.zeros((2, *shape))):
+            with pytest.raises(eg.UsageError, match="out"):
+                call(*before, one, out=wrong)
+    assert mod.inverse_dynamics(batch[:n_q], batch[n_q:], batch[n_q:]).shape == (mod.n_v, 4)
+    with pytest.raises(eg.UsageError, match="independent"):
+        mod.constraints(x[:n_q], rows="some")
+    assert "redundant at the reference" in mod.report()
+    assert "1 degree of freedom" in repr(mod)
+
+
+@pytest.fixture(scope="module")
+def arm() -> Any:
+    return models.build("two_link_manipulator").compile()
+
+
+def test_every_way_to_name_the_arguments_gives_the_same(arm: Any) -> None:
+    x, p, u = np.array([0.3, -0.4, 1.0, 2.0]), arm.p * 1.1, np.array([0.5, -0.2])
+    timed = {"t": 0.5, "x": x, "p": p, "u": u, "out": None}
+    state = {"x": x[:2], "p": p, "u": u, "out": None, "t": 0.5}
+    for call, every in ((arm.rhs, timed), (arm.bias, timed), (arm.mass_matrix, state), (arm.poses, state)):
+        expected = call(*every.values())
+        for positional in range(len(every) + 1):
+            first = list(every.values())[:positional]
+            rest = list(every.items())[positional:]
+            np.testing.assert_array_equal(call(*first, **dict(rest)), expected)
+            np.testing.assert_array_equal(call(*first, **dict(reversed(rest))), expected)
+        out = np.empty_like(expected)
+        assert call(**{**every, "out": out}) is out
+        np.testing.assert_array_equal(out, expected)
+        np.testing.assert_array_equal(functools.partial(call, **every)(), expected)
+        made = {"".join(list(name)): value for name, value in every.items()}  # names that are not interned
+        np.testing.assert_array_equal(call(**made), expected)
+    np.testing.assert_array_equal(arm.rhs(0, x), arm.rhs(0.0, x, None, None, None))
+    np.testing.assert_array_equal(arm.mass_matrix(x[:2]), arm.mass_matrix(x[:2], t=0.0))
+    by_place = arm.inverse_dynamics(x[:2], x[:2], x[2:])
+    np.testing.assert_array_equal(arm.inverse_dynamics(x[:2], a=x[2:], v=x[:2]), by_place)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'y'"):
+        arm.rhs(0.0, x, y=1)
+    with pytest.raises(TypeError, match="keywords must be strings"):
+        arm.rhs(0.0, x, **{1: 2})
+
+
+def test_results_may_overwrite_what_they_are_made_from(arm: Any) -> None:
+    """x, u or p in the memory of ``out``: read whole before it is written; lists and strided arrays mean the same."""
+    x, p, u = np.array([0.3, -0.4, 1.0, 2.0]), arm.p * 1.1, np.array([0.5, -0.2])
+    expected = arm.bind(p=p, u=u).rhs(0.5, x)
+    for start in range(5):
+        room = np.zeros(12)
+        inner = room[start : start + 2]
+        inner[:] = u
+        out = room[2:6]
+        np.testing.assert_array_equal(arm.rhs(0.5, x, p=p, u=inner, out=out), expected)
+        np.testing.assert_array_equal(out, expected)
+    room = np.concatenate([p, np.zeros(8)])
+    np.testing.assert_array_equal(arm.rhs(0.5, x, p=room[: len(p)], u=u, out=room[1:5]), expected)
+    strided = np.zeros((2, 3))
+    strided[:, 1] = u
+    for given in (u.tolist(), strided[:, 1], u.astype(np.float64)[::1], u.astype(">f8")):
+        np.testing.assert_array_equal(arm.rhs(0.5, x, p=p.tolist(), u=given), expected)
+        np.testing.assert_array_equal(arm.rhs(0.5, x, p=p, u=given), expected)
+
+
+def test_a_call_keeps_nothing_and_can_be_made_by_many_threads(arm: Any) -> None:
+    x, out, t = np.array([0.3, -0.4, 1.0, 2.0]), np.empty(4), 0.123
+    arguments = (x, out, t)
+    before = [sys.getrefcount(value) for value in arguments]
+    for _ in range(100):
+        arm.rhs(t, x, out=out)
+        arm.energy(x, t=t)
+        with pytest.raises(eg.UsageError):
+            arm.rhs(t, x, out=out[:1])
+        with pytest.raises(TypeError):
+            arm.rhs(t, x, out=out, wrong=x)
+    assert [sys.getrefcount(value) for value in arguments] == before
+    expected, wrong = arm.rhs(t, x), []
+
+    def run() -> None:
+        mine = np.empty(4)
+        for _ in range(2000):
+            if arm.rhs(t, x, out=mine) is not mine or not np.array_equal(mine, expected):
+                wrong.append(mine.copy())
+
+    threads = [threading.Thread(target=run) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def columns(call: Any, *arrays: np.ndarray, **more: Any) -> np.ndarray:
+    """The call for one column after the other."""
+    k = arrays[-1].shape[1]
+    each = [call(*(np.ascontiguousarray(a[:, j]) for a in arrays), **more) for j in range(k)]
+    return np.stack(each, axis=-1)
+
+
+@pytest.mark.parametrize("k", [1, 3, 8, 33])
+def test_columns_have_the_bits_of_single_calls(arm: Any, k: int) -> None:
+    rng = np.random.default_rng(k)
+    x = rng.uniform(-3.0, 3.0, (4, k))
+    u = np.array([0.3, -0.2])
+    np.testing.assert_array_equal(arm.rhs(0.0, x, u=u), columns(lambda s: arm.rhs(0.0, s, u=u), x))
+    for call, rows in ((arm.mass_matrix, 2), (arm.energy, 4), (arm.poses, 2)):
+        np.testing.assert_array_equal(call(x[:rows]), columns(call, x[:rows]))
+    for timed in (arm.bias, arm.outputs, arm.jacobian):
+        np.testing.assert_array_equal(timed(0.5, x), columns(lambda s, f=timed: f(0.5, s), x))
+    q, v, a = x[:2], x[2:], rng.uniform(-3.0, 3.0, (2, k))
+    np.testing.assert_array_equal(arm.inverse_dynamics(q, v, a), columns(arm.inverse_dynamics, q, v, a))
+
+
+TIMED = ("rhs", "jacobian", "bias", "outputs", "input_jacobian", "parameter_jacobian", "reactions", "multipliers")
+OF_STATE = ("energy", "project", "velocity_constraints", "momentum")
+OF_POSITION = (
+    "mass_matrix", "embedded_mass_matrix", "poses", "constraints", "constraint_jacobian", "center_of_mass",
+    "com_jacobian", "centroidal_inertia",
+)  # fmt: skip
+
+OF_MOTION = ("inverse_dynamics", "inverse_dynamics_derivatives")
+CALLS = (*TIMED, *OF_STATE, *OF_POSITION, *OF_MOTION)
+
+
+@pytest.fixture(scope="module", params=["cython", "numpy"])
+def turning(request: pytest.FixtureRequest) -> eg.Module:
+    return models.build("slider_crank").compile(target=request.param)
+
+
+def arguments(turning: eg.Module, name: str, x: Any) -> tuple[Any, ...]:
+    q, v = x[: turning.n_q], x[turning.n_q :]
+    return (0.3, x) if name in TIMED else (x,) if name in OF_STATE else (q,) if name in OF_POSITION else (q, v, 0.5 * v)
+
+
+def test_calls_take_values_by_name_under_either_name(turning: eg.Module) -> None:
+    p, u = {"m_r": 1.7, "g": "9.81 - 0.2"}, {"tau": "2*0.3"}
+    bound = turning.bind(p={"m_r": 1.7, "g": 9.61}, u=[0.6])
+    x = bound.x0({"theta": 0.4, "theta_dot": 1.0})
+    for name in CALLS:
+        given = arguments(turning, name, x)
+        call, wanted = getattr(turning, name), getattr(bound, name)(*given)
+        for words in ({"p": p, "u": u}, {"parameters": p, "inputs": u}, {"parameters": bound.p, "inputs": bound.u}):
+            for found, one in zip(call(*given, **words), wanted, strict=True):
+                np.testing.assert_allclose(found, one, rtol=1e-12, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("name", ["rhs", "project", "mass_matrix", "inverse_dynamics"])
+def test_what_is_given_twice_or_not_known_is_refused(turning: eg.Module, name: str) -> None:
+    given, call = arguments(turning, name, turning.x0()), getattr(turning, name)
+    with pytest.raises(eg.UsageError, match="p and parameters are the same argument; give one of them"):
+        call(*given, p={"m_r": 1.0}, parameters={"m_r": 1.0})
+    with pytest.raises(eg.UsageError, match="p and parameters are the same argument; give one of them"):
+        call(*given, *([0.0] if name == "project" else []), turning.p, parameters={"m_r": 1.0})  # its second is t
+    with pytest.raises(eg.UsageError, match="u and inputs are the same argument; give one of them"):
+        call(*given, u=[0.0], inputs={"tau": 0.0})
+    with pytest.raises(eg.UsageError, match=r"m_x.*(m_r|parameter)"):
+        call(*given, p={"m_x": 1.0})
+    with pytest.raises(eg.UsageError, match="tau"):
+        call(*given, inputs={"tau": "fast"})
+
+
+@pytest.fixture(scope="module")
+def links() -> Any:
+    return models.build("double_pendulum").compile(target="numpy")
+
+
+def same(a: Any, b: Any) -> None:
+    np.testing.assert_array_equal(a.t, b.t)
+    np.testing.assert_array_equal(a.x, b.x)
+
+
+def test_texts_are_numbers(links: Any) -> None:
+    plain = links.simulate((0, math.pi / 4), {"theta1": math.pi / 6, "bend_dot": -0.5}, {"l1": 0.75})
+    same(plain, links.simulate((0, "pi/4"), {"theta1": "deg(30)", "bend_dot": "-1/2"}, {"l1": "3/4"}))
+    same(plain, links.simulate("pi/4", {"theta1": "30*pi/180", "bend_dot": "-sqrt(0.25)"}, {"l1": "0.5 + 0.25"}))
+    np.testing.assert_array_equal(links.x0(theta1="deg(30)"), links.x0(theta1=math.pi / 6))
+    np.testing.assert_array_equal(links.bind({"l1": "3/4"}).p, links.bind({"l1": 0.75}).p)
+    given = {"rtol": "1e-6", "atol": "2e-8/2", "max_step": "1/50", "first_step": "1e-4"}
+    same(links.simulate("0.2", **given), links.simulate(0.2, rtol=1e-6, atol=1e-8, max_step=0.02, first_step=1e-4))
+    held = [links.equilibrium(hold={"theta1": value}).q for value in ("pi/3", math.pi / 3)]
+    np.testing.assert_array_equal(*held)
+
+
+def test_a_run_goes_on_from_the_last_state_of_another(links: Any) -> None:
+    first = links.simulate((0.0, 1.0), rtol=1e-10)
+    same(links.simulate((1.0, 2.0), first, rtol=1e-10), links.simulate((1.0, 2.0), first.x[:, -1], rtol=1e-10))
+    many = links.simulate_many(1.0, initial=first, parameters={"g": [9.81, 1.62]})
+    np.testing.assert_array_equal(many.x[:, 0], links.simulate((0, 1.0), first).x[:, -1])
+    other = models.build("slider_crank").compile(target="numpy")
+    with pytest.raises(eg.UsageError, match="the run has states theta1.*the model has theta, B"):
+        other.simulate(1.0, first)
+    loop = other.simulate((0.0, 0.5))
+    np.testing.assert_allclose(other.simulate((0.5, 0.6), loop).x[:, 0], loop.x[:, -1], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("call", [lambda m: m.x0(theta=90), lambda m: m.simulate(0.01, initial={"theta": 90.0})])
+def test_an_initial_angle_of_many_turns_is_noted(call: Callable[[Any], Any]) -> None:
+    module = eg.load_example("pendulum").compile(target="numpy")
+    with pytest.warns(UserWarning, match=r"theta = 90 is an angle of 14.3 turns.*write deg\(90\)") as noted:
+        call(module)
+    assert [Path(str(one.filename)).name for one in noted] == [Path(__file__).name]
+    module.x0(theta=12.0)
+    module.simulate(0.01, initial={"theta": "deg(90)"})
+
+
+@pytest.fixture(scope="module")
+def held() -> dict[str, Any]:
+    equations = models.build("pendulum").derive()
+    module = equations.compile(target="numpy")
+    return {"a Module": module, "a Trajectory": module.simulate(0.1), "Equations": equations}
+
+
+WRONG = {
+    "a Module": {"simualte": "simulate", "simulat_many": "simulate_many", "mass_matrx": "mass_matrix"},
+    "a Trajectory": {"t_evnts": "t_events", "to_panda": "to_pandas"},
+    "Equations": {"compil": "compile", "mass_matrx": "mass_matrix"},
+}
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_a_wrong_name_is_told_with_the_nearest(held: dict[str, Any], kind: str) -> None:
+    for name, near in WRONG[kind].items():
+        with pytest.raises(AttributeError, match=rf"^{kind} has no attribute '{name}'; did you mean .*\b{near}\b.*\?$"):
+            getattr(held[kind], name)
+        assert not hasattr(held[kind], name)
+        assert getattr(held[kind], name, 3) == 3
+    with pytest.raises(AttributeError, match=f"^{kind} has no attribute 'zzz'; there are .*, "):
+        _ = held[kind].zzz

@@ -1,0 +1,160 @@
+"""Runs for other eyes and programs: plots, xarray Datasets, netCDF, Parquet, python-control."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import control
+import matplotlib
+import matplotlib.pyplot as plt
+import models
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import eomgen as eg
+
+matplotlib.use("agg")
+
+
+@pytest.fixture(autouse=True)
+def close_figures() -> Iterator[None]:
+    yield
+    plt.close("all")
+
+
+@pytest.fixture(scope="module")
+def run() -> Any:
+    return models.build("slider_crank").compile(target="numpy").simulate(1.0)
+
+
+def pendulum(theta: float = 0.01, end: float = 8.0, **options: Any) -> Any:
+    m = eg.Model("pendulum", gravity=(0, -9.81, 0))
+    bob = m.body("bob", mass=1, com=(0, -1, 0))
+    m.revolute("hinge", m.ground, bob, coordinate="theta")
+    return m.compile(target="numpy").simulate(end, initial={"theta": theta}, rtol=1e-10, atol=1e-12, **options)
+
+
+def test_shape_against_shape_is_the_path_of_the_point(run: Any) -> None:
+    ax = run.plot(x="pin_x", y="s")
+    line = ax.lines[0].get_xydata()
+    # the tip of the rod is on the slider: a straight line of 45 degrees, drawn in one scale
+    assert line[:, 0] == pytest.approx(line[:, 1], abs=1e-9)
+    assert ax.get_aspect() == 1.0
+    assert len(line) > 500
+    assert run.plot("theta", x="s").get_xlabel() == "$s$ (m)"
+
+
+def test_a_phase_portrait_of_a_small_swing_is_an_ellipse() -> None:
+    ax = pendulum().plot("theta", kind="phase")
+    x, y = ax.lines[0].get_xydata().T
+    assert (x / 0.01) ** 2 + (y / (0.01 * np.sqrt(9.81))) ** 2 == pytest.approx(1.0, abs=1e-4)
+    assert ax.get_xlabel() == r"$\theta$ (rad)"
+    assert ax.get_ylabel() == r"$\dot{\theta}$ (rad/s)"
+
+
+def test_the_energy_between_the_steps_drifts_no_more_than_at_them() -> None:
+    run = pendulum(2.0)  # 110 steps of about a fortieth of a swing; the cubics between them are off by 7e-4 J
+    E = -9.81 * np.cos(2.0)  # of the closed form, at rest at 2 rad
+    at_steps = run["energy"]
+    drift = float(np.ptp(at_steps))
+    assert drift < 1e-8
+    curve = run.plot("energy").lines[0].get_ydata()
+    assert len(curve) > 5 * len(at_steps)
+    assert np.abs(curve - E).max() <= np.abs(at_steps - E).max() + 1e-13
+    parts, change = run.plot(kind="energy")
+    assert np.ptp(change.lines[0].get_ydata()) <= drift + 1e-13
+    t, kinetic = parts.lines[0].get_xydata().T
+    assert len(t) == len(curve)  # and smooth
+    swing = np.interp(t, *run.plot("theta").lines[0].get_xydata().T)
+    assert kinetic == pytest.approx(9.81 * (np.cos(swing) - np.cos(2.0)), abs=1e-3)  # T = m g l (cos - cos 2)
+
+
+def test_wishes_that_do_not_go_together_are_refused(run: Any) -> None:
+    for call, words in (
+        ({"y": "s"}, "needs x="),
+        ({"x": "s"}, "no column to draw against it"),
+        ({"x": "s", "y": "theta", "kind": "phase"}, "cannot be used together"),
+        ({"kind": "phases"}, "did you mean phase"),
+        ({"x": "thet", "y": "s"}, "did you mean theta"),
+    ):
+        with pytest.raises(eg.UsageError, match=words):
+            run.plot(**call)
+    assert plt.get_fignums() == []
+
+
+@pytest.fixture(scope="module")
+def ball() -> eg.Module:
+    """A ball on a slide that bounces, with names that the tables would like to have themselves."""
+    m = eg.Model("ball")
+    m.parameter("k", 4.0, unit="N/m", doc="stiffness of the slide")
+    m.prismatic("J", m.ground, m.body("ball", mass=1.0), axis="x", coordinate="s")
+    m.torque("motor", "J", "-k*s + 0.3*sin(3*t)")
+    m.torque("push", "J", m.input("f"))
+    m.event("state", "s + 0.5", direction=-1, reset={"s_dot": "-0.8*s_dot"})
+    m.event("top", "s_dot", direction=-1)
+    m.output("run", "2*s", unit="mm", doc="twice the way")
+    m.output("status", "s_dot")
+    return m.compile(target="numpy")
+
+
+def test_a_run_is_a_dataset(ball: eg.Module) -> None:
+    traj = ball.simulate(6.0, initial={"s": 1.0})
+    made = traj.to_xarray()
+    assert dict(made.sizes)["t"] == len(traj.t)
+    assert made.attrs["model"] == "ball"
+    assert json.loads(made.attrs["metadata"])["method"] == traj.metadata["method"]
+    for name in traj.names:
+        assert np.array_equal(made[name], traj[name])
+        assert made[name].dims == ("t",)
+        assert made[name].attrs["units"] == traj.units.get(name, "")
+    assert made["run"].attrs == {"units": "mm", "long_name": "twice the way"}
+    assert len(traj.t_events["state"]) >= 2
+    for name in ("state", "top"):
+        assert np.array_equal(made[f"t_events_{name}"], traj.t_events[name])
+        states = made[f"x_events_{name}"]
+        assert np.array_equal(states.sel(state="s_dot"), traj.x_events[name][1])
+
+
+def test_files_are_read_by_their_libraries(ball: eg.Module, tmp_path: Path) -> None:
+    traj = ball.simulate(3.0, initial={"s": 1.0})
+    assert traj.save(tmp_path / "run.nc") == tmp_path / "run.nc"
+    with xr.open_dataset(tmp_path / "run.nc") as read:
+        assert read.load().identical(traj.to_xarray()) or read.equals(traj.to_xarray())
+        assert read["s_ddot"].attrs["units"] == "m/s^2"
+        assert json.loads(read.attrs["metadata"]) == traj.metadata
+    traj.save(tmp_path / "run.parquet")
+    table = pd.read_parquet(tmp_path / "run.parquet")
+    pd.testing.assert_frame_equal(table, traj.to_pandas())
+    assert table.attrs["units"]["run"] == "mm"
+    assert json.loads(table.attrs["metadata"]) == traj.metadata
+    for name in ("run.nc", "run.parquet"):
+        with pytest.raises(eg.UsageError, match="is for other programs; load the .npz of the run"):
+            eg.load_trajectory(tmp_path / name)
+    with pytest.raises(eg.UsageError, match=r"\.npz or \.csv or \.nc or \.parquet, not '\.xls'"):
+        traj.save(tmp_path / "run.xls")
+
+
+def test_a_linearization_is_a_system_of_python_control() -> None:
+    """Names; poles against eigenvalues; a step response against the run of the nonlinear module."""
+    m = models.build("furuta_pendulum")
+    mod = m.compile(target="numpy")
+    linear = mod.linearize(np.zeros(mod.n_x))
+    assert linear.is_equilibrium
+    system = linear.ss()
+    assert system.state_labels == list(linear.states)
+    assert system.input_labels == list(linear.inputs)
+    assert system.output_labels == list(linear.outputs)
+    assert np.allclose(np.sort_complex(system.poles()), np.sort_complex(linear.eigenvalues), atol=1e-9)
+    times = np.linspace(0.0, 0.3, 31)
+    small = 1e-5
+    response = control.step_response(system, times, input=0, squeeze=False)
+    run = mod.simulate(
+        0.3, initial=np.zeros(mod.n_x), inputs={mod.u_names[0]: small}, t_eval=times, rtol=1e-11, atol=1e-14
+    )
+    for k, name in enumerate(linear.states):
+        assert np.allclose(response.states[k, 0], (run[name] - run[name][0]) / small, atol=2e-4)

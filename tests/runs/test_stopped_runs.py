@@ -1,0 +1,207 @@
+"""Runs that end early: steps that lead nowhere, causes named by kernels, Ctrl-C, and what is kept of each."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from itertools import product
+from typing import Any
+
+import models
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from sweeps import part_of
+
+import eomgen as eg
+
+
+@pytest.mark.parametrize(("rotation", "target"), [("euler_angles", "cython"), ("euler_parameters", "numpy")])
+def test_a_disc_that_falls_flat_ends_its_run(rotation: str, target: str) -> None:
+    """A thin disc that leans 0.2 rad at rest rolls about no axle: (m r^2/4 + m r^2) lean'' = m g r sin(lean)."""
+    rate = lambda lean: np.sqrt(2 * 9.81 / 1.25 * (np.cos(0.2) - np.cos(lean)))  # noqa: E731
+    # lean = 0.2 + s^2 takes the root out of the start
+    falling = quad(lambda s: 2 * s / rate(0.2 + s * s), 0, np.sqrt(np.pi / 2 - 0.2))[0]
+    m = eg.Model("disc", gravity=(0, 0, -9.81))
+    m.rolling("r", disc := m.body("d", mass=1, inertia=(0.25, 0.25, 0.5)), radius=1)
+    m.free("f", m.ground, disc, rotation=rotation)
+    angle = np.pi / 2 - 0.2
+    half = {"f_e0": np.cos(angle / 2), "f_e1": np.sin(angle / 2)}
+    m.initial(**half if rotation == "euler_parameters" else {"f_1": angle})
+    module = m.compile(target=target)
+    with pytest.raises(eg.SimulationError, match=rf"t = {falling:.5g}\d* s of 50 s: constraint 'r': the disc lies"):
+        module.simulate(50)
+
+
+def sliding(law: str, **initial: float) -> eg.Model:
+    m = eg.Model("sliding")
+    m.prismatic("s", m.ground, body := m.body("b", mass=1), axis="x")
+    m.force("law", body, (law, 0, 0))
+    m.initial(**initial)
+    return m
+
+
+@pytest.mark.parametrize(("method", "target"), [("DOP853", "cython"), ("RK45", "numpy"), ("LSODA", "cython")])
+def test_a_friction_that_jumps_is_named(method: str, target: str) -> None:
+    """A body of 1 kg at 1 m/s against 10 N stops after 0.1 s; from there the sign of its speed jumps."""
+    module = sliding("-10*sign(s_dot)", s_dot=1.0).compile(target=target)
+    with pytest.raises(eg.SimulationError) as caught:
+        module.simulate(5, method=method)
+    words = str(caught.value)
+    assert words.startswith(f"{method} stopped at t = 0.10000")
+    assert ", s_dot = " in words
+    assert "the rate of s_dot changes by 20 where s_dot changes by" in words
+    assert "jumps (smooth it)" in words
+
+
+@pytest.mark.parametrize(
+    ("method", "target"),
+    part_of(
+        product(["DOP853", "RK45", "Radau", "BDF", "LSODA", "IDA", "sensitivities", "integrator"], ["cython", "numpy"]),
+        lambda case: case in (("DOP853", "cython"), ("LSODA", "numpy"), ("integrator", "cython"), ("Radau", "cython")),
+    ),
+)
+def test_a_sliding_mode_over_a_short_span_is_told_in_seconds(method: str, target: str) -> None:
+    """A spring that holds 1 N against 2 N of dry friction at rest: some 5e7 steps in 0.02 s."""
+    m = sliding("-3*s - 2*sign(s_dot)", s=1 / 3)
+    module = m.compile(target=target)
+    asked: dict[str, Any] = {"t_eval": [0, 0.02]}
+    begun = time.process_time()
+    with pytest.raises(eg.SimulationError, match="no progress|would take too long|Required step size"):
+        if method == "IDA":
+            module.dae.solve(0.02, **asked)
+        elif method == "sensitivities":
+            module.sensitivities(["s"], 0.02, **asked)
+        elif method == "integrator":
+            module.integrator()(0.0, module.x0(s_dot=1e-9), 0.02)
+        else:
+            module.simulate(0.02, {"s_dot": 1e-9}, method=method, **asked)
+    assert time.process_time() - begun < 30  # some 3 s
+
+
+def four_bar() -> eg.Model:
+    m = eg.Model("four_bar")
+    for name, value in (("w", 4.0), ("k", 1.0)):
+        m.parameter(name, value)
+    m.input("tau")
+    a, b, c = (m.body(name, mass="sqrt(w)", inertia={"zz": "0.001*sqrt(w)"}) for name in ("crank", "coupler", "rocker"))
+    m.revolute("A", m.ground, a, coordinate="theta")
+    m.revolute("B", a.at(0.04, 0, 0), b, coordinate="bend")
+    m.revolute("C", b.at(0.12, 0, 0), c.at(0.08, 0, 0))
+    m.revolute("D", m.ground.at(0.1, 0, 0), c, coordinate="psi")
+    m.torque("motor", "A", "tau")
+    m.torque("law", "D", "-sqrt(k + psi)")
+    m.guess(theta=1.0, bend=-0.7, psi=1.1)
+    m.initial(theta=1.0)
+    return m
+
+
+@pytest.fixture(scope="module", params=[("auto", "numpy"), ("augmented", "cython")], ids=str)
+def linkage(request: Any) -> Any:
+    method, target = request.param
+    return four_bar().compile(method=method, target=target)
+
+
+CAUSES = [
+    # parameters, added to x, inputs, error, words
+    ({"k": -9.0}, 0.0, [0.0], eg.NonFiniteError, "the loads of law are not"),
+    ({"w": 0.0}, 0.0, [0.0], eg.SingularMassMatrixError, "moving theta meets no inertia"),
+    ({}, 1e200, [0.0], eg.NonFiniteError, "squares of theta, bend, psi, theta_dot, bend_dot, psi_dot overflow"),
+    ({}, 0.0, [np.nan], eg.NonFiniteError, "look for an input that is not a number"),
+    ({}, np.nan, [0.0], eg.NonFiniteError, "already are not; check the state"),
+]
+
+
+@pytest.mark.parametrize(("p", "added", "u", "error", "words"), CAUSES, ids=str)
+def test_the_cause_is_named(linkage: Any, p: Any, added: float, u: Any, error: type[Exception], words: str) -> None:
+    x = linkage.x0() + np.array([added] * linkage.n_x)
+    if added == 1e200:
+        x = np.where(np.arange(linkage.n_x) < 3, linkage.x0(), x)
+        words = "squares of theta_dot, bend_dot, psi_dot overflow"
+    with pytest.raises(error, match=words):
+        linkage.bind(p=p).rhs(0.0, x, u=u)
+
+
+@pytest.fixture(autouse=True)
+def interrupts() -> Iterator[None]:
+    """A process started in the background may ignore Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def pressed(after: float) -> list[float]:
+    """Ctrl-C in so many seconds; holds the time of it then."""
+    when: list[float] = []
+
+    def press() -> None:
+        when.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Timer(after, press).start()
+    return when
+
+
+def test_an_interrupt_keeps_what_there_was() -> None:
+    mod = models.build("double_pendulum").compile()
+    mod.simulate((0, 1e-3))
+    waits = []
+    for _ in range(4):  # the machine may be busy: the least of several
+        when = pressed(0.2)
+        with pytest.raises(KeyboardInterrupt) as stopped:
+            mod.simulate((0, 1e5), rtol=1e-12, atol=1e-12)
+        waits.append(time.perf_counter() - when[0])
+        if waits[-1] < 0.1:
+            break
+    assert min(waits) < 0.1
+    assert isinstance(stopped.value, eg.SimulationInterrupted)
+    part = stopped.value.trajectory
+    assert 0.0 < part.t[-1] < 1e5
+    assert len(part.t) > 50
+    assert f"t = {part.t[-1]:.6g}" in str(stopped.value)
+    few = part.t[:40]
+    again = mod.simulate((0, few[-1]), rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(again.t[:39], few[:39])
+    np.testing.assert_array_equal(again.x[:, :39], part.x[:, :39])
+
+
+def test_what_the_watch_or_a_handler_raises_comes_out() -> None:
+    mod = models.build("double_pendulum").compile()
+
+    def alarm(number: int, frame: Any) -> None:
+        raise TimeoutError("too long")
+
+    before = signal.signal(signal.SIGALRM, alarm)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.1)
+        with pytest.raises(TimeoutError, match="too long"):
+            mod.simulate((0, 1e5), rtol=1e-12, atol=1e-12, t_eval=[1e5])
+    finally:
+        signal.signal(signal.SIGALRM, before)
+
+
+@pytest.fixture(scope="module", params=["cython", "numpy"])
+def swing(request: pytest.FixtureRequest) -> Any:
+    m = eg.Model("asked", gravity=(0, -9.81, 0))
+    m.revolute("theta", m.ground, m.body("rod", mass=1, com=(0, -1, 0)))
+    m.initial(theta=0.5)
+    return m.compile(target=request.param)
+
+
+@pytest.mark.parametrize(("method", "times"), [("BDF", None), ("LSODA", np.linspace(0, 2, 9)), ("RK45", None)])
+def test_an_interrupt_keeps_the_run_of_any_method(swing: Any, method: str, times: Any) -> None:
+    def press(t: float, x: np.ndarray) -> float:
+        if t > 1.2:
+            raise KeyboardInterrupt
+        return 1.0
+
+    with pytest.raises(eg.SimulationInterrupted, match=r"interrupted at t = 1\.") as stopped:
+        swing.simulate((0, 2), events=press, method=method, t_eval=times)
+    part = stopped.value.trajectory
+    whole = swing.simulate((0, 2), method=method, dense_output=True)
+    assert 0.9 < part.t[-1] <= 1.5
+    assert (np.diff(part.t) > 0).all()
+    np.testing.assert_allclose(part.x, whole.at(part.t).x, atol=1e-6)
