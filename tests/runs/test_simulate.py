@@ -174,7 +174,7 @@ def rooted(request: pytest.FixtureRequest) -> eg.Module:
     """A force that is no number for x above 1 m."""
     m = eg.Model("rooted")
     m.prismatic("J", m.ground, m.body("cart", mass=1), axis="x", coordinate="x")
-    m.torque("pull", "J", "-sqrt(1 - x) - 1")
+    m.torque("pull", "J", "-sqrt(1 - x) - 8*x")
     return m.compile(target=request.param)
 
 
@@ -187,9 +187,9 @@ def test_a_failure_on_the_way_becomes_a_simulation_error_with_its_cause(rooted: 
 
 
 def test_a_passing_failure_only_shortens_the_step(rooted: eg.Module) -> None:
-    run = rooted.simulate(1.0, {"x": 0.95, "x_dot": 0.3}, rtol=1e-3, atol=1e-6, first_step=0.5)
-    assert run.t[-1] == 1.0
-    assert np.diff(run.t)[0] < 0.5
+    run = rooted.simulate(3.0, {"x": 0.9, "x_dot": 0.9}, rtol=1e-3, atol=1e-6, first_step=2.5)
+    assert run.t[-1] == 3.0
+    assert np.diff(run.t)[0] < 1.0
 
 
 def test_a_failure_at_the_start_is_no_simulation_error(swing: eg.Module, rooted: eg.Module) -> None:
@@ -234,9 +234,9 @@ def test_without_scipy_the_message_says_what_to_install() -> None:
 
 
 # -- runs do not share what they were given --------------------------------------------------------------------------
-@pytest.fixture(scope="module", params=["numpy", "cython"])
-def module(request: pytest.FixtureRequest) -> eg.Module:
-    return models.build("slider_crank").compile(target=request.param)
+@pytest.fixture(scope="module")
+def module() -> eg.Module:
+    return models.build("slider_crank").compile()
 
 
 @pytest.mark.parametrize("options", [{}, {"method": "RK45"}, {"rtol": 1e-5}, {"atol": 1e-6, "method": "Radau"}])
