@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -23,13 +24,27 @@ def rigid(**law: Any) -> dict[str, Any]:
 
 
 def on_floor(
-    shape: Mapping[str, Any], law: Mapping[str, Any], slope: float = 0.0, inertia: float = 0.005, target: str = "cython"
+    shape: Mapping[str, Any],
+    law: Mapping[str, float],
+    slope: float = 0.0,
+    inertia: float = 0.005,
+    target: str = "cython",
 ) -> Any:
     """A body of 1 kg in the plane on a floor along x that falls towards +x by an angle."""
-    m = eg.Model("on_floor", gravity=(G * np.sin(slope), -G * np.cos(slope), 0))
-    body = m.body("b", mass=1.0, inertia={"zz": inertia})
+    values = {"friction": 0.0, "restitution": 0.0, **law, "slope": slope, "inertia": inertia}
+    return floor_of(tuple(shape.items()), target).bind(values)
+
+
+@cache
+def floor_of(shape: tuple[tuple[str, Any], ...], target: str) -> Any:
+    """The same for any law, slope and inertia, which are parameters: one build for a shape."""
+    m = eg.Model("on_floor", gravity=(f"{G}*sin(slope)", f"-{G}*cos(slope)", 0))
+    for name, value in (("friction", 0.3), ("restitution", 0.0), ("slope", 0.0), ("inertia", 0.005)):
+        m.parameter(name, value)
+    body = m.body("b", mass=1.0, inertia={"zz": "inertia"})
     m.planar("j", m.ground, body)
-    m.contacts("c", {**shape, "on": body}, {"shape": "half_plane", "on": m.ground}, rigid(**law))
+    law = rigid(friction="friction", restitution="restitution")
+    m.contacts("c", {**dict(shape), "on": body}, {"shape": "half_plane", "on": m.ground}, law)
     return m.compile(target=target)
 
 

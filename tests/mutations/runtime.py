@@ -54,7 +54,7 @@ FAULTS = (
         "self.direction = int(np.sign(given)) if",
         "self.direction = 0 if",
         "the direction of an event is ignored",
-        ("tests/runs/test_events.py::test_texts_functions_and_mappings[DOP853]",),
+        ("tests/runs/test_events.py::test_texts_functions_and_mappings[DOP853-numpy]",),
     ),
     Fault(
         "gap-rate-in-time", "eomgen/analysis/impact.py",

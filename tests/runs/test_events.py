@@ -141,8 +141,9 @@ def swing() -> Any:
     return models.build("pendulum").compile()
 
 
-@pytest.mark.parametrize("method", ["DOP853", "RK45", "LSODA"])
-def test_texts_functions_and_mappings(swing: Any, method: str) -> None:
+@pytest.mark.parametrize(("method", "target"), [("DOP853", "numpy"), ("RK45", "cython"), ("LSODA", "cython")])
+def test_texts_functions_and_mappings(method: str, target: str) -> None:
+    swing = models.build("pendulum").compile(target=target)
     name = swing.q_names[0]
 
     def through(t: float, x: np.ndarray) -> float:
