@@ -189,18 +189,6 @@ def test_parameters_decide_at_their_declared_values_and_later() -> None:
             m.compile(target="numpy", kernels=["mass_matrix"]).bind(p={"J": 3.0})
 
 
-def test_an_inertia_written_in_two_ways_is_symmetric() -> None:
-    m = eg.Model("i")
-    a, b, c = (m.parameter(s, 1) for s in "abc")
-    tensor = [[5 * c, (a + b) * c, 0], [a * c + b * c, 5 * c, 0], [0, 0, 5 * c]]
-    m.weld("J", m.ground, m.body("b", mass=1, inertia=tensor))
-    m.check()
-    tensor[0][1] = a * c
-    m.weld("K", m.ground, m.body("d", mass=1, inertia=tensor))
-    with pytest.raises(eg.ModelError, match="not symmetric"):
-        m.check()
-
-
 def test_the_model_file_has_the_same_keys(tmp_path: Path) -> None:
     m = eg.Model("ways", check_inertia=False)
     m.parameter("r", 0.1)
@@ -286,19 +274,6 @@ def test_a_matrix_of_numbers_and_one_of_expressions() -> None:
         m = with_angle()
         m.ground.marker("m", matrix=matrix)
         np.testing.assert_allclose(pose(m), Rotation.from_euler("z", 0.3).as_matrix(), rtol=0, atol=1e-15)
-
-
-def test_unnamed_markers_and_files(tmp_path: Path) -> None:
-    m = with_angle()
-    place = m.ground.at(0, 1, 0, axes={"z": "x", "x": "y"})
-    other = m.ground.at(0, 1, 0, matrix=np.eye(3)[[1, 0, 2]] * [[1], [1], [-1]])
-    assert place.label != other.label
-    body = m.body("slider", mass=1, inertia=(1, 1, 1))
-    m.prismatic("s", place, body)
-    m.output("here", body.position[0])
-    m.save(tmp_path / "m.yaml")
-    mod = eg.load(tmp_path / "m.yaml").compile(target="numpy")
-    assert mod.outputs(0, mod.x0(s=0.7))[0] == pytest.approx(0.7)  # the marker's z is ground's x
 
 
 @pytest.mark.parametrize(

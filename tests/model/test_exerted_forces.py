@@ -1,4 +1,4 @@
-"""What force elements exert on bodies, ``force(track, on=wheel).x``: Newton and Euler for each body, and its names."""
+"""What force elements exert on bodies, ``force(track, on=wheel).x``, by Newton and Euler; contacts in model files."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from model_files import load
 
 import eomgen as eg
 
@@ -82,38 +83,6 @@ def test_newton_and_euler(method: str) -> None:
     assert pressed > 4
 
 
-def test_a_law_reads_what_another_element_exerts() -> None:
-    """A damper of a coefficient by the load on the floor, exactly in the Jacobian; names in a file and of instances."""
-    m = eg.Model("brake", gravity=(0, -G, 0))
-    block = m.body("block", mass=2.0, inertia={"zz": 0.01})
-    m.planar("slide", m.ground, block)
-    floor = {"shape": "half_plane", "on": m.ground}
-    pads = m.contacts(
-        "floor", {"shape": "box", "on": block, "size": (0.2, 0.1)}, floor, {"stiffness": 1e5, "exponent": 1}
-    )
-    drag = m.damper("drag", m.ground.at(-5, 0, 0), block, damping="0.3*force(floor, on=block).y")
-    m.output("load", pads.on(block).force[1])
-    m.output("slows", drag.on(block, axes=block).force[0])
-    m.output("size", pads.on(block).size)
-    m.initial(slide_x=0.1, slide_y=0.05 - 2e-5, slide_x_dot=1.0)
-    mod = m.compile(target="numpy")
-    x = mod.x0()
-    load, slows, size = mod.outputs(0.0, x)
-    assert load == pytest.approx(2 * 1e5 * 2e-5, rel=1e-12)  # two corners
-    assert size == pytest.approx(load, rel=1e-12)
-    assert slows == pytest.approx(-0.3 * load * 5.1 / np.hypot(5.1, 0.05 - 2e-5), rel=1e-4)
-    assert mod.rhs(0.0, x)[3] == pytest.approx(slows / 2.0, rel=1e-3)
-    h = 1e-7 * np.eye(6)
-    sides = np.transpose([(mod.rhs(0.0, x + d) - mod.rhs(0.0, x - d)) / 2e-7 for d in h])
-    np.testing.assert_allclose(mod.jacobian(0.0, x), sides, rtol=1e-4, atol=1e-3)
-
-    two = eg.Model("two", gravity=(0, -G, 0))
-    two.add(m, "left_")
-    two.output("total", "force(left.floor, on=left.block).y")
-    again = two.compile(target="numpy")
-    assert again.outputs(0.0, again.x0(left_slide_y=0.05 - 2e-5))[-1] == pytest.approx(load, rel=1e-12)
-
-
 @pytest.mark.thorough
 def test_it_is_written_again_and_verified(tmp_path: Path) -> None:
     file = tmp_path / "craft.yaml"
@@ -163,3 +132,76 @@ def test_forces_that_read_each_other_are_refused() -> None:
     m.force("two", body, ("force(one, on=body).x", 0, 0))
     with pytest.raises(eg.ModelError, match="algebraic loop between laws"):
         m.compile(target="numpy")
+
+
+# -- contacts in files ------------------------------------------------------------------------------------------------
+FILE = """\
+name: heap
+gravity: [0, -9.81, 0]
+parameters: {mu: 0.3, r: {value: 100, unit: mm}}
+bodies:
+  a: {mass: 1, inertia: {zz: 0.01}}
+  b: {mass: 1, inertia: {zz: 0.01}}
+joints:
+  ja: {type: planar, between: [ground, a]}
+  jb: {type: planar, between: [ground, b]}
+contacts:
+  floor:
+    first: [{shape: circle, on: [a, b], radius: r}]
+    second: {shape: half_plane, on: ground}
+    law: {stiffness: 1e5, dissipation: 0.3, friction: mu, smoothing: 0.001}
+  among:
+    first: [{shape: box, on: [a, b], size: [r, 2*r]}]
+    law: {stiffness: 1e5}
+initial: {ja_y: 0.095, jb_x: 0.05, jb_y: 0.2, ja_x_dot: 1}
+"""
+
+
+def test_a_file_as_python_and_written_again(tmp_path: Path) -> None:
+    m = load(tmp_path, FILE)
+    mod = m.compile(target="numpy")
+    x = mod.x0()
+    m2 = eg.Model("heap", gravity=(0, -9.81, 0))
+    mu, r = m2.parameter("mu", 0.3), m2.parameter("r", 0.1)
+    a, b = (m2.body(name, mass=1, inertia={"zz": 0.01}) for name in "ab")
+    m2.planar("ja", m2.ground, a)
+    m2.planar("jb", m2.ground, b)
+    law = {"stiffness": 1e5, "dissipation": 0.3, "friction": mu, "smoothing": 0.001}
+    m2.contacts("floor", {"shape": "circle", "on": [a, b], "radius": r}, {"shape": "half_plane", "on": m2.ground}, law)
+    m2.contacts("among", [{"shape": "box", "on": one, "size": (r, 2 * r)} for one in (a, b)], stiffness=1e5)
+    wanted = mod.rhs(0.0, x)
+    assert np.abs(wanted[6:]).max() > 10.0
+    assert np.allclose(m2.compile(target="numpy").rhs(0.0, x), wanted, rtol=1e-13)
+    again = load(tmp_path, m.to_yaml())
+    assert np.array_equal(again.compile(target="numpy").rhs(0.0, x), wanted)
+
+
+CIRCLES, BOXES, FLOOR, LAST = (
+    "first: [{shape: circle, on: [a, b], radius: r}]",
+    "first: [{shape: box, on: [a, b], size: [r, 2*r]}]",
+    "{shape: half_plane, on: ground}",
+    "law: {stiffness: 1e5}",
+)
+POINTS = "first: [{{shape: polygon, on: [a, b], points: {}}}]"
+FAULTS = [
+    ("friction: mu", "friction: -0.1", "heap.yaml:14: forces.floor.friction: is -0.1; must be 0 or greater"),
+    (CIRCLES, CIRCLES.replace("circle", "circel"), "no shape 'circel'; did you mean 'circle'?"),
+    (CIRCLES, "first: []", "forces.floor.first: has no shapes; give at least one shape"),
+    (CIRCLES, CIRCLES.replace("b]", "c]"), "first[0].on[1]: no body 'c'; bodies: ground, a, b"),
+    (LAST, "law: 3", "forces.among.law: is not a mapping of keys of the law"),
+    (LAST, "", "forces.among: has no law; give law: {stiffness: ...}"),
+    (LAST, "law: {stiffness: 1, stifness: 1}", "forces.among.stifness: unknown key"),
+    (FLOOR, "{shape: half_space, on: ground}", "circle and half_space do not meet"),
+    (FLOOR, "{shape: circle, on: a, radius: r}", "the shape on a is in both groups; give second only what is not in"),
+    (BOXES, BOXES.replace("[a, b]", "a"), "forces.among: has shapes on one body only"),
+    (BOXES, POINTS.format("[[0, 0], [1, 0], [0.2, 0.2], [0, 1]]"), "points: is not convex; give it as shape outline"),
+    (BOXES, POINTS.format("[[0, 0], [1, 0], [2, 0], [0, 1]]"), "points[1]: lies on a line with the corners beside it"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), FAULTS)
+def test_faults_of_files(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in FILE
+    with pytest.raises(eg.ModelError) as raised:
+        load(tmp_path, FILE.replace(old, new), "heap.yaml").check()
+    assert message in str(raised.value)

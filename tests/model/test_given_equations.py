@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import sympy
 from model_files import load
-from sympy.physics import mechanics as me
 
 import eomgen as eg
 
@@ -86,26 +85,6 @@ def test_constraints_with_given_rates(target: str) -> None:
 
 
 @pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("n", [2, 30])
-def test_no_constraints_small_and_large(n: int, target: str) -> None:
-    q, v = [f"q{k}" for k in range(n)], [f"u{k}" for k in range(n)]
-    rates = {q[k]: f"(1.5 + sin(q{k - 1}))*u{k} + w*cos(t)" if k else "u0" for k in range(n)}
-    mass = [[3.0 if i == j else "0.3*cos(q0)" if abs(i - j) == 1 else 0 for j in range(n)] for i in range(n)]
-    forcing = [f"-q{k} - 0.1*u{k}*u{(k + 1) % n}" for k in range(n)]
-    model = given(f"free{n}", coordinates=q, velocities=v, rates=rates, mass_matrix=mass, forcing=forcing)
-    module = model.compile(target=target)
-    x = np.random.default_rng(n).uniform(-1.0, 1.0, 2 * n)
-    p, u, t = x[:n], x[n:], 0.7
-    expected = np.concatenate([[u[0]], (1.5 + np.sin(p[:-1])) * u[1:] + 1.3 * np.cos(t)])
-    M = 3.0 * np.eye(n) + 0.3 * np.cos(p[0]) * (np.eye(n, k=1) + np.eye(n, k=-1))
-    f = -p - 0.1 * u * np.roll(u, -1)
-    assert module.rhs(t, x) == pytest.approx(np.concatenate([expected, np.linalg.solve(M, f)]), rel=1e-12)
-    assert module.jacobian(t, x) == pytest.approx(slopes(lambda y: module.rhs(t, y), x), abs=1e-8)
-    batch = np.column_stack([x, 0.5 * x])
-    assert module.rhs(t, batch)[:, 1] == pytest.approx(module.rhs(t, 0.5 * x))
-
-
-@pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("blade", [False, True])
 @pytest.mark.parametrize(("n", "k"), [(3, 2), (1, 2), (2, 3), (7, 6)])
 def test_speeds_and_coordinates_that_differ_in_number(n: int, k: int, blade: bool, target: str) -> None:
@@ -141,92 +120,6 @@ def test_speeds_and_coordinates_that_differ_in_number(n: int, k: int, blade: boo
         assert model.derive().explain().difference < 1e-9
 
 
-def test_sleigh_of_kane() -> None:
-    x, y, h, v, w = me.dynamicsymbols("x y h v w")
-    m, J, a = sympy.symbols("m J a")
-    ground, body = me.ReferenceFrame("A"), me.ReferenceFrame("B")
-    body.orient_axis(ground, ground.z, h)
-    body.set_ang_vel(ground, w * ground.z)
-    blade = me.Point("P")
-    blade.set_vel(ground, v * body.x)
-    center = blade.locatenew("C", a * body.x)
-    center.v2pt_theory(blade, ground, body)
-    known = [x.diff() - v * sympy.cos(h), y.diff() - v * sympy.sin(h), h.diff() - w]
-    kane = me.KanesMethod(ground, [x, y, h], [v, w], kd_eqs=known)
-    kane.kanes_equations([me.RigidBody("b", center, body, m, (me.inertia(body, 0, 0, J), center))], [])
-    module = eg.from_sympy(kane, "sleigh", parameters={m: 2.0, J: 0.3, a: 0.25}).compile(target="numpy")
-    x_dot = dict(zip(module.x_names, module.rhs(0.0, module.x0(h=0.4, v=0.9, w=-0.8)), strict=True))
-    assert (x_dot["x"], x_dot["y"], x_dot["h"]) == pytest.approx((0.9 * np.cos(0.4), 0.9 * np.sin(0.4), -0.8))
-    assert (x_dot["v"], x_dot["w"]) == pytest.approx((0.25 * 0.64, 2 * 0.25 * 0.72 / (0.3 + 2 * 0.25**2)))
-
-
-LENGTH = "e0**2 + e1**2 + e2**2 + e3**2 - 1"
-
-
-def turning(*rows: str, k: float | None = None) -> eg.Model:
-    """A body by Euler parameters and three speeds, and a slide; e^T e = 1 is no more than a constraint."""
-    turn = "-(e1*wx + e2*wy + e3*wz)/2", "(e0*wx + e2*wz - e3*wy)/2", "(e0*wy + e3*wx - e1*wz)/2"
-    names = ["e0", "e1", "e2", "e3", "z"]
-    model = given(
-        "turning",
-        coordinates=names,
-        velocities=["wx", "wy", "wz", "s"],
-        rates=dict(zip(names, (*turn, "(e0*wz + e1*wy - e2*wx)/2", "s"), strict=True)),
-        mass_matrix=[[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 3, 0], [0, 0, 0, "w"]],
-        forcing=["-wy*wz", "2*wx*wz", "-wx*wy", "-z"],
-        constraints=list(rows),
-        parameters={} if k is None else {"k": k},
-    )
-    model.guess(e0=1.0, e1=0.1, e2=-0.2, e3=0.3)
-    return model
-
-
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize(
-    "rows",
-    [
-        (LENGTH,),
-        (LENGTH, "2*(e1*e3 - e0*e2) + 0.5*z - 0.1", "wz - 0.3*s*e0 - 0.05"),
-        (f"2*(e1*e3 - e0*e2) + 0.5*z - 0.1 + 3*({LENGTH})", "2*(e1*e3 - e0*e2) + 0.5*z - 0.1"),
-    ],
-    ids=["length", "all kinds of rows", "only together"],
-)
-def test_lengths_that_no_velocity_changes(rows: tuple[str, ...], target: str) -> None:
-    """States off a constraint that velocities cannot leave are brought onto it by the coordinates themselves."""
-    module = turning(*rows).compile(target=target)
-    x = module.project(module.x0(wx=0.3, wy=-0.4) + 0.05 * np.random.default_rng(3).normal(size=9))
-    exact = module.jacobian(0.2, x)
-    assert exact == pytest.approx(slopes(lambda y: module.rhs(0.2, y), x, 1e-5), abs=1e-6 if len(rows) == 2 else 1e-8)
-    for off in (1e-9, 1e-3, 0.2):
-        near = module.project(x + off * np.array([1.0, -0.5, 0.3, 0.2, 0.1, 0, 0, 0, 0]))
-        e0, e1, e2, e3, z = near[:5]
-        assert near[:4] @ near[:4] == pytest.approx(1.0, abs=1e-13)
-        assert len(rows) == 1 or 2 * (e1 * e3 - e0 * e2) + 0.5 * z == pytest.approx(0.1, abs=1e-13)
-        assert module.project(near) == pytest.approx(near, abs=1e-14)
-
-
-@pytest.mark.parametrize("target", TARGETS)
-def test_length_as_constraint_takes_the_steps_of_a_ball(target: str) -> None:
-    body = eg.Model("ball")
-    body.spherical("b", body.ground, body.body("b", mass=1, inertia=(1, 2, 3)), rotation="euler_parameters")
-    ball = body.compile(target="numpy").simulate(5.0, initial={"b_wx": 0.01, "b_wy": 2.0, "b_wz": 0.01})
-    run = turning(LENGTH).compile(target=target).simulate(5.0, initial={"e0": 1.0, "wx": 0.01, "wy": 2.0, "wz": 0.01})
-    assert len(run.t) <= 1.5 * len(ball.t)
-    assert [run[w][-1] for w in ("wx", "wy", "wz")] == pytest.approx([ball[f"b_w{a}"][-1] for a in "xyz"], abs=1e-6)
-
-
-@pytest.mark.parametrize("row", [f"sqrt({LENGTH} + 1) - 1", "k*e0**2 + k*e1**2 + k*e2**2 + k*e3**2 - k"])
-def test_length_written_otherwise(row: str) -> None:
-    """The slopes by velocities cancel to rounding only."""
-    module = turning(row, k=2.0 if "k*" in row else None).compile(target="numpy")
-    x = module.x0(wy=2.0)
-    assert module.n_dof == 4
-    (note,) = (note for note in turning(row, k=2.0).check().notes if "constraint_1" in note)
-    assert note.startswith("constraint_1 follows from the rates or from other constraints;")
-    assert "leave" not in note
-    assert module.project(np.r_[1.001 * x[:4], x[4:]]) == pytest.approx(x, abs=1e-14)
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_an_exported_package_stands_alone(target: str, tmp_path: Path) -> None:
@@ -260,28 +153,6 @@ def test_independent_ones_as_linearize_takes_them(names: tuple[str, ...]) -> Non
         np.testing.assert_allclose(near.A, chosen_later.A, atol=1e-12)
 
 
-@pytest.mark.parametrize("collection", [np.array, set, lambda names: dict.fromkeys(names).keys(), iter])
-def test_independent_ones_in_any_collection(collection: Any) -> None:
-    names = ["a", "c", "r", "s"]
-    assert set(tied().derive(independent=collection(names)).independent) >= {"r", "s"}
-    module = tied().compile(target="numpy")
-    assert set(module.linearize(module.x0(a=0.3, c=0.2, r=0.5), independent=collection(names)).states) >= set(names)
-
-
-def test_independent_ones_that_depend_on_each_other_are_refused() -> None:
-    with pytest.raises(eg.ModelError, match="a, b, c: the positions have 2 degrees of freedom"):
-        tied().derive(independent=["a", "b", "c"])
-    with pytest.raises(eg.ModelError, match="'d'.*a, b, c"):
-        tied().derive(independent=["d"])
-
-
-def test_derivatives_by_inputs_and_parameters_are_refused() -> None:
-    module = tied().compile(target="numpy")
-    for name in ("input_jacobian", "parameter_jacobian"):
-        with pytest.raises(eg.UsageError, match="as functions of its velocities"):
-            getattr(module, name)(0.0, np.zeros(module.n_x))
-
-
 def test_directions_stay_on_moving_constraints_and_carry_the_rates() -> None:
     mod, t, h = tied().compile(target="numpy"), 0.3, 1e-5
     x = mod.project(np.array([0.4, 0.5, 0.1, 0.3, -0.2, 0.6, 0.1]), t=t)
@@ -310,7 +181,7 @@ def test_inputs_beside_given_rates_are_refused_by_name() -> None:
         mod.linearize(np.array([0.4, 0.5, 0.1, 0.3, -0.2, 0.6, 0.1]))
 
 
-# -- energy --------
+# -- energy -----------------------------------------------------------------------------------------------------------
 FREE_MASS = """
 name: free_mass
 parameters: {m: 2.0, k: 5.0}
@@ -348,14 +219,6 @@ def test_an_energy_that_is_not_known_is_refused(target: str, tmp_path: Path) -> 
         _ = loaded.energies
 
 
-def test_with_its_energy_it_is_kept(tmp_path: Path) -> None:
-    more = "kinetic_energy: m*x_dot**2/2\n  potential_energy: k*x**2/2"
-    run = free_mass(tmp_path, more, "total_energy").compile(target="numpy").simulate((0.0, 2.0), rtol=1e-10)
-    assert run.has_energies
-    assert run["energy"] == pytest.approx(2.5, rel=1e-6)
-    assert run["pull"] == pytest.approx(2.5, rel=1e-6)
-
-
 @pytest.mark.parametrize("name", ["kinetic_energy", "potential_energy", "total_energy"])
 def test_an_output_of_it_is_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(
@@ -371,7 +234,7 @@ def test_the_command_line_copes(tmp_path: Path) -> None:
     assert command.run(*given, "--json").json["energy"] is None
 
 
-# -- in Python --------
+# -- in Python --------------------------------------------------------------------------------------------------------
 BALL = """
 name: ball
 parameters: {r: 0.3, m: 2, k: 5}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import command
 import matplotlib
 import pytest
 import sympy
@@ -161,12 +160,6 @@ def test_names_without_latex_are_printed_as_in_a_textbook_and_kept_apart() -> No
     labels = [text.get_text() for text in run.plot(*PRINTED).get_legend().get_texts()]
     assert labels == [f"${latex}$" for latex in PRINTED.values()]
     assert run.plot("w_dot").get_ylabel().startswith(r"$\dot{w}$")
-
-
-def test_an_exported_package_prints_it(tmp_path: Path) -> None:
-    load(tmp_path, TEXT, "cart.yaml")
-    assert command.run("generate", tmp_path / "cart.yaml", "--out", tmp_path, "--target", "numpy").code == 0
-    assert r"x_{w}" in (tmp_path / "cart" / "model.json").read_text()
 
 
 @pytest.mark.parametrize(

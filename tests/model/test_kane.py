@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import sympy
 from bicycle_matrix import state_matrix
-from model_files import described
-from sympy.physics.mechanics import KanesMethod, Particle, Point, ReferenceFrame, RigidBody, dynamicsymbols, inertia
+from sympy.physics.mechanics import KanesMethod, Particle, Point, ReferenceFrame, dynamicsymbols
 from sympy_systems import bicycle, bicycle_numbers, double_pendulum, pulled_pendulum, rolling_disc
 
 import eomgen as eg
@@ -75,20 +73,6 @@ def test_rolling_disc(disc: eg.Model, target: str) -> None:
     assert run["q1_dot"] == pytest.approx(spin / np.cos(run["q2"]))
 
 
-def test_a_solver_that_fails_at_zero_is_told(disc: eg.Model) -> None:
-    model = eg.from_sympy(rolling_disc(), "disc", parameters={"g": 9.81, "r": 0.26, "m": 3.43})
-    with pytest.raises(eg.AssemblyError, match="not finite at the initial configuration q1 = 0, q2 = 0, q3 = 0"):
-        model.derive()
-
-
-def test_rolling_disc_is_regular_where_the_kinematics_are() -> None:
-    model = eg.from_sympy(rolling_disc("CRAMER"), "disc", parameters={"g": 9.81, "r": 0.26, "m": 3.43})
-    module = model.compile(target="numpy")
-    assert np.abs(module.rhs(0.0, np.zeros(10))).max() == 0.0
-    x = module.x0(**dict(zip(("q1", "q2", "q3", "q4", "q5", "u1", "u2", "u3"), DISC[0][0], strict=True)))
-    assert module.rhs(0.0, x) == pytest.approx(DISC[0][1], abs=1e-10)
-
-
 #: eigenvalues of the benchmark (Meijaard and others 2007, table 2): speed -> capsize, castering, weave (re, im)
 EIGENVALUES = {
     0.0: [-5.530943717653935, -3.131643247906567, 3.131643247906567, 5.530943717653935],
@@ -120,24 +104,6 @@ def test_bicycle(whipple: eg.Model, target: str) -> None:
         near = module.linearize(x, independent=["q1", "q2", "q5", "u2", "u3", "u5"])
         places = [near.states.index(name) for name in ("q2", "q5", "u2", "u5")]
         np.testing.assert_allclose(near.A[np.ix_(places, places)], state_matrix(speed), atol=1e-9)
-
-
-@pytest.mark.thorough
-def test_bicycle_far_from_upright(whipple: eg.Model, tmp_path: Path) -> None:
-    whipple.save(tmp_path / "bicycle.yaml")  # with intermediates: entries are longer than a file may have them
-    again = eg.load(tmp_path / "bicycle.yaml")
-    assert len(described(again)["equations"]["intermediates"]) > 100
-    module = whipple.compile(target="numpy")
-    x = module.x0(q1=0.2, q2=0.1, q5=0.2, u2=0.3, u5=-0.2, u3=5.0)
-    assert abs(module.constraints(x[:4])[0]) < 1e-12
-    exact = module.jacobian(0.0, x)
-    assert np.abs(exact - slopes(lambda z: module.rhs(0.0, z), x)).max() < 1e-7
-    assert again.compile(target="numpy").rhs(0.0, x) == pytest.approx(module.rhs(0.0, x), rel=1e-10, abs=1e-10)
-    numbers = dict(zip(module.x_names, x, strict=True))
-    assert numbers["q4"] != 0.0
-    off = module.project(x + 1e-3 * np.arange(1.0, len(x) + 1.0))
-    assert abs(module.constraints(off[:4])[0]) < 1e-12
-    assert np.abs(module.velocity_constraints(off)).max() < 1e-11
 
 
 DISC_NUMBERS = {"g": 9.81, "r": 0.26, "m": 3.43}
@@ -251,78 +217,3 @@ def test_forces_of_auxiliary_speeds_that_do_not_follow_are_named() -> None:
         eg.from_sympy(kane, "bead")
     values = {"m": 1.0, "g": 9.81, "mu": 0.1, "c": 0.5}
     assert eg.from_sympy(kane, "bead", values, inputs=["F"]).compile(target="numpy").u_names == ("F",)
-
-
-def test_constants_of_auxiliary_equations_stay_parameters() -> None:
-    m, g, k = sympy.symbols("m g k")
-    q, u, w, N = dynamicsymbols("q u w N")
-    frame, origin, point = ReferenceFrame("A"), Point("O"), Point("P")
-    origin.set_vel(frame, 0)
-    point.set_vel(frame, u * frame.x + w * frame.y)
-    kane = KanesMethod(frame, [q], [u], [q.diff() - u], u_auxiliary=[w])
-    kane.kanes_equations([Particle("b", point, m)], [(point, -k * q * frame.x + (N - m * g) * frame.y)])
-    model = eg.from_sympy(kane, "block", {"m": 2.0, "g": 9.81, "k": 3.0}, outputs={"twice": 2 * N})
-    mod = model.compile(target="numpy")
-    assert set(mod.p_names) == {"m", "g", "k"}
-    assert dict(zip(mod.y_names, mod.outputs(0.0, [0.1, 0.0]), strict=True)) == pytest.approx(
-        {"N": 19.62, "twice": 39.24}
-    )
-
-
-def pushed_block(normal: Any, sideways: Any, mu: Any) -> KanesMethod:
-    """A block with friction on a plane; auxiliary speeds along the normal, and sideways."""
-    m, g = sympy.symbols("m g")
-    q, u, w, z = dynamicsymbols("q u w z")
-    frame, origin, point = ReferenceFrame("A"), Point("O"), Point("P")
-    origin.set_vel(frame, 0)
-    point.set_vel(frame, u * frame.x + w * frame.y + z * frame.z)
-    kane = KanesMethod(frame, [q], [u], [q.diff() - u], u_auxiliary=[w, z])
-    force = -mu * normal * frame.x + (normal - m * g) * frame.y + sideways * frame.z
-    kane.kanes_equations([Particle("b", point, m)], [(point, force)])
-    return kane
-
-
-def test_forces_of_auxiliary_speeds_that_are_symbols() -> None:
-    """They are solved for where they act nowhere else; else they are refused by name, or noted."""
-    N, S, h, mu = sympy.symbols("N S h mu")
-    values = {"m": 2.0, "g": 10.0, "mu": 0.5}
-    mod = eg.from_sympy(pushed_block(dynamicsymbols("N"), S, mu), "block", values).compile(target="numpy")
-    assert dict(zip(mod.y_names, mod.outputs(0.0, [0.0, 0.0]), strict=True)) == pytest.approx({"N": 20.0, "S": 0.0})
-    assert mod.rhs(0.0, [0.0, 0.0])[1] == pytest.approx(-5.0)
-    greek = eg.from_sympy(pushed_block(dynamicsymbols(r"\nu"), S, mu), "block", values)
-    assert greek.renamed == {"outputs": {r"\nu": "nu"}}
-    assert r'latex: "\\nu"' in greek.to_yaml()
-    assert greek.compile(target="numpy").y_names == ("S", "nu")
-    with pytest.raises(eg.ModelError, match=r"the forces N of .* act elsewhere too; .* functions of time"):
-        eg.from_sympy(pushed_block(N, S, mu), "block", values)
-    pushed = eg.from_sympy(pushed_block(N, S, mu), "block", {"m": 2.0, "mu": 0.5}, inputs=["N"])
-    assert (pushed.compile(target="numpy").y_names, pushed.notes) == (("S",), ())
-    notes = eg.from_sympy(pushed_block(dynamicsymbols("N"), S + h, mu), "block", values).notes
-    assert notes == ("auxiliary equations with S, h are not used; write the force as a function of time",)
-
-
-def test_euler_parameters_whose_kinematics_are_written_implicitly() -> None:
-    """Angular velocity as given, e . e' = 0 and the norm as configuration constraint: Euler's equations."""
-    e, w = dynamicsymbols("e0:4"), dynamicsymbols("w1:4")
-    i1, i2, i3, m = sympy.symbols("i1:4 m")
-    ground, turned, point = ReferenceFrame("A"), ReferenceFrame("B"), Point("O")
-    turned.orient_quaternion(ground, e)
-    point.set_vel(ground, 0)
-    spin, given = turned.ang_vel_in(ground), sum(x * axis for x, axis in zip(w, turned, strict=True))
-    turned.set_ang_vel(ground, given)
-    kinematics = [*((spin - given).dot(axis) for axis in turned), sum(x * x.diff() for x in e)]
-    kane = KanesMethod(
-        ground, q_ind=e[1:], q_dependent=e[:1], u_ind=w, kd_eqs=kinematics, explicit_kinematics=False,
-        configuration_constraints=[sum(x**2 for x in e) - 1],
-    )  # fmt: skip
-    kane.kanes_equations([RigidBody("b", point, turned, m, (inertia(turned, i1, i2, i3), point))], [])
-    model = eg.from_sympy(kane, "spin", parameters={i1: 1.0, i2: 2.0, i3: 3.0}, guess={"e0": 1.0})
-    mod = model.compile(target="numpy")
-    random = np.random.default_rng(3)
-    for _ in range(3):
-        (a, b, c, d), (p, q, r) = random.normal(size=4), random.normal(size=3)
-        a, b, c, d = np.array([a, b, c, d]) / np.linalg.norm([a, b, c, d])
-        state = dict(zip(mod.x_names, mod.rhs(0.0, [b, c, d, a, p, q, r]), strict=True))
-        half = np.array([[-b, -c, -d], [a, -d, c], [d, a, -b], [-c, b, a]]) @ [p, q, r] / 2
-        expected = [*half, -q * r, p * r, -p * q / 3]
-        assert [state[n] for n in ("e0", "e1", "e2", "e3", "w1", "w2", "w3")] == pytest.approx(expected, abs=1e-12)

@@ -83,21 +83,6 @@ def test_disabled_actuators_do_not_act(parts: dict[str, str], tmp_path: Path) ->
     compare(model, mj)
 
 
-def test_disabled_groups_of_actuators_do_not_act(tmp_path: Path) -> None:
-    path = tmp_path / "pieces.xml"
-    path.write_text(TEXT.format(**EMPTY).replace("<option ", '<option actuatorgroupdisable="3" '))
-    model = eg.load(path)
-    assert model.notes == ("left out: actuators that the file disables (p)",)
-    compare(model, mujoco.MjModel.from_xml_path(str(path)))
-
-
-@pytest.mark.parametrize("flag", ["equality", "constraint"])
-def test_disabled_equalities_do_not_hold(flag: str, tmp_path: Path) -> None:
-    model, mj = load(tmp_path, flag=f'{flag}="disable"', equality='<joint name="tie" joint1="j" joint2="k"/>')
-    assert model.notes == ("left out: the equality tie, which is not active",)
-    compare(model, mj)
-
-
 @pytest.mark.parametrize(("flag", "kept"), [("", True), ('frictionloss="disable" limit="disable"', False)])
 def test_disabled_friction_and_limits_are_no_data(flag: str, kept: bool, tmp_path: Path) -> None:
     model, _ = load(tmp_path, flag=flag, joint='frictionloss="0.4" limited="true" range="-1 2"', one='frictionloss="1"')
@@ -153,22 +138,6 @@ def test_the_armature_of_a_ball_on_a_moving_parent(rotation: str, tmp_path: Path
         found = module.rhs(0.0, np.concatenate([state.q, state.v])[at])[module.n_q :]
         told = state.acceleration[np.array(at[module.n_q :]) - len(state.q)]
         assert np.abs(found - told).max() < 1e-12 * np.abs(told).max()
-
-
-def test_armature_that_belongs_to_no_body_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "turning.xml"
-    path.write_text(TURNING.format(f='armature="1"', b="", c=""))
-    with pytest.raises(eg.ModelError, match="joint.f.armature: armature on a free joint is not supported"):
-        eg.load(path)
-
-
-def test_limits_and_dry_friction_of_balls_are_noted(tmp_path: Path) -> None:
-    path = tmp_path / "turning.xml"
-    path.write_text(TURNING.format(f="", b='range="0 40"', c='frictionloss="1"'))
-    assert eg.load(path).notes == (
-        "left out: the limit of the spherical joint b",
-        "left out: the dry friction of the spherical joint c",
-    )
 
 
 NOTED = [
@@ -246,32 +215,6 @@ def test_forces_and_controls_are_cut_as_in_mujoco(given: dict[str, str], target:
     assert "damping" in str(given) or differs > 3  # the ranges were met
 
 
-def test_controls_are_not_cut_where_the_file_says_so(tmp_path: Path) -> None:
-    path = tmp_path / "pullers.xml"
-    text = PULLERS.format(**dict.fromkeys(("joint", "tendon", "m", "a", "b"), "") | {"p": 'ctrlrange="-0.3 0.4"'})
-    path.write_text(text.replace("<option gravity", '<option><flag clampctrl="disable"/></option><option gravity'))
-    module, mj = eg.load(path).compile(target="numpy"), mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(mj)
-    data.ctrl[:] = 1.0
-    mujoco.mj_forward(mj, data)
-    assert module.rhs(0.0, np.zeros(4), u=np.ones(4))[2:] == pytest.approx(data.qacc_smooth, rel=1e-9)
-
-
-def test_a_gripper_does_not_close_faster_than_its_motor_can(tmp_path: Path) -> None:
-    """450 rad/s^2 without the range of the force, 18 with it."""
-    path = tmp_path / "gripper.xml"
-    path.write_text(
-        '<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="finger" axis="0 0 1"/>'
-        '<inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></worldbody>'
-        '<actuator><position name="grip" joint="finger" kp="45" forcerange="-1.8 1.8"/></actuator></mujoco>'
-    )
-    module = eg.load(path).compile(target="numpy")
-    assert module.rhs(0.0, np.zeros(2), u=[1.0])[1] == pytest.approx(18.0)
-    slope = module.jacobian(0.0, np.zeros(2), u=[1.0])
-    assert slope[1].tolist() == [0.0, 0.0]  # a force that is cut does not change with the angle
-    assert module.jacobian(0.0, np.zeros(2), u=[0.01])[1, 0] == pytest.approx(-450.0)
-
-
 def test_limits_that_do_not_act_are_noted(tmp_path: Path) -> None:
     model, _ = load(tmp_path, joint='limited="true" range="-1 2" actuatorfrcrange="-1 1"')
     (note,) = model.notes
@@ -340,17 +283,6 @@ def test_springs_drives_tendons_and_joint_chains_equal_mujoco(rotation: str, tmp
     assert (bodies["arm_a_1"]["mass"], bodies["arm"]["mass"]) == (0.0, pytest.approx(1.0))
 
 
-@pytest.mark.parametrize("rotation", ROTATIONS)
-def test_loops_of_bodies_that_turn_freely_close(rotation: str, tmp_path: Path) -> None:
-    path = tmp_path / "closed.xml"
-    equality = '<equality><connect name="pin" body1="end" body2="loose" anchor="0.1 0.2 0"/></equality>'
-    path.write_text(EVERYTHING.replace("<actuator>", equality + "<actuator>"))
-    report = eg.load(path, rotation=rotation).check()
-    assert report.loop_joints == ["pin"]
-    assert (len(report.coordinates), report.degrees_of_freedom) == (14 if rotation == ROTATIONS[1] else 12, 9)
-    assert report.assembly_restarts == 0
-
-
 def test_it_floats_by_its_own_word(tmp_path: Path) -> None:
     path = tmp_path / "m.xml"
     path.write_text(EVERYTHING)
@@ -369,112 +301,6 @@ def test_a_warning_of_mujoco_is_a_note_and_no_file(tmp_path: Path, monkeypatch: 
 
 
 # -- equalities -------------------------------------------------------------------------------------------------------
-LOOPS = {
-    "connect": '<connect name="pin" body1="coupler" body2="rocker" anchor="0.4 0 0.1"/>',
-    "joint": '<joint joint1="a" joint2="b" polycoef="0.1 0.5 0.3 -0.2 0.1"/>',
-    "tendon": '<tendon tendon1="one" tendon2="two" polycoef="0.1 0.5"/>',
-    "weld": '<weld name="glue" body1="coupler" body2="rocker" relpose="0.4 0 0 0.9 0.1 0.3 0.2"/>',
-}
-LOOP = """
-<mujoco model="loop">
-  <worldbody>
-    <body name="crank"><joint name="a" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.02"/>
-      <body name="coupler" pos="0 0 0.3"><joint name="b" axis="0 1 0" ref="{ref}"/>{extra}
-        <geom type="capsule" fromto="0 0 0 0.4 0 0.1" size="0.02"/></body></body>
-    <body name="rocker" pos="0.4 0 0"><joint name="c" axis="0 1 0"/>{extra}
-      <geom type="capsule" fromto="0 0 0 0 0 0.4" size="0.02"/></body>
-  </worldbody>
-  <tendon>
-    <fixed name="one"><joint joint="a" coef="2"/><joint joint="b" coef="-0.5"/></fixed>
-    <fixed name="two"><joint joint="b" coef="0.3"/><joint joint="c" coef="1.5"/></fixed>
-  </tendon>
-  <equality>{equality}</equality>
-</mujoco>
-"""
-ROWS = {"connect": 3, "weld": 6, "joint": 1, "tendon": 1}
-EXTRA = '<joint name="{0}1" axis="1 0 0"/><joint name="{0}2" axis="0 0 1"/><joint name="{0}3" type="slide"/>'
-
-
-@pytest.mark.parametrize("kind", LOOPS)
-def test_equalities_close_loops_as_mujocos_rows_do(kind: str, tmp_path: Path) -> None:
-    """Accelerations of the loop against multipliers on the rows that MuJoCo makes, at states that satisfy both."""
-    text = LOOP.replace("{equality}", LOOPS[kind]).replace("{ref}", "0" if ROWS[kind] > 1 else "20")
-    for name in ("m", "n"):
-        text = text.replace("{extra}", EXTRA.format(name) if kind == "weld" else "", 1)
-    path = tmp_path / "loop.xml"
-    path.write_text(text)
-    module = eg.load(path).derive().compile(target="numpy")
-    mj = mujoco.MjModel.from_xml_path(str(path))
-    mj.geom_contype[:] = 0
-    data = mujoco.MjData(mj)
-    rows = ROWS[kind]
-    order = [mj.joint(name).dofadr[0] for name in module.q_names]
-    random = np.random.default_rng(4)
-    for _ in range(5):
-        x = module.x0() + random.uniform(-0.05, 0.05, module.n_x)
-        x[module.n_q :] *= 40
-        x = module.project(x)
-        q, v = x[: module.n_q], x[module.n_q :]
-
-        def at(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-            data.qpos[order], data.qvel[order] = q, v
-            mujoco.mj_forward(mj, data)
-            return np.array(data.efc_J).reshape(-1, mj.nv)[:rows][:, order]
-
-        ahead = (at(q + 1e-5 * v, v) - at(q - 1e-5 * v, v)) / 2e-5
-        C_q = at(q, v)
-        assert np.abs(data.efc_pos[:rows]).max() < 1e-9
-        assert np.abs(C_q @ v).max() < 1e-9
-        M = np.zeros((mj.nv, mj.nv))
-        for column, unit in zip(M, np.eye(mj.nv), strict=True):
-            mujoco.mj_mulM(mj, data, column, unit)
-        M = M[np.ix_(order, order)]
-        h = data.qfrc_bias[order]
-        U, sizes, Vt = np.linalg.svd(C_q)
-        rank = int((sizes > 1e-8).sum())
-        G, g = Vt[:rank], (U.T @ (ahead @ v))[:rank] / sizes[:rank]
-        K = np.block([[M, G.T], [G, np.zeros((rank, rank))]])
-        expected = np.linalg.solve(K, np.concatenate([-h, -g]))[: mj.nv]
-        found = module.rhs(0.0, x)[module.n_q :]
-        assert np.abs(found - expected).max() <= 1e-6 * np.abs(expected).max()  # the rows' rate is by differences
-
-
-TIED = """
-<mujoco model="tied">
-  <worldbody>
-    {bodies}
-  </worldbody>
-  <tendon><fixed name="sum"><joint joint="a" coef="2"/><joint joint="b" coef="-1"/></fixed></tendon>
-  <equality>
-    <joint name="bent" joint1="a" joint2="b" polycoef="0.1 0.5 0.25 0 0"/>
-    <tendon name="held" tendon1="sum" polycoef="0.3"/>
-    <joint name="straight" joint1="c" joint2="b" polycoef="0 -2 0 0 0"/>
-  </equality>
-</mujoco>
-"""
-TIED_BODY = '<body><joint name="{0}" ref="{1}"/><geom type="box" size="0.1 0.2 0.3" pos="0.2 0 0"/></body>'
-
-
-def test_equalities_of_joints_and_tendons_become_couplings(tmp_path: Path) -> None:
-    path = tmp_path / "tied.xml"
-    bodies = [TIED_BODY.format(name, ref) for name, ref in (("a", 90), ("b", 0), ("c", 0))]
-    path.write_text(TIED.format(bodies="".join(bodies)))
-    quarter = np.pi / 2
-    found = described(eg.load(path))["constraints"]
-    assert found["held"] == {
-        "type": "coupling",
-        "coordinates": {"a": 2.0, "b": -1.0},
-        "offset": pytest.approx(0.3 + np.pi),
-    }
-    assert found["straight"] == {"type": "coupling", "coordinates": {"c": 1.0, "b": 2.0}}
-    assert "b" in found["bent"]["equation"]
-    locked = described(eg.load(path, lock={"b": 0.2}))["constraints"]
-    assert locked["bent"]["coordinates"] == {"a": 1.0}
-    assert locked["bent"]["offset"] == pytest.approx(quarter + 0.1 + 0.5 * 0.2 + 0.25 * 0.2**2)
-    model = eg.load(path, lock=["b", "c"])
-    assert [n for n in model.notes if "straight" in n] == [
-        "left out: the coupling straight, all of whose joints are locked"
-    ]
 
 
 AWAY = """<mujoco model="away"><option gravity="0 0 0"><flag contact="disable"/></option><worldbody>
@@ -571,14 +397,6 @@ def test_equalities_that_hardly_hold_in_mujoco_are_noted(equality: str, what: st
     path.write_text(HELD.format(equality))
     note = f"the equality e holds exactly here; MuJoCo lets it yield far ({what})"
     assert eg.load(path).notes == ((note,) if what else ())
-    mujoco.set_mju_user_warning(lambda text: None)  # no log file in the current folder
-    mj = mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(mj)
-    data.qpos[:] = 0.1, 0.2, -1.1, 0.3, 1.0, 0.5, 0.1, 0.2
-    for _ in range(int(2 / mj.opt.timestep)):
-        mujoco.mj_step(mj, data)
-    scale = mj.eq_data[0][10] if what.endswith("torquescale") else 1.0
-    assert (np.abs(data.efc_pos).max() / abs(scale) > 0.05) == bool(what)
 
 
 # -- nothing passes in silence ----------------------------------------------------------------------------------------

@@ -117,44 +117,6 @@ def test_without_a_twin_only_compiled_code_runs(sources: Path) -> None:
         m.check()
 
 
-def test_twins_of_two_models_are_kept_apart(sources: Path) -> None:
-    a, b = (pendulum("-swing(q)", full(sources, python=twin)).compile(target="numpy") for twin in (math.sin, math.tan))
-    x = np.array([0.4, 0.0])
-    assert a.rhs(0, x)[1] == pytest.approx(-math.sin(0.4))
-    assert b.rhs(0, x)[1] == pytest.approx(-math.tan(0.4))
-
-
-def test_a_callable_with_derivatives(sources: Path) -> None:
-    def wave(q: float) -> float:
-        return math.sqrt(q)
-
-    def slope(q: float) -> float:
-        return 0.5 / math.sqrt(q)
-
-    native = full(sources, python=wave, python_derivatives=[slope])
-    module = pendulum("-swing(q)", native).compile(target="numpy")
-    assert module.jacobian(0, [0.25, 0.0])[1, 0] == pytest.approx(-1.0, rel=1e-14)
-    with pytest.raises(eg.NonFiniteError):
-        module.rhs(0, [-0.25, 0.0])
-
-
-def test_a_native_function_in_a_constraint_needs_its_twin(sources: Path) -> None:
-    x, y, x_dot, y_dot = sympy.symbols("x y x_dot y_dot")
-    swing = sympy.Function("swing")
-    for twin in (None, sources / "laws.py"):
-        m = eg.Model.from_lagrangian("bead", (x_dot**2 + y_dot**2) / 2 - 9.81 * y, [x, y], constraints=[y - swing(x)])
-        m.native("swing", sources / "laws.c", derivatives=["swing_slope"], python=twin)
-        m.initial(x=0.7)
-        if twin is None:
-            with pytest.raises(eg.ModelError, match="without a Python version"):
-                m.compile(optimize=0)
-            continue
-        run = m.compile(optimize=0).simulate((0, 2), rtol=1e-9, atol=1e-11)
-        assert np.ptp(run["x"]) > 1
-        assert np.max(np.abs(run["y"] - np.sin(run["x"]))) < 1e-10
-        assert run["energy"] == pytest.approx(run["energy"][0], abs=1e-6)
-
-
 def test_the_source_is_part_of_what_is_compiled(sources: Path) -> None:
     m = pendulum("-9.81*swing(q)", full(sources))
     x = np.array([0.4, 0.0])
@@ -226,17 +188,6 @@ def test_a_file_cannot_carry_a_callable(sources: Path) -> None:
     m = pendulum("-swing(q)", full(sources, python=math.sin))
     with pytest.raises(eg.UsageError, match="cannot be written to a model file"):
         m.to_yaml()
-
-
-@pytest.mark.thorough
-def test_functions_of_one_source_are_linked_together(sources: Path) -> None:
-    (sources / "laws.c").write_text("".join(f"double f{k}(double x) {{ return {k}.0*x; }}\n" for k in range(3)))
-    m = eg.Model("three")
-    for k in range(3):
-        m.native(f"f{k}", sources / "laws.c")
-    m.revolute("q", m.ground, m.body("bob", mass=1, com=(0, -1, 0)))
-    m.torque("law", "q", "f0(q) + f1(q) + f2(q)")
-    assert m.compile(optimize=0).rhs(0, [1.0, 0.0])[1] == pytest.approx(3.0)
 
 
 WRONG = [
@@ -316,23 +267,6 @@ def test_permission_runs_it(sources: Path, monkeypatch: pytest.MonkeyPatch) -> N
     module = load(sources, FILE, allow_native=True).compile(target="numpy")
     assert module.rhs(0, [0.4, 0])[1] == pytest.approx(-np.sin(0.4) / 1.5, rel=1e-14)
     assert module.outputs(0, [0.4, 0])[0] == pytest.approx(np.cos(0.4), rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("entry", "message"),
-    [
-        ("source: 3", "functions.swing.source: 3 is not the path of a file"),
-        ("source: none.c", "none.c cannot be read (No such file or directory); paths are relative"),
-        ("source: laws.c, derivatives: swing", "functions.swing.derivatives: 'swing' is not a list"),
-        ("source: ., function: a", "is not a plain file but a folder"),
-        ("source: laws.c, python: [a]", "functions.swing.python: ['a'] is not the path of a file"),
-    ],
-)
-def test_broken_native_entries(sources: Path, entry: str, message: str) -> None:
-    text = FILE.replace("source: laws.c, derivatives: [swing_slope], python: laws.py", entry)
-    with pytest.raises(eg.ModelError) as caught:
-        load(sources, text, allow_native=True).check()
-    assert message in str(caught.value.problems[0])
 
 
 def test_the_command_line_asks_for_permission(sources: Path) -> None:

@@ -41,22 +41,18 @@ BROKEN = [
     ('<link name="base"/>', '<link name="base"/>\n<link name="lost"/>', "arm.urdf:3: link.lost: has no parent"),
     ('<child link="tip"/>', '<child link="tp"/>', "urdf:8: joint.slide.child: no link 'tp'; did you mean 'tip'"),
     ('<child link="tip"/>', "", "urdf:8: joint.slide.child: is missing"),
-    ('type="prismatic"', 'type="sliding"', "urdf:8: joint.slide.type: no joint of type 'sliding'; types: rev"),
-    ('<mass value="0.5"/>', '<mass value="0"/>', "urdf:8: joint.slide: the joint moves no mass: link 'tip'"),
+    ("prismatic", "sliding", "urdf:8: joint.slide.type: no joint of type 'sliding'; types: rev"),
+    ('mass value="0.5"', 'mass value="0"', "urdf:8: joint.slide: the joint moves no mass: link 'tip'"),
     ('value="2"', 'value="-2"', "urdf:3: link.upper.inertial.mass: is -2"),
     ('value="2"', 'value="nan"', "urdf:3: link.upper.inertial.mass.value: 'nan' is not finite"),
-    ('xyz="0 0 0.4"', 'xyz="0 0 1e999"', "urdf:8: joint.slide.origin.xyz: '1e999' is not"),
     ('ixx="0.1"', 'ixx="a lot"', "urdf:4: link.upper.inertial.inertia.ixx: 'a lot' is not a number"),
     ('ixx="0.1"', 'ixx="-9"', "urdf:3: bodies.upper.inertia: has a negative principal moment"),
+    ('xyz="0 0 0.4"', 'xyz="0 0.4"', "urdf:8: joint.slide.origin.xyz: '0 0.4' is not three numbers"),
     ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', "urdf:6: joint.shoulder.axis: the axis has no length"),
     ('name="tip"', 'name="upper"', "urdf:5: link.upper: the name is given twice, first in line 3"),
     ('<parent link="base"/>', '<parent link="tip"/>', "'base'|ring"),
-    ('<link name="base"/>', "", "^[^\\n]*urdf:6: joint.shoulder.parent: no link 'base'; links: upper, tip$"),
-    (
-        '<parent link="upper"/><child link="tip"/>',
-        '<parent link="base"/><child link="upper"/>',
-        "also the child of .*<loop_joint",
-    ),
+    ('<link name="base"/>', "", "urdf:6: joint.shoulder.parent: no link 'base'; links: upper, tip$"),
+    ('upper"/><child link="tip"/>', 'base"/><child link="upper"/>', "also the child of .*<loop_joint"),
     ("</robot>", "", "urdf:11: file: not XML: no element found"),
     ('<link name="base"/>', '<xacro:include filename="a"/>', "is a xacro file; expand it first"),
     ('<robot name="arm">', BOMB + '<robot name="&c;">', "urdf:2: file: declares a document type or an entity"),
@@ -331,28 +327,6 @@ def test_a_model_that_never_compiles_is_given_up(model: Any) -> None:
     assert time.monotonic() - start < 300
 
 
-def test_refusals_of_mujoco_name_the_file_and_line_of_the_user(model: Any) -> None:
-    part = model('\n\n<worldbody>\n<body name="b">\n<joint type="screw"/></body></worldbody>', "sub/part.xml")
-    path = model('\n<include file="sub/part.xml"/>' + BALL)
-    with pytest.raises(
-        eg.ModelError, match=r"sub/part.xml:6: mujoco: MuJoCo refuses it: .*line 6 of part.xml"
-    ) as caught:
-        eg.load(path)
-    assert caught.value.problems[0].file == os.path.realpath(part)
-    other = model('<worldbody>\n<body name="b"><geom size="1" shape="round"/></body></worldbody>', "sub/other.xml")
-    path = model('<asset><model name="o" file="sub/other.xml"/></asset>' + BALL)
-    with pytest.raises(eg.ModelError, match=rf"{other}:3: mujoco: .*unrecognized attribute: 'shape'"):
-        eg.load(path)
-
-
-def test_included_files_pass_the_same_parser(tmp_path: Path) -> None:
-    (tmp_path / "part.xml").write_text(BOMB + "<mujocoinclude/>")
-    path = tmp_path / "model.xml"
-    path.write_text('<mujoco><include file="part.xml"/></mujoco>')
-    with pytest.raises(eg.ModelError, match=r"part.xml:2: file: declares a document type"):
-        eg.load(path)
-
-
 @pytest.mark.parametrize(
     ("line", "said"),
     [
@@ -396,16 +370,6 @@ def test_numbers_of_urdf_are_bounded(given: dict[str, str], said: str, tmp_path:
     path.write_text(URDF.format(**({"xx": "1", "xy": "0", "mass": "1", "origin": "", "more": ""} | given)))
     with pytest.raises(eg.ModelError, match=said):
         eg.load(path).check()
-
-
-@pytest.mark.parametrize("suffix", [".urdf", ".xml"])
-def test_pipes_folders_and_names_that_are_none_end_at_once(suffix: str, tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / f"pipe{suffix}")
-    with pytest.raises(eg.UsageError, match="is not a plain file but a pipe"):
-        eg.load(tmp_path / f"pipe{suffix}")
-    (tmp_path / f"folder{suffix}").mkdir()
-    with pytest.raises(eg.UsageError, match="is not a plain file but a folder"):
-        eg.load(tmp_path / f"folder{suffix}")
 
 
 def test_meshes_of_model_files_with_names_that_are_none_are_faults(tmp_path: Path) -> None:

@@ -197,14 +197,6 @@ def test_names_are_checked() -> None:
         eg.from_sympy(pulled, inputs=5)
 
 
-def test_constraints_that_contradict_each_other_are_refused() -> None:
-    x, y = dynamicsymbols("x y")
-    kinetic = (x.diff() ** 2 + y.diff() ** 2) / 2
-    method = lagrange(kinetic, [x, y], hol_coneqs=[x - y], nonhol_coneqs=[x.diff() - y.diff() - 1])
-    with pytest.raises(eg.ModelError, match="velocity constraint 1 contradicts the others"):
-        eg.from_sympy(method)
-
-
 def faults(**changes: Any) -> str:
     given = {"coordinates": ["a", "b"], "mass_matrix": [[1, 0], [0, 2]], "forcing": ["-a", "-b_dot"]} | changes
     with pytest.raises(eg.ModelError) as caught:
@@ -227,12 +219,6 @@ def test_given_equations_are_checked() -> None:
     assert "equations.constraints[0]: is not linear in the velocities" in faults(constraints=["a_dot*b_dot"])
     assert "equations.multipliers: 2 names for 1 constraints" in faults(constraints=["a - b"], multipliers=["l", "n"])
     assert "cannot be used here" in faults(forcing=["a_ddot", 0])
-
-
-def test_intermediates_are_checked() -> None:
-    assert "equations.intermediates.a: the name is already used by the coordinate" in faults(intermediates={"a": "2"})
-    assert "unknown name 'z2'" in faults(intermediates={"z1": "z2 + 1", "z2": "a"})
-    assert "equations.intermediates.2z" in faults(intermediates={"2z": 1})
 
 
 def test_equations_stand_alone(tmp_path: Path) -> None:
@@ -277,28 +263,6 @@ def test_names_that_sympy_allows_are_taken(given: str, name: str, latex: str) ->
     assert mod.outputs(0.0, x) == pytest.approx([1.0])
 
 
-def test_names_that_clash_once_they_are_changed_are_told_apart() -> None:
-    x, y = dynamicsymbols(r"\theta theta")
-    mod = eg.from_sympy(lagrange(x.diff() ** 2 / 2 + y.diff() ** 2 - x, [x, y])).compile(target="numpy")
-    assert mod.q_names == ("theta_2", "theta")
-    assert mod.rhs(0.0, np.zeros(4))[2:] == pytest.approx([-1.0, 0.0])
-
-
-def test_the_time_may_have_another_name() -> None:
-    before, tau, t = dynamicsymbols._t, sympy.Symbol("tau"), sympy.Symbol("t")
-    dynamicsymbols._t = tau
-    try:
-        q = dynamicsymbols("q")
-        method = lagrange(t * q.diff(tau) ** 2 / 2 - q * sympy.sin(tau), [q])
-    finally:
-        dynamicsymbols._t = before
-    model = eg.from_sympy(method, parameters={t: 2.0})
-    assert model.renamed == {"parameters": {"t": "t_"}}
-    assert model.compile(target="numpy").rhs(0.3, [0.5, 0.1]) == pytest.approx([0.1, -np.sin(0.3) / 2.0])
-    arrays = eg.Model.from_equations("arrays", np.array([q]), np.array([[2.0]]), np.array([-q.diff(tau)]))
-    assert arrays.compile(target="numpy").rhs(0.3, [0.5, 0.1]) == pytest.approx([0.1, -0.05])
-
-
 def test_symbols_of_a_lagrangian_and_of_equations_are_taken_too() -> None:
     angle, rate, k, mu = symbols(r"\theta \theta_dot lambda µ")
     values = {k: 2.0, mu: 4.0}
@@ -309,23 +273,3 @@ def test_symbols_of_a_lagrangian_and_of_equations_are_taken_too() -> None:
     for model in (one, two, three):
         assert model.renamed == {"coordinates": {r"\theta": "theta"}, "parameters": {"lambda": "lambda_", "µ": "mu"}}
         assert model.compile(target="numpy").rhs(0.0, [3.0, 0.5]) == pytest.approx([0.5, -1.5])
-
-
-def test_multipliers_that_are_no_outputs_are_noted() -> None:
-    x, y = dynamicsymbols("x y")
-    kinetic = (x.diff() ** 2 + y.diff() ** 2) / 2
-    twice = eg.from_sympy(lagrange(kinetic - y, [x, y], hol_coneqs=[x - y, 2 * x - 2 * y]))
-    assert any("multipliers are no outputs: the constraints are redundant" in note for note in twice.notes)
-    assert twice.compile(target="numpy").y_names == ()
-    once = eg.from_sympy(lagrange(kinetic - sympy.Symbol("lam1") * y, [x, y], hol_coneqs=[x - y]))
-    assert any("lam1" in note for note in once.notes)
-
-
-def test_functions_of_coordinates_are_tables() -> None:
-    q, h = dynamicsymbols("q"), sympy.Function("h")
-    model = eg.from_sympy(lagrange(q.diff() ** 2 / 2 - h(q), [q]), "curve")
-    with pytest.raises(eg.ModelError, match=r"h\(q\(t\)\).*model\.table"):
-        model.check()
-    points = np.linspace(-2.0, 2.0, 41)
-    model.table("h", points, points**2)
-    assert model.compile(target="numpy").rhs(0.0, [0.5, 0.0])[1] == pytest.approx(-1.0, abs=1e-3)

@@ -272,21 +272,6 @@ def test_a_table_in_a_file(tmp_path: Path) -> None:
     assert "<Model sample: 1 function, 1 body" in repr(m)
 
 
-def test_models_of_python_are_written_with_their_functions(tmp_path: Path) -> None:
-    m = eg.Model("written")
-    f = m.table("f", np.linspace(0, 1, 5), np.arange(5.0), kind="monotone", extrapolation="constant")
-    g = m.table("g", range(4), range(4), np.eye(4))
-    m.prismatic("s", m.ground, m.body("b", mass=1), axis="x")
-    s = m.coordinate("s")
-    m.actuator("push", "s", f(m.t) - g(s, s**2).diff(s))
-    m.output("slope", (f(s * 3) * g(s, s)).diff(s, 2))
-    assert "diff(g(s, s**2), 1, 0)" in m.to_yaml()
-    one, other = (each.compile(target="numpy") for each in (m, load(tmp_path, m.to_yaml())))
-    x = np.array([0.23, 0.1])
-    np.testing.assert_allclose(one.rhs(0.3, x), other.rhs(0.3, x), rtol=1e-14)
-    np.testing.assert_allclose(one.outputs(0.3, x), other.outputs(0.3, x), rtol=1e-13)
-
-
 BROKEN: list[tuple[str, str, str]] = [
     ("  law: {type: tabel, x: [0, 1], y: [0, 1]}", "functions.law.type", "no function of type 'tabel'; did you mean"),
     ("  law: {x: [0, 1], y: [0, 1]}", "functions.law.type", "is missing"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 
 import numpy as np
@@ -253,15 +252,6 @@ def test_other_units_are_the_same_physics() -> None:
     )
 
 
-def test_what_is_written_keeps_its_units(tmp_path: Path) -> None:
-    made = _pendulum(True)
-    text = made.to_yaml()
-    assert "l: {value: 500, unit: mm}" in text
-    again = load(tmp_path, text)
-    assert again.to_yaml() == text
-    assert again.compile(target="numpy").p.tolist() == made.compile(target="numpy").p.tolist()
-
-
 def test_outputs_that_cannot_be_converted_are_refused() -> None:
     m = model("mass", "1")
     m.output("th", "th", unit="deg")
@@ -269,71 +259,6 @@ def test_outputs_that_cannot_be_converted_are_refused() -> None:
     with pytest.raises(eg.ModelError) as caught:
         m.check()
     assert [p.path for p in caught.value.problems] == ["outputs.th.unit", "outputs.number.unit"]
-
-
-COMPONENT = """name: two
-gravity: [0, -9.81, 0]
-components:
-  link:
-    attachments: [top]
-    parameters:
-      l: {value: 500, unit: mm}
-      m: {value: 250, unit: g}
-    bodies: {rod: {mass: m, com: [l/2, 0, 0], inertia: {zz: m*l**2/12}}}
-    joints: {th: {type: revolute, between: [top, rod]}}
-parameters: {L: {value: 60, unit: cm}}
-add:
-  a: {component: link, at: ground}
-  b: {component: link, at: ground, parameters: {l: 300}}
-  c: {component: link, at: ground, parameters: {l: L/2}}
-"""
-
-
-def test_components_keep_their_units(tmp_path: Path) -> None:
-    mod = load(tmp_path, COMPONENT).compile(target="numpy")
-    found = dict(zip(mod.p_names, mod.p.tolist(), strict=True))
-    assert [found[name] for name in ("a_l", "b_l", "L", "c_m")] == [0.5, 0.3, 0.6, 0.25]
-    assert [mod.metadata["units"][name] for name in ("a_l", "b_l", "L", "c_m")] == ["m", "m", "m", "kg"]
-    with pytest.raises(eg.ModelError) as caught:
-        load(tmp_path, COMPONENT.replace("l: L/2", "l: L**2")).check()
-    assert any("a length (m) is needed here" in p.message for p in caught.value.problems)
-
-
-def test_an_expression_is_not_scaled_by_its_unit(tmp_path: Path) -> None:
-    text = COMPONENT.replace("m: {value: 250, unit: g}", "m: {value: l*0.5, unit: g}")
-    with pytest.raises(eg.ModelError) as caught:
-        load(tmp_path, text).check()
-    assert any("is an expression" in p.message for p in caught.value.problems)
-
-
-@pytest.mark.parametrize(("value", "unit"), [(1e308, "km"), (1e-305, "nm")])
-def test_values_out_of_range_are_refused(value: float, unit: str) -> None:
-    m = model("mass", "1")
-    m.parameter("far", value, unit=unit)
-    m.input("u", value, unit=unit)
-    with pytest.raises(eg.ModelError) as caught:
-        m.check()
-    assert [p.path for p in caught.value.problems] == ["parameters.far.value", "inputs.u.value"]
-
-
-def test_springs_on_a_coordinate_know_its_dimension() -> None:
-    for kind, coordinate, right, wrong in (
-        ("revolute", "j", "N*mm/deg", "N/m"),
-        ("translational", "j_y", "N/mm", "N*m/rad"),
-        ("cylindrical", "j_z", "N/mm", "N*m/rad"),
-    ):
-        for unit, fine in ((right, True), (wrong, False)):
-            m = eg.Model("rubber")
-            m.parameter("k", 1, unit=unit)
-            b = m.body("b", mass=1, inertia=(1, 1, 1))
-            getattr(m, kind)("j", m.ground, b)
-            m.joint_spring("s", joint=coordinate, stiffness="k")
-            if fine:
-                m.check()
-                continue
-            with pytest.raises(eg.ModelError) as caught:
-                m.check()
-            assert [p.path for p in caught.value.problems] == ["forces.s.stiffness"]
 
 
 def swing() -> eg.Model:
@@ -362,29 +287,7 @@ def test_an_output_has_the_unit_that_is_certain(expression: str, unit: str) -> N
     assert m.derive().compile(target="numpy").metadata["units"].get("y1", "") == unit
 
 
-@pytest.mark.parametrize(
-    ("expression", "unit", "told"),
-    [
-        ("th", "mm", "th is a number or an angle, and a length (m) is needed here"),
-        ("x(rod.tip) - s", "deg", "is a length (m), and a number or an angle is needed here"),
-        ("th_dot", "m/s", "th_dot is a rate (1/s), and a speed (m/s) is needed here"),
-    ],
-)
-def test_an_output_of_another_dimension_is_told(expression: str, unit: str, told: str) -> None:
-    m = swing()
-    m.output("y1", expression, unit=unit)
-    with pytest.raises(eg.ModelError, match=re.escape(told)):
-        m.derive()
-
-
-def test_numbers_and_laws_may_hide_a_unit_of_an_output() -> None:
-    m = swing()
-    m.output("force", "-40*s", unit="N")
-    m.output("lift", "sin(th)", unit="mm")
-    assert m.compile(target="numpy").outputs(0.0, [0.5, 0.2, 0.0, 0.0]) == pytest.approx([-8.0, 1e3 * np.sin(0.5)])
-
-
-# -- values of instances of components -------
+# -- values of instances of components --------------------------------------------------------------------------------
 PAIR = """
 name: pair
 parameters: {s: 0.3}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -256,25 +255,6 @@ FOUR_BAR = f"""<robot name="four_bar"><link name="base"/><link name="a">{INERTIA
 </joint>{{}}</robot>"""
 
 
-def test_a_loop_without_a_type_is_taken_by_its_axis_and_said(tmp_path: Path) -> None:
-    path = tmp_path / "four_bar.urdf"
-    ends = '<parent link="b"/><parent_origin xyz="0.4 0 0"/><child link="c"/><child_origin xyz="0.3 0 0"/>'
-    links = '<link1 link="b" xyz="0.4 0 0"/><link2 link="c" xyz="0.3 0 0"/>'
-    axis = '<axis xyz="0 0 1"/>'
-    loops = [("loop_constraint", ends, "spherical"), ("loop_constraint", axis + ends, "revolute")]
-    loops += [("loop_joint", links, "spherical"), ("loop_joint", axis + links, "revolute")]
-    for tag, inside, word in loops:
-        path.write_text(FOUR_BAR.format(f'<{tag} name="l">{inside}</{tag}>'))
-        model = eg.load(path)
-        model.guess(j1=1.0, j2=-0.7, j3=1.6)
-        assert model.notes == (f"{tag}.l: names no type; taken as {word}",)
-        module = model.compile(target="numpy")
-        assert (module.n_dof, module.q_names) == (1, ("j1", "j2", "j3"))
-        j1, j2, j3 = module.x0()[:3]
-        tip = 0.2 * np.exp(1j * j1) + 0.4 * np.exp(1j * (j1 + j2))
-        assert tip == pytest.approx(0.4 + 0.3 * np.exp(1j * j3), abs=1e-12)
-
-
 REFUSED = [
     ('<loop_joint name="l" type="floating"><link1 link="b"/><link2 link="c"/></loop_joint>', "no loop is closed by"),
     ('<loop_joint name="l" type="fixed"><link1 link="b"/></loop_joint>', "loop_joint.l.link2: is missing"),
@@ -287,86 +267,6 @@ REFUSED = [
 def test_faults_of_loops_are_told_with_their_line(loop: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(eg.ModelError, match=f"robot.urdf:7: .*{said}"):
         urdf(tmp_path, FOUR_BAR.format(loop))
-
-
-NOTED = [
-    ('<gazebo><joint name="g"><parent>b</parent><child>c</child></joint></gazebo>', "<joint> g in line 7, which ties"),
-    ("<drake:ball_constraint/>", "<drake:ball_constraint> in line 7, which ties links or joints"),
-    (
-        '<coupling name="k"><predecessor link="b"/><successor link="c"/></coupling>',
-        "<coupling> k in line 7, which ties",
-    ),
-    (
-        '<loop_joint name="l" type="ball"><link1 link="c"/><link2 link="c"/></loop_joint>',
-        "left out: l, because no joint moves its two links against each other",
-    ),
-    ('<ros2_control name="r"><param value="${port}"/></ros2_control>', "<ros2_control>"),
-    ('<xacro:imu_sensor name="x"/>', "left out: elements of xacro that it did not expand (<xacro:imu_sensor>)"),
-]
-
-
-@pytest.mark.parametrize(("extra", "said"), NOTED)
-def test_what_leaves_more_freedoms_is_named(extra: str, said: str, tmp_path: Path) -> None:
-    path = tmp_path / "four_bar.urdf"
-    text = FOUR_BAR.replace("<robot", '<robot xmlns:xacro="x" xmlns:drake="d"')
-    path.write_text(text.format(extra))
-    model = eg.load(path)
-    assert said in model.notes[-1]
-    assert model.check().degrees_of_freedom == 3
-
-
-@pytest.mark.parametrize(
-    "part", ['<xacro:include filename="a"/>', '<link name="m"><visual name="${v}"/></link>', "<xacro:macro/>"]
-)
-def test_files_that_xacro_must_expand_are_refused(part: str, tmp_path: Path) -> None:
-    path = tmp_path / "four_bar.urdf"
-    path.write_text(FOUR_BAR.replace("<robot", '<robot xmlns:xacro="x"').format(part))
-    with pytest.raises(eg.ModelError, match="urdf:7: robot: is a xacro file; expand it first"):
-        eg.load(path)
-
-
-def test_the_world_need_not_be_written(tmp_path: Path) -> None:
-    text = FOUR_BAR.format("").replace('<link name="base"/>', "").replace('link="base"', 'link="world"')
-    model = urdf(tmp_path, text)
-    assert model.notes == ("the link 'world' is not in the file; it stands for the ground",)
-    assert model.check().degrees_of_freedom == 3
-
-
-LAST = [("continuous", "0 0 1", True), ("continuous", "1 0 0", False), ("prismatic", "0 0 1", False)]
-
-
-@pytest.mark.parametrize(("kind", "axis", "refused"), LAST)
-def test_a_last_link_that_no_torque_can_feel_is_refused_at_once(
-    kind: str, axis: str, refused: bool, tmp_path: Path
-) -> None:
-    """A point mass on the axis of its joint; beside it, or on a slide, it is fine."""
-    path = tmp_path / "arm.urdf"
-    point = '<inertial><origin xyz="0 0 0.5"/><mass value="1"/></inertial>'
-    path.write_text(
-        f'<robot name="r"><link name="base"/><link name="a">{INERTIAL}</link><link name="b">{point}</link>'
-        '<joint name="j" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint>\n'
-        f'<joint name="k" type="{kind}"><parent link="a"/><child link="b"/><axis xyz="{axis}"/></joint></robot>'
-    )
-    if refused:
-        with pytest.raises(eg.ModelError, match="urdf:2: joint.k: the joint moves no inertia: link 'b'"):
-            eg.load(path)
-        assert "for kinematics only" in eg.load(path, check_inertia="note").notes[0]
-    else:
-        eg.load(path).compile(target="numpy")
-
-
-def test_planar_joints_on_other_axes_are_noted(tmp_path: Path) -> None:
-    path = tmp_path / "plane.urdf"
-    text = '<robot name="r"><link name="a"/><link name="b">{}</link><joint name="j" type="planar"><parent link="a"/>'
-    text = text.format(INERTIAL) + '<child link="b"/><axis xyz="{}"/></joint></robot>'
-    path.write_text(text.format("0 0 2"))
-    assert eg.load(path).notes == ()
-    path.write_text(text.format("0 1 0"))
-    model = eg.load(path)
-    assert "across its axis" in model.notes[0]
-    assert "Pinocchio" in model.notes[0]
-    position = model.compile(target="numpy").poses([0.3, 0.4, 0.0])[-1, :3, 3]
-    assert position[1] == 0.0
 
 
 STRANGE = """<robot name="strange" mood="sad"><link name="base"/><wheel size="3"/>
@@ -418,12 +318,6 @@ def test_infinite_and_absent_limits(given: str, limits: dict[str, float], option
     for side in sides if option == "stop" else ():
         beyond, sign = (limits[side] - 0.1, 1) if side == "lower" else (limits[side] + 0.1, -1)
         assert sign * module.rhs(0.0, [beyond, 0.0])[1] > 1.0
-
-
-@pytest.mark.parametrize("given", ['lower="nan"', 'upper="nan" lower="-1"', 'effort="nan"', 'velocity="a lot"'])
-def test_limits_that_are_no_numbers_are_refused(given: str, tmp_path: Path) -> None:
-    with pytest.raises(eg.ModelError, match="urdf:2: joint.j.limit"):
-        urdf(tmp_path, ONE.format(given))
 
 
 PENDULUM = """<robot name="swing"><link name="base"/>
@@ -563,20 +457,6 @@ def test_a_slip_of_the_pen_is_told(given: dict[str, Any], said: str, tmp_path: P
         eg.load(tmp_path / "arm.yaml", check_inertia="error").check()
 
 
-def test_where_a_body_frame_lies_does_not_matter() -> None:
-    """A moment of -1e-3 kg m^2 is no rounding of 1 kg over 0.5 m, and -1e-15 is; about a far point it may be."""
-    for far in (0.0, 1e4, 1e6):
-        for moment, wrong in ((-1e-3, True), (-1e-15, False)):
-            m = eg.Model("far")
-            b = m.body("b", mass=1.0, com=(far + 0.5, 0, 0), inertia=(moment, 1e-8, 1e-8))
-            m.revolute("a", m.ground, b.at(far, 0, 0), coordinate="th")
-            if wrong:
-                with pytest.raises(eg.ModelError, match="negative principal moment"):
-                    m.check()
-            else:
-                m.check()
-
-
 def test_romeo_whose_fingers_have_no_mass_moves() -> None:
     path = SHIPPED / "romeo_description/urdf/romeo.urdf"
     with pytest.raises(eg.ModelError, match="check_inertia='note'"):
@@ -588,23 +468,3 @@ def test_romeo_whose_fingers_have_no_mass_moves() -> None:
     for call in (module.rhs, module.jacobian):
         with pytest.raises(eg.SingularMassMatrixError, match=r"kinematics only: .*bodies without mass .*LFinger11Link"):
             call(0.0, x)
-
-
-def test_a_robot_without_any_mass_loads_by_itself(tmp_path: Path) -> None:
-    text = (SHIPPED / "ur_description/urdf/ur5_robot.urdf").read_text()
-    bare = re.sub(r"<inertial>.*?</inertial>", "", text, flags=re.DOTALL)
-    path = tmp_path / "ur5.urdf"
-    path.write_text(bare)
-    model = eg.load(path, actuate=True)
-    assert any("kinematics only: no moving link has mass" in note for note in model.notes)
-    module = model.compile(target="numpy")
-    whole = eg.load(SHIPPED / "ur_description/urdf/ur5_robot.urdf").compile(target="numpy", kernels=["poses"])
-    q = np.random.default_rng(0).uniform(-1, 1, module.n_q)
-    np.testing.assert_array_equal(module.poses(q), whole.poses(q))
-    run = module.kinematic_analysis(**{module.q_names[1]: np.linspace(0, 1, 5)})
-    assert np.isfinite(run.poses()).all()
-    assert module.kinematics(q)[0].shape == (module.n_q,)
-    with pytest.raises(eg.SingularMassMatrixError, match="kinematics only"):
-        module.simulate(0.1)
-    with pytest.raises(eg.SingularMassMatrixError, match="kinematics only"):
-        module.linearize()

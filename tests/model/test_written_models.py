@@ -210,20 +210,6 @@ def test_load_goes_by_the_suffix(tmp_path: Path) -> None:
             eg.load(tmp_path / name)
 
 
-@pytest.mark.parametrize("given", ["b", "[b]", "[b, c]"])
-def test_one_name_or_several_are_released_and_slide(given: str) -> None:
-    text = f"""
-name: m
-bodies: {{a: {{mass: 1}}}}
-joints: {{x: {{type: prismatic, between: [ground, a]}}}}
-constraints: {{k: {{type: coupling, equation: x_dot, closes: x, releases: {given}}}}}
-events: {{e: {{expression: x, restitution: 0.5, friction: 0.3, slip: {given}}}}}
-"""
-    assert not schema_faults(text)
-    for key in ("releases", "slip"):
-        assert schema_faults(text.replace(f"{key}: {given}", f"{key}: {{b: 1}}"))
-
-
 # -- unnamed markers --------------------------------------------------------------------------------------------------
 def arm() -> eg.Model:
     m = eg.Model("arm", gravity=(0, "-g", 0))

@@ -152,32 +152,6 @@ def test_messages_name_the_argument_and_what_is_allowed() -> None:
 
 
 # -- places of arguments, and what is left out ------------------------------------------------------------------------
-#: Arguments after the name that people give by place.
-ORDERS = {
-    "revolute": "predecessor successor axis coordinate",
-    "screw": "predecessor successor pitch axis coordinate",
-    "cylindrical": "predecessor successor axis coordinates",
-    "spherical": "predecessor successor sequence coordinates rotation",
-    "free": "predecessor successor sequence coordinates rotation",
-    "distance": "predecessor successor length",
-    "force": "marker value axes",
-    "torque": "on value axes",
-    "spring": "a b stiffness length via",
-    "friction": "joint viscous coulomb static stribeck smoothing",
-    "stop": "joint stiffness lower upper exponent dissipation restitution velocity formula",
-    "bushing": "a b stiffness damping",
-    "coupling": "coordinates offset equation",
-    "gear": "a b radii teeth cones internal phase",
-    "rolling": "wheel plane radius shape tube no_spin",
-    "driver": "coordinate value between angle marker axis on",
-}
-
-
-@pytest.mark.parametrize("name", ORDERS)
-def test_arguments_keep_their_places(name: str) -> None:
-    names = [key for key in inspect.signature(getattr(eg.Model, name)).parameters if key not in ("self", "name")]
-    wanted = ORDERS[name].split()
-    assert [key for key in names if key in wanted] == wanted
 
 
 def parts() -> tuple[eg.Model, Any, Any, Any, Any]:
@@ -207,16 +181,6 @@ def test_what_a_force_acts_on_and_its_value() -> None:
     m.torque("t1", a, (0, 0, 1))
     m.torque("t2", J.coordinate, 1)
     assert (described(m)["forces"]["t1"]["body"], last(m)["joint"]) == ("a", "J")
-
-
-def test_numbers_that_hold_anyway_are_left_out() -> None:
-    m, _, b, J, _ = parts()
-    m.sphere_plane("c", m.ground, b, radius=1, stiffness=5, exponent=1.5, viscous_friction=0, formula=None)
-    assert set(last(m)) == {"type", "between", "radius", "stiffness"}
-    m.coupling("x", equation="J - t", offset=0)
-    assert set(last(m, "constraints")) == {"type", "equation"}
-    m.friction("f", J, viscous=0)  # a law all the same
-    m.check()
 
 
 def test_ends_that_are_not_there_are_told_by_the_check() -> None:
