@@ -181,13 +181,6 @@ def test_what_is_wrong_is_told_with_its_place(change: tuple[str, str], message: 
     assert message in str(raised.value)
 
 
-def test_an_output_that_repeats_a_coordinate_may_not_be_printed_otherwise(tmp_path: Path) -> None:
-    m = load(tmp_path, TEXT)
-    m.output("s", "s", latex="z")
-    with pytest.raises(eg.ModelError, match="printed as 'x_{w}' already"):
-        m.check()
-
-
 #: What no symbol has -> a word of the message.
 REFUSED = {
     "{}": "nothing",

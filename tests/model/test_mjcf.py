@@ -449,17 +449,6 @@ def test_what_mjcf_has_and_the_model_has_not_is_noted(parts: dict[str, str], sai
         assert said in note
 
 
-def test_bodies_that_hang_together_do_not_touch(tmp_path: Path) -> None:
-    """MuJoCo lets no body touch the one it moves on, but for the world."""
-    path = tmp_path / "chain.xml"
-    inner = '<body name="inner" pos="0 0 .1"><joint/><geom size=".1"/>{}</body>'
-    text = '<mujoco><worldbody><body><joint/><geom size=".1"/>{}</body></worldbody></mujoco>'
-    path.write_text(text.format(inner.format("")))
-    assert eg.load(path).notes == ()
-    path.write_text(text.format(inner.format(inner.format("").replace("inner", "last"))))
-    assert eg.load(path).notes == ("left out: contact of geoms",)  # the first and the last
-
-
 #: Fields of MuJoCo's compiled models, options and flags that somebody has looked at.
 KNOWN_FIELDS = (
     "actuator_acc0 actuator_actadr actuator_actearly actuator_actlimited actuator_actnum actuator_actrange "

@@ -11,7 +11,7 @@ import sympy
 from model_files import described, load
 from sympy import symbols
 from sympy.physics.mechanics import KanesMethod, LagrangesMethod, System, dynamicsymbols
-from sympy_systems import cartesian_pendulum, double_pendulum, four_bar, knife_edge, pulled_pendulum, rolling_disc
+from sympy_systems import cartesian_pendulum, double_pendulum, four_bar, knife_edge, rolling_disc
 
 import eomgen as eg
 
@@ -228,13 +228,6 @@ def test_equations_stand_alone(tmp_path: Path) -> None:
         load(tmp_path, text).check()
     assert "equations.masses: unknown key" in str(caught.value)
     assert "equations: the model has bodies" in str(caught.value)
-
-
-def test_a_method_that_needs_bodies_is_refused() -> None:
-    model = eg.from_sympy(pulled_pendulum(), "pulled")
-    with pytest.raises(eg.UsageError, match="for given equations there are: auto, given"):
-        model.derive("embedding")
-    assert model.derive("given").method == "given"
 
 
 @pytest.mark.parametrize(

@@ -342,19 +342,3 @@ def test_calls_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     for call, said in CALLS.items():
         (problem,) = faults(tmp_path, written(TABLE, call))
         assert said in f"{problem.message}; {problem.remedy}", call
-
-
-def test_names_of_functions_belong_to_the_one_namespace() -> None:
-    m = eg.Model("clash")
-    m.parameter("f", 1.0)
-    for name in ("f", "sin", "vx", "s"):
-        m.table(name, [0, 1], [0, 1])
-    m.prismatic("s", m.ground, m.body("b", mass="f"), axis="x")
-    with pytest.raises(eg.ModelError) as caught:
-        m.check()
-    text = str(caught.value)
-    assert "functions.f: the name 'f' is already used by the parameter at parameters.f" in text
-    assert "functions.sin: 'sin' is a built-in function" in text
-    assert "functions.vx: 'vx' is a built-in name for the motion of a marker" in text
-    assert "joints.s: the name 's' is already used by the function at functions.s" in text
-    assert len(caught.value.problems) == 4

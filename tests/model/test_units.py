@@ -172,17 +172,6 @@ def test_a_number_in_an_inertia_may_be_the_mass_of_the_body(mass: object, inerti
             m.compile(target="numpy")
 
 
-def test_a_model_without_units_is_not_checked() -> None:
-    m = eg.Model("free")
-    b = m.body("b", mass=1, inertia=(0, 0, 1))
-    m.revolute("th", m.ground, b)
-    m.output("y", "th + th_dot")
-    m.check()
-    m.parameter("l", 1, unit="m")
-    with pytest.raises(eg.ModelError, match="combines"):
-        m.check()
-
-
 #: As people write them; a bracket divides as a whole.
 UNITS = [
     *("mm", "km/h", "g*mm^2", "deg", "rpm", "kN/mm", "lbf*ft", "N*mm/deg", "bar", "inch", "t", "ms", "deg/s", "mN m"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import command
 import mujoco
 import numpy as np
 import pinocchio as pin
@@ -78,17 +77,6 @@ def test_names_become_identifiers_and_are_kept(tmp_path: Path) -> None:
     assert model.renamed["joints"] == dict(zip(joints, module.joint_names, strict=True))
     model.save(tmp_path / "names.yaml")
     assert eg.load(tmp_path / "names.yaml").compile(target="numpy", kernels=["poses"]).joint_names == module.joint_names
-
-
-def test_convert_writes_a_model_file_that_runs(tmp_path: Path) -> None:
-    out = tmp_path / "arm.yaml"
-    words = ("convert", ARM, "--floating", "--lock", "left", "--lock", "right=0.01", "--out", out)
-    assert command.run(*words).code == 0
-    assert command.run("check", out).code == 0
-    assert eg.load(out).check().coordinates == [*(f"base_{k}" for k in "xyz123"), "yaw", "shoulder", "elbow"]
-    printed = command.run("convert", ARM)
-    assert "note: " in printed.err
-    assert printed.out.startswith("# ")
 
 
 def test_python_and_model_files_know_the_data(tmp_path: Path) -> None:

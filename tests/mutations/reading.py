@@ -85,4 +85,18 @@ FAULTS = (
         "the root of a square has the sign of what is squared",
         (f"{FORMS}::test_roots_of_squares_and_magnitudes_have_no_sign[sqrt(1 - sin(A)**2)]",),
     ),
+    Fault(
+        "unit-bracket", "eomgen/describe/units.py",
+        "signs.append(signs[-1] * sign)",
+        "signs.append(signs[-1])",
+        "a bracket behind a division multiplies: N/(mm/s)",
+        ("tests/model/test_units.py::test_sizes_are_those_of_pint",),
+    ),
+    Fault(
+        "chained-comparison", "eomgen/describe/expressions.py",
+        'return self.fold(node, "and", results)',
+        'return self.fold(node, "or", results)',
+        "a < b < c is true where one of both holds",
+        ("tests/model/test_expressions.py::test_meaning",),
+    ),
 )  # fmt: skip
