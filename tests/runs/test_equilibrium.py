@@ -91,6 +91,7 @@ def test_newton_that_stalls_goes_downhill() -> None:
     assert V[1] < min(V[0], V[2])
 
 
+@pytest.mark.quick
 def test_nothing_balances() -> None:
     m = eg.Model("fall", gravity=(0, -9.81, 0))
     body = m.body("body", mass=2.0)
@@ -220,18 +221,6 @@ def test_damping_makes_a_rest_asymptotically_stable_unless_something_is_free(fre
     mod = m.compile(target="numpy")
     assert mod.equilibrium({"a": 0.4}).stability == ("marginal" if free else "asymptotically stable")
     assert mod.linearize(mod.x0(a=np.pi)).stability == "unstable"
-
-
-def test_follower_forces_are_judged_by_eigenvalues() -> None:
-    """A stiffness that is not symmetric flutters: w^2 (complex) of [[3, p], [-p, 2]] if 2 p > 1."""
-    m = eg.Model("flutter")
-    for name, value in (("a", "-3*a - p*b"), ("b", "p*a - 2*b")):
-        m.prismatic(name.upper(), m.ground, m.body(f"m{name}", mass=1), axis="x", coordinate=name)
-        m.actuator(f"f{name}", name.upper(), value)
-    m.parameter("p", 0.4)
-    mod = m.compile(target="numpy")
-    assert mod.equilibrium({"a": 0.1}).stability == "marginal"
-    assert mod.equilibrium({"a": 0.1}, p={"p": 0.6}).stability == "unstable"
 
 
 def maxwell(method: str = "auto", flow: str = "s_dot - 15*(x1 - s)") -> Any:

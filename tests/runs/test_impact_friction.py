@@ -326,16 +326,6 @@ def test_a_gap_at_another_scale_is_refused(way: str, factor: float) -> None:
         module.simulate(0.4)
 
 
-def test_a_slope_written_by_its_tangent_is_no_distance() -> None:
-    """y - x tan a falls to 0 where the distance does, but is 1/cos a as large."""
-    with pytest.raises(eg.UsageError, match=r"gap hit changes by 1\.15"):
-        thrown("{y} - 0.5 - 0.57735026919*P_x", "{v}*0.866025403784 + P_y_dot*0.5").compile(target="numpy").simulate(
-            0.4
-        )
-    good = thrown("({y} - 0.5 - 0.57735026919*P_x)*0.866025403784", "{v}*0.866025403784 + P_y_dot*0.5")
-    good.compile(target="numpy").simulate(0.4)
-
-
 def test_what_friction_refuses() -> None:
     m = eg.Model("r")
     b = m.body("b", mass=1.0, inertia={"zz": 0.1})

@@ -198,6 +198,7 @@ def test_least_change(name: str, metric: str) -> None:
     np.testing.assert_allclose(v, expected, atol=1e-8 * np.abs(expected).max())
 
 
+@pytest.mark.quick
 def test_held_values_stay() -> None:
     mod = compiled("slider_crank")
     x = disturbed(mod, 5, 0.05)

@@ -265,17 +265,6 @@ def test_a_ball_joint_led_by_three_distances() -> None:
     np.testing.assert_allclose(found.a[:, 1:-1], (sides[1].v[:, 1:] - sides[0].v[:, 1:]) / (2 * h), atol=1e-8)
 
 
-def test_change_points_where_the_determinant_only_touches_zero() -> None:
-    """Three parallel cranks on one bar: a redundant loop, flat at 0 and pi; all cranks turn alike throughout."""
-    mod = models.build("three_cranks").compile(target="numpy")
-    theta = np.concatenate([np.linspace(-0.5, 6, 66), [6.1]])
-    found = mod.kinematic_analysis(theta1=theta, theta1_dot=2.0, theta1_ddot=1.0)
-    for name in ("theta2", "theta3"):
-        for suffix, value in (("", theta), ("_dot", 2.0), ("_ddot", 1.0)):
-            np.testing.assert_allclose(found[name + suffix], value, atol=1e-9)
-    np.testing.assert_allclose([s.values["theta1"] for s in found.singular], [0, np.pi], atol=1e-10)
-
-
 def test_values_in_any_order_are_those_of_the_sweep(four_bar: eg.Module, crank: eg.Module) -> None:
     values = np.random.default_rng(0).normal(size=40)
     order = np.argsort(values)

@@ -20,6 +20,7 @@ def numbers(pairs: Any) -> np.ndarray:
     return np.sort_complex(np.array([float(re) + 1j * float(im) for re, im in pairs]))
 
 
+@pytest.mark.quick
 def test_the_iftomm_four_bar() -> None:
     """Equilibrium, M, C, K and eigenvalues of the IFToMM linearization benchmark."""
     given = models.reference("iftomm_fourbar_diagonal_spring")["reference"]
@@ -140,20 +141,6 @@ def test_a_sleeping_top_in_either_rotation(factor: float) -> None:
         np.testing.assert_allclose(np.sort(values.real), np.sort(both.real), rtol=0, atol=1e-6)
         assert found.stability == ("unstable" if factor < 1 else "marginal")
     assert turning.states == ("S_rx", "S_ry", "S_rz", "S_wx", "S_wy", "S_wz")
-
-
-def test_the_second_order_form_of_chosen_coordinates() -> None:
-    disc = compiled("rolling_disc")
-    zero = dict.fromkeys(("x", "y", "yaw", "lean", "spin", "yaw_dot", "lean_dot"), 0.0)
-    found = disc.linearize(disc.x0(zero, spin_dot=3.0))
-    with pytest.raises(eg.UsageError, match="yaw_dot acts on lean through C"):
-        found.second_order("lean")
-    M, C, K = found.second_order("lean", "yaw")
-    np.testing.assert_allclose(M, np.diag([0.625, 0.125]), rtol=1e-12)  # 5/4 m r^2, m r^2/4
-    np.testing.assert_allclose(K, np.diag([-9.81, 0.0]), rtol=0, atol=1e-12)  # -m g r
-    np.testing.assert_allclose(C, 3.0 * np.array([[0.0, -0.75], [0.25, 0.0]]), rtol=0, atol=1e-12)
-    with pytest.raises(eg.UsageError, match="the rate of x is not one of the independent velocities"):
-        found.second_order("x")
 
 
 def test_state_space_names_and_display() -> None:

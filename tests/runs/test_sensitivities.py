@@ -73,6 +73,7 @@ def oscillator() -> eg.Model:
     return m
 
 
+@pytest.mark.quick
 def test_a_linear_oscillator() -> None:
     """Derivatives of the closed solution, by SymPy, in all five of its constants; an output of acceleration too."""
     mod = oscillator().compile(target="numpy")
@@ -335,19 +336,6 @@ def disc(folder: Path) -> eg.Model:
     return m
 
 
-def two_bars(folder: Path) -> eg.Model:
-    """A double pendulum whose end hits a wall that moves."""
-    m = eg.Model("wall", gravity=(0, "-g", 0))
-    m.parameter("g", G)
-    mass, far, l = m.parameter("mass", 0.7), m.parameter("far", 0.3), m.parameter("l", 0.8)
-    upper = m.body("upper", mass=1.0, com=(0, -0.5, 0), inertia={"zz": 0.08})
-    lower = m.body("lower", mass=mass, com=(0, -l / 2, 0), inertia={"zz": 0.05})
-    m.revolute("A", m.ground, upper, coordinate="a")
-    m.revolute("B", upper.at(0, -1, 0), lower, coordinate="b")
-    m.event("wall", lower.at(0, -l, 0).position[0] + far + 0.05 * m.t, restitution=0.6)
-    return m
-
-
 ROLLS = {"x": 0, "y": 0, "yaw": 0, "lean": 0.2, "spin": 0, "yaw_dot": 0.5, "lean_dot": 0.1, "spin_dot": 3.0}
 #: model, names, what is held, end, how many events
 STRUCK: dict[str, tuple[Any, list[str], dict[str, float], float, int]] = {
@@ -360,9 +348,6 @@ STRUCK: dict[str, tuple[Any, list[str], dict[str, float], float, int]] = {
         ["l", "theta_dot"], {"theta": -0.5, "theta_dot": 10.0}, 0.3, 1,
     ),
     "a reset that rolling takes back in part": (disc, ["r", "lean", "spin_dot"], ROLLS, 0.4, 1),
-    "a wall that moves": (
-        two_bars, ["mass", "far", "b_dot"], {"a": 0.9, "b": 0.2, "a_dot": 0.0, "b_dot": 0.0}, 0.9, 1
-    ),
 }  # fmt: skip
 
 

@@ -47,6 +47,7 @@ def test_an_integrator_finds_its_equilibrium() -> None:
     assert rest.stability == "asymptotically stable"
 
 
+@pytest.mark.quick
 def test_linear_equations_contain_states() -> None:
     linear = servo().linearize(servo().equilibrium().x)
     assert linear.states == ("s", "s_dot", "z", "w")
@@ -73,23 +74,6 @@ def test_large_states_do_not_spoil_an_equilibrium() -> None:
     held = mod.equilibrium(hold={"z": 0.25})
     assert held["p"] == pytest.approx(5e6 + 4e-5 * 0.05 / 1e-12, rel=1e-9)
     assert held.supports["z"] == pytest.approx(800 * 9.81 - 0.002 * held["p"], rel=1e-9)
-
-
-def test_calls_of_the_mechanism_leave_states_out() -> None:
-    mod = servo()
-    x = np.array([0.2, 0.3, 0.4, 0.5])
-    push = KP * 0.5 + KI * 0.4 - C * 0.5 + 1.5
-    np.testing.assert_allclose(mod.mass_matrix(x[:1]), [[M]])
-    np.testing.assert_allclose(mod.embedded_mass_matrix(x[:1]), [[M]])
-    assert mod.bias(0.0, x) == pytest.approx([-push])
-    assert mod.inverse_dynamics(x[:1], x[1:], [0.0]) == pytest.approx([-push])
-    assert mod.energy(x) == pytest.approx([M * 0.3**2 / 2, 0.0])
-    many = np.repeat(x[:, None], 3, axis=1)
-    assert mod.bias(0.0, many).shape == (1, 3)
-    assert mod.mass_matrix(many[:1]).shape == (1, 1, 3)
-    assert mod.inverse_dynamics(many[:1], many[1:], np.zeros((1, 3))).shape == (1, 3)
-    with pytest.raises(eg.UsageError, match=r"takes v = \[v; s\]"):
-        mod.inverse_dynamics(x[:1], x[1:2], [0.0])
 
 
 @pytest.mark.parametrize(
@@ -402,20 +386,6 @@ def test_many_runs_are_single_runs() -> None:
         single = mod.simulate(3.0, parameters={"tau": tau}, initial={"a": a}).x[:, -1]
         np.testing.assert_array_equal(alone.x[:, k], single)
         np.testing.assert_allclose(many.x[:, k], single, rtol=0.0, atol=1e-8)
-
-
-def test_trajectories_keep_states(tmp_path: Path) -> None:
-    mod = lag_module()
-    traj = mod.simulate(1.0)
-    traj.save(tmp_path / "run.npz")
-    read = eg.load_trajectory(tmp_path / "run.npz")
-    np.testing.assert_array_equal(read["a"], traj["a"])
-    assert "a_dot" in traj.to_pandas().columns
-    np.testing.assert_array_equal(traj.s[0], traj["a"])
-    onwards = mod.simulate((1.0, 2.0), initial=traj)
-    assert onwards["a"][0] == traj["a"][-1]
-    np.testing.assert_allclose(onwards.x[:, -1], expm(2.0 * matrix()) @ [0.1, 0, 0.2], atol=1e-7)
-    assert mod.simulate(0.1, initial=np.array([0.0, 0.0, 0.9]))["a"][0] == 0.9
 
 
 def test_the_differential_algebraic_form_has_the_same_motion() -> None:

@@ -78,6 +78,7 @@ def test_singular_positions_between_grid_points_are_found(arm: eg.Module) -> Non
     assert np.count_nonzero(ws.singular) == 6
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("limits", [True, {"q2": (-2, 2.5)}])
 def test_limits(arm: eg.Module, limits: Any) -> None:
     ws = arm.workspace({"q1": (0, TURN, 5), "q2": (-np.pi, np.pi, 41)}, ["x", "y"], limits=limits)

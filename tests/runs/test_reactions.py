@@ -1,0 +1,371 @@
+"""Reactions balance every body by Newton and Euler and do no work; free-body diagrams, ADAMS, Pinocchio; redundancy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import judges
+import models
+import numpy as np
+import pinocchio as pin
+import pytest
+import random_models
+import rotations
+import scipy.linalg
+import sympy
+import yaml
+from analysed import compiled
+from random_models import Placement
+from scipy.spatial.transform import Rotation
+
+import eomgen as eg
+
+G = 9.81
+
+
+def described(model: eg.Model) -> tuple[judges.RigidBodies, dict[str, Any]]:
+    """Bodies of a model without parameters, and its joints: type, predecessor, its marker, successor, its marker."""
+    text = yaml.safe_load(model.to_yaml())
+    entries = list(text["bodies"].values())
+    masses, centers = (np.array([e[key] for e in entries], dtype=float) for key in ("mass", "com"))
+    inertias = [np.diag(i) if np.ndim(i) == 1 else np.array(i) for i in (e["inertia"] for e in entries)]
+    names = ["ground", *text["bodies"]]
+
+    def marker(place: Any) -> tuple[int, Placement]:
+        given = {"body": place} if isinstance(place, str) else place
+        R = models.rotation(given.get("rpy", (0.0, 0.0, 0.0)))
+        return names.index(given["body"]) - 1, Placement(R, np.array(given.get("at", np.zeros(3)), dtype=float))
+
+    joints = {name: (e["type"], *(x for place in e["between"] for x in marker(place)))
+              for name, e in text["joints"].items()}  # fmt: skip
+    return judges.RigidBodies(masses, centers, np.array(inertias), np.array(text["gravity"])), joints
+
+
+class Balance:
+    """What must act on each body at a state, ``needed`` (k, 6): force and moment about its origin, from poses alone."""
+
+    def __init__(self, model: eg.Model, module: Any, x: np.ndarray) -> None:
+        rigid, joints = described(model)
+        self.module, self.x, self.joints = module, x, [joints[name] for name in module.joint_names]
+        q, v = x[: module.n_q], x[module.n_q :]
+        a = module.rhs(0.0, x)[module.n_q :]
+
+        def rates(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+            return rotations.coordinate_rates(module.metadata, q, v)
+
+        q_dot = rates(q, v)
+        q_ddot = rates(q, a) + rates(q_dot, v) - rates(0 * q_dot, v)  # q' = N v, N linear in Euler parameters
+        self.bodies = b = judges.Bodies(module, q, q_dot)
+        self.N = np.array([rates(q, e) for e in np.eye(module.n_v)]).T
+        w_dot, r_ddot = b.w_dot + b.J_w @ q_ddot, b.r_ddot + b.J_r @ q_ddot
+        self.needed = np.zeros((len(rigid.masses), 6))
+        for k, mass in enumerate(rigid.masses):
+            arm, w = b.R[k] @ rigid.centers[k], b.w[k]
+            tensor = b.R[k] @ rigid.inertias[k] @ b.R[k].T
+            force = mass * (r_ddot[k] + np.cross(w_dot[k], arm) + np.cross(w, np.cross(w, arm)) - rigid.gravity)
+            self.needed[k] = [*force, *(tensor @ w_dot[k] + np.cross(w, tensor @ w) + np.cross(arm, force))]
+
+    def place(self, body: int, marker: Placement) -> tuple[np.ndarray, np.ndarray]:
+        """Axes and origin of a marker in ground axes."""
+        if body < 0:
+            return marker.rotation, marker.position
+        R = self.bodies.R[body]
+        return R @ marker.rotation, self.bodies.r[body] + R @ marker.position
+
+    def add(self, total: np.ndarray, joint: Any, wrench: np.ndarray) -> None:
+        """A wrench on the successor at its marker, and its opposite on the predecessor."""
+        _, i, _, j, S = joint
+        _, point = self.place(j, S)
+        for body, sign in ((j, 1.0), (i, -1.0)):
+            if body >= 0:
+                arm = point - self.bodies.r[body]
+                total[body] += sign * np.concatenate([wrench[:3], wrench[3:] + np.cross(arm, wrench[:3])])
+
+    def relative(self, joint: Any) -> np.ndarray:
+        """Velocity of S against P at S, and angular velocity, per generalized velocity (6, n_v), ground axes."""
+        _, i, _, j, S = joint
+        _, point = self.place(j, S)
+        result = np.zeros((6, self.module.n_v))
+        for k, sign in ((j, 1.0), (i, -1.0)):
+            if k >= 0:
+                turn = self.bodies.J_w[k] @ self.N
+                result[:3] += sign * (self.bodies.J_r[k] @ self.N + np.cross(turn.T, point - self.bodies.r[k]).T)
+                result[3:] += sign * turn
+        return result
+
+    def check(self, found: np.ndarray, loads: Any = None) -> None:
+        """Reactions, and loads (wrenches by joint), balance every body; reactions do no work in any free motion."""
+        module, exerted, size = self.module, np.zeros_like(self.needed), np.abs(self.needed).max()
+        for joint, wrench in zip(self.joints, found + (0.0 if loads is None else loads), strict=True):
+            self.add(exerted, joint, wrench)
+        np.testing.assert_allclose(exerted, self.needed, atol=1e-8 * size, rtol=0)
+        q, free = self.x[: module.n_q], np.eye(module.n_v)
+        if module.n_rows:
+            C_q = module.constraint_jacobian(q, rows="all")
+            free = scipy.linalg.null_space(C_q, rcond=1e-9)
+            held = C_q.T @ module.multipliers(0.0, self.x)  # M a + h + C_q^T l = 0
+            motion = module.mass_matrix(q) @ module.rhs(0.0, self.x)[module.n_q :] + module.bias(0.0, self.x)
+            np.testing.assert_allclose(motion + held, 0.0, atol=1e-8 * size, rtol=0)
+        for joint, wrench in zip(self.joints, found, strict=True):
+            np.testing.assert_allclose(wrench @ self.relative(joint) @ free, 0.0, atol=1e-8 * size, rtol=0)
+
+
+@pytest.mark.parametrize("rotation", ["euler_angles", "euler_parameters"])
+@pytest.mark.parametrize("seed", range(3))
+def test_every_body_of_random_trees(seed: int, rotation: str) -> None:
+    made = random_models.random_model(seed, 5, reverse=True, rotation=rotation)
+    module = made.model.compile("recursive" if seed % 2 else "embedding", target="numpy")
+    x = judges.random_states(module, seed, 1)[0]
+    Balance(made.model, module, x).check(module.reactions(0.0, x))
+    assert not module.undetermined_reactions(0.0, x).any()
+
+
+@pytest.mark.parametrize(("seed", "planar"), [(20, False), (22, False), (23, True), (24, True)])
+def test_every_body_of_random_loops(seed: int, planar: bool) -> None:
+    made = random_models.random_model(seed, 5, planar=planar, reverse=True, loop=True)
+    module = made.model.compile(target="numpy")
+    x = judges.random_states(module, seed, 1)[0]
+    Balance(made.model, module, x).check(module.reactions(0.0, x))
+
+
+def slider_crank(cut: str = "C", drives: dict[str, float] | None = None) -> eg.Model:
+    """In a plane of space, its bodies' frames turned; all coordinates have names but that of the joint to cut."""
+    m = eg.Model("turned", gravity=(1.0, -9.0, 2.0))
+    centers = {"crank": (0.1, 0.02, 0.01), "rod": (0.2, 0.0, 0.03), "block": (0.0, 0.1, 0.0)}
+    crank, rod, block = (m.body(n, mass=1.0, com=com, inertia=(0.01, 0.02, 0.025)) for n, com in centers.items())
+    tilt, level = (0.3, -0.2, 0.5), (np.pi / 2, 0, np.pi / 2)  # z along x
+    rail = tuple((Rotation.from_euler("xyz", tilt) * Rotation.from_euler("xyz", level)).as_euler("xyz").tolist())
+    ends = {
+        "A": ("revolute", m.ground.at(0.1, 0.2, 0.3, rpy=tilt), crank),
+        "B": ("revolute", crank.at(0.2, 0, 0), rod),
+        "C": ("revolute", rod.at(0.5, 0, 0), block.at(0, 0, 0, rpy=(0, 0, 0.4))),
+        "D": ("prismatic", m.ground.at(0.1, 0.2, 0.3, rpy=rail), block.at(0, 0, 0, rpy=level)),
+    }
+    for name, (kind, a, b) in ends.items():
+        m.joint(kind, name, a, b, **({} if name == cut else {"coordinate": f"q{name}"}))
+    for name, value in (drives or {}).items():
+        m.torque(f"drive_{name}", name, value)
+    m.initial(qA=0.7, qA_dot=3.0)
+    m.guess(**{f"q{name}": value for name, value in (("B", -0.96), ("C", 0.66), ("D", 0.64)) if name != cut})
+    return m
+
+
+def test_drives_on_every_joint_and_whatever_joint_is_cut() -> None:
+    """A drive's wrench is along z of the predecessor's marker, at the successor's; cut hinges and a cut slider too."""
+    drives = {"A": 1.3, "B": -0.7, "C": 0.9, "D": 2.2}
+    cuts, found = set(), []
+    for cut in ("B", "C", "D"):
+        model = slider_crank(cut, drives)
+        module = model.compile(target="numpy")
+        x = module.x0()
+        judge, loads = Balance(model, module, x), []
+        for name, (kind, i, P, *_) in zip(module.joint_names, judge.joints, strict=True):
+            along = drives[name] * judge.place(i, P)[0][:, 2]
+            loads.append([*along, 0, 0, 0] if kind == "prismatic" else [0, 0, 0, *along])
+        judge.check(module.reactions(0.0, x), np.array(loads))
+        cuts |= set(module.metadata["loop_joint_names"])
+        found.append(dict(zip(module.joint_names, module.reactions(0.0, x), strict=True)))
+        for name, wrench in found[-1].items():
+            np.testing.assert_allclose(wrench, found[0][name], atol=1e-8)
+    assert cuts == {"B", "C", "D"}
+
+
+def test_a_drive_on_a_cut_slider_reacts_on_both_bodies() -> None:
+    """Reactions with a drive found by inverse dynamics are those of the model that has its force as an element."""
+    plain = slider_crank("D").compile(target="numpy")
+    x = plain.x0()
+    assert plain.loop_names == ("D",)
+    found = plain.actuator_forces(0.0, x, {plain.minimal.q_names[0]: 5.0}, actuated=["D"])
+    driven = slider_crank("D", {"D": float(found["D"])}).compile(target="numpy")
+    np.testing.assert_allclose(driven.reactions(0.0, x), found.reactions, atol=1e-9)
+
+
+@pytest.mark.quick
+def test_a_chain_against_pinocchio() -> None:
+    """``data.f`` of the recursive Newton-Euler algorithm is the force that the parent exerts, in joint axes."""
+    made = random_models.random_model(5, 5, types=("revolute", "prismatic"))
+    module, model = made.model.compile(target="numpy"), pin.Model()
+    for k, kind in enumerate(made.kinds):
+        outer, inner = (pin.SE3(p.rotation, p.position) for p in (made.outer[k], made.inner[k]))
+        parent = made.parents[k]
+        held = pin.SE3.Identity() if parent < 0 else pin.SE3(made.inner[parent].rotation, made.inner[parent].position)
+        axis = pin.JointModelRZ() if kind == "revolute" else pin.JointModelPZ()
+        joint = model.addJoint(parent + 1, axis, held.actInv(outer), f"q{k}")
+        body = pin.Inertia(made.masses[k], made.centers[k], made.inertias[k])
+        model.appendBodyToJoint(joint, body, inner.inverse())
+    model.gravity.linear = made.gravity
+    data = model.createData()
+    x = judges.random_states(module, 3, 1)[0]
+    order = [module.q_names.index(f"q{k}") for k in range(5)]
+    a = module.rhs(0.0, x)[5:]
+    pin.forwardKinematics(model, data, x[:5][order])
+    pin.rnea(model, data, x[:5][order], x[5:][order], a[order])
+    found = module.reactions(0.0, x)
+    for k in range(5):
+        f = data.f[k + 1]
+        expected = [*(data.oMi[k + 1].rotation @ f.linear), *(data.oMi[k + 1].rotation @ f.angular)]
+        np.testing.assert_allclose(found[module.joint_names.index(f"q{k}")], expected, atol=1e-11)
+
+
+def three_cranks() -> eg.Model:
+    """A bar on three parallel cranks: a row is redundant in the plane too."""
+    m = eg.Model("three_cranks", gravity=(0.0, -9.81, 0.3))
+    bar = m.body("bar", mass=1.3, com=(0.3, 0.05, 0.02), inertia=(0.01, 0.04, 0.04))
+    for k, x in ((1, 0.0), (2, 0.35), (3, 0.6)):
+        crank = m.body(f"crank{k}", mass=0.7, com=(0.1, 0, 0.01), inertia=(0.001, 0.003, 0.003))
+        m.revolute(f"A{k}", m.ground.at(x, 0, 0), crank, coordinate=f"theta{k}")
+        m.revolute(f"B{k}", crank.at(0.2, 0, 0), bar.at(x, 0, 0))
+    m.initial(theta1=-0.5, theta1_dot=2.0)
+    m.guess(theta2=-0.5, theta3=-0.5)
+    m.independent("theta1")
+    return m
+
+
+@pytest.mark.parametrize("build", [three_cranks, slider_crank])
+def test_smallest_reactions_of_redundant_constraints(build: Any) -> None:
+    """Least norm of all reactions, moments over the model's length, by one pseudo-inverse; and what is undetermined."""
+    model = build()
+    module = model.compile(target="numpy")
+    x = module.x0()
+    judge, length = Balance(model, module, x), module.metadata["length_scale"]
+    columns, places = [], []
+    for k, joint in enumerate(judge.joints):
+        if joint[0] == "revolute":
+            axes = judge.place(joint[3], joint[4])[0]
+            blocks = [*np.hstack([np.eye(3), np.zeros((3, 3))]), *np.hstack([np.zeros((2, 3)), axes.T[:2]])]
+        else:
+            axes = judge.place(joint[1], joint[2])[0]
+            blocks = [*np.hstack([axes.T[:2], np.zeros((2, 3))]), *np.hstack([np.zeros((3, 3)), np.eye(3)])]
+        for wrench in np.array(blocks) * [1, 1, 1, length, length, length]:
+            total = np.zeros_like(judge.needed)
+            judge.add(total, joint, wrench)
+            columns.append(total.ravel())
+            places.append((k, wrench))
+    K = np.array(columns).T
+    null = scipy.linalg.null_space(K, rcond=1e-9)
+    expected, stress = np.zeros((len(judge.joints), 6)), np.zeros((len(judge.joints), 6, null.shape[1]))
+    for (k, wrench), value, row in zip(places, np.linalg.pinv(K, rcond=1e-9) @ judge.needed.ravel(), null, strict=True):
+        expected[k] += value * wrench
+        stress[k] += np.outer(wrench, row)
+    np.testing.assert_allclose(module.reactions(0.0, x), expected, atol=1e-8 * np.abs(expected).max())
+    undetermined = np.abs(stress).max(axis=2, initial=0.0) > 1e-7
+    np.testing.assert_array_equal(module.undetermined_reactions(0.0, x), undetermined)
+    assert undetermined.any()
+
+
+def test_contact_force_of_a_rolling_disc() -> None:
+    """The free joint exerts nothing; ground pushes with m (a - g) at the contact."""
+    mod = compiled("rolling_disc")
+    for x in judges.random_states(mod, 3, 2):
+        np.testing.assert_allclose(mod.reactions(0.0, x), 0.0, atol=1e-9)
+        a = mod.rhs(0.0, x)[mod.n_q :]
+        acc = a[[mod.v_names.index(f"{axis}_dot") for axis in "xyz"]]
+        force = mod.driving_forces(0.0, x)
+        found = [force[f"roll.{row}"] for row in ("slip_x", "slip_y", "height")]
+        np.testing.assert_allclose(found, 2.0 * (acc + np.array([0, 0, G])), atol=1e-9)
+
+
+def test_torque_of_a_driver() -> None:
+    """A driven pendulum: torque m l^2 theta'' + m g l cos theta, and the pin force of the prescribed motion."""
+    m = eg.Model("driven", gravity=(0, -G, 0))
+    rod = m.body("rod", mass=2.0, com=(0.5, 0, 0))
+    m.revolute("A", m.ground, rod, coordinate="theta")
+    m.coupling("drive", equation="theta - 0.3 - 2*t - 0.5*t**2")
+    mod = m.compile(target="numpy")
+    t = 0.7
+    theta, rate = 0.3 + 2 * t + 0.5 * t**2, 2 + t
+    x = np.array([theta, rate])
+    torque = mod.driving_forces(t, x)["drive"]
+    np.testing.assert_allclose(torque, 2.0 * 0.25 * 1.0 + 2.0 * G * 0.5 * np.cos(theta), rtol=1e-12)
+    e, n = np.array([np.cos(theta), np.sin(theta)]), np.array([-np.sin(theta), np.cos(theta)])
+    pin = 2.0 * (0.5 * (1.0 * n - rate**2 * e) + [0, G])
+    np.testing.assert_allclose(mod.reactions(t, x)[0], [*pin, 0, 0, 0, 0], atol=1e-12)
+
+
+def placed(body: Any, rotation: Rotation, position: Any) -> Any:
+    return body.at(*map(float, position), rpy=tuple(rotation.as_euler("xyz").tolist()))
+
+
+KINDS = {"rev": "revolute", "rev_spring": "revolute", "sph": "spherical", "pri": "prismatic", "cyl": "cylindrical"}
+
+
+@pytest.mark.parametrize("case", models.reference("adams_single_body_joints")["cases"])
+def test_reaction_histories_of_adams(case: str) -> None:
+    """MSC ADAMS, stored with Project Chrono (data/testing/joints): ``rforce`` is minus the force on the body."""
+    given = models.reference("adams_single_body_joints")["cases"][case]
+    geometry = given["geometry"]
+    m = eg.Model(case, gravity=(0, 0, -9.80665))
+    body = m.body("body", mass=1, inertia=tuple(geometry["inertia_cm_frame"]))
+    ground = Rotation.from_matrix(geometry["ground_joint_frame_columns_xyz"])
+    frame, joint = (Rotation.from_matrix(geometry[key]) for key in ("cm_frame0", "body_joint_frame0"))
+    arm = frame.inv().apply(np.subtract(geometry["body_point0_global"], geometry["cm0"]))
+    base, end = placed(m.ground, ground, geometry["ground_point"]), placed(body, frame.inv() * joint, arm)
+    kind = geometry["joint_type"]
+    m.joint(KINDS[kind], "j", base, end)
+    if kind == "rev_spring":
+        m.torsional_spring("k", joint="j", stiffness=200)
+        m.torsional_damper("d", joint="j", damping=10)
+    rows = [row for row in given["rows"] if row["t"] <= 1.0]
+    mod = m.compile(target="numpy")
+    run = mod.simulate((0, 1.0), t_eval=[row["t"] for row in rows], rtol=1e-10, atol=1e-11)
+    found = mod.reactions(run.t, run.x)[0, :3].T
+    own = np.array([row["own"]["net_joint_force_on_body_global"] for row in rows])
+    theirs = -np.array([row["rforce"] for row in rows])
+    np.testing.assert_allclose(found, own, atol=2e-6 * np.abs(own).max())
+    np.testing.assert_allclose(found, theirs, atol=2 * given["check"]["rforce_err"] + 1e-6)
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "rssr"])
+def test_targets_batches_and_shapes(name: str) -> None:
+    one, other = compiled(name), compiled(name, "cython")
+    x = np.array(judges.random_states(one, 1, 4)).T
+    for call in ("multipliers", "reactions"):
+        many = getattr(one, call)(0.0, x)
+        np.testing.assert_allclose(
+            many, getattr(other, call)(0.0, x), atol=1e-10 * max(1.0, np.abs(many).max(initial=0))
+        )
+        single = np.stack([getattr(one, call)(0.0, column) for column in x.T], axis=-1)
+        np.testing.assert_allclose(single, many, atol=1e-11 * max(1.0, np.abs(many).max(initial=0)))
+        out = np.empty_like(many)
+        assert getattr(one, call)(0.0, x, out=out) is out
+        np.testing.assert_array_equal(out, many)
+    assert one.undetermined_reactions(0.0, x).dtype == bool
+
+
+def test_inputs_that_change_from_state_to_state() -> None:
+    module = compiled("slider_crank")
+    x = np.array(judges.random_states(module, 1, 3)).T
+    u = np.array([[0.0, 2.0, -5.0]])
+    found = module.reactions(0.0, x, u=u)
+    for k in range(3):
+        np.testing.assert_allclose(found[..., k], module.reactions(0.0, x[:, k], u=u[:, k]), atol=1e-10)
+    assert np.abs(found[..., 2] - module.reactions(0.0, x[:, 2])).max() > 1.0
+    with pytest.raises(eg.EomgenError, match=r"u must have shape \(1,\), or \(1, k\) for k states"):
+        module.multipliers(0.0, x, u=np.zeros((1, 2)))
+
+
+def test_what_reactions_refuse() -> None:
+    module = compiled("slider_crank")
+    with pytest.raises(eg.EomgenError, match=r"x must have shape \(6,\) or \(6, k\)"):
+        module.reactions(0.0, np.zeros(4))
+    with pytest.raises(eg.EomgenError, match=r"t must be a number or have shape \(2,\)"):
+        module.reactions(np.zeros(3), np.repeat(module.x0()[:, None], 2, axis=1))
+    with pytest.raises(eg.EomgenError, match="out must be"):
+        module.reactions(0.0, module.x0(), out=np.zeros(3))
+    s, s_dot = sympy.symbols("s s_dot")
+    bare = eg.Model.from_lagrangian("bare", s_dot**2 / 2 - s**2, [s]).compile(target="numpy")
+    with pytest.raises(eg.EomgenError, match="no joints between bodies"):
+        bare.reactions(0.0, bare.x0())
+
+
+def test_parameters_by_name_serve_multipliers_and_reactions() -> None:
+    mod = compiled("slider_crank")
+    x, bound = mod.x0(), mod.bind(p={"m_s": 2.0})
+    np.testing.assert_array_equal(mod.reactions(0.0, x, p={"m_s": 2.0}), bound.reactions(0.0, x))
+    np.testing.assert_array_equal(mod.multipliers(0.0, x, p={"m_s": 2.0}), bound.multipliers(0.0, x))
+    assert np.abs(mod.reactions(0.0, x) - bound.reactions(0.0, x)).max() > 1e-3
+    with pytest.raises(eg.UsageError, match="kk"):
+        mod.reactions(0.0, x, p={"kk": 1.0})
+    for call in (mod.reactions, mod.actuator_forces):
+        with pytest.raises(eg.UsageError, match="^t must be a number"):
+            call("a", x)
