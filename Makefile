@@ -10,7 +10,7 @@
 # make pictures  draws the stored pictures of the documentation anew: of pages, of their blocks, of the gallery
 # make mutations  puts deliberate faults into a copy of the sources; fails if no test notices one (half an hour)
 # make fuzz   attacks the package with hostile files, texts, calls and objects: CASES=100000, or HOURS=8 with new ones;
-#             KINDS='yaml sympy' only these, JOBS=2 processes, OUT=DIR for what is found, RESULTS=1 writes the table
+#             KINDS='yaml sympy' only these, and SEED=4711 one case of one kind, shown
 # make clean  removes what the other targets made, .venv included
 # Each makes its own .venv (Python 3.11 or later) and installs what it needs; a second call goes straight to work.
 
@@ -59,8 +59,8 @@ mutations: $(VENV)/.installed-test
 	@$(BIN)/python tests/mutations/run.py --jobs 2
 
 fuzz: $(VENV)/.installed-test
-	@cd tests && ../$(BIN)/python -m hostile.run $(KINDS) $(if $(HOURS),--hours $(HOURS)) $(if $(CASES),--cases $(CASES)) \
-	  $(if $(JOBS),--jobs $(JOBS)) $(if $(OUT),--out $(abspath $(OUT))) $(if $(RESULTS),--results)
+	@cd tests && ../$(BIN)/python -m attack.fuzz $(KINDS) $(if $(HOURS),--hours $(HOURS)) $(if $(CASES),--cases $(CASES)) \
+	  $(if $(SEED),--seed $(SEED))
 
 clean:
 	@rm -rf $(VENV) build dist eomgen/built demo_output docs/_build docs/tutorials/*.ipynb docs/tutorials/*.png eomgen.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,11 +1,6 @@
-"""Robot files to start from, and what is put into them: elements, attributes, numbers, names of files, declarations."""
+"""Robot files to start from, and what is put into them: elements, numbers, names of files, declarations."""
 
 from __future__ import annotations
-
-from functools import cache
-
-from eomgen.robots.mjcf_constructs import MJCF
-from eomgen.robots.urdf_constructs import URDF
 
 _BALL = '<worldbody><body name="a"><joint name="j"/><geom size="1"/></body></worldbody>'
 _SHAPE = '<worldbody><body name="a"><joint name="j1"/><geom type="mesh" mesh="m"/></body></worldbody>'
@@ -71,15 +66,6 @@ MESHES = {
     "d.msh": "\x01\x00\x00\x7f\x01\x00\x00\x7f\x01\x00\x00\x00\x00\x00\x00\x00",
     "e.png": "\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x7f\xff\xff\xff\x7f\xff\xff\xff\x08\x06",
 }  # fmt: skip
-TAGS = {
-    "urdf": sorted(
-        {tag for path in URDF for tag in path.split("/")}
-        | {"xacro:macro", "a:b", "mujoco", "robot", "geometry", "mesh", "box"}
-    ),
-    "mjcf": sorted(
-        {tag for path in MJCF for tag in path.split("/")} | {"Include", "Compiler", "INCLUDE", "a:b", "robot", "mujoco"}
-    ),
-}
 #: Numbers as they stand in attributes.
 NUMBERS = (
     "0", "-0", "1", "-1", "2", "5", "-5", "1e-9", "1e9", "1e155", "-1e155", "1e308", "-1e308", "1.8e308", "1e400", "1e-308", "5e-324", "1e-320", "nan", "inf", "-inf", "NaN", "Infinity",
@@ -130,31 +116,3 @@ DECLARATIONS = (
     '<!DOCTYPE r [<!ENTITY % p SYSTEM "http://127.0.0.1:9/x"> %p;]>', "<!DOCTYPE r []>", '<!DOCTYPE r [<!ATTLIST link name CDATA "x">]>', '<?xml-stylesheet href="file:///etc/passwd"?>',
     '<?xml version="1.0" encoding="utf-16"?>', '<?xml version="1.1"?>', '<?xml version="1.0" encoding="x"?>', "\ufeff", "<!-- -- -->", "<![CDATA[x]]>", '<?xml version="1.0" encoding="idna"?>', '<?xml version="1.0" encoding="zlib"?>',
 )  # fmt: skip
-
-
-@cache
-def attributes(dialect: str) -> tuple[str, ...]:
-    """Every attribute that a dialect knows, and some that belong to other elements."""
-    table = URDF if dialect == "urdf" else MJCF
-    known = {name for rows in table.values() for row in rows for name in row.attributes if name.isidentifier()}
-    more = (
-        "fileup",
-        "fileback",
-        "nrow",
-        "ncol",
-        "width",
-        "height",
-        "content_type",
-        "user",
-        "nuser_body",
-        "nkey",
-        "class",
-        "name",
-        "plugin",
-        "instance",
-        "key",
-        "value",
-        "radius",
-        "length",
-    )
-    return tuple(sorted(known | set(more)))

@@ -8,19 +8,27 @@ from __future__ import annotations
 import base64
 import copy
 import random
+import re
 import struct
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import eomgen as eg
-from eomgen.errors import ModelError
+from attack.robot_words import BASES, DECLARATIONS, FILES, MESHES, NUMBERS, PIECES, VALUES
+from attack.runner import Kind, Wrong
+from attack.words import TEXTS
+from attack.yaml_files import answered
 
-from .kind import Wrong, fewer, trimmed
-from .robot_words import BASES, DECLARATIONS, FILES, MESHES, NUMBERS, PIECES, TAGS, VALUES, attributes
-from .words import TEXTS
-from .yaml_files import command
+import eomgen as eg
+
+#: Elements and attributes that the words themselves use, and some more.
+_WORDS = {name: " ".join([*BASES[name], *PIECES[name]]) for name in BASES}
+TAGS = {
+    name: sorted({*re.findall(r"<([\w:]+)", text), "a:b", "robot", "mujoco", "Include"})
+    for name, text in _WORDS.items()
+}
+MORE = "fileup fileback nrow ncol width height content_type user nuser_body nkey class name plugin key value radius length".split()
+NAMES = {name: sorted({*re.findall(r" (\w+)=", text), *MORE}) for name, text in _WORDS.items()}
 
 OPTIONS: dict[str, tuple[Any, ...]] = {
     "floating": (True,),
@@ -39,13 +47,11 @@ MASS = 12345.678  #: of the body that the secret file describes
 ENCODINGS = ("utf-16", "utf-32", "utf-8-sig", "utf-7", "cp1252", "latin-1")
 
 
-class Robots:
+class Robots(Kind):
     """Robot files of one dialect.
 
     A case is ``{"files": {name: text or base64 of bytes}, "main": name, "options": {...}, "stage": "load" | "check"}``.
     """
-
-    unjudged: tuple[type[Warning], ...] = ()
 
     def __init__(self, name: str, suffix: str, programs: frozenset[str]) -> None:
         self.name, self.suffix, self.programs = name, suffix, programs
@@ -85,11 +91,11 @@ class Robots:
     def run(self, case: Any, folder: Path) -> str:
         try:
             if case["stage"] == "check":
-                return command(["check", case["main"]], (0, 1))
+                return answered(["check", case["main"]], (0, 1))
             model = eg.load(case["main"], **case["options"])
             text = model.to_yaml()
             model.mechanism()
-        except ModelError as error:
+        except eg.ModelError as error:
             text = str(error)
             if SECRET in text and SECRET not in str(case):
                 raise Wrong("an error quotes a file outside") from None
@@ -97,15 +103,6 @@ class Robots:
         if (SECRET in text and SECRET not in str(case)) or str(MASS) in text:
             raise Wrong("a file outside was read")
         return "loaded"
-
-    def smaller(self, case: Any) -> Iterator[Any]:
-        for names in fewer([name for name in case["files"] if name != case["main"]]):
-            yield {**case, "files": {n: case["files"][n] for n in (*names, case["main"])}}
-        for keys in fewer(list(case["options"])):
-            yield {**case, "options": {k: case["options"][k] for k in keys}}
-        for name, data in case["files"].items():
-            if isinstance(data, str):
-                yield from ({**case, "files": {**case["files"], name: text}} for text in trimmed(data))
 
 
 class Meshes(Robots):
@@ -193,7 +190,7 @@ def change(root: ET.Element, r: random.Random, dialect: str) -> None:
     elements = list(root.iter())
     element, k = r.choice(elements), r.randrange(13)
     holders = {child: holder for holder in elements for child in holder}
-    keys, names = list(element.attrib), attributes(dialect)
+    keys, names = list(element.attrib), NAMES[dialect]
     if k == 0 and element in holders:
         holders[element].remove(element)
     elif k == 1 and keys:

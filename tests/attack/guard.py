@@ -27,6 +27,7 @@ ROOTS = tuple(
         sys.prefix,
         sys.base_prefix,
         *sysconfig.get_paths().values(),
+        str(Path(sympy.__file__).parents[1]),
         str(PACKAGE),
         str(PACKAGE.parent / "templates"),
         str(PACKAGE.parent / "examples"),
@@ -36,63 +37,18 @@ ROOTS = tuple(
 #: What Python and the system read for themselves.
 SYSTEM = ("/proc/self/", "/proc/cpuinfo", "/proc/meminfo", "/sys/", "/usr/lib/", "/usr/share/", "/lib/", "/etc/ld.so")
 DEVICES = ("/dev/null", "/dev/full", "/dev/urandom", "/dev/tty")
-#: Events that no case may cause.
-FORBIDDEN = [
-    "os.system",
-    "os.exec",
-    "os.spawn",
-    "os.startfile",
-    "os.fork",
-    "os.forkpty",
-    "pty.spawn",
-    "socket.",
-    "urllib.",
-    "http.",
-    "ftplib.",
-    "smtplib.",
-    "imaplib.",
-    "poplib.",
-    "telnetlib.",
-    "webbrowser.",
-    "pickle.",
-    "ctypes.",
-    "sys.addaudithook",
-    "sys.setprofile",
-    "sys.settrace",
-    "os.setxattr",
-    "os.chflags",
-    "os.chroot",
-    "os.kill",
-    "os.killpg",
-    "resource.",
-    "syslog.",
-    "sqlite3.",
-    "fcntl.ioctl",
-    "mmap.",
-    "gc.get_objects",
-    "code.__new__",
-]
-#: Events whose first arguments are paths that the case changes.
-CHANGES = {
-    "os.remove": 1,
-    "os.rename": 2,
-    "os.mkdir": 1,
-    "os.rmdir": 1,
-    "os.chmod": 1,
-    "os.chown": 1,
-    "os.link": 2,
-    "os.symlink": 2,
-    "os.truncate": 1,
-    "os.utime": 1,
-    "os.removexattr": 1,
-    "shutil.rmtree": 1,
-    "shutil.move": 2,
-    "tempfile.mkstemp": 1,
-    "tempfile.mkdtemp": 1,
-    "shutil.chown": 1,
-    "shutil.make_archive": 1,
-    "shutil.unpack_archive": 2,
-}
+#: Beginnings of events that no case may cause.
+FORBIDDEN = (
+    "os.system os.exec os.spawn os.startfile os.fork os.forkpty pty.spawn socket. urllib. http. ftplib. smtplib. imaplib. "
+    "poplib. telnetlib. webbrowser. pickle. ctypes. sys.addaudithook sys.setprofile sys.settrace os.setxattr os.chflags "
+    "os.chroot os.kill os.killpg resource. syslog. sqlite3. fcntl.ioctl mmap. gc.get_objects code.__new__"
+).split()
+#: Events whose first arguments, one or two, are paths that the case changes.
+CHANGES = dict.fromkeys(
+    "os.remove os.mkdir os.rmdir os.chmod os.chown os.truncate os.utime os.removexattr shutil.rmtree shutil.chown "
+    "tempfile.mkstemp tempfile.mkdtemp shutil.make_archive".split(),
+    1,
+) | dict.fromkeys("os.rename os.link os.symlink shutil.move shutil.unpack_archive".split(), 2)
 LOOKS = ("os.listdir", "os.scandir", "os.walk", "os.chdir", "glob.glob", "os.getxattr", "os.listxattr")
 #: Python's own makers of classes, which run a text they wrote themselves.
 _STANDARD = ("dataclasses.py", "collections/__init__.py", "enum.py", "functools.py", "typing.py", "inspect.py")

@@ -1,0 +1,204 @@
+"""Nasty texts where no text belongs: names, keys, expressions, words, files; each is refused by name and place."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.sax import saxutils
+
+import command
+import pytest
+from attack.nasty_texts import NASTY
+
+import eomgen as eg
+
+#: Models that together have every section of a file.
+MODELS: dict[str, Any] = {
+    "held": {
+        "name": "held",
+        "gravity": [0, "-9.81", 0],
+        "parameters": {"l": {"value": 0.5, "unit": "m"}},
+        "inputs": {"tau": {"value": 0.0, "unit": "N*m"}},
+        "bodies": {
+            "rod": {
+                "mass": 1.0,
+                "com": ["l/2", 0, 0],
+                "inertia": {"zz": 0.1},
+                "markers": {"tip": {"at": ["l", 0, 0]}},
+                "display": [{"shape": "box", "size": [1, 1, 1]}],
+            }
+        },
+        "joints": {"A": {"type": "revolute", "between": ["ground", "rod"], "coordinate": "theta", "axis": "z"}},
+        "forces": {"motor": {"type": "torque", "joint": "A", "value": "tau"}},
+        "states": {"z": {"rate": "-z"}},
+        "outputs": {"y": {"expression": "y(rod.tip)", "unit": "m"}},
+        "events": {"low": {"expression": "y(rod.tip)"}},
+        "initial": {"theta": 0.3},
+        "simulation": {"end": 1, "method": "DOP853"},
+    },
+    "mechanism": {
+        "name": "mechanism",
+        "parameters": {"m": 1.0},
+        "functions": {"f": {"type": "table", "x": [0, 1, 2], "y": [0, 1, 4], "kind": "cubic"}},
+        "bodies": {
+            "a": {"mass": "m", "inertia": [1, 1, 1]},
+            "b": {"mass": "m", "points": [{"mass": 1, "at": [1, 0, 0]}]},
+        },
+        "joints": {
+            "A": {"type": "revolute", "between": ["ground", "a"], "limits": {"lower": -1}},
+            "B": {"type": "cylindrical", "between": [{"body": "a", "at": [1, 0, 0]}, "b"], "coordinates": ["s", "w"]},
+        },
+        "forces": {"k": {"type": "spring", "between": ["ground", "b"], "stiffness": "f(m)"}},
+        "constraints": {"c": {"type": "coupling", "coordinates": {"A": 1, "w": 2}}},
+        "events": {"e": {"expression": "A", "reset": {"A_dot": "-A_dot"}, "terminal": 2}},
+        "guess": {"A": 0.1},
+        "independent": ["A", "s"],
+    },
+    "bare": {
+        "name": "bare",
+        "parameters": {"k": 1.0},
+        "lagrangian": {"coordinates": ["a", "b"], "expression": "a_dot**2 + b_dot**2 - k*a", "forces": {"a": "k"}},
+    },
+    "given": {
+        "name": "given",
+        "equations": {
+            "coordinates": ["q"],
+            "velocities": ["v"],
+            "rates": {"q": "v"},
+            "intermediates": {"z": "q**2"},
+            "mass_matrix": [[1]],
+            "forcing": ["-z"],
+        },
+    },
+}
+
+
+def paths(value: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], bool]]:
+    """Places of all values, and of all keys, of a model file's data."""
+    if isinstance(value, dict | list):
+        for key, part in value.items() if isinstance(value, dict) else enumerate(value):
+            if isinstance(value, dict):
+                yield (*at, key), True
+            yield from paths(part, (*at, key))
+    else:
+        yield at, False
+
+
+def changed(value: Any, at: tuple[Any, ...], text: str, is_key: bool) -> Any:
+    """The data with a text in place of one value or key."""
+    head, rest = at[0], at[1:]
+    if isinstance(value, list):
+        return [
+            (changed(part, rest, text, is_key) if rest else text) if k == head else part for k, part in enumerate(value)
+        ]
+    if rest:
+        return {k: changed(part, rest, text, is_key) if k == head else part for k, part in value.items()}
+    return {text if is_key and k == head else k: text if k == head and not is_key else v for k, v in value.items()}
+
+
+def load(data: Any, folder: Path) -> eg.Model:
+    (folder / "model.yaml").write_text(json.dumps(data))
+    return eg.load(folder / "model.yaml")
+
+
+@pytest.mark.parametrize("every", [44, pytest.param(6, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("name", MODELS)
+def test_a_nasty_text_is_refused_by_name(name: str, every: int, tmp_path: Path) -> None:
+    """A few of the texts in each place, the next in the next."""
+    assert load(MODELS[name], tmp_path).mechanism().name == name
+    for number, (at, is_key) in enumerate(paths(MODELS[name])):
+        for text in [*NASTY.values()][number % every :: every]:
+            with pytest.raises(eg.ModelError) as caught:
+                load(changed(MODELS[name], at, text, is_key), tmp_path).mechanism()
+            for problem in caught.value.problems:
+                assert str(problem).isprintable(), (at, text)
+                assert len(str(problem)) < 10_000
+
+
+def test_names_in_a_robot_become_identifiers(tmp_path: Path) -> None:
+    inertial = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
+    path, taken = tmp_path / "robot.urdf", 0
+    for text in NASTY.values():
+        text = re.sub(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "", text)  # what XML can hold
+        shown = saxutils.quoteattr(text, {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
+        path.write_text(
+            f"<robot name={shown}><link name='base'/><link name={shown}>{inertial}</link>"
+            f"<joint name={shown} type='continuous'><parent link='base'/><child link={shown}/><axis xyz='0 1 0'/></joint>"
+            "</robot>",
+            encoding="utf-8",
+        )
+        try:
+            model = eg.load(path)
+            mechanism = model.mechanism()
+        except eg.EomgenError as error:
+            assert all(c.isprintable() or c == "\n" for c in str(error))
+            continue
+        taken += 1
+        for name in (mechanism.name, *(b.name for b in mechanism.bodies), *(j.name for j in mechanism.joints)):
+            assert re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,63}", name)
+        model.save(tmp_path / "again.yaml")
+        assert eg.load(tmp_path / "again.yaml").mechanism().name == mechanism.name
+    assert taken > len(NASTY) / 2
+
+
+def test_a_nasty_file_name_is_an_error_with_a_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for text in NASTY.values():
+        model = eg.Model("held")
+        model.body("rod", solids=[{"type": "mesh", "file": text, "density": 1.0}])
+        model.native("f", text, python=text)
+        with pytest.raises(eg.ModelError) as caught:
+            model.mechanism()
+        assert {"bodies.rod.solids[0].file", "functions.f.source"} <= {p.path for p in caught.value.problems}
+        assert all(c.isprintable() or c == "\n" for c in str(caught.value))
+        with pytest.raises((eg.EomgenError, OSError)):
+            eg.load(text)
+
+
+# -- names of models, which become names of functions and files --------------------------------------------------------
+WORD = "zzname"
+
+
+@pytest.mark.parametrize("target", ["c", "cython"])
+def test_no_name_of_a_model_makes_a_name_that_is_there(target: str, tmp_path: Path) -> None:
+    """Nor a file: where the name would have to be one that generated code has, the model is refused."""
+    example = (Path(__file__).parents[2] / "examples" / "cam_follower.yaml").read_text()
+    (tmp_path / "model.yaml").write_text(re.sub(r"^name: .*$", f"name: {WORD}", example, flags=re.MULTILINE))
+    assert command.run("generate", "model.yaml", "--out", ".", "--target", target, cwd=tmp_path).code == 0
+    files = [file for file in (tmp_path / WORD).rglob("*") if file.is_file()]
+    there = {file.name.lower() for file in files if file.parent.name == WORD}
+    for file in files:
+        if target == "c" and file.suffix in (
+            ".c",
+            ".h",
+        ):  # in a module what lies in several files is not linked by name
+            bare = re.sub(r'/\*.*?\*/|"(\\.|[^"\\\n])*"', " ", file.read_text(), flags=re.DOTALL)
+            there |= set(re.findall(r"[A-Za-z_]\w*", bare))
+    own = {word for word in there if WORD in word.lower()}
+    assert len(own) > 2
+    names = set()
+    for word in own - {WORD}:
+        start, _, end = re.split(f"({WORD})", word, maxsplit=1, flags=re.IGNORECASE)
+        for other in there - own:
+            if len(other) > len(start + end) and other.startswith(start) and other.endswith(end):
+                names.add(other[len(start) : len(other) - len(end)].lower())
+    for name in sorted(names | {"eomgen", "eomgen_real", "EOMGEN_x", "Python", "python", "structmember", "errors"}):
+        with pytest.raises(eg.ModelError) as caught:
+            eg.Model(name).mechanism()
+        assert "name" in {problem.path for problem in caught.value.problems}, (
+            f"a model {name!r} would make {target} code"
+        )
+
+
+@pytest.mark.parametrize(
+    "name", ["real", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("rk4", "series"))]
+)
+def test_words_of_the_generated_code_may_name_a_model(name: str) -> None:
+    m = eg.Model(name)
+    m.prismatic("s", m.ground, m.body("box", mass=2.0))
+    m.force("push", m.bodies["box"], (6.0, 0, 0))
+    module = m.compile(kernels=["rhs"], optimize=0)
+    assert abs(module.rhs(0.0, module.x0())[1]) in (0.0, 3.0)
