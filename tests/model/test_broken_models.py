@@ -238,7 +238,10 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("case", REFUSED)
+SLOW = pytest.param("too many values", marks=pytest.mark.thorough)
+
+
+@pytest.mark.parametrize("case", [SLOW if case == "too many values" else case for case in REFUSED])
 def test_refused(case: str, tmp_path: Path) -> None:
     text, line, message = REFUSED[case]
     problems = faults(tmp_path, text)

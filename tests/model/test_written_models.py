@@ -289,4 +289,4 @@ def test_the_tracked_excavator_is_what_its_script_writes() -> None:
     _, pins = Track().laid()
     np.testing.assert_allclose(pins[-1], pins[0], atol=1e-8)
     np.testing.assert_allclose(np.hypot(*np.diff(pins, axis=0).T), Track().pitch, atol=1e-12)
-    assert (EXAMPLES / "tracked_excavator.yaml").read_text() == build().to_yaml()
+    assert eg.load_example("tracked_excavator").to_yaml() == build().to_yaml()
