@@ -14,7 +14,7 @@ METHODS = (
 #: Both targets of a test: NumPy's functions always, compiled code by ``make thorough``.
 TARGETS = ["numpy", pytest.param("cython", marks=pytest.mark.thorough)]
 #: Examples that together have every type of joint, force, constraint and shape of all of them, every description of
-#: rotations, every function in an expression, and events, inputs and outputs (tests/emit/test_traced.py looks).
+#: rotations, every function in an expression, and events, inputs and outputs (tests/code/test_targets.py looks).
 OF_ALL_KINDS = (
     "bicycle", "cam_follower", "compass_gait", "double_pendulum", "double_wishbone", "engine", "four_bar", "gait_leg",
     "gear_train", "hydraulic_boom", "planetary_gear", "quadrotor_load", "rolling_disc", "satellite", "slider_crank",

@@ -52,7 +52,7 @@ FAULTS = (
         "    if target == \"cython\":\n        _refuse_native()",
         "    if target == \"numpy\":\n        _refuse_native()",
         "a wheel for others is compiled for the processor of this computer",
-        ("tests/compilation/test_wheel.py::test_flags_for_this_processor_alone_are_refused",),
+        ("tests/code/test_packages.py::test_flags_for_this_processor_alone_are_refused",),
     ),
     Fault(
         "recorded-zero", "eomgen/verification/record_calls.py",

@@ -1,0 +1,364 @@
+"""What generated C makes of constraints: accelerations, projection, derivatives, reduced masses, and what it reports.
+
+Judges: a solve with multipliers in NumPy, in which rotations go by SciPy; closed forms; differences of results.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import models
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import eomgen as eg
+
+KERNELS = [
+    "rhs", "jacobian", "project", "input_jacobian", "parameter_jacobian", "embedded_mass_matrix", "kinematics",
+    "constraints", "constraint_jacobian", "velocity_constraints", "loop_coordinates", "loop_coordinate_jacobian",
+]  # fmt: skip
+
+
+class Case(NamedTuple):
+    """A model in C, the NumPy module whose straight-line functions give M, h and C_q, and a state off the start."""
+
+    in_c: Any
+    judge: Any
+    x: np.ndarray
+
+
+def rods(twice: bool = False) -> eg.Model:
+    """Two bodies on balls, held together by a rod, or two in one place: five freedoms."""
+    m = eg.Model("rods", gravity=(0.0, 0.0, -9.81))
+    l, torque = m.parameter("l", 1.1), m.input("torque", 0.4)
+    a = m.body("a", mass=1.2, com=(0.1, 0.2, -0.5), inertia=(0.2, 0.3, 0.15))
+    b = m.body("b", mass=0.8, com=(-0.1, 0.1, -0.4), inertia=(0.1, 0.2, 0.15))
+    m.spherical("A", m.ground, a, rotation="euler_parameters")
+    m.spherical("B", m.ground.at(1.0, 0.0, 0.0), b, rotation="euler_parameters")
+    m.distance("rod", a.at(0.0, 0.3, -1.0), b.at(0.2, 0.0, -0.9), length=l)
+    if twice:
+        m.distance("second", a.at(0.0, 0.3, -1.0), b.at(0.2, 0.0, -0.9), length=l + m.parameter("gap", 0.0))
+    m.torque("drive", a, (torque, 0, 0))
+    return m
+
+
+def five_bar() -> eg.Model:
+    """Five links in a plane: two freedoms, of which neither is alone in M."""
+    m = eg.Model("five_bar", gravity=(0.0, -9.81, 0.0))
+    l, torque = m.parameter("l", 0.5), m.input("torque", 0.3)
+    bodies = [m.body(f"b{k}", mass=1.0 + 0.3 * k, com=(0.25, 0.01 * k, 0), inertia={"zz": 0.02}) for k in range(4)]
+    m.revolute("A", m.ground, bodies[0])
+    m.revolute("B", bodies[0].at(l, 0, 0), bodies[1])
+    m.revolute("D", m.ground.at(0.6, 0, 0), bodies[2])
+    m.revolute("E", bodies[2].at(0.5, 0, 0), bodies[3])
+    m.revolute("C", bodies[1].at(0.6, 0, 0), bodies[3].at(0.6, 0, 0))
+    m.torque("drive", "A", torque)
+    m.initial(A=1.84, D=1.2)
+    return m
+
+
+def carriage() -> eg.Model:
+    """A four-bar linkage on a sledge that a law leads: a length and an angle are independent, and coupled."""
+    m = eg.Model("carriage", gravity=(0.0, -9.81, 0.0))
+    l, torque = m.parameter("l", 1.7), m.input("torque", 0.3)
+    sledge, *bars = (m.body(f"b{k}", mass=1.0 + 0.3 * k, com=(0.4, 0.1, 0), inertia={"zz": 0.2}) for k in range(4))
+    m.prismatic("S", m.ground, sledge, axis="x")
+    m.revolute("A", sledge, bars[0])
+    m.revolute("B", bars[0].at(0.8, 0, 0), bars[1])
+    m.revolute("C", bars[1].at(2.0, 0, 0), bars[2].at(1.5, 0, 0))
+    m.revolute("D", sledge.at(l, 0, 0), bars[2])
+    m.torque("drive", "A", torque)
+    m.guess = {"A": 1.0}
+    return m
+
+
+def towed() -> eg.Model:
+    """A sledge with a pendulum on a rope to a hook that moves by a law of time."""
+    m = eg.Model("towed", gravity=(0.0, -9.81, 0.0))
+    sledge = m.body("sledge", mass=2.0)
+    rod = m.body("rod", mass=0.7, com=(0.0, -0.3, 0), inertia={"zz": 0.02})
+    m.prismatic("S", m.ground, sledge, axis="x", coordinate="s")
+    m.revolute("A", sledge, rod, coordinate="a")
+    hook = m.body("hook", mass=0.3)
+    m.prismatic("H", m.ground.at(2.0, 0.5, 0), hook, axis="y", coordinate="h")
+    m.driver("lead", "h", "0.2*sin(3*t)")
+    m.distance("rope", hook, rod.at(0.1, -0.6, 0), length=m.parameter("l", 1.6))
+    m.torque("drive", "A", m.input("torque", 0.3))
+    m.initial(a=0.2)
+    return m
+
+
+def chain(n: int) -> eg.Model:
+    """A chain of hinges in a plane; the last link hangs on a massless one, of a length d that may vanish."""
+    m = eg.Model(f"chain{n}", gravity=(0.0, -9.81, 0.0))
+    last, mass, d = m.ground, m.parameter("mass", 1.0), m.parameter("d", 0.6)
+    for k in range(n):
+        heavy = 0.0 if k == n - 2 else mass * (1.0 + 0.1 * k)
+        link = m.body(f"b{k}", mass=heavy, com=(0.3, 0.05, 0), inertia={"zz": 0.04 * heavy})
+        m.revolute(f"J{k}", last, link)
+        last = link.at(d if k == n - 2 else 0.6, 0.0, 0.0)
+    m.torque("drive", "J1", m.input("torque", 0.3))
+    return m
+
+
+#: Model, method of derivation, and the functions that are compiled.
+CASES: dict[str, tuple[Callable[[], eg.Model], str, list[str]]] = {
+    "slider_crank": (lambda: models.build("powered_slider_crank"), "embedding", KERNELS),
+    "slider": (lambda: crank("s"), "embedding", KERNELS),
+    "balls": (rods, "embedding", [k for k in KERNELS if k != "kinematics"]),
+    "balls, reactions": (rods, "newton_euler", ["rhs", "project"]),
+    "freedoms": (five_bar, "embedding", KERNELS),
+    "freedoms, multipliers": (five_bar, "augmented", ["rhs", "project"]),
+    "lengths": (carriage, "embedding", ["rhs", "project", "embedded_mass_matrix"]),
+    "towed": (towed, "embedding", ["rhs", "project", "jacobian", "parameter_jacobian", "input_jacobian"]),
+    "tree": (lambda: chain(13), "embedding", ["rhs", "jacobian", "input_jacobian", "parameter_jacobian"]),
+    "long tree": (lambda: chain(40), "embedding", ["rhs", "jacobian"]),
+    "by columns": (lambda: chain(60), "recursive", ["rhs", "jacobian"]),
+}
+LOOPS = [name for name in CASES if "tree" not in name and name != "by columns"]
+TIME = 0.4
+
+
+@cache
+def case(name: str) -> Case:
+    model, method, kernels = CASES[name]
+    in_c = model().derive(method).compile(kernels=kernels, optimize=0)
+    judge = model().derive("embedding").compile(target="numpy")
+    v = 0.7 * np.cos(1.0 + np.arange(judge.n_v))
+    q = judge.x0()[: judge.n_q] + (0.0 if judge.n_c else 0.3 * np.sin(np.arange(judge.n_q)))
+    return Case(in_c, judge, judge.project(np.concatenate([q, v]), t=TIME))
+
+
+def moved(judge: Any, x: np.ndarray, h: float) -> np.ndarray:
+    """q after the time h at the velocities of the state."""
+    q, v = np.array(x[: judge.n_q]), x[judge.n_q :]
+    balls = [tuple(pair) for pair in judge.metadata["quaternion_slots"]]
+    plain_q = [k for k in range(judge.n_q) if not any(i <= k < i + 4 for i, _ in balls)]
+    plain_v = [k for k in range(judge.n_v) if not any(j <= k < j + 3 for _, j in balls)]
+    q[plain_q] += h * v[plain_v]
+    for i, j in balls:
+        e = q[i : i + 4]
+        turned = Rotation.from_quat(e, scalar_first=True) * Rotation.from_rotvec(h * v[j : j + 3])
+        f = turned.as_quat(scalar_first=True)
+        q[i : i + 4] = f if f @ e > 0.0 else -f
+    return q
+
+
+def central(values: Callable[[float], Any], h: float) -> Any:
+    """A derivative at 0 to fourth order."""
+    return (8.0 * (values(h) - values(-h)) - (values(2 * h) - values(-2 * h))) / (12.0 * h)
+
+
+def accelerations(judge: Any, x: np.ndarray) -> np.ndarray:
+    """By multipliers, from M, h, C_q and differences along the motion."""
+    q, v, n = x[: judge.n_q], x[judge.n_q :], judge.n_v
+    M, h = judge.mass_matrix(q), judge.bias(TIME, x)
+    if not judge.n_c:
+        return np.linalg.solve(M, -h)
+
+    def drift(s: float) -> Any:
+        """C' of the velocities held, s later."""
+        return judge.velocity_constraints(np.concatenate([moved(judge, x, s), v]), t=TIME + s)
+
+    C_q, gamma = judge.constraint_jacobian(q, t=TIME), central(drift, 1e-3)
+    K = np.block([[M, C_q.T], [C_q, np.zeros((len(C_q), len(C_q)))]])
+    return np.linalg.lstsq(K, -np.concatenate([h, gamma]), rcond=1e-12)[0][:n]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_accelerations_are_those_with_multipliers(name: str) -> None:
+    in_c, judge, x = case(name)
+    x_dot = in_c.rhs(TIME, x)
+    rates = central(lambda h: moved(judge, x, h), 1e-3)
+    np.testing.assert_allclose(x_dot[: judge.n_q], rates, atol=1e-9)
+    a = accelerations(judge, x)
+    np.testing.assert_allclose(x_dot[judge.n_q :], a, rtol=1e-8, atol=1e-8 * np.abs(a).max())
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_a_state_off_the_constraints_moves_as_the_nearest_one(name: str) -> None:
+    in_c, judge, x = case(name)
+    off = x + 0.02 * np.sin(np.arange(len(x)))
+    near = in_c.project(off, t=TIME)
+    q = near[: judge.n_q]
+    assert np.abs(judge.constraints(q, t=TIME)).max() <= 1e-12
+    assert np.abs(judge.velocity_constraints(near, t=TIME)).max() <= 1e-12
+    expected, found = in_c.rhs(TIME, near), in_c.rhs(TIME, off)
+    np.testing.assert_allclose(found[judge.n_q :], expected[judge.n_q :], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "freedoms", "towed"])
+def test_velocities_are_projected_with_the_smallest_change(name: str) -> None:
+    """Those of a least-squares solve, in lengths of the mechanism's size."""
+    in_c, judge, x = case(name)
+    off = np.array(x)
+    off[judge.n_q :] += 0.1 * np.cos(np.arange(judge.n_v))
+    closed = in_c.project(off, t=TIME)
+    C_q, left = judge.constraint_jacobian(x[: judge.n_q], t=TIME), judge.velocity_constraints(off, t=TIME)
+    assert np.abs(left).max() > 0.01
+    step, kernel = closed[judge.n_q :] - off[judge.n_q :], np.linalg.svd(C_q)[2][len(C_q) :].T
+    np.testing.assert_allclose(C_q @ step, -left, atol=1e-11)
+    size = judge.metadata["length_scale"]
+    scales = np.array([size if kind == "length" else 1.0 for kind in judge.metadata["coordinate_kinds"]])
+    across = kernel.T @ (step / scales**2)  # nothing of it is a motion that the constraints leave free
+    np.testing.assert_allclose(across, 0.0, atol=1e-8 * np.abs(step / scales**2).max())
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "balls", "freedoms", "towed", "tree", "long tree", "by columns"])
+def test_derivatives_are_differences(name: str) -> None:
+    """Of rhs in all directions of x, those across the constraints too, by inputs and by parameters."""
+    in_c, judge, x = case(name)
+    J, rng = in_c.jacobian(TIME, x), np.random.default_rng(3)
+    for d in rng.normal(size=(4, len(x))):
+        slope = central(lambda h, d=d: in_c.rhs(TIME, x + h * d), 1e-4)  # type: ignore[misc]
+        np.testing.assert_allclose(J @ d, slope, rtol=1e-6, atol=1e-6 * np.abs(slope).max())
+    if "parameter_jacobian" not in CASES[name][2]:
+        return
+    u, p = np.array(judge.u), np.array(judge.p)
+    for k in range(len(p)):
+        by_p = central(lambda h, k=k: in_c.rhs(TIME, x, p=p + h * np.eye(len(p))[k]), 1e-4)  # type: ignore[misc]
+        found = in_c.parameter_jacobian(TIME, x)[:, k]
+        np.testing.assert_allclose(found, by_p, rtol=1e-6, atol=1e-7 * max(1.0, np.abs(by_p).max()))
+    by_u = central(lambda h: in_c.rhs(TIME, x, u=u + h), 1e-3)
+    np.testing.assert_allclose(in_c.input_jacobian(TIME, x)[:, 0], by_u, rtol=1e-6, atol=1e-8 * np.abs(by_u).max())
+
+
+def test_euler_parameters_are_projected_by_the_least_turn() -> None:
+    """The turn that closes the loop is along the gradient of the constraint, scaled by the size of the mechanism."""
+    in_c, judge, x = case("balls")
+    balls, n_q = judge.metadata["quaternion_slots"], judge.n_q
+    off = np.array(x)
+    for k, (i, _) in enumerate(balls):
+        turn = Rotation.from_rotvec([1e-4 * (k + 1), -2e-4, 1.5e-4])
+        off[i : i + 4] = (Rotation.from_quat(x[i : i + 4], scalar_first=True) * turn).as_quat(scalar_first=True)
+    closed = in_c.project(off)
+    assert np.abs(judge.constraints(closed[:n_q])).max() <= 1e-13
+    pairs = [[Rotation.from_quat(q[i : i + 4], scalar_first=True) for q in (off, closed)] for i, _ in balls]
+    step, C_q = (
+        np.concatenate([(a.inv() * b).as_rotvec() for a, b in pairs]),
+        judge.constraint_jacobian(closed[:n_q])[0],
+    )
+    across = step - C_q * (C_q @ step) / (C_q @ C_q)
+    assert np.abs(across).max() <= 1e-3 * np.abs(step).max()
+
+
+def test_long_ways_onto_the_constraints_are_gone_in_limited_steps() -> None:
+    """Of bodies that are thrown about: the state that NumPy's loop comes to, with the same limit of a step."""
+    in_c, judge, x = case("balls")
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        off = np.array(x)
+        off[: judge.n_q] += rng.normal(size=judge.n_q)
+        closed = in_c.project(off)
+        assert np.abs(judge.constraints(closed[: judge.n_q])).max() <= 1e-12
+        np.testing.assert_allclose(closed, judge.project(off), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "slider", "freedoms"])
+def test_kinematics_satisfies_all_three_levels(name: str) -> None:
+    """Of independent values, lengths among them where the slider is chosen."""
+    in_c, judge, x = case(name)
+    chosen = list(in_c.metadata["independent"])
+    q_i, v_i, a_i = x[: judge.n_q][chosen] + 0.003, 1.5 + np.arange(len(chosen)), np.full(len(chosen), -2.0)
+    q, v, a = in_c.kinematics(q_i, v_i, a_i)
+    np.testing.assert_allclose([q[chosen], v[chosen], a[chosen]], [q_i, v_i, a_i], atol=1e-14)
+    assert np.abs(judge.constraints(q)).max() <= 1e-13
+    state = np.concatenate([q, v])
+    assert np.abs(judge.velocity_constraints(state)).max() <= 1e-12
+    gamma = central(lambda s: judge.velocity_constraints(np.concatenate([moved(judge, state, s), v])), 1e-3)
+    np.testing.assert_allclose(judge.constraint_jacobian(q) @ a, -gamma, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["freedoms", "lengths"])
+def test_the_embedded_mass_matrix_is_that_of_the_motions_left(name: str) -> None:
+    """B^T M B, where column k of B moves independent coordinate k alone and keeps the loops closed."""
+    in_c, judge, x = case(name)
+    q, chosen = x[: judge.n_q], list(in_c.metadata["independent"])
+    rows = np.vstack([judge.constraint_jacobian(q), np.eye(judge.n_v)[chosen]])
+    right = np.vstack([np.zeros((len(rows) - len(chosen), len(chosen))), np.eye(len(chosen))])
+    B = np.linalg.lstsq(rows, right, rcond=1e-12)[0]
+    expected = B.T @ judge.mass_matrix(q) @ B
+    assert abs(expected[0, 1]) > 0.01 * abs(expected).max()
+    np.testing.assert_allclose(in_c.embedded_mass_matrix(q), expected, rtol=1e-10)
+
+
+def crank(chosen: str, **masses: float) -> eg.Model:
+    """A slider-crank; r = 0.1, l = 0.35."""
+    mass = {"crank": 1.0, "rod": 0.8, "slider": 0.5} | masses
+    m = eg.Model("crank", gravity=(0.0, -9.81, 0.0))
+    p = {name: m.parameter(f"m_{name}", value) for name, value in mass.items()}
+    bodies = {
+        "crank": m.body("crank", mass=p["crank"], com=(0.05, 0, 0), inertia={"zz": p["crank"] * 0.01 / 12}),
+        "rod": m.body("rod", mass=p["rod"], com=(0.175, 0, 0), inertia={"zz": p["rod"] * 0.35**2 / 12}),
+        "slider": m.body("slider", mass=p["slider"]),
+    }
+    m.revolute("A", m.ground, bodies["crank"], coordinate="theta")
+    m.revolute("B", bodies["crank"].at(0.1, 0, 0), bodies["rod"], coordinate="phi")
+    m.prismatic("D", m.ground, bodies["slider"], axis="x", coordinate="s")
+    m.revolute("C", bodies["rod"].at(0.35, 0, 0), bodies["slider"])
+    m.independent(chosen)
+    m.initial(theta=0.7)
+    return m
+
+
+def near_dead_centre(theta: float) -> np.ndarray:
+    phi = -np.arcsin(0.1 * np.sin(theta) / 0.35) - theta
+    return np.array([theta, phi, 0.1 * np.cos(theta) + 0.35 * np.cos(theta + phi)])
+
+
+@pytest.mark.parametrize("method", ["embedding", "augmented"])
+def test_a_dead_centre_matters_where_the_set_is_fixed(method: str) -> None:
+    """There s cannot move the slider-crank: rhs takes another coordinate and does not notice; the embedded M tells."""
+    kernels = ["rhs", "jacobian", "project", "embedded_mass_matrix", "kinematics"]
+    by_angle, by_length = (crank(n).derive(method).compile(kernels=kernels, optimize=0) for n in ("theta", "s"))
+    for theta in (0.0, 1e-12, 1e-6, 1e-3):
+        x = by_angle.project(np.concatenate([near_dead_centre(theta), [2.0, -2.5, 0.0]]))
+        np.testing.assert_allclose(by_length.rhs(0.0, x), by_angle.rhs(0.0, x), rtol=1e-11, atol=1e-9)
+        np.testing.assert_allclose(by_length.jacobian(0.0, x), by_angle.jacobian(0.0, x), rtol=1e-8, atol=1e-6)
+    dead = near_dead_centre(0.0)
+    assert by_angle.embedded_mass_matrix(dead).shape == (1, 1)
+    for q in (dead, near_dead_centre(1e-9)):
+        with pytest.raises(eg.PartitionError):
+            by_length.embedded_mass_matrix(q)
+    assert by_length.embedded_mass_matrix(near_dead_centre(1e-5)) > 0.0
+
+
+def test_a_freedom_that_moves_no_inertia_is_reported() -> None:
+    """s' = -0.13 sin(theta) theta': the inertia of the only freedom is 1.3 s'^2, and at theta = 0 rounding."""
+    kernels = ["rhs", "project", "embedded_mass_matrix"]
+    toggle = crank("theta", crank=0.0, rod=0.0, slider=1.3).compile(kernels=kernels, optimize=0)
+    for theta in (0.7, 1e-6):
+        assert np.isfinite(toggle.rhs(0.0, [*near_dead_centre(theta), 0.0, 0.0, 0.0])).all()
+    with pytest.raises(eg.SingularMassMatrixError):
+        toggle.rhs(0.0, [*near_dead_centre(0.0), 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("name", ["tree", "long tree"])
+@pytest.mark.parametrize("parameters", [(0.0, 0.6), (1.0, 0.0)], ids=["no mass", "coincident axes"])
+def test_a_tree_without_inertia_is_reported(name: str, parameters: tuple[float, float]) -> None:
+    in_c, _, x = case(name)
+    assert np.isfinite(in_c.rhs(0.0, x, p=[0.1, 1e-3])).all()
+    for call in (in_c.rhs, in_c.jacobian):
+        with pytest.raises(eg.SingularMassMatrixError):
+            call(0.0, x, p=parameters)
+
+
+def test_a_gap_that_is_left_is_reported() -> None:
+    """Two rods in one place whose lengths differ: half of the difference is left at either."""
+    in_c, judge = (
+        rods(twice=True).compile(kernels=["project", "constraints"], optimize=0),
+        rods(twice=True).compile(target="numpy"),
+    )
+    x, p, place = judge.x0(), np.array(judge.p), judge.p_names.index("gap")
+    for gap in (0.0, 2e-11):
+        p[place] = gap
+        closed = in_c.project(x, p=p)
+        residuals = judge.bind(p=p).constraints(closed[: judge.n_q], rows="all")
+        assert np.abs(residuals).max() == pytest.approx(gap / 2, abs=1e-14)
+    for gap in (1e-9, 1e-3):
+        p[place] = gap
+        with pytest.raises(eg.ProjectionError):
+            in_c.project(x, p=p)

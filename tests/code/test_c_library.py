@@ -1,0 +1,414 @@
+"""C libraries that stand alone, in double and in single precision: results, what they need, what they say they cost.
+
+Judges: the compiled module in double precision; gcc's own account of stack (-fcallgraph-info) and of symbols (nm); for
+processors without an operating system, Debian's cross compilers and the emulators of qemu, where they are installed.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import models
+import numpy as np
+import pytest
+from command import run
+from sweeps import part_of
+
+import eomgen as eg
+
+BARE = ["-std=c99", "-O2", "-ffp-contract=off", "-DEOMGEN_LANES=0", "-DEOMGEN_WITHOUT_SERIES"]
+WARNINGS = ["-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Wpedantic"]
+OPTIMIZED = "slider_crank"  # the others compile in a quarter of the time, to the same numbers
+CASES = ["double_pendulum", "slider_crank", "skewed_four_bar", "powered_arm", "spatial_loop"]
+#: Kernels that both have, with the number of states; the digits that single precision leaves of the largest entry.
+KERNELS = ("rhs", "mass_matrix", "bias", "energy", "project", "jacobian")
+LEFT = 2e-4
+
+
+def c_files(folder: Path) -> list[str]:
+    """The library's own sources."""
+    return sorted(file.name for file in folder.glob(f"{folder.name}*.c") if "real_time" not in file.name)
+
+
+class Small:
+    """A library in single precision, through ctypes."""
+
+    def __init__(self, folder: Path, module: Any) -> None:
+        name = folder.name
+        level = "-O2" if name == OPTIMIZED else "-O0"
+        command = ["gcc", "-shared", "-fPIC", *BARE, level, *WARNINGS, *c_files(folder), "-o", "lib.so", "-lm"]
+        subprocess.run(command, cwd=folder, check=True)
+        self.library, self.name = ctypes.CDLL(str(folder / "lib.so")), name
+        sizes = {k: int(v) for k, v in re.findall(r"_N_(\w+) = (\d+)", (folder / f"{name}.h").read_text())}
+        self.c, self.w = (np.zeros(sizes[k] + 1, np.float32) for k in ("CONST", "STEP_WORK"))
+        self.u = np.append(module.u, 0.0).astype(np.float32)
+        assert self.function("precompute")(self.at(np.append(module.p, 0.0).astype(np.float32)), self.at(self.c)) == 0
+
+    def function(self, kernel: str) -> Any:
+        return getattr(self.library, f"{self.name}_{kernel}")
+
+    @staticmethod
+    def at(array: np.ndarray) -> Any:
+        return array.ctypes.data_as(ctypes.c_void_p)
+
+    def call(self, kernel: str, x: np.ndarray, size: int) -> np.ndarray:
+        out = np.zeros(size, np.float32)
+        places = [self.at(a) for a in (x.astype(np.float32), self.u, self.c, out, self.w)]
+        assert self.function(kernel)(ctypes.c_float(0.0), *places) == 0
+        return out
+
+    def step(self, kernel: str, x: np.ndarray, h: float) -> np.ndarray:
+        moved = x.astype(np.float32)
+        places = [self.at(a) for a in (moved, self.u, self.c, self.w)]
+        assert self.function(kernel)(ctypes.c_float(0.0), ctypes.c_float(h), *places) == 0
+        return moved
+
+
+@pytest.fixture(scope="module", params=CASES)
+def small(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Small, Any]:
+    """The library in single precision beside the module in double precision."""
+    judge = models.build(request.param).compile(target="numpy")
+    folder = library(models.build(request.param), tmp_path_factory.mktemp("c"), "--precision", "float")
+    return Small(folder, judge), judge
+
+
+def library(model: eg.Model, folder: Path, *words: str) -> Path:
+    """The sources that the command writes."""
+    model.save(folder / "model.yaml")
+    assert run("generate", folder / "model.yaml", "--out", folder, "--target", "c", *words).code == 0
+    return folder / model.name
+
+
+def states(module: Any, count: int = 4) -> list[np.ndarray]:
+    random = np.random.default_rng(3)
+    start = module.x0()
+    return [start, *(module.project(start + 0.1 * random.normal(size=start.size)) for _ in range(count - 1))]
+
+
+def test_single_precision_agrees_with_double(small: tuple[Small, Any]) -> None:
+    library, module = small
+    for x in states(module):
+        for kernel in KERNELS:
+            of_q = kernel == "mass_matrix"
+            given = x[: module.n_q] if of_q else x
+            expected = np.ravel(getattr(module, kernel)(0.0, x) if kernel in ("rhs", "bias", "jacobian") else
+                                getattr(module, kernel)(given))  # fmt: skip
+            found = library.call(kernel, given, expected.size)
+            assert np.abs(found - expected).max() <= LEFT * max(1.0, np.abs(expected).max()), kernel
+
+
+def test_both_steps_converge_to_the_same_motion(small: tuple[Small, Any]) -> None:
+    """RK4 is exact for a short way; semi-implicit Euler's error falls with its step."""
+    library, module = small
+    x, span = module.x0(), 0.02
+    by_rk4 = x
+    for _ in range(10):
+        by_rk4 = library.step("step", by_rk4, span / 10)
+    errors = []
+    for n in (20, 80):
+        y = x
+        for _ in range(n):
+            y = library.step("step_semi_implicit", y, span / n)
+        errors.append(float(np.abs(y - by_rk4).max()))
+    scale = float(np.abs(by_rk4 - x).max())
+    assert errors[1] <= max(0.4 * errors[0], 2e-5 * max(1.0, float(np.abs(by_rk4).max())))
+    assert errors[1] < 0.1 * scale
+
+
+@pytest.fixture(scope="module")
+def arm() -> Any:
+    """PUMA 560 as a module of NumPy functions."""
+    return models.build("puma560").compile(target="numpy")
+
+
+@pytest.fixture(scope="module", params=part_of(["double", "float"], lambda name: name == "double"))
+def arm_library(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return library(models.build("puma560"), tmp_path_factory.mktemp(request.param), "--precision", request.param)
+
+
+def test_stack_stays_below_what_the_header_says(arm_library: Path) -> None:
+    """gcc tells the bytes of every function and who calls whom."""
+    name = arm_library.name
+    files = c_files(arm_library)
+    subprocess.run(["gcc", *BARE, "-fcallgraph-info=su", "-c", *files], cwd=arm_library, check=True)
+    text = "".join((arm_library / f"{file.removesuffix('.c')}.ci").read_text() for file in files)
+    own = {
+        title.split(":")[-1]: int(size)
+        for title, size in re.findall(r'node: \{ title: "(\S+)" label: ".*?\\n(\d+) bytes', text)
+    }
+    calls = [
+        (a.split(":")[-1], b.split(":")[-1]) for a, b in re.findall(r'sourcename: "(\S+)" targetname: "(\S+)"', text)
+    ]
+
+    def measured(function: str) -> int:
+        return own.get(function, 0) + max((measured(b) for a, b in calls if a == function and b != a), default=0)
+
+    told = bytes_of_stack(arm_library)
+    assert len(told) > 15
+    for kernel, bound in told.items():
+        assert 0 < measured(f"{name}_{kernel}") <= bound, kernel
+    assert max(told.values()) < 60_000
+
+
+def bytes_of_stack(folder: Path) -> dict[str, int]:
+    """What the header says of every function."""
+    header = (folder / f"{folder.name}.h").read_text()
+    found = re.findall(r"^     (\w+): .*\n.*\n +at most (\d+) bytes of stack", header, re.MULTILINE)
+    return {name: int(size) for name, size in found}
+
+
+def test_what_a_model_says_of_itself_is_not_taken_for_code(tmp_path: Path) -> None:
+    """Its text stands in the C as well, where lengths of arrays are read."""
+    doc = "Here M = m_c r^2, N = 2, WIDTH = rpm; static int f(int n) { real a[9000]; }"
+    text, bounds = (models.EXAMPLES / "slider_crank.yaml").read_text(encoding="utf-8"), []
+    for name, given in (("plain", text), ("told", re.sub("^doc: .*", f'doc: "{doc}"', text, flags=re.MULTILINE))):
+        (tmp_path / f"{name}.yaml").write_text(given, encoding="utf-8")
+        (tmp_path / name).mkdir()
+        bounds.append(bytes_of_stack(library(eg.load(tmp_path / f"{name}.yaml"), tmp_path / name)))
+    assert text != given
+    assert len(bounds[0]) > 15
+    assert bounds[0] == bounds[1]
+
+
+def test_nothing_is_written_but_what_is_given(arm_library: Path) -> None:
+    """No data that is written, no heap, no input or output: of other objects, only mathematics and copies of memory."""
+    flags = [*BARE, *WARNINGS, "-fno-pie", "-DEOMGEN_OWN_ANGLES"]
+    files = c_files(arm_library)
+    subprocess.run(["gcc", *flags, "-r", *files, "-o", "bare.o"], cwd=arm_library, check=True)
+    symbols = subprocess.run(["nm", "bare.o"], cwd=arm_library, check=True, capture_output=True, text=True).stdout
+    kinds = {line.split()[-2] for line in symbols.splitlines()}
+    needed = {line.split()[-1] for line in symbols.splitlines() if line.split()[-2] == "U"}
+    assert kinds <= {"T", "t", "R", "r", "U"}
+    assert needed <= {"memcpy", "memset", "sqrt", "sqrtf", "fmax", "fmin", "fmaxf", "fminf"}
+
+
+MAIN = """
+#include <math.h>
+#include "{name}.h"
+#if defined(__arm__) && !defined(__linux__) /* no operating system below the program but the emulator's */
+void _start(void);
+int main(void);
+static int call(int number, int a, const void *b, int n)
+{{
+    register int r7 __asm__("r7") = number;
+    register int r0 __asm__("r0") = a;
+    register const void *r1 __asm__("r1") = b;
+    register int r2 __asm__("r2") = n;
+    __asm__ volatile("svc 0" : "+r"(r0) : "r"(r7), "r"(r1), "r"(r2) : "memory");
+    return r0;
+}}
+static void put(const void *bytes, int n) {{ (void)call(4, 1, bytes, n); }}
+void _start(void) {{ (void)call(1, main(), 0, 0); }}
+#else
+#include <stdio.h>
+static void put(const void *bytes, int n) {{ fwrite(bytes, 1, (size_t)n, stdout); }}
+#endif
+
+static {type} c[{prefix}_N_CONST + 1], w[{prefix}_N_WORK + 1], out[{prefix}_N_X * {prefix}_N_X];
+
+static void show(int status, int n)
+{{
+    if (status != 0) {{ out[0] = ({type})NAN; }}
+    put(out, n * (int)sizeof(out[0]));
+}}
+
+int main(void)
+{{
+    static const {type} p[] = {{ {p} }}, u[] = {{ {u} }}, x[{count}][{prefix}_N_X] = {{ {x} }};
+    {name}_precompute(p, c);
+    for (int k = 0; k < {count}; k++) {{
+        show({name}_rhs(0, x[k], u, c, out, w), {prefix}_N_X);
+        show({name}_mass_matrix(0, x[k], u, c, out, w), {prefix}_N_V * {prefix}_N_V);
+        show({name}_jacobian(0, x[k], u, c, out, w), {prefix}_N_X * {prefix}_N_X);
+    }}
+    return 0;
+}}
+"""
+#: Compiler and emulator of each processor.  Code for Cortex-M7 runs on a larger one, whose instructions include
+#: its own: qemu 7.2 starts no program on a Cortex-M7 without a machine around it.
+PROCESSORS = {
+    "this one": (["gcc"], [], ()),
+    "cortex-m7": (
+        ["arm-none-eabi-gcc", "-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-d16", "-nostartfiles"],
+        ["qemu-arm", "-cpu", "max"],
+        ("gcc for ARM", "qemu"),
+    ),
+    "risc-v": (["riscv64-linux-gnu-gcc", "-static"], ["qemu-riscv64"], ("gcc for RISC-V", "qemu")),
+}
+
+
+@pytest.mark.parametrize(
+    "processor", [pytest.param(name, marks=pytest.mark.needs(*needs)) for name, (*_, needs) in PROCESSORS.items()]
+)
+def test_processors_agree(processor: str, arm: Any, arm_library: Path) -> None:
+    """PUMA 560: 1e-13 in double precision, 1e-5 in single precision, relative to the largest entry."""
+    compiler, emulator, _ = PROCESSORS[processor]
+    name, precision = arm_library.name, arm_library.parent.name.rstrip("0123456789")
+    given = states(arm)
+    numbers = {
+        "p": [*arm.p, 0.0], "u": [*arm.u, 0.0], "x": np.concatenate(given), "count": len(given), "type": precision,
+    }  # fmt: skip
+    texts = {k: ", ".join(map(repr, map(float, v))) if k in "pux" else v for k, v in numbers.items()}
+    (arm_library / "main.c").write_text(MAIN.format(name=name, prefix=name.upper(), **texts))
+    command = [*compiler, *BARE, "-O1", "-DEOMGEN_WITHOUT_TABLES", "-ffunction-sections", "-Wl,--gc-sections"]
+    subprocess.run([*command, "main.c", *c_files(arm_library), "-o", "main", "-lm"], cwd=arm_library, check=True)
+    done = subprocess.run([*emulator, "./main"], cwd=arm_library, check=True, capture_output=True)
+    found = np.frombuffer(done.stdout, {"double": np.float64, "float": np.float32}[precision])
+    for x in given:
+        for expected in (arm.rhs(0.0, x), arm.mass_matrix(x[: arm.n_q]), arm.jacobian(0.0, x)):
+            rows, found = np.split(found, [expected.size])
+            error = np.abs(rows - np.ravel(expected)).max()
+            assert error <= {"double": 1e-13, "float": 1e-5}[precision] * np.abs(expected).max()
+    assert not found.size
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--target", "cython", "--precision", "float"), "precision='float' is for target c"),
+        (("--target", "cuda", "--precision", "float"), "is for target c"),
+    ],
+)
+def test_single_precision_is_for_c_alone(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    refused = run("generate", models.EXAMPLES / "pendulum.yaml", "--out", tmp_path, *words)
+    assert refused.code in (1, 2)
+    assert said in refused.err
+    assert not list(tmp_path.iterdir())
+
+
+# What compilers and sanitizers say.
+
+STRICT = ["-Wall", "-Wextra", "-Werror", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Wvla"]
+COMPILERS = {
+    "C99": ["gcc", "-std=c99"], "C++": ["g++", "-std=c++17", "-x", "c++"],
+    "portable": ["gcc", "-std=c99", "-DEOMGEN_PORTABLE"],
+    "clang": ["clang", "-std=c99"], "clang++": ["clang++", "-std=c++17", "-x", "c++"],
+}  # fmt: skip
+#: A loop, redundant rows, a long tree as loops, rolling, states, contacts.
+WARNED = ["slider_crank", "double_pendulum", "three_cranks", "hydraulic_boom", "rolling_disc", "many_links", "blocks"]
+
+
+def many_links() -> eg.Model:
+    """A chain so long that its functions are loops over alike bodies."""
+    m, last = eg.Model("many_links", gravity=(0, -9.81, 0)), None
+    for k in range(70):
+        link = m.body(f"b{k}", mass=1.0, com=(0.05, 0.01, 0.02), inertia=(1e-3, 1.2e-3, 1.5e-3))
+        m.revolute(f"j{k}", m.ground if last is None else last.at(0.1, 0, 0), link, axis="zy"[k % 2])
+        last = link
+    return m
+
+
+def blocks() -> eg.Model:
+    """Two boxes that touch each other and the ground."""
+    m = eg.Model("blocks", gravity=(0, -9.81, 0))
+    shapes = []
+    for k in range(2):
+        body = m.body(f"b{k}", mass=1.0, inertia={"zz": 0.01})
+        m.planar(f"j{k}", m.ground, body)
+        corners = [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)]
+        shapes.append({"shape": "polygon", "on": body, "points": corners})
+    law = {"stiffness": 1e4, "dissipation": 1.0, "friction": 0.3}
+    m.contacts("floor", shapes, {"shape": "half_plane", "on": m.ground}, law)
+    m.contacts("touch", shapes, law=law)
+    return m
+
+
+def built(name: str) -> eg.Model:
+    return {"many_links": many_links, "blocks": blocks}.get(name, lambda: models.build(name))()
+
+
+@pytest.mark.parametrize("compiler", [
+    "C99", "C++", pytest.param("portable", marks=pytest.mark.thorough),
+    *(pytest.param(name, marks=[pytest.mark.thorough, pytest.mark.needs("clang")]) for name in ("clang", "clang++")),
+])  # fmt: skip
+@pytest.mark.parametrize("name", part_of(WARNED, lambda name: name in ("slider_crank", "hydraulic_boom", "blocks")))
+def test_compilers_say_nothing(name: str, compiler: str, tmp_path: Path) -> None:
+    """Warnings are errors; what warns where values are followed shows with optimization, in the thorough run."""
+    folder = library(built(name), tmp_path)
+    level = ["-O1", "-c"] if compiler == "portable" else ["-fsyntax-only"]
+    done = subprocess.run(
+        [*COMPILERS[compiler], *STRICT, "-ffp-contract=off", *level, *c_files(folder)],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+CALLS = """
+#include <stdio.h>
+#include <stdlib.h>
+#include "eomgen.h"
+int main(void)
+{
+    const eomgen_model *m = eomgen_model_table();
+    const double p[] = { %s, 0.0 }, x0[] = { %s };
+    double *c = malloc(sizeof(double) * (size_t)(m->n_const + 1)), *u = calloc((size_t)m->n_u + 1, sizeof(double));
+    double *w = malloc(sizeof(double) * (size_t)(m->n_work + 1)), total = 0.0;
+    if (m->precompute(p, c) != 0) { return 1; }
+    for (int k = 0; k < m->n_kernels; k++) {
+        const eomgen_kernel *f = m->kernels + k;
+        double *x = malloc(sizeof(double) * (size_t)(f->n_in + 1));
+        double *out = malloc(sizeof(double) * (size_t)(f->n_out + 1));
+        for (int i = 0; i < f->n_in; i++) { x[i] = i < %d ? x0[i] : 0.3; }
+        const int status = f->call(0.1, x, u, c, out, w);
+        if (status < 0) { printf("%%s: %%d\n", f->name, status); return 1; }
+        for (int i = 0; i < f->n_out; i++) { total += status == 0 ? out[i] : 0.0; }
+        if (f->call(0.1, x, u, c, NULL, w) < 0) { return 2; }
+        free(x), free(out);
+    }
+    free(c), free(u), free(w);
+    return total == total ? 0 : 1;
+}
+"""
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", WARNED)
+def test_sanitizers_say_nothing(name: str, tmp_path: Path) -> None:
+    """Every function through the table, with arrays of exactly the stated lengths on the heap, and none for results."""
+    model = built(name)
+    folder, module = library(model, tmp_path), model.compile(target="numpy")
+    numbers = [", ".join(map(repr, map(float, [*values, 0.0]))) for values in (module.p, module.x0())]
+    (folder / "main.c").write_text(CALLS % (*numbers, module.n_x))
+    flags = ["-std=c99", "-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    subprocess.run(["gcc", *flags, "main.c", *c_files(folder), "-o", "main", "-lm"], cwd=folder, check=True)
+    done = subprocess.run(["./main"], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_text_cannot_break_the_sources(tmp_path: Path) -> None:
+    """Whatever documents say, and whatever a model is called."""
+    for name in ("block", "rhs", "driver", "N", "main", "x"):
+        m = eg.Model(name, doc='It says """hello""" \\n */ and {{ more }} ??/\nsecond line')
+        m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+        m.parameter("l", 1.0, unit="m", doc='a length, "quoted"??/ and */ awkward')
+        folder = library(m, tmp_path)
+        files = c_files(folder)
+        subprocess.run(["gcc", "-std=c99", *STRICT, "-fsyntax-only", *files], cwd=folder, check=True)
+
+
+def test_the_package_builds_its_libraries_and_its_example(tmp_path: Path) -> None:
+    """Judged by the closed form of a slider-crank's velocities, r = 0.1 and l = 0.35."""
+    folder = library(models.build("slider_crank"), tmp_path)
+    text = re.search(r"```c\n(.*?)```", (folder / "README.md").read_text(), re.DOTALL)
+    assert text is not None
+    (folder / "slider_crank_example.c").write_text(text.group(1))
+    flags = "CFLAGS=-O0 -std=c99 -fPIC -Wall -Wextra -Werror"
+    subprocess.run(["make", "-s", "all", "slider_crank_example", flags], cwd=folder, check=True)
+    assert (folder / "libslider_crank.so").exists()
+    done = subprocess.run(["./slider_crank_example"], cwd=folder, capture_output=True, text=True, check=True)
+    x_dot = [float(word) for word in done.stdout.split()]
+    module = models.build("slider_crank").compile(target="numpy")
+    given = re.search(r"const double x\[SLIDER_CRANK_N_X\] = \{ (.*?) \}", text.group(1))
+    assert given is not None
+    x = [float(word) for word in given.group(1).split(", ")]
+    np.testing.assert_allclose(x_dot, module.rhs(0.0, x), rtol=1e-9, atol=1e-9)
+    theta, omega = x[module.x_names.index("theta")], x[module.x_names.index("theta_dot")]
+    phi = -np.arcsin(0.1 / 0.35 * np.sin(theta))
+    turning = -0.1 / 0.35 * np.cos(theta) / np.cos(phi) * omega
+    speed = -0.1 * np.sin(theta) * omega - 0.35 * np.sin(phi) * turning
+    assert abs(omega) >= 1.0
+    assert x_dot[module.q_names.index("s")] == pytest.approx(speed, abs=1e-12)

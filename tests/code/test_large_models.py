@@ -1,0 +1,300 @@
+"""C of large models: loops over alike bodies, alike limbs side by side, shapes in contact, closed chains, beside NumPy.
+
+NumPy's text has one statement for each operation; text in C that goes through alike parts has to give its numbers, and
+to grow less than the model.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import models
+import numpy as np
+import pytest
+from command import run
+from sweeps import part_of
+
+import eomgen as eg
+
+KERNELS = ["rhs", "bias", "inverse_dynamics", "energy", "poses", "jacobian"]
+
+
+def planar_chain(n: int) -> eg.Model:
+    m = eg.Model("planar_chain", gravity=(1.0, "-g", 0))
+    for name, value in (("g", 9.81), ("m", 0.7), ("l", 0.3)):
+        m.parameter(name, value)
+    last: Any = m.ground
+    for k in range(n):
+        link = m.body(f"b{k}", mass="m", com=("l/2", 0, 0), inertia=(0.002, 0.003, f"m*l**2/{14 + k % 7}"))
+        m.revolute(f"j{k}", last, link)
+        last = link.at("l", 0, 0)
+    return m
+
+
+def numbers_chain(n: int) -> eg.Model:
+    """Hinges across each other, springs on every third joint, a force at the tip."""
+    m = eg.Model("numbers_chain", gravity=(0.3, -9.0, 2.0))
+    m.input("u", 0.4)
+    last: Any = m.ground
+    for k in range(n):
+        link = m.body(f"b{k}", mass=1.0 + 0.01 * k, com=(0.05, 0.01, 0), inertia=(2e-3, 1e-3, 1.5e-3))
+        m.revolute(f"j{k}", last, link, axis="zy"[k % 2])
+        if k % 3 == 0:
+            m.torsional_spring(f"s{k}", f"j{k}", stiffness=3.0 + k)
+            m.torque(f"d{k}", f"j{k}", f"u - 0.2*j{k}_dot")
+        last = link.at(0.1, 0, 0)
+    m.force("tip", last, (1, "2*u", "sin(t)"))
+    return m
+
+
+def slides(n: int) -> eg.Model:
+    """Slides and hinges in turn, on turned axes, two on every body."""
+    m = eg.Model("slides", gravity=(0, 0, -9.81))
+    m.parameter("c", 0.3)
+    bodies: list[Any] = []
+    for k in range(n):
+        body = m.body(
+            f"b{k}", mass=1.2, com=(0, 0.1, "c/5"), inertia={"xx": 0.03, "yy": 0.02, "zz": 0.025, "xy": 0.002}
+        )
+        outer = (bodies[(k - 1) // 2] if k else m.ground).at(0.1, 0.2, 0, rpy=(0.3, -0.2, 0.1 * (k % 2)))
+        joint = m.prismatic if k % 2 else m.revolute
+        joint(f"j{k}", outer, body, axis=(0.6, 0.0, 0.8))
+        if k % 4 == 0:
+            m.damper(f"d{k}", m.ground, body, damping=0.5 + 0.1 * k)
+        bodies.append(body)
+    return m
+
+
+def afloat(n: int) -> eg.Model:
+    """Three equal arms on a body that floats, in Euler parameters."""
+    m = eg.Model("afloat", gravity=(0, 0, -9.81))
+    base = m.body("base", mass=5.0, inertia=(0.4, 0.5, 0.6))
+    m.free("root", m.ground, base, rotation="euler_parameters")
+    for arm in range(3):
+        last: Any = base.at(0.2 * arm, 0.1, 0, rpy=(0, 0, 2.0 * arm))
+        for k in range(n // 3):
+            link = m.body(f"a{arm}_{k}", mass=1.0, com=(0.1, 0, 0.02), inertia=(0.01, 0.02, 0.03))
+            if k == 1:
+                m.spherical(f"j{arm}_{k}", last, link, rotation="euler_parameters")
+            else:
+                m.revolute(f"j{arm}_{k}", last, link, axis="xyz"[k % 3])
+            last = link.at(0.3, 0, 0)
+    return m
+
+
+def branched(n: int) -> eg.Model:
+    """Another chain hangs on the tenth link of a chain, and reads what loops hand on there."""
+    m = eg.Model("branched", gravity=(0, -9.81, 0))
+    links: list[Any] = []
+    for name, mass, com in (("a", 1.0, (0.05, 0, 0)), ("b", 0.5, (0.05, 0.01, 0))):
+        last: Any = links[10].at(0.1, 0, 0) if links else m.ground
+        for k in range(n // 2):
+            link = m.body(f"{name}{k}", mass=mass, com=com, inertia=(1e-3, 1.2e-3, 1.5e-3))
+            m.revolute(f"j{name}{k}", last, link)
+            links.append(link)
+            last = link.at(0.1, 2 * com[1], 0)
+    return m
+
+
+def two_arms(n: int) -> eg.Model:
+    """Two arms of n links of a body that slides and turns; they mirror each other, but for one mass."""
+    m = eg.Model("two_arms", gravity=(0.0, 0.3, -9.81))
+    m.body("trunk", mass=8.0, inertia={"xx": 0.4, "yy": 0.3, "zz": 0.5, "xy": 0.01, "xz": 0.02, "yz": -0.03})
+    m.revolute("turn", "ground", "trunk", axis=(0.4, 0.0, 0.9))
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        before = "trunk"
+        for k in range(n):
+            name, heavy = f"{side}{k}", 1.0 + 0.2 * (side == "right" and k == 1)
+            tensor = {"xx": 0.03, "yy": 0.03, "zz": 0.04, "xy": 0.002 * sign, "xz": 0.001, "yz": -0.003 * sign}
+            m.body(name, mass=heavy * (1.5 - 0.3 * k), com=(0.03, 0.2 * sign, 0.05), inertia=tensor)
+            axis = ((1.0, 0.0, 0.0), (0.0, 0.6 * sign, 0.8), (0.0, 0.0, 1.0))[k % 3]
+            m.revolute(f"{name}_angle", {"body": before, "at": (0.0, 0.3 * sign, 0.1 * k)}, name, axis=axis)
+            m.torque(f"{name}_motor", f"{name}_angle", m.input(f"tau_{name}", 0.1 * k))
+            before = name
+    return m
+
+
+def touching(n: int) -> eg.Model:
+    """A hanging chain whose links are discs that meet each other and the floor."""
+    m = planar_chain(n)
+    discs = {"shape": "circle", "on": [m.bodies[f"b{k}"] for k in range(n)], "radius": 0.2}
+    law = {"stiffness": 300.0, "dissipation": "0.2*m", "friction": 0.3, "smoothing": 0.1}
+    m.contacts("floor", discs, {"shape": "half_plane", "on": m.ground.at(0, -0.4, 0)}, law)
+    m.contacts("among", discs, law=law)
+    return m
+
+
+TREES: dict[str, tuple[Callable[[int], eg.Model], int, str]] = {
+    "planar chain": (planar_chain, 60, "recursive"), "numbers": (numbers_chain, 45, "recursive"),
+    "slides": (slides, 40, "recursive"), "afloat": (afloat, 39, "recursive"), "branched": (branched, 60, "auto"),
+    "two arms": (two_arms, 3, "embedding"), "touching": (touching, 12, "auto"),
+}  # fmt: skip
+
+
+def agree(found: Any, wanted: Any, size: float, name: str) -> None:
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=size * max(1.0, np.abs(wanted).max()), err_msg=name)
+
+
+@pytest.mark.parametrize("name", part_of(TREES, lambda name: name in ("planar chain", "two arms", "touching")))
+def test_trees_in_c_equal_numpy(name: str) -> None:
+    make, n, method = TREES[name]
+    equations = make(n).derive(method)
+    kernels = ["rhs", "jacobian"] if name == "touching" else KERNELS
+    in_c, judge = equations.compile(kernels=kernels, optimize=0), equations.compile(target="numpy", kernels=kernels)
+    rng = np.random.default_rng(5)
+    q, v, a = (rng.uniform(-0.6, 0.6, size) for size in (judge.n_q, judge.n_v, judge.n_v))
+    for i, _ in judge.metadata["quaternion_slots"]:
+        q[i : i + 4] /= np.linalg.norm(q[i : i + 4])
+    x = np.concatenate([q, v])
+    agree(in_c.rhs(0.2, x), judge.rhs(0.2, x), 1e-9, "rhs")
+    agree(in_c.jacobian(0.2, x), judge.jacobian(0.2, x), 1e-8, "jacobian")
+    if kernels is KERNELS:
+        agree(in_c.bias(0.2, x), judge.bias(0.2, x), 1e-12, "bias")
+        agree(in_c.inverse_dynamics(q, v, a), judge.inverse_dynamics(q, v, a), 1e-12, "inverse_dynamics")
+        agree(in_c.energy(x), judge.energy(x), 1e-12, "energy")
+        agree(in_c.poses(q), judge.poses(q), 1e-13, "poses")
+
+
+def closed_chain(n: int, spatial: bool) -> eg.Model:
+    """A pendulum of n links whose end is held."""
+    m = eg.Model("closed_chain", gravity=(0, "-g", 0))
+    m.parameter("g", 9.81)
+    last: Any = m.ground
+    for i in range(n):
+        link = m.body(f"b{i}", mass=1.0 + 0.01 * i, com=(0.05, 0, 0), inertia=(1e-3, 1.2e-3, 1.5e-3))
+        m.revolute(f"j{i}", last, link, axis="y" if spatial and i % 3 == 1 else "z")
+        m.guess(**{f"j{i}": 0.0 if spatial and i % 3 == 1 else 2 * np.pi / (n * (2 / 3 if spatial else 1) + 1)})
+        last = link.at(0.1, 0, 0)
+    m.torque("drive", "j0", m.input("tau", 0.3))
+    (m.spherical if spatial else m.revolute)("end", last, m.ground.at(0.02, 0.02, 0))
+    return m
+
+
+def four_bars(n: int) -> eg.Model:
+    """n parallelograms in a row, which are redundant where their cranks are parallel."""
+    m = eg.Model("four_bars", gravity=(0, "-g", 0))
+    m.parameter("g", 9.81)
+    rod: dict[str, Any] = {"mass": 1.0, "inertia": (0.01, 0.08, 0.08)}
+    cranks = [m.body(f"crank{k}", com=(0, 0.5, 0), **rod) for k in range(n + 1)]
+    for k, crank in enumerate(cranks):
+        m.revolute(f"A{k}", m.ground.at(k, 0, 0), crank)
+        m.guess(**{f"A{k}": 0.3})
+    for k in range(n):
+        coupler = m.body(f"coupler{k}", com=(0.5, 0, 0), **rod)
+        m.revolute(f"B{k}", cranks[k].at(0, 1, 0), coupler)
+        m.guess(**{f"B{k}": -0.3})
+        m.revolute(f"C{k}", coupler.at(1, 0, 0), cranks[k + 1].at(0, 1, 0))
+    m.torque("drive", "A0", m.input("tau", 0.3))
+    return m
+
+
+LOOPS: dict[str, Callable[[], eg.Model]] = {
+    "planar": lambda: closed_chain(18, False), "spatial": lambda: closed_chain(15, True), "bars": lambda: four_bars(6),
+    "stewart_platform": lambda: models.build("stewart_platform"), "excavator": lambda: models.build("excavator"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", part_of(LOOPS, lambda name: name == "bars"))
+def test_loops_in_c_equal_multipliers(name: str) -> None:
+    """On the constraints and off them, by the method that C has for them beside a solve with multipliers."""
+    judge = LOOPS[name]().compile(method="augmented", target="numpy")
+    in_c = LOOPS[name]().compile(kernels=["rhs", "project", "jacobian"], optimize=0)
+    rng = np.random.default_rng(3)
+    start = judge.x0()
+    for far in (0.0, 1e-3):
+        x = start + far * rng.uniform(-1.0, 1.0, judge.n_x)
+        x[judge.n_q :] += 0.1 * rng.uniform(-1.0, 1.0, judge.n_v)
+        closed = judge.project(x)
+        agree(in_c.project(x), closed, 1e-9, "project")
+        wanted = judge.rhs(0.3, x)
+        agree(in_c.rhs(0.3, x)[judge.n_q :], wanted[judge.n_q :], 1e-8, "rhs")
+    J, d = in_c.jacobian(0.3, closed), rng.normal(size=judge.n_x)
+    slope = (judge.rhs(0.3, closed + 1e-5 * d) - judge.rhs(0.3, closed - 1e-5 * d)) / 2e-5
+    agree(J @ d, slope, 1e-6, "jacobian")
+
+
+# How long the text is, apart from tables of numbers and the model's own description.
+
+
+def length(model: eg.Model, folder: Path) -> int:
+    folder.mkdir()
+    model.save(folder / "model.yaml")
+    assert run("generate", folder / "model.yaml", "--out", folder, "--target", "c").code == 0
+    text = "".join(file.read_text() for file in (folder / model.name).glob(f"{model.name}*.c"))
+    tables = r"(static )?const \w+ \*?\w+\[\d*\](\[\d+\])? = \{.*?\n\};|metadata_texts\[\] = \{.*?\n\};"
+    return len(re.sub(f"(?s){tables}", "", text))
+
+
+@pytest.mark.thorough
+def test_text_grows_less_than_a_tree(tmp_path: Path) -> None:
+    small, big = (length(planar_chain(n), tmp_path / str(n)) for n in (100, 200))
+    assert big < 1.7 * small
+
+
+def test_text_of_contacts_does_not_grow_with_the_shapes(tmp_path: Path) -> None:
+    """Of two bodies with many shapes each."""
+
+    def rows(count: int) -> eg.Model:
+        m = eg.Model("rows", gravity=(0, -9.81, 0))
+        groups = []
+        for i in range(2):
+            body = m.body(f"b{i}", mass=1.0, inertia={"zz": 0.01})
+            m.planar(f"j{i}", m.ground, body)
+            on = [body.at(0.1 * k, 0.01 * k * k, 0) for k in range(count)]
+            groups.append([{"shape": "circle", "on": on, "radius": 0.06}])
+        m.contacts("touch", *groups, {"stiffness": 1e3})
+        return m
+
+    few, many = (length(rows(count), tmp_path / str(count)) for count in (10, 40))
+    assert many < 1.1 * few
+
+
+# Second derivatives.
+
+
+TWICE = [("double_pendulum", "recursive"), ("four_bar", "embedding"), ("rolling_disc", "embedding")]
+MORE = [("double_pendulum", "embedding"), ("four_bar", "recursive"), ("spatial_loop", "auto")]
+
+
+@pytest.mark.parametrize(("name", "method"), part_of([*TWICE, *MORE], TWICE.__contains__))
+def test_products_with_hessians_are_differences_of_jacobians(name: str, method: str) -> None:
+    """Of rhs by x, in directions off the constraints too, and of inverse dynamics; a Hessian is symmetric."""
+    kernels = ["rhs", "jacobian", "project", "rhs_hessian_product", "inverse_dynamics_hessian_product"]
+    module = models.build(name).derive(method).compile(
+        target="numpy", kernels=[*kernels, "inverse_dynamics_derivatives", "constraints", "constraint_jacobian"]
+    )  # fmt: skip
+    start, rng = models.build(name).compile(target="numpy").x0(), np.random.default_rng(2)
+    x = module.project(start + 0.02 * rng.uniform(-1, 1, module.n_x))
+    w, d, e = rng.uniform(-1, 1, (3, module.n_x))
+
+    def along(h: float) -> Any:
+        return w @ module.jacobian(0.3, module.project(x + h * d))
+
+    found = module.rhs_hessian_product(0.3, x, w, d)
+    other = module.rhs_hessian_product(0.3, x, w, e)
+    agree(d @ other, e @ found, 1e-9, "symmetry")
+    if not module.n_c:
+        slope = (8 * (along(1e-4) - along(-1e-4)) - (along(2e-4) - along(-2e-4))) / 12e-4
+        agree(found, slope, 1e-8, "rhs")
+    else:  # second difference of the weighted rates themselves, which project
+
+        def weighed(a: float, b: float) -> float:
+            return float(w @ module.rhs(0.3, x + a * d + b * e))
+
+        def mixed(h: float) -> float:
+            return (weighed(h, h) - weighed(h, -h) - weighed(-h, h) + weighed(-h, -h)) / (4 * h * h)
+
+        agree(e @ found, 2 * mixed(1e-4) - mixed(2e-4), 1e-4, "rhs")  # off the constraints its slopes have corners
+    q, v, a = x[: module.n_q], x[module.n_q :], rng.uniform(-1, 1, module.n_v)
+    d = rng.uniform(-1, 1, module.n_q + 2 * module.n_v)
+
+    def forces(h: float) -> Any:
+        parts = np.split(np.concatenate([q, v, a]) + h * d, [module.n_q, module.n_q + module.n_v])
+        found = module.inverse_dynamics_derivatives(*parts)
+        return w[: module.n_v] @ np.hstack([found.dtau_dq, found.dtau_dv, found.dtau_da])
+
+    slope = (8 * (forces(1e-3) - forces(-1e-3)) - (forces(2e-3) - forces(-2e-3))) / 12e-3
+    agree(module.inverse_dynamics_hessian_product(q, v, a, w[: module.n_v], d), slope, 1e-9, "inverse dynamics")

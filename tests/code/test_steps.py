@@ -1,0 +1,237 @@
+"""Steps, events and tables of compiled runs: every coefficient beside SciPy's methods, series beside closed forms.
+
+Right-hand sides of any form are written as first-order states; with six states and more, steps take four at a time.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+import eomgen as eg
+
+STEPS = 8
+TIMES, VALUES = [0.0, 0.4, 1.0, 1.7, 2.0], [1.0, -0.5, 0.3, 0.2, 2.0]
+
+
+@cache
+def mixed(copies: int) -> Any:
+    """A free mass beside nonlinear states, pushed by an input; as many copies of the states as asked for, unlike."""
+    m = eg.Model("mixed")
+    m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="s")
+    m.torque("push", "J", m.input("F"))
+    for k in range(copies):
+        w = 1.0 + 0.2 * k
+        m.state(f"a{k}", f"sin(b{k}) + cos({w}*t)", initial=0.5 + 0.1 * k)
+        m.state(f"b{k}", f"-0.3*a{k}*c{k}", initial=1.0)
+        m.state(f"c{k}", f"exp(-t) - {w}*c{k}*a{k} + b{(k + 1) % copies}", initial=-0.3)
+    m.initial(s_dot=0.2)
+    return m.compile(optimize=0)
+
+
+@pytest.mark.parametrize("copies", [1, 3], ids=["few states", "many states"])
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "RK23", "Radau"])
+def test_steps_are_those_of_scipy(method: str, copies: int) -> None:
+    """Times of the steps, states at their ends and between, and how often the rates were asked for."""
+    mod = mixed(copies)
+    x0, options = mod.x0(), {"rtol": 1e-6, "atol": 1e-9}
+    more = {"jac": mod.jacobian} if method == "Radau" else {}
+    whole = solve_ivp(mod.rhs, (0.0, 8.0), x0, method=method, dense_output=True, **options, **more)
+    run = mod.simulate((0.0, 8.0), x0, method=method, **options)
+    assert len(run.t) == len(whole.t)
+    np.testing.assert_allclose(run.t, whole.t, rtol=1e-6)  # from an estimate in which digits cancel
+    first = run.t[: STEPS + 1]
+    inside = (first[:-1, None] + np.diff(first)[:, None] * [0.25, 0.5, 0.75, 1.0]).ravel()
+    asked = mod.simulate((0.0, 8.0), x0, method=method, t_eval=inside, **options)
+    np.testing.assert_allclose(asked.x, whole.sol(inside), rtol=1e-8, atol=3e-9)
+    counted = solve_ivp(mod.rhs, (0.0, 8.0), x0, method=method, **options, **more).nfev
+    assert run.nfev == pytest.approx(counted, rel=0.03 if method == "Radau" else 0)
+
+
+def test_an_implicit_method_halves_systems_of_second_order() -> None:
+    """A stiff oscillator takes the steps of SciPy's Radau, and its Newton's method converges as fast."""
+    m = eg.Model("stiff")
+    m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="s")
+    m.torque("spring", "J", "-400*s - 0.3*s_dot")
+    m.initial(s=2.0)
+    mod = m.compile(optimize=0)
+    options = {"rtol": 1e-9, "atol": 1e-11}
+    judge = solve_ivp(mod.rhs, (0.0, 2.0), mod.x0(), "Radau", jac=mod.jacobian, **options)
+    run = mod.simulate(2.0, method="Radau", **options)
+    np.testing.assert_allclose(run.x[:, -1], judge.y[:, -1], atol=1e-7)
+    assert len(run.t) == pytest.approx(len(judge.t), rel=0.02)
+    assert run.nfev == pytest.approx(judge.nfev, rel=0.02)
+
+
+def test_van_der_pol() -> None:
+    """Test set of E. Hairer and G. Wanner: eps = 1e-6, y(0) = (2, 0), at t = 2."""
+    m = eg.Model("van_der_pol")
+    m.prismatic("J", m.ground, m.body("mass", mass=1e-6), axis="x", coordinate="y")
+    m.torque("force", "J", "(1 - y**2)*y_dot - y")
+    m.initial(y=2.0)
+    mod = m.compile(optimize=0)
+    run = mod.simulate(2.0, method="Radau", rtol=1e-9, atol=1e-11)
+    assert run.x[:, -1] == pytest.approx([1.706167732170456, -0.8928097010248257], rel=1e-10)
+
+
+def test_taylors_method_keeps_its_tolerance() -> None:
+    """x' = x^2, y' = -y from 1/2 and 1: 1 / (2 - t) and exp(-t), at the ends of few steps and between."""
+    m = eg.Model("series")
+    m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="s")
+    m.state("x", "x*x", initial=0.5)
+    m.state("y", "-y", initial=1.0)
+    mod = m.compile(optimize=0)
+    run = mod.simulate(1.5, method="Taylor", rtol=1e-10, atol=1e-10)
+    assert len(run.t) <= STEPS + 1
+    inside = (run.t[:-1, None] + np.diff(run.t)[:, None] * [0.25, 0.5, 0.75, 1.0]).ravel()
+    asked = mod.simulate(1.5, method="Taylor", t_eval=inside, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(asked["x"], 1.0 / (2.0 - inside), rtol=1e-9)
+    np.testing.assert_allclose(asked["y"], np.exp(-inside), rtol=1e-9)
+
+
+def test_taylors_steps_are_judged_by_their_ends() -> None:
+    """q'' = -q^3 from 0 at speed 1, where the first coefficients vanish; energy v^2/2 + q^4/4 stays."""
+    m = eg.Model("cube")
+    m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="q")
+    m.torque("spring", "J", "-q**3")
+    m.initial(q_dot=1.0)
+    mod = m.compile(optimize=0)
+    for rtol in (1e-6, 1e-9):
+        run = mod.simulate(20.0, method="Taylor", rtol=rtol, atol=rtol)
+        judge = solve_ivp(lambda t, x: [x[1], -(x[0] ** 3)], (0.0, 20.0), [0.0, 1.0], "DOP853", rtol=1e-12, atol=1e-13)
+        assert np.abs(run.x[:, -1] - judge.y[:, -1]).max() <= 30 * rtol
+        assert np.abs(run["q_dot"] ** 2 / 2 + run["q"] ** 4 / 4 - 0.5).max() <= 10 * rtol
+
+
+def test_zeros_are_found_in_their_directions() -> None:
+    """sin t rises through 0 at 2 pi and falls at pi; 1 - 1e-4 - sin t dips below 0 within a step; the run ends at 9."""
+    m = eg.Model("clock")
+    m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="c")
+    m.initial(c_dot=1.0)
+    m.state("x", "cos(t)")
+    for name, text, options in (
+        ("rise", "x", {"direction": 1}), ("fall", "x", {"direction": -1}), ("both", "x", {}),
+        ("dip", "1 - 1e-4 - x", {}), ("end", "c - 9", {"terminal": True}),
+    ):  # fmt: skip
+        m.event(name, text, **options)
+    run = m.compile(optimize=0).simulate(12.0, rtol=1e-12, atol=1e-13)
+    width = np.arccos(1.0 - 1e-4)
+    assert np.diff(run.t).mean() > 4.0 * width
+    dips = [n * np.pi + side * width for n in (0.5, 2.5) for side in (-1.0, 1.0)]
+    for name, zeros in {
+        "rise": [2 * np.pi], "fall": [np.pi], "both": [np.pi, 2 * np.pi], "dip": dips, "end": [9.0],
+    }.items():  # fmt: skip
+        times = [t for t in run.t_events[name] if t > 0.0]
+        assert times == pytest.approx(zeros, abs=1e-9), name
+    assert run.t[-1] == pytest.approx(9.0, abs=1e-12)
+
+
+def test_after_a_reset_rates_are_those_of_the_new_state() -> None:
+    """A ball with restitution 0.9 beside a state that follows its speed, for 4 s and until its bounces accumulate."""
+    m = eg.Model("ball", gravity=(0, -9.81, 0))
+    m.prismatic("J", m.ground, m.body("ball", mass=1.0), axis="y", coordinate="h")
+    m.initial(h=1.0)
+    m.event("floor", "h", direction=-1, reset={"h_dot": "-0.9*h_dot"})
+    mod = m.compile(optimize=0)
+    fall, speed = np.sqrt(2 / 9.81), np.sqrt(2 * 9.81)
+    hits = fall + np.concatenate([[0.0], np.cumsum(2 * speed * 0.9 ** np.arange(1, 20) / 9.81)])
+    k = int((hits < 4.0).sum())
+    after, up = 4.0 - hits[k - 1], speed * 0.9**k
+    for method in ("DOP853", "RK45", "RK23"):
+        run = mod.simulate(4.0, method=method, rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(run.t_events["floor"], hits[:k], atol=1e-9)
+        assert run["h"][-1] == pytest.approx(up * after - 9.81 * after**2 / 2, abs=1e-8)
+        assert run["h_dot"][-1] == pytest.approx(up - 9.81 * after, abs=1e-8)
+    with pytest.raises(eg.ZenoError):
+        mod.simulate(20.0)
+
+
+@pytest.mark.parametrize("kind", ["zero-order", "linear", "cubic"])
+def test_tables_are_read_as_scipy_reads_them(kind: str) -> None:
+    """A unit mass is pushed by a table: its speed is the integral; the output reads the table itself."""
+    m = eg.Model("tabled")
+    m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="s")
+    m.torque("push", "J", m.input("F"))
+    m.output("force", "F")
+    run = m.compile(optimize=0).simulate(
+        2.3, inputs={"F": eg.Signal(TIMES, VALUES, kind)}, t_eval=np.linspace(0.0, 2.3, 47), rtol=1e-11, atol=1e-12
+    )
+    t, spline = run.t, CubicSpline(TIMES, VALUES)
+    last = np.clip(np.searchsorted(TIMES, t, side="right") - 1, 0, len(TIMES) - 1)
+    values = {
+        "zero-order": np.array(VALUES)[last], "linear": np.interp(t, TIMES, VALUES),
+        "cubic": spline(np.clip(t, TIMES[0], TIMES[-1])),
+    }[kind]  # fmt: skip
+    np.testing.assert_allclose(run["force"], values, rtol=1e-12, atol=1e-13)
+    fine = np.linspace(0.0, 2.3, 46001)
+    at = np.clip(np.searchsorted(TIMES, fine[:-1] + 1e-9, side="right") - 1, 0, len(TIMES) - 1)
+    middle = 0.5 * (fine[1:] + fine[:-1])
+    rates = {
+        "zero-order": np.array(VALUES)[at], "linear": np.interp(middle, TIMES, VALUES),
+        "cubic": spline(np.clip(middle, TIMES[0], TIMES[-1])),
+    }[kind]  # fmt: skip
+    speed = np.concatenate([[0.0], np.cumsum(rates * np.diff(fine))])
+    np.testing.assert_allclose(run["s_dot"], np.interp(t, fine, speed), atol=2e-9 if kind != "cubic" else 2e-8)
+
+
+# Ensembles: runs side by side, x'' = -k x + u, each with a stiffness of its own.
+
+COUNT, SLOPE, LATE = 7, 0.6, 0.4
+SAMPLES = np.linspace(0.0, 3.0, 13)
+LANES = {"DOP853": 1e-8, "RK45": 1e-8, "RK23": 1e-6, "Taylor": 1e-10}
+
+
+@cache
+def oscillator() -> Any:
+    m = eg.Model("oscillator")
+    m.prismatic("J", m.ground, m.body("mass", mass=1.0), axis="x", coordinate="x")
+    m.torque("spring", "J", f"-k*x + {m.input('u')}")
+    m.parameter("k", 2.0)
+    return m.compile()
+
+
+def swings(k: int, forced: bool) -> np.ndarray:
+    """x and x' at all times: about u / k, or pushed by a ramp from a time on."""
+    stiffness, x, v = 2.0 + 5.0 * k, 1.0 - 0.2 * k, 0.5 * k
+    w, rest = np.sqrt(stiffness), 0.0 if forced else 0.3 * k / stiffness
+    c, s = np.cos(w * SAMPLES), np.sin(w * SAMPLES)
+    places, speeds = rest + (x - rest) * c + v / w * s, -(x - rest) * w * s + v * c
+    if forced:
+        late = np.maximum(SAMPLES - LATE, 0.0)
+        places = places + SLOPE / stiffness * (late - np.sin(w * late) / w)
+        speeds = speeds + SLOPE / stiffness * (1.0 - np.cos(w * late)) * (SAMPLES > LATE)
+    return np.stack([places, speeds])
+
+
+@pytest.mark.parametrize(
+    ("forced", "method"),
+    [*((False, method) for method in LANES), *((True, method) for method in LANES if method != "Taylor")],
+)
+def test_every_run_of_an_ensemble_has_its_own_closed_form(method: str, forced: bool) -> None:
+    """With about as many steps as SciPy takes: those of lanes are a ninth shorter, so that fewer are rejected."""
+    mod, rtol = oscillator(), LANES[method]
+    k = np.arange(COUNT)
+    ramp = {"u": eg.Signal([0.0, LATE, 10.0], [0.0, 0.0, SLOPE * (10.0 - LATE)], "linear")}
+    runs = mod.simulate_many(
+        3.0, {"x": 1.0 - 0.2 * k, "x_dot": 0.5 * k}, parameters={"k": 2.0 + 5.0 * k},
+        inputs=ramp if forced else {"u": 0.3 * k}, method=method, t_eval=SAMPLES, rtol=rtol, atol=1e-9,
+    )  # fmt: skip
+    assert runs.ok.all()
+    for one in range(COUNT):
+        np.testing.assert_allclose(runs.samples[:, :, one], swings(one, forced), atol=60 * rtol)
+    if forced:
+        return
+    for one in range(COUNT):
+        if method == "Taylor":  # terms (w h)^p / p! of order 16 come down to 1e-10 at w h = 1.6
+            assert runs.steps[one] <= 3.0 * np.sqrt(2.0 + 5.0 * one) / 1.2 + 1
+            continue
+        judge = solve_ivp(
+            lambda t, x, one=one: [x[1], 0.3 * one - (2.0 + 5.0 * one) * x[0]], (0.0, 3.0),
+            [1.0 - 0.2 * one, 0.5 * one], method, rtol=rtol, atol=1e-9,
+        )  # fmt: skip
+        assert 0.95 * (len(judge.t) - 1) <= runs.steps[one] <= 1.2 * (len(judge.t) - 1) + 2
