@@ -295,30 +295,3 @@ def test_a_gpu_has_many_states_and_gives_memory_back() -> None:
     x = np.random.default_rng(1).normal(size=(4, 4_000_000))
     for _ in range(int(1.2 * total / x.nbytes / 2)):
         model.rhs(0.0, x)
-
-
-@pytest.mark.needs("a GPU")
-@pytest.mark.parametrize("library", [pytest.param(name, marks=pytest.mark.needs(name)) for name in ("CuPy", "PyTorch")])
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_arrays_of_other_libraries_are_taken(library: str) -> None:
-    model, module = pair("double_pendulum", None)
-    x = np.random.default_rng(0).normal(size=(4, 100))
-    wanted = np.array([module.rhs(0.0, one) for one in x.T]).T
-    if library == "CuPy":
-        import cupy
-
-        found = model.rhs(0.0, cupy.asarray(x))
-        taken = cupy.asarray(found)
-        assert taken.data.ptr == found.pointer
-        numbers = taken.get()
-        for bad, words in ((cupy.asarray(x.T.copy()).T, "in C order"), (taken.astype("f4"), "must hold float64")):
-            with pytest.raises(eg.UsageError, match=words):
-                model.rhs(0.0, bad)
-    else:
-        import torch
-
-        found = model.rhs(0.0, torch.as_tensor(x, device="cuda"))
-        taken = torch.as_tensor(found, device="cuda")
-        assert taken.data_ptr() == found.pointer
-        numbers = taken.cpu().numpy()
-    np.testing.assert_allclose(numbers, wanted, rtol=0.0, atol=1e-12 * np.abs(wanted).max())

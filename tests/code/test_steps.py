@@ -92,6 +92,8 @@ def test_taylors_method_keeps_its_tolerance() -> None:
     asked = mod.simulate(1.5, method="Taylor", t_eval=inside, rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(asked["x"], 1.0 / (2.0 - inside), rtol=1e-9)
     np.testing.assert_allclose(asked["y"], np.exp(-inside), rtol=1e-9)
+    ends = mod.simulate(1.5, method="Taylor", t_eval=np.nextafter(run.t[1:], 0.0), rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(ends.x, run.x[:, 1:], rtol=1e-13, atol=1e-14)  # the series ends where the step does
 
 
 def test_taylors_steps_are_judged_by_their_ends() -> None:

@@ -136,7 +136,7 @@ FAULTS = (
         "r[i] = (along[i] + r3[i]) / s[N + i];",
         "r[i] = along[i] / s[N + i];",
         "derivative by parameters: the constraints' own rates stay",
-        ("tests/code/test_accelerations.py::test_derivatives_are_differences[balls]",),
+        ("tests/code/test_accelerations.py::test_derivatives_are_differences[freedoms]",),
     ),
     Fault(
         "c-shift-accelerations", "templates/c/drivers/shift_loops.c",
@@ -171,7 +171,7 @@ FAULTS = (
         "d[i] -= lu[i * NZ + k] * entry;",
         "d[i] -= lu[k * NZ + i] * entry;",
         "forward substitution: a transpose is lost",
-        ("tests/code/test_accelerations.py::test_accelerations_are_those_with_multipliers[freedoms, multipliers]",),
+        ("tests/code/test_accelerations.py::test_accelerations_are_those_with_multipliers[balls, reactions]",),
     ),
     Fault(
         "c-columns-jacobian", "templates/c/drivers/columns_jacobian.c",

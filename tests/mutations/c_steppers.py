@@ -164,7 +164,7 @@ FAULTS = (
         "if (s->times[middle] <= at) {",
         "if (s->times[middle] <= at + 0.1) {",
         "values of a table are held from too early",
-        ("tests/code/test_steps.py::test_tables_are_read_as_scipy_reads_them[zero-order]",),
+        ("tests/code/test_steps.py::test_tables_are_read_as_scipy_reads_them[linear]",),
     ),
     Fault(
         "table-cubic", "templates/c/steppers/signals.c",
