@@ -338,7 +338,9 @@ def test_a_freedom_that_moves_no_inertia_is_reported() -> None:
 
 
 @pytest.mark.parametrize("name", ["tree", "long tree"])
-@pytest.mark.parametrize("parameters", [(0.0, 0.6), (1.0, 0.0)], ids=["no mass", "coincident axes"])
+@pytest.mark.parametrize(
+    "parameters", [(0.0, 0.6), (1.0, 0.0), (1.0, 1e-10)], ids=["no mass", "coincident axes", "axes so close"]
+)
 def test_a_tree_without_inertia_is_reported(name: str, parameters: tuple[float, float]) -> None:
     in_c, _, x = case(name)
     assert np.isfinite(in_c.rhs(0.0, x, p=[0.1, 1e-3])).all()

@@ -24,7 +24,7 @@ FAULTS = (
         'conditions.append(graph.apply("lt", size * SINGULAR, d))',
         'conditions.append(graph.apply("lt", -size, d))',
         "a motion without inertia is not noticed",
-        ("tests/code/test_accelerations.py::test_a_tree_without_inertia_is_reported[coincident axes-tree]",),
+        ("tests/code/test_accelerations.py::test_a_tree_without_inertia_is_reported[axes so close-tree]",),
     ),
     Fault(
         "sparse-factor", "eomgen/program/sparse.py",
