@@ -128,15 +128,19 @@ def by_series() -> Any:
         m.prismatic(f"J{k}", m.ground, m.body(f"body{k}", mass=1.0), axis="x", coordinate=f"q{k}")
         m.torque(f"F{k}", f"J{k}", text)
     module = m.compile(optimize=0, kernels=["rhs", "project"])
-    return module.simulate(END, method="Taylor", rtol=1e-12, atol=1e-13)
+    solver = module.Taylor(module.rhs, 0.0, np.zeros(module.n_x), END, rtol=1e-12, atol=1e-13)
+    for _ in range(FEW):  # with a wrong coefficient they become ever shorter
+        if solver.status == "running":
+            solver.step()
+    return solver.t, dict(zip(module.x_names, solver.y, strict=True))
 
 
 @pytest.mark.parametrize("name", FORCES)
 def test_series_integrate_every_operation(name: str) -> None:
-    run, force = by_series(), FORCES[name][1]
+    (end, x), force = by_series(), FORCES[name][1]
     expected = quad(lambda t: float(force(math, t)), 0.0, END, epsabs=1e-13, epsrel=1e-13)[0]
-    assert run[f"q{list(FORCES).index(name)}_dot"][-1] == pytest.approx(expected, rel=1e-11, abs=1e-12)
-    assert len(run.t) <= FEW
+    assert end == END
+    assert x[f"q{list(FORCES).index(name)}_dot"] == pytest.approx(expected, rel=1e-11, abs=1e-12)
 
 
 # Sine and cosine of generated code.

@@ -140,8 +140,8 @@ FAULTS = (
     ),
     Fault(
         "event-touch", "templates/c/steppers/crossings.c",
-        "return least < 0.5 * fmin(fabs(a), fabs(b));",
-        "return least < -0.5 * fmin(fabs(a), fabs(b));",
+        "if (!(a * b > 0.0) || da >= 0.0",
+        "if (a * b > 0.0 || da >= 0.0",
         "a value that comes to zero and back within a step is missed",
         ("tests/code/test_steps.py::test_zeros_are_found_in_their_directions",),
     ),
