@@ -357,14 +357,6 @@ def test_nothing_is_removed_through_a_foreign_cache(
     assert run("cache", "list").code == 0
 
 
-def test_numpy_goes_without_a_foreign_cache(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    cache.mkdir(mode=0o700)
-    give_away(cache, monkeypatch)
-    assert renamed("alone", tmp_path).compile(target="numpy").rhs(0.0, np.zeros(2)).shape == (2,)
-    with pytest.raises(eg.ToolchainError, match=FOREIGN):
-        write_unit(tmp_path)
-
-
 # Loaded models.
 
 MEMORY = """

@@ -68,17 +68,6 @@ def test_an_implicit_method_halves_systems_of_second_order() -> None:
     assert run.nfev == pytest.approx(judge.nfev, rel=0.02)
 
 
-def test_van_der_pol() -> None:
-    """Test set of E. Hairer and G. Wanner: eps = 1e-6, y(0) = (2, 0), at t = 2."""
-    m = eg.Model("van_der_pol")
-    m.prismatic("J", m.ground, m.body("mass", mass=1e-6), axis="x", coordinate="y")
-    m.torque("force", "J", "(1 - y**2)*y_dot - y")
-    m.initial(y=2.0)
-    mod = m.compile(optimize=0)
-    run = mod.simulate(2.0, method="Radau", rtol=1e-9, atol=1e-11)
-    assert run.x[:, -1] == pytest.approx([1.706167732170456, -0.8928097010248257], rel=1e-10)
-
-
 def test_taylors_method_keeps_its_tolerance() -> None:
     """x' = x^2, y' = -y from 1/2 and 1: 1 / (2 - t) and exp(-t), at the ends of few steps and between."""
     m = eg.Model("series")
