@@ -221,6 +221,7 @@ def test_the_rolling_disc_has_three_equations() -> None:
     assert sum(sympy.count_ops(x) for x in eqs.force) <= 52
 
 
+@pytest.mark.thorough
 def test_choices_within_choices_are_named() -> None:
     """Six feet that are held or free: each depends on those before, so that choices written out double with each."""
     eqs = eg.load_example("rimless_wheel").derive()

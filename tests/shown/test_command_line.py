@@ -282,6 +282,7 @@ def test_the_doctor_finds_all_well(call: Call) -> None:
     assert {"small model"} <= {check["name"] for check in result.json["checks"]}
 
 
+@pytest.mark.thorough
 def test_the_doctor_tells_what_is_installed_and_cannot_be_imported(tmp_path: Path) -> None:
     """As pint 0.24 beside a later flexparser: every run with a unit such as inch failed, and doctor was content."""
     for name in ("pint", "trimesh"):

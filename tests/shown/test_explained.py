@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import subprocess
 from functools import cache
@@ -137,7 +136,7 @@ OTHERS = [(name, method, "full") for name in ("double_pendulum", "car_axis", "ro
 OTHERS += [(name, METHODS[(k + step) % 8], "short") for k, name in enumerate(NAMES) for step in (0, 3)]
 OTHERS += [(name, "auto", "short") for name in NAMES]
 SOME = {("double_pendulum", "hamilton", "full")}
-SOME |= {(name, "auto", "short") for name in ("satellite", "hydraulic_boom", "gear_train")}
+SOME |= {(name, "auto", "short") for name in ("hydraulic_boom", "gear_train")}
 
 
 @pytest.mark.parametrize(("name", "method", "level"), part_of(dict.fromkeys(OTHERS), SOME.__contains__))
@@ -263,14 +262,6 @@ def test_a_model_at_rest_is_told_in_motion_and_rounding_as_zero() -> None:
     assert float(found[r"\ddot{\mathrm{bend}}"]) == pytest.approx(9.81)
     declared = section(explained("slider_crank", "embedding"), "Numbers")
     assert "The declared initial state" in declared
-
-
-@pytest.mark.parametrize("name", ["hydraulic_boom", "car_axis", "kapitza_pendulum"])
-def test_states_of_each_kind_have_numbers(name: str) -> None:
-    """First-order states, inputs, motions over time: every symbol of the table has a finite number."""
-    rows = re.findall(r"^\| \$(.+?)\$ \| (.+?) \|$", section(explained(name), "Numbers"), re.M)
-    assert len(rows) > 3
-    assert all(math.isfinite(float(value)) for _, value in rows)
 
 
 # -- names and letters ------------------------------------------------------------------------------------------------

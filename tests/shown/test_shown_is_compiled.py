@@ -21,8 +21,8 @@ NAMES = sorted(path.stem for path in EXAMPLES.glob("*.yaml"))
 KINDS = ("double_pendulum", "slider_crank", "rolling_disc", "car_axis", "satellite")
 OTHERS = [method for method in METHODS if method != "embedding"]
 #: Loops and trees, states, motions over time, switched and sampled parts, rotations of every description.
-ALWAYS = ("slider_crank", "car_axis", "rolling_disc", "satellite", "hydraulic_boom", "gear_train", "cam_follower")
-ALWAYS += ("rimless_wheel", "planetary_gear", "flyball_governor", "two_link_manipulator", "wheelset")
+ALWAYS = ("slider_crank", "car_axis", "rolling_disc", "satellite", "hydraulic_boom", "gear_train")
+ALWAYS += ("planetary_gear", "flyball_governor", "two_link_manipulator", "wheelset")
 MATRICES = ("mass_matrix", "constraint_jacobian", "velocity_transformation", "poses", "body_mass_matrix")
 MATRICES += ("body_velocity_transformation",)
 CLOSE = 1e-10
@@ -110,7 +110,7 @@ def test_of_every_example(name: str) -> None:
     ("name", "method"),
     part_of(
         [(name, method) for name in KINDS for method in OTHERS],
-        lambda pair: pair[0] == "slider_crank" or pair in (("rolling_disc", "lagrange"), ("satellite", "recursive")),
+        lambda pair: pair[0] == "slider_crank" or pair == ("rolling_disc", "lagrange"),
     ),
 )
 def test_of_every_method(name: str, method: str) -> None:
@@ -153,7 +153,7 @@ def test_the_block_system_has_the_compiled_accelerations_and_multipliers(name: s
         np.testing.assert_allclose(found[c.module.n_v :], multipliers, rtol=1e-7, atol=1e-8 * np.abs(multipliers).max())
 
 
-@pytest.mark.parametrize("name", ["double_pendulum", "satellite"])
+@pytest.mark.parametrize("name", part_of(["double_pendulum", "satellite"], "double_pendulum".__eq__))
 def test_momenta_and_their_rates_are_those_of_the_canonical_form(name: str) -> None:
     c = Compared(name, "hamilton", 3)
     form = c.module.canonical

@@ -244,15 +244,6 @@ def test_a_view_shows_its_values_and_its_equations() -> None:
     assert "M v' = f with v' = (3)" in str(still).splitlines()
 
 
-@pytest.mark.parametrize("method", part_of(METHODS, ("embedding", "newton_euler").__contains__))
-def test_functions_of_time_show_the_same_equations(method: str) -> None:
-    equations = eg.load_example("slider_crank").derive(method)
-    timed = equations.with_dynamicsymbols()
-    changed = str(timed).replace(" of freedom, functions of time", " of freedom")
-    assert changed.partition("read next")[0] == str(equations).partition("read next")[0]
-    assert timed._repr_latex_() == equations._repr_latex_()
-
-
 @pytest.mark.parametrize(
     "name", part_of(("double_pendulum", "slider_crank", "rolling_disc", "car_axis"), lambda n: n != "rolling_disc")
 )

@@ -1,0 +1,215 @@
+"""Animations: as many frames as the time asks for, files that others read, pages that need no network and play."""
+
+from __future__ import annotations
+
+import base64
+import importlib.util
+import io
+import re
+import shutil
+import time
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import numpy as np
+import pytest
+from browser import Browser
+from kernels import executed
+from PIL import Image
+
+import eomgen as eg
+
+
+@pytest.fixture(scope="module")
+def module() -> Any:
+    return eg.load_example("slider_crank").compile(target="numpy")
+
+
+@pytest.fixture(scope="module")
+def run(module: Any) -> Any:
+    return module.simulate(1.0)
+
+
+def test_positions_of_markers_are_those_of_outputs(run: Any, module: Any, tmp_path: Path) -> None:
+    tip = run.position("rod.tip")
+    assert tip[0] == pytest.approx(run["pin_x"], abs=1e-12)
+    assert run.poses().shape == (module.n_bodies, 4, 4, len(run))
+    assert run.position("slider") == pytest.approx(tip, abs=1e-6)
+    with pytest.raises(eg.UsageError, match="no marker or body 'rod.tap'; did you mean rod.tip"):
+        run.position("rod.tap")
+    loaded = eg.load_trajectory(run.save(tmp_path / "run.npz"))
+    assert loaded.poses(module) == pytest.approx(run.poses(), abs=1e-12)
+    with pytest.raises(eg.UsageError, match="give model=module"):
+        loaded.animate(tmp_path / "run.gif")
+    other = eg.load_example("pendulum").compile(target="numpy")
+    with pytest.raises(eg.UsageError, match="give the module that it was made with"):
+        loaded.poses(other)
+
+
+def test_a_gif_has_a_frame_for_every_step_of_time(run: Any, module: Any, tmp_path: Path) -> None:
+    file = run.animate(tmp_path / "run.gif", fps=10, speed=0.5, trace="rod.tip", plot="theta", dpi=40)
+    with Image.open(file) as image:
+        durations, frames = [], []
+        for k in range(image.n_frames):
+            image.seek(k)
+            durations.append(image.info["duration"])
+            frames.append(np.asarray(image.convert("L"), dtype=int))
+    assert (len(frames), sum(durations)) == (21, 2100)  # 1 s at half speed, 10 in a second, both ends
+    assert all((np.abs(a - b) > 40).any() for a, b in pairwise(frames))  # it moves
+    shown = run.animate(format="gif", fps=4, dpi=30)
+    found = re.fullmatch('<img alt="animation" src="data:image/gif;base64,(.*)">', shown._repr_html_())
+    assert found is not None
+    with Image.open(io.BytesIO(base64.b64decode(found[1]))) as image:
+        assert image.n_frames == 13  # 1 s in 3 s, 4 in a second, both ends
+
+
+def test_a_gif_keeps_the_colours_of_its_frames(tmp_path: Path) -> None:
+    """Of a spatial model, whose solids have many shades; 64 colours by number of dots were wrong by 54 of 255."""
+    run = eg.load_example("stewart_platform").compile(target="numpy").simulate(0.02)
+    film = run.animate(tmp_path / "a.gif", fps=2, speed=0.02, dpi=40)
+    folder = run.animate(tmp_path / "frames", fps=2, speed=0.02, dpi=40)
+    assert [file.name for file in sorted(folder.iterdir())] == ["frame_0.png", "frame_1.png", "frame_2.png"]
+    with pytest.raises(eg.UsageError, match="must be new or empty"):
+        run.animate(folder)
+    with Image.open(film) as stored, Image.open(folder / "frame_0.png") as made:
+        a, b = (np.asarray(one.convert("RGB")).astype(int) for one in (stored, made))
+    wrong = np.abs(a - b).max(axis=2)
+    assert wrong.mean() < 0.5
+    assert np.percentile(wrong, 99.9) <= 16
+
+
+def test_films_need_ffmpeg(run: Any, tmp_path: Path) -> None:
+    if importlib.util.find_spec("imageio_ffmpeg") or shutil.which("ffmpeg"):
+        assert run.animate(tmp_path / "run.mp4", fps=5, dpi=40).read_bytes()[4:8] == b"ftyp"
+    else:
+        with pytest.raises(eg.MissingDependencyError, match="needs ffmpeg: pip install imageio-ffmpeg"):
+            run.animate(tmp_path / "run.mp4")
+
+
+@pytest.mark.parametrize(
+    ("file", "how", "said"),
+    [
+        ("run.avi", {}, r"\.gif, \.mp4 or \.html"),
+        ("run.gif", {"fps": 0}, "fps must be a number greater than 0"),
+        ("run.gif", {"fps": 60, "speed": 0.001}, "is the most; give a speed"),
+        ("run.gif", {"trace": "nowhere"}, "trace"),
+        ("run.gif", {"dpi": "x"}, "dpi must be a number"),
+        ("run.gif", {"dpi": 1e6}, "dpi must be a number from 1 to 1200"),
+        ("run.gif", {"format": "gif"}, "format= is for an animation without a file"),
+        ("run.gif", {"forces": ("hing",)}, "no joint, spring or damper 'hing'"),
+        ("gif", {}, "such as 'run.gif', or format='gif' without a file"),
+        (None, {"format": "png"}, "format must be one of 'gif', 'mp4', 'html', not 'png'"),
+        ("run.gif", {"model": eg.Model("m")}, r"model must be a module, as Model.compile\(\) returns"),
+    ],
+)
+def test_slips_are_told_before_any_work(
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str | None, how: dict[str, Any], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(eg.UsageError, match=said):
+        run.animate(file, **how)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_page_holds_all_it_needs(run: Any, module: Any, tmp_path: Path) -> None:
+    pytest.importorskip("k3d")
+    text = run.animate(tmp_path / "run.html", fps=10, trace="rod.tip").read_text()
+    assert re.findall(r"""(?:src|href)\s*=\s*["']?(?:https?:)?//""", text[:5000] + text[-5000:]) == []
+    assert "<title>slider_crank</title>" in text
+    slow = str(module.simulate(0.1).animate(speed=0.25))
+    assert '<option value="1.0" selected>x0.25</option><option value="2.0">x0.5</option>' in slow
+    assert "t = 0.000 s" in slow
+    motion = module.kinematic_analysis(theta=np.linspace(0.0, 1.0, 5))
+    assert '"words": ["theta = 0.000 rad", "theta = 0.250 rad"' in str(motion.animate(plot="s"))
+
+
+def test_the_longest_arrow_is_the_force_that_a_joint_bears() -> None:
+    """At rest the hinge holds 2 kg; let go at a right angle it holds nothing at first, and 3 m g at the bottom."""
+    pytest.importorskip("k3d")
+    m = eg.Model("hanging", gravity=(0, -9.81, 0))
+    m.revolute("hinge", m.ground, m.body("bob", mass=2.0, com=(0, -1, 0)), coordinate="theta")
+    mod = m.compile(target="numpy")
+    for angle, end, force in ((0.0, 0.2, 2 * 9.81), (np.pi / 2, 0.6, 3 * 2 * 9.81)):
+        run = mod.simulate((0, end), initial={"theta": angle}, rtol=1e-9)
+        shown = re.search(r"longest arrow ([\d.]+) N", str(run.animate(forces=True, fps=40, speed=0.1)))
+        assert shown is not None
+        q, w = run["theta"], run["theta_dot"]
+        bound = np.abs(2 * (w**2 + 9.81 * np.cos(q))).max()  # m l w^2 along the rod, and m g cos of the fall
+        assert float(shown[1]) == pytest.approx(bound, rel=0.01)
+        assert float(shown[1]) <= force * 1.001
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.thorough
+def test_a_page_plays_and_its_slider_moves_it_without_a_network(run: Any, tmp_path: Path) -> None:
+    page = run.animate(tmp_path / "run.html", fps=10, trace="rod.tip", plot=["theta", "energy"], forces=True)
+    with Browser(tmp_path / "profile") as browser:
+        browser.open(page.as_uri())
+        browser.wait_for("document.getElementById('words') !== null")
+        time = "+document.getElementById('time').value"
+        browser.wait_for(f"{time} > 0.2")  # it plays of itself
+        browser.click("#play")
+        here = browser.evaluate(time)
+        pixels = browser.picture()
+        assert len(np.unique(pixels.reshape(-1, 3) // 32, axis=0)) > 8  # links of several colours, not an empty canvas
+        assert browser.evaluate(time) == here  # it stands still
+        browser.click("#time", across=0.6)
+        browser.wait_for("document.getElementById('words').textContent.startsWith('t = 0.6')")
+        there, moved = browser.evaluate(time), browser.picture()
+        above = slice(40, int(browser.place("#canvasTarget")["h"]) - 20)
+        assert (pixels[above] != moved[above]).any(axis=2).mean() > 0.005
+        cursor = browser.place("#cursor")["x"]
+        browser.click("#play")
+        browser.wait_for(f"{time} > {there}")
+        browser.wait_for(f"document.querySelector('#cursor').getBoundingClientRect().x > {cursor}")
+        assert (browser.complaints, browser.requests) == ([], [])
+
+
+@pytest.mark.needs("chromium")
+@pytest.mark.thorough
+def test_a_page_fits_a_narrow_window_and_says_what_it_lacks(run: Any, tmp_path: Path) -> None:
+    pytest.importorskip("k3d")
+    file = run.animate(tmp_path / "run.html", names=False)
+    with Browser(tmp_path / "profile", size=(420, 760)) as browser:
+        browser.open(file.as_uri())
+        browser.wait_for("document.getElementById('words') && document.getElementById('words').textContent !== ''")
+        end = time.monotonic() + 30
+        while True:  # until the mechanism is drawn
+            drawn = (browser.picture()[60:600] < 200).any(axis=(0, 2))
+            if drawn.sum() > 50 and not drawn[:3].any() and not drawn[-3:].any():
+                break
+            assert time.monotonic() < end, "the mechanism reaches beyond the window"
+            time.sleep(0.5)
+        script = "HTMLCanvasElement.prototype.getContext = () => null;"
+        browser.call("Page.addScriptToEvaluateOnNewDocument", source=script)
+        browser.open(file.as_uri())
+        browser.wait_for("document.getElementById('missing') !== null")
+        assert "needs WebGL 2" in browser.evaluate("document.getElementById('missing').textContent")
+
+
+@pytest.mark.thorough
+def test_a_kernel_shows_progress_pictures_and_short_tracebacks(tmp_path: Path) -> None:
+    cells = [
+        "import eomgen as eg\nmod = eg.load_example('pendulum').compile(target='numpy')\nmod",
+        "traj = mod.simulate(20.0, progress=True, rtol=1e-9)",
+        "traj.plot();",
+        "traj.animate(plot='theta')",
+        "def mine():\n    return mod.simulate(1.0, initial={'thet': 3})\nmine()",
+    ]
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(text) for text in cells])
+    notebook.cells[4].metadata.tags = ["raises-exception"]
+    nbformat.write(notebook, tmp_path / "given.ipynb")
+    (tmp_path / "done").mkdir()
+    outputs = [cell.outputs for cell in executed(tmp_path / "given.ipynb", tmp_path / "done", raw=True).cells]
+    assert "base64" in outputs[0][0].data["text/html"]
+    (bar,) = outputs[1]  # what was shown of the progress, at its end: nothing
+    assert bar.data["text/html"] == ""
+    assert any("image/png" in one.get("data", {}) for one in outputs[2])
+    assert outputs[3][0].data["text/html"].startswith("<iframe")
+    (error,) = outputs[4]
+    text = "\n".join(error.traceback)
+    assert "line 2, in mine" in text
+    assert "did you mean theta" in text
+    assert "eomgen/" not in text
