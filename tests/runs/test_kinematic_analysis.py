@@ -13,15 +13,6 @@ import pytest
 import eomgen as eg
 
 
-def slider_crank(driven: bool = True) -> eg.Model:
-    m = eg.load(models.EXAMPLES / "driven_slider_crank.yaml")
-    if not driven:
-        m.description.sections["constraints"].clear()
-        for entry in m.description.sections["bodies"]:
-            entry.values |= {"mass": 1, "inertia": {"zz": 1}}
-    return m
-
-
 def parallelogram(value: str = "0.5 + 2*pi*t") -> eg.Model:
     m = eg.Model("parallelogram")
     one, bar, two = (m.body(name, mass=0) for name in ("one", "bar", "two"))
@@ -37,12 +28,20 @@ def parallelogram(value: str = "0.5 + 2*pi*t") -> eg.Model:
 
 @pytest.fixture(scope="module")
 def crank() -> eg.Module:
-    return slider_crank().compile(target="numpy")
+    return eg.load_example("driven_slider_crank").compile(target="numpy")
 
 
 @pytest.fixture(scope="module")
 def free_crank() -> eg.Module:
-    return slider_crank(driven=False).compile(target="numpy", independent=["theta"])
+    """The same with masses and without its driver."""
+    m = eg.Model("free_slider_crank")
+    one, rod, slider = (m.body(name, mass=1, inertia={"zz": 1}) for name in ("crank", "rod", "slider"))
+    m.revolute("A", m.ground, one, coordinate="theta")
+    m.revolute("B", one.at(0.1, 0, 0), rod, coordinate="bend")
+    m.revolute("C", rod.at(0.3, 0, 0), slider)
+    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    m.guess(bend=0, s=0.4)
+    return m.compile(target="numpy", independent=["theta"])
 
 
 @pytest.fixture(scope="module")
