@@ -180,7 +180,6 @@ def test_a_drive_on_a_cut_slider_reacts_on_both_bodies() -> None:
     np.testing.assert_allclose(driven.reactions(0.0, x), found.reactions, atol=1e-9)
 
 
-@pytest.mark.quick
 def test_a_chain_against_pinocchio() -> None:
     """``data.f`` of the recursive Newton-Euler algorithm is the force that the parent exerts, in joint axes."""
     made = random_models.random_model(5, 5, types=("revolute", "prismatic"))
