@@ -210,6 +210,10 @@ def public_tests() -> Iterator[str]:
 
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
-    wrong = [line for check in (forbidden, limits, directions, references, packages, keywords) for line in check()]
+    wrong = [
+        line
+        for check in (forbidden, limits, directions, references, packages, keywords, public_tests)
+        for line in check()
+    ]
     print("\n".join(wrong) or "source text: nothing wrong")
     sys.exit(bool(wrong))

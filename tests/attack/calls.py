@@ -239,13 +239,7 @@ OBJECTS: dict[str, Callable[[Any], Any]] = {
     "function": lambda m: lambda *a: 1.0,
     "self": lambda m: m,
     "type": lambda m: float,
-    "generator": lambda m: (x for x in (1.0, 2.0)),
     "object": lambda m: object(),
-    "masked": lambda m: np.ma.masked_array([1.0, 2.0], mask=[True, False]),
-    "date": lambda m: np.datetime64("2001-01-01"),
-    "ellipsis": lambda m: ...,
-    "slice": lambda m: slice(None),
-    "true": lambda m: True,
     "false": lambda m: np.False_,
 }
 KINDS = {"calls": Calls()}

@@ -32,9 +32,7 @@ ENVIRONMENT: dict[str, tuple[str | None, ...]] = {
     "LANG": (None, "", "C", "xx_YY.nothing"),
     "LC_ALL": (None, "", "C", "POSIX", "xx_YY.nothing"),
     "COLUMNS": (None, "", "0", "1", "-1", "x", "9" * 30),
-    "TERM": (None, "", "dumb", "nothing"),
     "TMPDIR": ("none", "other.txt", ""),
-    "MPLBACKEND": ("nothing", ""),
     "CC": (*NO_COMPILERS, "", " "),
 }
 #: Files that every case finds in its folder.

@@ -60,7 +60,7 @@ def agree(task: Callable[[int], Any]) -> None:
 @TARGETS
 def test_calls_runs_and_ensembles(crank: Any) -> None:
     def task(k: int) -> list[Any]:
-        x = crank.x0()[:, None] + 0.01 * np.random.default_rng(k).normal(size=(crank.n_x, 40))
+        x = crank.x0()[:, None] + 0.01 * np.random.default_rng(k).normal(size=(crank.n_x, 12))
         n, p = crank.n_q, crank.p * (1.0 + 0.01 * k)
         start = {"theta": 0.3 + 0.01 * k}
         run = crank.simulate(SPAN, initial=start, inputs={"tau": "0.1*sin(t)"}, method="DOP853" if k % 2 else "Radau")

@@ -98,7 +98,7 @@ sys.addaudithook(hook)
 
 @pytest.mark.parametrize(
     ("target", "step"),
-    [("numpy", 7), pytest.param("numpy", 1, marks=THOROUGH), pytest.param("cython", 3, marks=THOROUGH)],
+    [("numpy", 9), pytest.param("numpy", 1, marks=THOROUGH), pytest.param("cython", 3, marks=THOROUGH)],
 )
 def test_a_build_that_is_killed_at_a_change_of_the_cache(target: str, step: int, tmp_path: Path) -> None:
     """In a new cache, for every change until the build is through; what was left behind is no hindrance."""
@@ -114,7 +114,7 @@ def test_a_build_that_is_killed_at_a_change_of_the_cache(target: str, step: int,
 
 @pytest.mark.parametrize(
     ("target", "processes"),
-    [("numpy", 4), pytest.param("numpy", 20, marks=THOROUGH), pytest.param("cython", 12, marks=THOROUGH)],
+    [("numpy", 3), pytest.param("numpy", 20, marks=THOROUGH), pytest.param("cython", 12, marks=THOROUGH)],
 )
 def test_many_processes_at_once(target: str, processes: int, tmp_path: Path) -> None:
     """Nothing there yet, some of them killed meanwhile."""
@@ -226,20 +226,18 @@ def test_odd_paths_under_the_poorest_locale(place: str, target: str, tmp_path: P
 
 #: What is odd -> lines before the package is imported, and changes of the environment.
 ODD: dict[str, tuple[str, Changes]] = {
-    "umask 0": ("os.umask(0)", {}),
     "no home at all": (
         "import pwd; os.environ.pop('HOME', None); pwd.getpwuid = lambda uid: {}['nobody']",
         {"EOMGEN_CACHE_DIR": None, "XDG_CACHE_HOME": None},
     ),
+    "umask 0": ("os.umask(0)", {}),
     "no TMPDIR": ("", {"TMPDIR": "/nowhere/at/all"}),
     "umask 777": ("os.umask(0o777)", {}),
     "umask 002": ("os.umask(2)", {}),
-    "an empty TMPDIR": ("", {"TMPDIR": ""}),
     "no PATH": ("", {"PATH": ""}),
     "no current folder": ("import tempfile; os.chdir(tempfile.mkdtemp()); os.rmdir(os.getcwd())", {}),
     "closed streams": ("os.close(0); os.close(1); os.close(2)", {}),
     "20 open files": ("import resource; resource.setrlimit(resource.RLIMIT_NOFILE, (20, 20))", {}),
-    "optimised Python": ("", {"PYTHONOPTIMIZE": "2"}),
     "a clock 30 years ahead": ("import time; clock = time.time; time.time = lambda: clock() + 1e9", {}),
     "a clock 30 years behind": ("import time; clock = time.time; time.time = lambda: clock() - 1e9", {}),
     "a home that is a file": ("", {"EOMGEN_CACHE_DIR": None, "XDG_CACHE_HOME": None, "HOME": "/etc/passwd"}),
@@ -253,21 +251,11 @@ ODD: dict[str, tuple[str, Changes]] = {
 
 
 @TARGETS
-@pytest.mark.parametrize("name", [*list(ODD)[:2], *(pytest.param(name, marks=THOROUGH) for name in list(ODD)[2:])])
+@pytest.mark.parametrize("name", [*list(ODD)[:1], *(pytest.param(name, marks=THOROUGH) for name in list(ODD)[1:])])
 def test_odd_environments(name: str, target: str, tmp_path: Path) -> None:
     before, changes = ODD[name]
     outcome = run(tmp_path / "cache", target, before, changes)
     survived(name, outcome, after=run(tmp_path / "cache", target))
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("moment", [0.0, 3e9])
-def test_files_of_another_time(moment: float, tmp_path: Path) -> None:
-    cache = tmp_path / "cache"
-    assert run(cache, "cython") == "right"
-    for path in [*cache.rglob("*"), cache]:
-        os.utime(path, (moment, moment))
-    assert run(cache, "cython") == "right"
 
 
 # -- compilers and versions --------------------------------------------------------------------------------------------
@@ -275,8 +263,6 @@ VERSION = '[ "$1" = --version ] && exec gcc --version'
 OUTPUT = 'out=; last=; for word; do [ "$last" = -o ] && out=$word; last=$word; done'
 LINKS = 'case " $* " in *" -c "*) exec gcc "$@";; esac'
 COMPILERS = {
-    "exits with 1": "exit 1",
-    "dies of a signal": "kill -SEGV $$",
     "hangs behind a child": "sleep 600 & wait",
     "prints without end": "exec yes",
     "hangs in compiling": f"{VERSION}\nsleep 600",

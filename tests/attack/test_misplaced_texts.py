@@ -105,7 +105,7 @@ def load(data: Any, folder: Path) -> eg.Model:
 
 
 @pytest.mark.parametrize("every", [44, pytest.param(6, marks=pytest.mark.thorough)])
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", [pytest.param("bare", marks=pytest.mark.quick), "given", "held", "mechanism"])
 def test_a_nasty_text_is_refused_by_name(name: str, every: int, tmp_path: Path) -> None:
     """A few of the texts in each place, the next in the next."""
     assert load(MODELS[name], tmp_path).mechanism().name == name
@@ -191,14 +191,3 @@ def test_no_name_of_a_model_makes_a_name_that_is_there(target: str, tmp_path: Pa
         assert "name" in {problem.path for problem in caught.value.problems}, (
             f"a model {name!r} would make {target} code"
         )
-
-
-@pytest.mark.parametrize(
-    "name", ["real", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("rk4", "series"))]
-)
-def test_words_of_the_generated_code_may_name_a_model(name: str) -> None:
-    m = eg.Model(name)
-    m.prismatic("s", m.ground, m.body("box", mass=2.0))
-    m.force("push", m.bodies["box"], (6.0, 0, 0))
-    module = m.compile(kernels=["rhs"], optimize=0)
-    assert abs(module.rhs(0.0, module.x0())[1]) in (0.0, 3.0)
