@@ -96,7 +96,7 @@ def test_values_between_the_steps(crank: eg.Module, target: str) -> None:
     np.testing.assert_array_equal(plain.at(0.05).x, kept.at(0.05).x)
 
 
-def test_events_are_projected_and_counted_across_corners(crank: eg.Module) -> None:
+def test_events_are_projected_and_counted_across_corners() -> None:
     driven = models.build("slider_crank").compile(target="numpy")
 
     def turn(t: float, x: np.ndarray) -> float:

@@ -179,8 +179,8 @@ def test_what_the_watch_or_a_handler_raises_comes_out() -> None:
 
     before = signal.signal(signal.SIGALRM, alarm)
     try:
-        signal.setitimer(signal.ITIMER_REAL, 0.1)
         with pytest.raises(TimeoutError, match="too long"):
+            signal.setitimer(signal.ITIMER_REAL, 0.1)
             mod.simulate((0, 1e5), rtol=1e-12, atol=1e-12, t_eval=[1e5])
     finally:
         signal.signal(signal.SIGALRM, before)
