@@ -208,7 +208,8 @@ class _DaeRun:
             self._store(times, np.repeat(x[:, None], len(times), axis=1), True)
         if after is None:
             return x
-        self._store(np.array([t]), x[:, None], True)
+        if self.times is None or t in self.times:
+            self._store(np.array([t]), x[:, None], True)
         return after
 
     def _part(self, t: float, x: Array, end: float, jumped: bool) -> tuple[float, Array, list[int]]:

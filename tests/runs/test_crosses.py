@@ -1,0 +1,430 @@
+"""Crosses: every call that reads inputs over time, with inputs of every kind, in mechanisms of every kind.
+
+Wrong results without a word sat where two features meet that are each right alone.  The cells cover all pairs of
+{mechanism, kind of input, call}; the outputs of every cell are a position, a velocity, an acceleration, a reaction, the
+input and a parameter.  Each is judged by SciPy's DOP853 on ``rhs`` with the input as a function of Python, begun anew
+where the input jumps, or is refused by the name that the table of refusals has.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from functools import cache, partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+import eomgen as eg
+
+END = 0.29
+TIMES = np.array([0.003, 0.115, 0.19, END])  # no corner of an input and no sample among them
+PLACES, VALUES = [0.0, 0.05, 0.11, 0.21, 1.0], [1.0, -2.0, 3.0, 5.0, 7.0]
+OUTPUTS = ("position", "velocity", "acceleration", "reaction", "input", "parameter")
+
+
+class Wave:
+    """An input that knows its rates."""
+
+    def __init__(self, order: int = 0) -> None:
+        self.order = order
+
+    def __call__(self, t: float) -> float:
+        return float(3.0**self.order * np.sin(3.0 * t + self.order * np.pi / 2) + (self.order == 0))
+
+    def derivative(self) -> Wave:
+        return Wave(self.order + 1)
+
+
+def piecewise(t: float, kind: str) -> float:
+    """A table read by another program than eomgen."""
+    if kind == "held":
+        return VALUES[max(0, int(np.searchsorted(PLACES, t, side="right")) - 1)]
+    return float(np.interp(t, PLACES, VALUES))
+
+
+#: Kind of input -> what a run is given, and the same as a function of time and state.
+KINDS: dict[str, tuple[Any, Callable[[float, np.ndarray], float]]] = {
+    "number": (1.5, lambda t, x: 1.5),
+    "held": (eg.Signal(PLACES, VALUES, "zero-order"), lambda t, x: piecewise(t, "held")),
+    "linear": ((PLACES, VALUES), lambda t, x: piecewise(t, "linear")),
+    "cubic": (eg.Signal(PLACES, VALUES, "cubic"), lambda t, x: float(CubicSpline(PLACES, VALUES)(t))),
+    "text": ("1 + sin(3*t)*k", lambda t, x: 1.0 + np.sin(3.0 * t) * 2.0),
+    "function": (lambda t, x: np.cos(4.0 * t) - 0.2 * x[0], lambda t, x: np.cos(4.0 * t) - 0.2 * x[0]),
+    "object": (Wave(), lambda t, x: Wave()(t)),
+}
+
+
+def finished(m: eg.Model, body: Any, coordinate: str, joint: str, acceleration: Any = None) -> eg.Model:
+    """With an output of every kind; the reaction where the joint has one."""
+    m.output("position", coordinate)
+    m.output("velocity", f"{coordinate}_dot")
+    m.output("acceleration", body.acceleration[0] if acceleration is None else acceleration)
+    if joint:
+        m.output("reaction", f"reaction({joint}).y")
+    m.output("input", "2*u + 0.1*k")
+    m.output("parameter", f"k*{coordinate}")
+    m.output("clearance", f"{coordinate} + 100")
+    return m
+
+
+def started(name: str, gravity: Any = (0, -9.81, 0)) -> tuple[eg.Model, Any]:
+    m = eg.Model(name, gravity=gravity)
+    m.parameter("k", 2.0)
+    return m, m.input("u")
+
+
+def tree() -> eg.Model:
+    m, u = started("tree")
+    rod = m.body("rod", mass=1, com=(0.5, 0, 0), inertia={"zz": 0.1})
+    m.revolute("A", m.ground, rod, coordinate="q")
+    m.torque("motor", "A", u - 0.1 * m.parameter("c", 1.0))
+    m.initial(q=0.3)
+    return finished(m, rod, "q", "A")
+
+
+def loops(name: str = "loops", rods: int = 1) -> eg.Model:
+    """A parallelogram of equal cranks; with a second rod one of its loops is redundant."""
+    m, u = started(name)
+    cranks = [m.body(f"crank{i}", mass=1, com=(0.1, 0, 0), inertia={"zz": 0.01}) for i in range(2 + (rods > 1))]
+    rod = m.body("rod", mass=0.5, com=(0.25, 0, 0), inertia={"zz": 0.02})
+    for i, crank in enumerate(cranks):
+        place = (0.5, 0.25)[i - 1] if i else 0.0
+        m.revolute(f"A{i}", m.ground.at(place, 0, 0), crank, **({"coordinate": "q"} if i == 0 else {}))
+        m.revolute(f"B{i}", crank.at(0.2, 0, 0), rod.at(place, 0, 0))
+    m.torque("motor", "A0", u)
+    m.initial(q=0.7)
+    m.independent("q")
+    return finished(m, rod, "q", "A0" if rods == 1 else "")
+
+
+def nonholonomic() -> eg.Model:
+    m, u = started("nonholonomic", (0, 0, 0))
+    blade = m.body("blade", mass=1, com=(0.1, 0, 0), inertia={"zz": 0.1})
+    m.planar("J", m.ground, blade, coordinates=["q", "y", "phi"])
+    m.coupling("edge", equation="q_dot*sin(phi) - y_dot*cos(phi)")
+    m.force("push", blade, (u, 0, 0))
+    m.initial(phi=0.4, phi_dot=1.0, q_dot=0.5)
+    return finished(m, blade, "q", "")
+
+
+def states() -> eg.Model:
+    m, u = started("states", (0, 0, 0))
+    cart = m.body("cart", mass=2)
+    m.prismatic("J", m.ground, cart, axis="x", coordinate="q")
+    f = m.state("f", "(u - f)/0.05", initial=0.2)
+    m.actuator("push", "J", value=f + u / 4)
+    return finished(m, cart, "q", "J")
+
+
+def sampled() -> eg.Model:
+    m, u = started("sampled", (0, 0, 0))
+    cart = m.body("cart", mass=2)
+    m.prismatic("J", m.ground, cart, axis="x", coordinate="q")
+    m.actuator("push", "J", value=m.sampled("f", "u - 3*q", period=0.02) + u / 4)
+    return finished(m, cart, "q", "J")
+
+
+def switched() -> eg.Model:
+    m, u = started("switched", (0, 0, 0))
+    first, second = (m.body(name, mass=1, inertia={"zz": 0.5}) for name in ("first", "second"))
+    m.revolute("A", m.ground, first, coordinate="q")
+    m.revolute("B", m.ground, second)
+    m.torque("motor", "A", u)
+    m.coupling("clutch", equation="q_dot - B_dot", closes="0.04 - t", opens="0.15 - t")
+    m.initial(q_dot=1.0)
+    return finished(m, first, "q", "", "q_ddot")
+
+
+def contacts() -> eg.Model:
+    m, u = started("contacts")
+    ball = m.body("ball", mass=1, inertia={"zz": 0.004})
+    m.planar("J", m.ground, ball, coordinates=["q", "y", "phi"])
+    law = {"stiffness": 1e4, "dissipation": 0.5, "friction": 0.4, "smoothing": 1e-2}
+    shapes = {"shape": "circle", "on": ball, "radius": 0.1}, {"shape": "half_plane", "on": m.ground}
+    m.contacts("floor", *shapes, law)
+    m.force("push", ball, (u, 0, 0))
+    m.initial(y=0.0995)
+    return finished(m, ball, "q", "")
+
+
+def driven() -> eg.Model:
+    """The length of a swinging rope is the input."""
+    m, _ = started("driven")
+    mass = m.body("mass", mass=1)
+    m.revolute("A", m.ground, m.body("arm", mass=0), coordinate="q")
+    m.prismatic("B", m.bodies["arm"], mass, axis="x", coordinate="s")
+    m.driver("rope", "s", "2 + u/10")
+    m.initial(q=0.3)
+    return finished(m, mass, "q", "A")
+
+
+def massless() -> eg.Model:
+    m, u = started("massless")
+    rod, tip = m.body("rod", mass=0), m.body("tip", mass=0.5)
+    m.revolute("A", m.ground, rod, coordinate="q")
+    m.weld("W", rod.at(0.4, 0, 0), tip)
+    m.torque("motor", "A", u)
+    return finished(m, tip, "q", "A")
+
+
+def fixed() -> eg.Model:
+    """Without freedoms: a motion in time, and an input that loads it."""
+    m, u = started("fixed")
+    rod = m.body("rod", mass=1, com=(0.5, 0, 0), inertia={"zz": 0.1})
+    m.revolute("A", m.ground, rod, coordinate="q")
+    m.driver("drive", "q", "0.3 + t + t**2")
+    m.torque("motor", "A", u)
+    return finished(m, rod, "q", "A")
+
+
+MECHANISMS: dict[str, Callable[[], eg.Model]] = {
+    "tree": tree, "loops": loops, "redundant": partial(loops, "redundant", 2), "nonholonomic": nonholonomic,
+    "states": states, "sampled": sampled, "switched": switched, "contacts": contacts, "driven": driven,
+    "massless": massless, "fixed": fixed,
+}  # fmt: skip
+
+
+@cache
+def module(mechanism: str) -> Any:
+    return MECHANISMS[mechanism]().compile(target="numpy")
+
+
+class Reference:
+    """A run by SciPy and by what this file knows of the mechanism."""
+
+    def __init__(self, mechanism: str, kind: str, k: float = 2.0) -> None:
+        self.mechanism, self.kind, self.mod, self.k = mechanism, kind, module(mechanism), k
+        function = KINDS[kind][1]
+        self.u = (lambda t, x: 1.0 + np.sin(3.0 * t) * k) if kind == "text" else function
+        self.corners = [0.0, *[t for t in PLACES[1:4] if kind in ("held", "linear", "cubic") and t < END], END]
+        self.x = self._states()
+
+    def given(self, t: float, x: np.ndarray) -> np.ndarray:
+        """All inputs of a call: the input and the rates that the mechanism takes."""
+        u = self.u
+        if self.mechanism != "driven":
+            return np.array([u(t, x)])
+        rates = {
+            "number": lambda order: 0.0,
+            "linear": lambda order: 0.0,
+            "cubic": lambda order: float(CubicSpline(PLACES, VALUES)(t, order)),
+            "text": lambda order: self.k * (Wave(order)(t)),
+            "object": lambda order: Wave(order)(t),
+        }[self.kind]
+        return np.array([u(t, x), rates(1), rates(2)])
+
+    def rhs(self, t: float, x: np.ndarray) -> np.ndarray:
+        return np.asarray(self.mod.rhs(t, x, p={"k": self.k}, u=self.given(t, x)))
+
+    def _states(self) -> np.ndarray:
+        x = self.mod.x0()
+        if self.mechanism == "switched":
+            return self._clutch()
+        if self.mechanism == "fixed":
+            return np.array([[0.3 + t + t**2, 1 + 2 * t] for t in TIMES]).T
+        samples = [0.02 * k for k in range(15)] if self.mechanism == "sampled" else []
+        corners = sorted({*self.corners, *samples})
+        found: dict[float, np.ndarray] = {}
+        for start, end in pairwise(corners):
+            if start in samples:
+                x = self._sample(start, x)
+            inside = [t for t in TIMES if start <= t <= end]
+            middle = partial(self._within, start, end)
+            run = solve_ivp(middle, (start, end), x, "DOP853", sorted({*inside, end}), rtol=1e-10, atol=1e-12)
+            found |= dict(zip(inside, run.y.T, strict=False))
+            x = run.y[:, -1]
+        return np.array([self.mod.project(found[t], t=t, u=self.given(t, found[t])) for t in TIMES]).T
+
+    def _within(self, start: float, end: float, t: float, x: np.ndarray) -> np.ndarray:
+        """x' inside a part, so that the value of a jump is that of the part."""
+        return self.rhs(min(max(t, start + 1e-12), end - 1e-12), x)
+
+    def _sample(self, t: float, x: np.ndarray) -> np.ndarray:
+        place = self.mod.x_names.index("f")
+        new = x.copy()
+        new[place] = self.u(t + 1e-12, x) - 3.0 * x[0]
+        return new
+
+    def _clutch(self) -> np.ndarray:
+        """Two equal rotors in closed equations; the motion of the second begins at rest."""
+        corners = sorted({*self.corners, 0.04, 0.15})
+        x, found = np.array([0.0, 0.0, 1.0, 0.0]), {}
+        for start, end in pairwise(corners):
+            closed = 0.04 <= start < 0.15
+            if start == 0.04:
+                x[2:] = x[2:].mean()
+
+            def rhs(t: float, y: np.ndarray, part: tuple[float, float, bool] = (start, end, closed)) -> np.ndarray:
+                torque = self.u(min(max(t, part[0] + 1e-12), part[1] - 1e-12), y)
+                shares = (0.5, 0.5) if part[2] else (1.0, 0.0)
+                return np.array([y[2], y[3], torque * shares[0] / 0.5, torque * shares[1] / 0.5])
+
+            inside = [t for t in TIMES if start <= t <= end]
+            run = solve_ivp(rhs, (start, end), x, "DOP853", sorted({*inside, end}), rtol=1e-10, atol=1e-12)
+            found |= dict(zip(inside, run.y.T, strict=False))
+            x = run.y[:, -1].copy()
+        return np.array([[*found[t], 0.0] for t in TIMES]).T
+
+    def outputs(self) -> np.ndarray:
+        if self.mechanism == "switched":
+            closed = [0.04 <= t < 0.15 for t in TIMES]
+            u = np.array([self.u(t, x) for t, x in zip(TIMES, self.x.T, strict=True)])
+            return np.array(
+                [
+                    self.x[0],
+                    self.x[2],
+                    u / np.where(closed, 1.0, 0.5),
+                    2 * u + 0.1 * self.k,
+                    self.k * self.x[0],
+                    self.x[0] + 100,
+                ]
+            )
+        rows = [
+            self.mod.outputs(t, x, p={"k": self.k}, u=self.given(t, x)) for t, x in zip(TIMES, self.x.T, strict=True)
+        ]
+        return np.array(rows).T
+
+
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
+
+
+def columns(run: Any, names: tuple[str, ...]) -> np.ndarray:
+    return np.array([run[name] for name in names])
+
+
+def simulated(mod: Any, u: Any, reference: Reference, method: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+    options = TIGHT if method != "Radau" else {"rtol": 1e-8, "atol": 1e-10}
+    run = mod.simulate(END, inputs={"u": u}, t_eval=TIMES, method=method, **options)
+    return run.x, columns(run, mod.y_names)
+
+
+def sensitivities(mod: Any, u: Any, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
+    """The run and its derivatives by the parameter k, against differences of references."""
+    found = mod.sensitivities(["k"], END, inputs={"u": u}, t_eval=TIMES)
+    low, high = (Reference(reference.mechanism, reference.kind, 2.0 + h) for h in (-1e-4, 1e-4))
+    slopes = (high.outputs() - low.outputs()) / 2e-4
+    dy = np.array(
+        [found.dy[name][0] if isinstance(found.dy, dict) else found.dy[i][0] for i, name in enumerate(mod.y_names)]
+    )
+    np.testing.assert_allclose(dy, slopes, atol=2e-5 * max(1.0, np.abs(slopes).max()))
+    return found.trajectory.x, columns(found.trajectory, mod.y_names)
+
+
+def ensemble(mod: Any, u: Any, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
+    runs = mod.simulate_many(END, parameters={"k": [2.0, 2.5]}, inputs={"u": u}, t_eval=TIMES, **TIGHT)
+    one = runs.trajectory(0).at(TIMES)
+    np.testing.assert_allclose(runs.samples[: mod.n_q, :, 0], one.x[: mod.n_q], atol=1e-6)
+    return one.x, columns(one, mod.y_names)
+
+
+def differential_algebraic(mod: Any, u: Any, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
+    warnings.filterwarnings("ignore", "IDA steps over contacts")  # which it does not here
+    run = mod.dae.solve(END, inputs={"u": u}, t_eval=TIMES, rtol=1e-9, atol=1e-11)
+    return run.x, columns(run, mod.y_names)
+
+
+def impacts(mod: Any, u: Any, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
+    """A gap that stays open changes nothing."""
+    run = mod.simulate_impacts(END, {"clearance": 0.5}, inputs={"u": u}, **TIGHT).at(TIMES)
+    return run.x, columns(run, mod.y_names)
+
+
+def fit(mod: Any, u: Any, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
+    """The parameter k is found again from the output that it scales; the data begin where the run does."""
+    start = 2.0 * mod.x0()[0]
+    data = {"t": [0.0, *TIMES], "parameter": [start, *reference.outputs()[mod.y_names.index("parameter")]]}
+    found = mod.fit(data, {"k": 1.8}, inputs={"u": u})
+    assert found.values["k"] == pytest.approx(2.0, abs=1e-5)
+    return reference.x, reference.outputs()
+
+
+def linearize(mod: Any, u: Any, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
+    """B and D are the differences of x' and of the outputs."""
+    t, x = TIMES[1], reference.x[:, 1]
+    given = reference.given(t, x)
+    line = mod.linearize(x, t, u=given, form="full")
+    h = np.array([1e-3, *np.zeros(len(given) - 1)])
+    low, high = (reference.mod.rhs(t, x, u=given + s * h) for s in (-1, 1))
+    np.testing.assert_allclose(line.B[:, 0], (high - low) / 2e-3, atol=1e-8 * max(1.0, np.abs(high).max()))
+    if reference.mechanism == "driven":  # there D is that of states which do not follow the input
+        return reference.x, reference.outputs()
+    low, high = (reference.mod.outputs(t, x, u=given + s * h) for s in (-1, 1))
+    np.testing.assert_allclose(line.D[:, 0], (high - low) / 2e-3, atol=1e-8 * max(1.0, np.abs(high).max()))
+    return reference.x, reference.outputs()
+
+
+def again(mod: Any, u: Any, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
+    """States between the steps of a run, which are asked for afterwards."""
+    run = mod.simulate(END, inputs={"u": u}, **TIGHT).at(TIMES)
+    return run.x, columns(run, mod.y_names)
+
+
+def minimal(mod: Any, u: Any, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
+    """The minimal form's x' at states of the reference is that of the full form."""
+    small = mod.minimal
+    for t, x in zip(TIMES, reference.x.T, strict=True):
+        given = reference.given(t, x)
+        i = [mod.x_names.index(name) for name in small.x_names]
+        small.reset(x[: mod.n_q])
+        np.testing.assert_allclose(small.rhs(t, x[i], u=given), mod.rhs(t, x, u=given)[i], atol=1e-8)
+    return reference.x, reference.outputs()
+
+
+CALLS: dict[str, Callable[..., tuple[np.ndarray, np.ndarray]]] = {
+    "simulate": simulated,
+    "Radau": partial(simulated, method="Radau"),
+    "BDF": partial(simulated, method="BDF"),
+    "sensitivities": sensitivities,
+    "ensemble": ensemble,
+    "dae": differential_algebraic,
+    "impacts": impacts,
+    "fit": fit,
+    "linearize": linearize,
+    "again": again,
+    "minimal": minimal,
+}
+CELLS = [(m, list(KINDS)[(i + j) % len(KINDS)], c) for i, m in enumerate(MECHANISMS) for j, c in enumerate(CALLS)]
+#: Cells that are refused -> words of the refusal.
+REFUSED: dict[tuple[str, str], str] = {
+    ("function", "ensemble"): "must be a number, .* not a function",
+    ("object", "ensemble"): "must be a number, .* not a function",
+    ("function", "sensitivities"): "derivatives are not known",
+    ("function", "fit"): "derivatives are not known",
+    ("nonholonomic", "minimal"): "has no minimal form",
+    ("sampled", "linearize"): "not available for models with sampled states",
+    ("fixed", "impacts"): "no degree of freedom",
+    ("driven", "held"): "its value jumps",
+    ("driven", "linear"): "its slope jumps",
+    ("driven", "function"): "needs its rate u_dot",
+}
+
+
+#: Dear ones: stiff contacts in Python.
+THOROUGH = {("contacts", call) for call in ("fit", "sensitivities", "ensemble", "Radau", "BDF")}
+MARKED = [
+    pytest.param(*cell, id="-".join(cell), marks=[pytest.mark.thorough] if (cell[0], cell[2]) in THOROUGH else [])
+    for cell in CELLS
+]
+
+
+@pytest.mark.parametrize(("mechanism", "kind", "call"), MARKED)
+def test_cells(mechanism: str, kind: str, call: str) -> None:
+    mod = module(mechanism)
+    pairs = [(kind, call), (mechanism, call), (mechanism, kind)]
+    refused = next((REFUSED[pair] for pair in pairs if pair in REFUSED), "")
+    refused = "" if call == "linearize" and mechanism == "driven" else refused  # it takes values, no table
+    if refused:
+        with pytest.raises(eg.EomgenError, match=refused):
+            CALLS[call](mod, KINDS[kind][0], Reference(mechanism, "number"))
+        return
+    reference = Reference(mechanism, kind)
+    x, y = CALLS[call](mod, KINDS[kind][0], reference)
+    limit = 1e-5 if call in ("dae", "BDF", "Radau") else 2e-7
+    n = mod.n_q + mod.n_v
+    np.testing.assert_allclose(x[:n], reference.x[:n], atol=limit * max(1.0, np.abs(x).max()))
+    np.testing.assert_allclose(y, reference.outputs(), atol=30 * limit * max(1.0, np.abs(y).max()))
