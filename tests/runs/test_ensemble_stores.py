@@ -1,4 +1,4 @@
-"""Ensembles kept in folders go on where they were, and run on workers of dask.distributed, whatever becomes of one."""
+"""Ensembles kept in folders go on where they were, run on workers of dask.distributed, and can be interrupted."""
 
 from __future__ import annotations
 

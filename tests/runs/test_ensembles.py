@@ -363,11 +363,6 @@ def test_a_run_that_fails_holds_up_no_other() -> None:
     np.testing.assert_allclose(many.t_end[s == 1], 1.0, atol=1e-6)
 
 
-def test_what_has_no_series_is_refused() -> None:
-    with pytest.raises(eg.UsageError, match="no Taylor series"):
-        compiled("slider_crank", "cython").simulate_many(1, count=2, method="Taylor")
-
-
 def test_a_grid_has_every_combination() -> None:
     crank = compiled("slider_crank", "numpy")
     grid = {"theta": (-0.5, 0.5, 3), "r": [0.09, 0.11], "tau": [0.0, 1.0]}

@@ -261,13 +261,6 @@ def test_a_row_that_never_rests_is_refused() -> None:
         mod.equilibrium()
 
 
-def test_a_row_of_time_rests_when_its_time_has_come() -> None:
-    """s' = x1 - s - t: at t = 2 the rest is x1 = F/10 + 0.1 (30 (s - x1)) with s = x1 - 2."""
-    found = maxwell(flow="s_dot - (x1 - s - t)").equilibrium(t=2.0)
-    assert found["x1"] == pytest.approx(-6.0, rel=1e-12)
-    assert found["s"] == pytest.approx(-8.0, rel=1e-12)
-
-
 def pendulum_beside(stiffness: float, mass: float) -> Any:
     """A pendulum of length 1 and a tiny mass on a stiff spring, which have nothing to do with each other."""
     m = eg.Model("beside", gravity=(0, -9.81, 0))

@@ -257,11 +257,6 @@ def test_events_and_runs_see_the_rate_of_a_table(slip: str, X: Any) -> None:
     np.testing.assert_allclose([run["j_x_dot"][-1], again["j_x_dot"][-1]], expected, rtol=1e-8)
 
 
-def test_a_table_that_moves_with_the_state_is_refused() -> None:
-    with pytest.raises(eg.UsageError, match="input X depends on the state, and so does its rate"):
-        thrown_on_a_table("place").simulate(0.3, inputs={"X": "2*j_x_dot", "V": "0"})
-
-
 @pytest.mark.parametrize(
     ("slip", "unit", "upright", "speed"),
     [

@@ -219,11 +219,6 @@ def test_what_cannot_be_asked(free_crank: eg.Module, asked: dict[str, object], s
         free_crank.kinematic_analysis(**asked)
 
 
-def test_nothing_is_left_to_lead_where_drivers_move_all(crank: eg.Module) -> None:
-    with pytest.raises(eg.UsageError, match="the drivers determine the whole motion; give t"):
-        crank.kinematic_analysis(theta=[0, 1])
-
-
 def test_limits_of_every_coordinate(four_bar: eg.Module, free_crank: eg.Module) -> None:
     swing = four_bar.motion_range("psi")
     limits = [np.pi - np.arccos((0.08**2 + 0.1**2 - d**2) / (2 * 0.08 * 0.1)) for d in (0.08, 0.16)]
