@@ -28,21 +28,20 @@ ALL = [
 ]
 
 
-def every_pair(swapped: bool) -> eg.Model:
+def every_pair() -> eg.Model:
     """Two bodies that each bear one shape of every kind, beside each other and turned."""
     m, bodies = flying(2)
     groups = [
         [{**shape, "on": body.at(0.25 * k - 0.4, 0.02 * k, 0, rpy=(0.2 * k, 0.5, -0.3))} for k, shape in enumerate(ALL)]
         for body in bodies
     ]
-    m.contacts("touch", *(groups[::-1] if swapped else groups), {**ELASTIC, "friction": 0.3, "smoothing": 0.01})
+    m.contacts("touch", *groups, {**ELASTIC, "friction": 0.3, "smoothing": 0.01})
     return m
 
 
-def test_every_pair_in_both_targets_and_orders() -> None:
+def test_every_pair_in_both_targets() -> None:
     """Momentum is kept, forces at rest are slopes of the energy, Jacobians are differences, C gives the numbers."""
-    mod, other = (every_pair(swapped).compile(target="numpy") for swapped in (False, True))
-    quick = every_pair(False).compile(optimize=0)
+    mod, quick = every_pair().compile(target="numpy"), every_pair().compile(optimize=0)
     rng, met = np.random.default_rng(5), 0
     while met < 10:
         turns = [Rotation.random(random_state=rng.integers(1 << 30)) for _ in "ab"]
@@ -54,8 +53,7 @@ def test_every_pair_in_both_targets_and_orders() -> None:
         x[mod.n_q :] = rng.standard_normal(12)
         force, rates = -mod.bias(0.0, x), mod.rhs(0.0, x)
         assert np.abs(force[:3] + force[6:9]).max() <= 1e-11 * np.abs(force).max()
-        for one in (other, quick):
-            np.testing.assert_allclose(one.rhs(0.0, x), rates, rtol=1e-8, atol=1e-9 * np.abs(rates).max())
+        np.testing.assert_allclose(quick.rhs(0.0, x), rates, rtol=1e-8, atol=1e-9 * np.abs(rates).max())
         J = quick.jacobian(0.0, x)
         assert np.abs(differences(quick, x) - J).max() <= 1e-4 * np.abs(J).max()
         if met < 3:
@@ -67,7 +65,7 @@ BALL = {"shape": "sphere", "radius": 0.08}
 BLOCK = {"shape": "cuboid", "size": (0.3, 0.2, 0.5)}
 PAIRS = [
     *((EGG, {**EGG, "semi_axes": (0.15, 0.06, 0.12)}), (EGG, BALL), (EGG, ROD), (ROD, BALL), (ROD, ROD), (BALL, BALL)),
-    *((BLOCK, EGG), (BLOCK, BALL)),
+    *((BLOCK, EGG), (BLOCK, BALL), (ROD, EGG), (EGG, BLOCK)),
 ]
 OWN = Rotation.from_euler("xyz", (0.2, 0.5, -0.3))
 
@@ -90,7 +88,7 @@ def test_known_normals(first: dict[str, Any], second: dict[str, Any]) -> None:
     m.contacts("touch", {**first, "on": a.at(0.03, 0.01, 0, rpy=(0.2, 0.5, -0.3))}, {**second, "on": b}, ELASTIC)
     mod = m.compile(target="numpy")
     rng = np.random.default_rng(1)
-    for k in range(24):
+    for k in range(15):
         turns = [Rotation.random(random_state=rng.integers(1 << 30)) for _ in "ab"]
         frame, n = turns[0] * OWN, np.zeros(3)
         free = rng.permutation(3)[: k % 3 + 1] if first is BLOCK else np.arange(3)
@@ -109,7 +107,7 @@ def test_known_normals(first: dict[str, Any], second: dict[str, Any]) -> None:
         force, push = -mod.bias(0.0, x), STIFF * depth**1.5
         np.testing.assert_allclose(force[6:9], push * out, atol=1e-7 * push)
         assert np.abs(force[:3] + force[6:9]).max() <= 1e-12 * push
-        if k < 3:
+        if k < 2:
             check_slopes(mod, x)
             slopes = differences(mod, x)
             assert np.abs(slopes - mod.jacobian(0.0, x)).max() <= 1e-5 * np.abs(slopes).max()
