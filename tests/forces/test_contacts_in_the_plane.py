@@ -133,14 +133,14 @@ def test_angle_at_which_a_box_slides() -> None:
 def test_newtons_cradle() -> None:
     """Equal spheres in a row with gaps: the last takes all of the speed."""
     m = eg.Model("cradle", gravity=(0, 0, 0))
-    bodies = [m.body(f"b{k}", mass=1.0) for k in range(5)]
+    bodies = [m.body(f"b{k}", mass=1.0) for k in range(3)]
     for k, body in enumerate(bodies):
         m.prismatic(f"x{k}", m.ground, body, axis="x")
     m.contacts("among", {"shape": "circle", "on": bodies, "radius": 0.05}, law={"stiffness": 1e6})
-    start: dict[str, Any] = {f"x{k}": 0.105 * k for k in range(5)} | {"x0_dot": 1.0}
-    traj = m.compile(optimize=0).simulate((0, 0.2), initial=start, rtol=1e-11, atol=1e-13)
-    speeds = np.array([traj[f"x{k}_dot"][-1] for k in range(5)])
-    assert np.allclose(speeds, [0, 0, 0, 0, 1], atol=1e-7)
+    start: dict[str, Any] = {f"x{k}": 0.105 * k for k in range(3)} | {"x0_dot": 1.0}
+    traj = m.compile(target="numpy").simulate((0, 0.1), initial=start, rtol=1e-11, atol=1e-13)
+    speeds = np.array([traj[f"x{k}_dot"][-1] for k in range(3)])
+    assert np.allclose(speeds, [0, 0, 1], atol=1e-7)
 
 
 TILTED = [("circle", "circle", 0.16), ("box", "circle", 0.16), ("segment", "box", 0.09), ("polygon", "segment", 0.07)]
@@ -253,7 +253,8 @@ def test_flush_stacks_rest(widths: tuple[float, ...], turn: float, swapped: bool
         assert np.abs(run[f"j{k}_x"]).max() < 1e-8
 
 
-@pytest.mark.parametrize("widths", part_of([(widths,) for widths in WIDTHS], WIDTHS[1].__eq__))
+@pytest.mark.thorough
+@pytest.mark.parametrize("widths", WIDTHS)
 def test_flush_stacks_are_held_rigidly(widths: tuple[float, ...]) -> None:
     mod = tower([box(wide) for wide in widths], RIGID, 0.3)
     run = mod.simulate(0.2, method="moreau", step=1e-3)

@@ -136,7 +136,7 @@ def bicycle(steer: float, law: dict[str, Any]) -> eg.Model:
     return m
 
 
-@pytest.mark.parametrize("law", [POINT, {"law": "magic_formula", "shifts": False}], ids=["brush", "magic_formula"])
+@pytest.mark.parametrize("law", [POINT, pytest.param(SYMMETRIC, marks=pytest.mark.thorough)], ids=["brush", "magic"])
 def test_steady_cornering_is_that_of_the_linear_bicycle(law: dict[str, Any]) -> None:
     """r = V delta / (L + K V^2), K = (m / L) (b / C_f - a / C_r), for small angles."""
     steer, V = 1e-4, 20.0  # small: the brush weakens by r = C alpha / (3 mu F_z)
