@@ -23,7 +23,6 @@ import nbformat
 import numpy as np
 import pytest
 from browser import Browser
-from forked import run_python
 from kernels import executed
 from models import EXAMPLES
 from PIL import Image
@@ -43,14 +42,19 @@ def blocks(path: Path, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", path.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
 
-def having(language: str) -> list[Any]:
-    return part_of([path for path in DOCUMENTS if blocks(path, language)], lambda path: path.name in ALWAYS)
+def having(language: str, always: tuple[str, ...] = ALWAYS) -> list[Any]:
+    return part_of([path for path in DOCUMENTS if blocks(path, language)], lambda path: path.name in always)
 
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def run_python(*words: object) -> subprocess.CompletedProcess[str]:
+    """A script in a process of its own, in which warnings are errors."""
+    return subprocess.run([sys.executable, "-W", "error", *map(str, words)], capture_output=True, text=True)
 
 
 def same_picture(made: Path, stored: Path) -> None:
@@ -68,7 +72,7 @@ def same_picture(made: Path, stored: Path) -> None:
 def test_python_blocks_run_in_order(path: Path, here: Path) -> None:
     script = here / "document.py"
     script.write_text("\n".join(blocks(path, "python")), encoding="utf-8")
-    result = run_python(script, options=("-W", "error"))
+    result = run_python(script)
     assert result.returncode == 0, result.stderr
     for name in re.findall(r"!\[[^\]]*\]\((?:\.\./)?pictures/([^)]+)\)", path.read_text(encoding="utf-8")):
         if (here / name).exists():  # the block that saves it stands on the page
@@ -83,15 +87,15 @@ def test_yaml_blocks_pass_check(path: Path, here: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", having("console"), ids=lambda p: p.name)
+@pytest.mark.parametrize("path", having("console", ALWAYS[:1]), ids=lambda p: p.name)
 def test_commands_run_in_order(path: Path, here: Path) -> None:
     commands = [line[2:] for text in blocks(path, "console") for line in text.splitlines() if line.startswith("$ ")]
     assert commands
     for line in commands:
         program, *words = shlex.split(line)
         assert program == "eomgen"
-        result = run_python("-m", "eomgen", *words)
-        assert result.returncode == 0, f"{line}\n{result.stderr}"
+        result = command.run(*words, cwd=here)
+        assert result.code == 0, f"{line}\n{result.err}"
 
 
 SCRIPTS = {
@@ -106,7 +110,7 @@ SCRIPTS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", part_of(SCRIPTS, lambda name: name == "four_bar.py"))
 def test_example_scripts_run(here: Path, name: str) -> None:
-    result = run_python(EXAMPLES / name, *(["4"] if name == "chain.py" else []), options=("-W", "error"))
+    result = run_python(EXAMPLES / name, *(["4"] if name == "chain.py" else []))
     assert result.returncode == 0, result.stderr
     assert SCRIPTS[name] in result.stdout
     for error in re.findall(r"(?:kept to|book:|length to|equal to) ([0-9.e+-]+)", result.stdout):
