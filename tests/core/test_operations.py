@@ -150,6 +150,7 @@ TRUTHS += ["x < y < 0.5", "-1 <= x <= y", "x and not y or y > 1", "where(x, 3, 4
 
 
 @pytest.mark.parametrize("place", [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 2.0), (0.3, 0.3), (-0.5, 0.2)])
+@pytest.mark.quick
 def test_comparisons_are_those_of_python(place: tuple[float, float]) -> None:
     """A chain a < b < c is true where both are; any number but 0 is true."""
     x, y = place
@@ -361,6 +362,7 @@ def cost(*laws: Any) -> tuple[int, int, int, dict[str, int]]:
         (["(x + y)*(y + x)", "(x + y)**2"], (1, 1, 0, {})),  # the same is formed once
     ],
 )
+@pytest.mark.quick
 def test_nothing_is_computed_twice_or_for_nothing(laws: list[str], wanted: Any) -> None:
     assert cost(*laws) == wanted
 
@@ -468,6 +470,7 @@ def held(equation: str, **parameters: float) -> Any:
     return m.check()
 
 
+@pytest.mark.quick
 def test_identities_hold_nothing_and_what_is_small_does() -> None:
     for identity in (
         "sin(a)**2 + cos(a)**2 - 1",

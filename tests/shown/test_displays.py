@@ -180,6 +180,7 @@ def test_every_display_is_well_formed_and_fits(name: str) -> None:
     assert latex.count("{") == latex.count("}")
 
 
+@pytest.mark.quick
 def test_small_equations_stand_in_matrix_form() -> None:
     lines = str(derived("double_pendulum")).splitlines()
     assert lines[:5] == [

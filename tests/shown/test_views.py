@@ -134,6 +134,7 @@ def test_the_potential_of_a_spring_has_a_derivative_which_is_its_force() -> None
 # -- values put in, functions of time, names --------------------------------------------------------------------------
 
 
+@pytest.mark.quick
 def test_values_put_in_one_after_the_other() -> None:
     equations = pendulum().derive()
     m, l, g, c = sp.symbols("m l g c")
