@@ -1,0 +1,572 @@
+"""Edges: what outside examiners found wrong, one small case of each kind with what is right."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import xml.etree.ElementTree as ET
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+
+def model(text: str, suffix: str = ".yaml") -> eg.Model:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"model{suffix}"
+        path.write_text(text, encoding="utf-8")
+        return eg.load(path)
+
+
+SPRING = """name: spring
+parameters: {k: 3, c: 0.1}
+inputs: {u: 0}
+bodies: {bob: {mass: 2}}
+joints: {slide: {type: prismatic, between: [ground, bob], axis: x, coordinate: q}}
+forces: {d: {type: torque, joint: slide, value: u - c*q_dot - k*q}}
+initial: {q: 1}
+"""
+
+
+def test_fewer_speeds_than_coordinates() -> None:
+    """x' = v cos h, y' = v sin h, h' = w, v' = a w^2, w' = -m a v w / J, without constraints."""
+    m = eg.Model.from_equations(
+        "sleigh",
+        ["x", "y", "h"],
+        velocities=["v", "w"],
+        rates={"x": "v*cos(h)", "y": "v*sin(h)", "h": "w"},
+        mass_matrix=[["m", "0"], ["0", "J"]],
+        forcing=["m*a*w**2", "-m*a*v*w"],
+        parameters={"m": 2.0, "J": 0.425, "a": 0.25},
+    )
+    for target in ("numpy", "cython"):
+        mod = m.compile(target=target)
+        x = mod.x0(x=0.1, y=0.2, h=0.4, v=0.9, w=-0.8)
+        truth = {"x": 0.9 * np.cos(0.4), "y": 0.9 * np.sin(0.4), "h": -0.8, "v": 0.16, "w": 0.36 / 0.425}
+        got = dict(zip(mod.x_names, mod.rhs(0.0, x), strict=False))
+        assert all(abs(got[k] - v) < 1e-12 for k, v in truth.items()), got
+    for n, k in ((4, 3), (7, 6), (1, 2), (2, 3)):
+        q, v = [f"q{i}" for i in range(n)], [f"s{i}" for i in range(k)]
+        m = eg.Model.from_equations(
+            "m",
+            q,
+            velocities=v,
+            rates={a: v[min(i, k - 1)] for i, a in enumerate(q)},
+            mass_matrix=[["1" if i == j else "0" for j in range(k)] for i in range(k)],
+            forcing=["0"] * k,
+        )
+        mod = m.compile(target="numpy")
+        assert np.allclose(mod.rhs(0.0, np.ones(n + k))[:n], 1.0), (n, k)
+
+
+def test_quaternion_norm_as_constraint() -> None:
+    """Four Euler parameters and three speeds with e.e = 1 as a constraint."""
+    mod = model("""name: quat
+equations:
+  coordinates: [e0, e1, e2, e3]
+  velocities: [wx, wy, wz]
+  rates:
+    {e0: -(e1*wx + e2*wy + e3*wz)/2, e1: (e0*wx + e2*wz - e3*wy)/2, e2: (e0*wy + e3*wx - e1*wz)/2,
+     e3: (e0*wz + e1*wy - e2*wx)/2}
+  mass_matrix: [[1, 0, 0], [0, 2, 0], [0, 0, 3]]
+  forcing: [-wy*wz, 2*wx*wz, -wx*wy]
+  constraints: [e0**2 + e1**2 + e2**2 + e3**2 - 1]
+initial: {e0: 1, wx: 0.01, wy: 2, wz: 0.01}
+""").compile(target="numpy")
+    x = mod.x0()
+    x[:4] *= 1 + 1e-9
+    mod.rhs(0.0, x)
+    steps = len(mod.simulate(0.05).t)
+    assert steps < 60, f"{steps} steps for 0.05 s"
+
+
+def test_drag_at_rest() -> None:
+    """-v |v| has the derivative 0 at rest."""
+    m = eg.Model("drag", gravity=(0, 0, -9.81))
+    b = m.body("b", mass=1)
+    m.translational("t", m.ground, b)
+    speed = "sqrt(vx(b)**2 + vy(b)**2 + vz(b)**2)"
+    m.force("d", b, [f"-v{c}(b)*{speed}" for c in "xyz"])
+    mod = m.compile()
+    J = mod.jacobian(0, np.zeros(6))
+    assert np.isfinite(J).all()
+    assert abs(J[3:, 3:]).max() == 0.0
+    mod.linearize(np.zeros(6))
+    truth = -np.sqrt(9.81) * np.tanh(5 * np.sqrt(9.81))
+    for method in ("Radau", "Taylor"):
+        end = mod.simulate(5.0, method=method)["t_z_dot"][-1]
+        assert abs(end - truth) < 1e-5, (method, end)
+
+
+LOOP = """<robot name="four_bar"><link name="base"/>
+<link name="a"><inertial><mass value="1"/><origin xyz="0.1 0 0"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="b"><inertial><mass value="2"/><origin xyz="0.2 0 0"/>
+<inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="c"><inertial><mass value="1"/><origin xyz="0.15 0 0"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j1" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/></joint>
+<joint name="j2" type="continuous"><parent link="a"/><child link="b"/><origin xyz="0.2 0 0"/><axis xyz="0 0 1"/></joint>
+<joint name="j3" type="continuous"><parent link="base"/><child link="c"/><origin xyz="0.4 0 0"/>
+<axis xyz="0 0 1"/></joint>
+%s</robot>"""
+
+
+def test_loops_in_urdf() -> None:
+    """loop_joint (Drake) and loop_constraint close the loop: one degree of freedom."""
+    drake = (
+        '<loop_joint name="l" type="continuous"><axis xyz="0 0 1"/>'
+        '<link1 link="b" rpy="0 0 0" xyz="0.4 0 0"/><link2 link="c" rpy="0 0 0" xyz="0.3 0 0"/></loop_joint>'
+    )
+    other = (
+        '<loop_constraint name="l"><parent link="b"/><parent_origin xyz="0.4 0 0"/><child link="c"/>'
+        '<child_origin xyz="0.3 0 0"/></loop_constraint>'
+    )
+    for tag in (drake, other):
+        m = model(LOOP % tag, ".urdf")
+        m.guess(j1=1.0, j2=-0.7, j3=1.6)
+        assert m.check().degrees_of_freedom == 1
+
+
+def test_names_of_sympy() -> None:
+    """Names as SymPy users write them are taken."""
+    import sympy as sm
+    from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
+
+    bad = []
+    for name in (r"\theta_1", r"\theta_{1}", "θ", "lambda", "q.1", "pi", "int", "q_dot"):
+        q, m, g, length = dynamicsymbols(name), sm.Symbol("m"), sm.Symbol("g"), sm.Symbol("l")
+        lm = LagrangesMethod(m * length**2 * q.diff() ** 2 / 2 + m * g * length * sm.cos(q), [q])
+        lm.form_lagranges_equations()
+        try:
+            mod = eg.from_sympy(lm, "p", parameters={m: 2, length: 0.7, g: 9.81}).compile(target="numpy")
+            assert abs(mod.rhs(0, [0.5, 0.3])[1] + 9.81 / 0.7 * np.sin(0.5)) < 1e-12
+        except Exception as e:
+            bad.append(f"{name}: {type(e).__name__}")
+    assert not bad, bad
+
+
+def test_tension_with_massless_pulley() -> None:
+    """A multiplier as an output where a body has no mass: the rope's force 32.7 N is what mod.multipliers says."""
+    m1, m2, m3, g = 4.0, 1.0, 2.5, 9.81
+    a = np.linalg.solve([[m1, 0, 0, 2], [0, m2, 0, 1], [0, 0, m3, 1], [1, 0.5, 0.5, 0]], [m1 * g, m2 * g, m3 * g, 0])
+    m = eg.Model("atwood", gravity=(0, -g, 0))
+    for i, (n, mass) in enumerate((("w1", m1), ("w2", m2), ("w3", m3), ("pulley", 0))):
+        m.prismatic(f"{n}_y", m.ground.at(0.5 * i, 0, 0), m.body(n, mass=mass), axis="-y")
+    m.coupling("rope1", {"w1_y": 1, "pulley_y": 1}, 2.0)
+    m.coupling("rope2", {"w2_y": 1, "w3_y": 1, "pulley_y": -2}, 1.0)
+    m.output("tension", "multiplier(rope2)")
+    m.initial(w1_y=1.0, w2_y=1.2)
+    mod = m.compile(target="numpy")
+    assert abs(abs(mod.outputs(0, mod.x0())[0]) - a[3]) < 1e-9
+
+
+def test_coincident_points() -> None:
+    """|r|^2 = 0 of two points is told as what it is."""
+    from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
+
+    x1, x2, y1, y2 = dynamicsymbols("x1 x2 y1 y2")
+    speeds = sum(v.diff() ** 2 for v in (x1, x2, y1, y2)) / 2
+    lm = LagrangesMethod(speeds - 9.81 * (y1 + y2), [x1, x2, y1, y2], hol_coneqs=[(x1 - x2) ** 2 + (y1 - y2) ** 2])
+    lm.form_lagranges_equations()
+    try:
+        n = eg.from_sympy(lm, "a").check().degrees_of_freedom
+    except eg.EomgenError as e:
+        assert "component" in str(e), e
+    else:
+        assert n == 2, n
+
+
+def test_independent_kept() -> None:
+    """A named independent coordinate is kept and completed, or refused; never dropped in silence."""
+    m = eg.Model("two", gravity=(0, -9.81, 0))
+    a, b, c = (m.body(n, mass=1, com=(x, 0, 0), inertia={"zz": 0.1}) for n, x in (("a", 0.2), ("b", 0.55), ("c", 0.4)))
+    w = m.body("w", mass=1, inertia={"zz": 0.3})
+    m.revolute("A", m.ground, a, coordinate="q")
+    m.revolute("B", a.at(0.4, 0, 0), b, coordinate="s")
+    m.revolute("C", b.at(1.1, 0, 0), c.at(0.8, 0, 0))
+    m.revolute("D", m.ground.at(1.2, 0, 0), c, coordinate="r")
+    m.revolute("E", m.ground, w, coordinate="e")
+    m.guess(q=0.6, s=-0.2, r=1.5)
+    m.initial(q=0.6)
+    m.independent("q")
+    try:
+        names = m.compile(target="numpy").minimal.x_names
+    except eg.EomgenError:
+        return
+    assert "q" in names, names
+
+
+def test_casadi_without_holonomic_rows() -> None:
+    """rhs and project of the CasADi target where all constraints are nonholonomic."""
+    m = eg.Model("sleigh")
+    b = m.body("b", mass=2.0, com=(0.25, 0, 0), inertia={"zz": 0.3})
+    m.planar("J", m.ground, b)
+    m.knife_edge("k", b)
+    e = m.derive()
+    mod = e.compile()
+    x = mod.x0(J_3=0.4, J_3_dot=-0.8)
+    c = e.to_casadi()
+    got = np.array(c.rhs(0, x, c.u_values, c.p_values)).ravel()
+    assert np.allclose(got, mod.rhs(0.0, x), atol=1e-12), got
+
+
+def test_rates_as_a_list() -> None:
+    """A list where a mapping is wanted is a named error."""
+    with contextlib.suppress(eg.EomgenError):
+        eg.Model.from_equations("m", ["q"], velocities=["v"], rates=["v"], mass_matrix=[["1"]], forcing=["0"]).check()
+
+
+def test_callbacks_cannot_change_the_run() -> None:
+    """An input or event function that changes the state it is given changes nothing, or is an error."""
+    bad = []
+    for target in ("cython", "numpy"):
+        mod = model(SPRING).compile(target=target)
+        truth = mod.simulate((0, 1)).x[:, -1]
+
+        def scaled(t, x):
+            x *= 0.999
+            return 0.0
+
+        def moved(t, x):
+            x[0] = 5.0
+            return 1.0
+
+        for method in ("DOP853", "RK45", "Radau", "BDF", "LSODA"):
+            for more in ({"inputs": {"u": scaled}}, {"events": [moved]}):
+                try:
+                    end = mod.simulate((0, 1), method=method, **more).x[:, -1]
+                except (eg.EomgenError, ValueError):
+                    continue
+                if not np.allclose(end, truth, atol=1e-5):
+                    bad.append((target, method, *more))
+    assert not bad, bad
+
+
+def test_event_that_is_nan() -> None:
+    """An event function that returns NaN is an error that names it, as for an input."""
+    for target in ("cython", "numpy"):
+        mod = model(SPRING).compile(target=target)
+        try:
+            mod.simulate((0, 1), events=[lambda t, x: np.nan if x[0] < 0.5 else x[0] - 0.4])
+        except (eg.EomgenError, ValueError):
+            continue
+        raise AssertionError(f"{target}: no word")
+
+
+def test_driven_mechanism_with_an_event() -> None:
+    """A mechanism that drivers move wholly, with an event that never happens."""
+    for end in ("", ", terminal: true"):
+        m = model(
+            "name: d\nbodies: {b: {mass: 1}}\njoints: {j: {type: prismatic, between: [ground, b], coordinate: q}}\n"
+            "constraints: {c: {type: driver, coordinate: q, value: t}}\n"
+            f"events: {{e: {{expression: q + 1{end}}}}}\n"
+        )
+        for target in ("numpy", "cython"):
+            assert abs(m.compile(target=target).simulate((0, 1))["q"][-1] - 1.0) < 1e-12
+
+
+def test_states_without_freedoms() -> None:
+    """First-order and sampled states beside bodies that cannot move: s' = -s from 2; s -> s/2 + 1 every 0.1 s."""
+    head = "name: w\nbodies: {b: {mass: 1}}\njoints: {j: {type: weld, between: [ground, b]}}\nstates: "
+    for target in ("numpy", "cython"):
+        end = model(head + '{s: {rate: "-s", initial: 2}}\n').compile(target=target).simulate((0, 1))["s"][-1]
+        assert abs(end - 2 * np.exp(-1)) < 1e-7, end
+        model(head + '{s: {sampled: "0.5*s+1", period: 0.1, initial: 2}}\n').compile(target=target).simulate((0, 1))
+
+
+def test_limits_of_urdf_at_infinity() -> None:
+    """lower="-inf" is no limit on that side."""
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/>'
+        '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
+        '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+        '<limit lower="-inf" upper="-0.5" effort="1" velocity="1"/></joint></robot>'
+    )
+    model(text, ".urdf").check()
+
+
+def test_documents_are_well_formed() -> None:
+    """Control characters in doc: modelDescription.xml stays XML."""
+    bad = []
+    for char in ("\x07", "\x1b", "\uffff", "\u202e", "\u2066", "\u200b", "\ufeff"):
+        text = json.dumps(f"a{char}b")
+        m = model(
+            f"name: fz\ndoc: {text}\nbodies: {{b: {{mass: 1}}}}\n"
+            "joints: {j: {type: prismatic, between: [ground, b], coordinate: q}}\n"
+            f"inputs: {{u: {{value: 0, doc: {text}}}}}\n"
+        )
+        with tempfile.TemporaryDirectory() as d:
+            m.save(f"{d}/fz.yaml")
+            subprocess.run(
+                [sys.executable, "-m", "eomgen", "generate", f"{d}/fz.yaml", "--target", "fmu", "--out", f"{d}/o"],
+                check=True,
+                capture_output=True,
+            )
+            found = [os.path.join(r, f) for r, _, fs in os.walk(f"{d}/o") for f in fs if f.endswith(".fmu")]
+            try:
+                ET.fromstring(zipfile.ZipFile(found[0]).read("modelDescription.xml"))
+            except ET.ParseError:
+                bad.append(("fmu", ascii(char)))
+            for form in ("md", "tex"):
+                m.derive().explain().save(f"{d}/x.{form}")
+                if f"a{char}b" in Path(f"{d}/x.{form}").read_bytes().decode():
+                    bad.append((form, ascii(char)))
+    assert not bad, bad
+
+
+def test_sliding_is_seen() -> None:
+    """A force that changes sign with the velocity, over a short span, with and without t_eval."""
+    mod = model(SPRING.replace("u - c*q_dot - k*q", '"where(q_dot > 0, -4, 4)"')).compile()
+    for more in ({}, {"t_eval": [0, 0.05]}):
+        start = time.perf_counter()
+        with contextlib.suppress(Exception):
+            mod.simulate((0, 0.05), **more)
+        assert time.perf_counter() - start < 10, more
+
+
+def test_latex_of_loops() -> None:
+    """No double superscript in LaTeX, whatever the joints are called (here B and P beside the projection)."""
+    from matplotlib.mathtext import MathTextParser
+
+    m = model("""name: six
+bodies:
+  crank: {mass: 1, com: [0.03, 0, 0], inertia: {zz: 0.001}, markers: {a: [0.06, 0, 0]}}
+  coupler: {mass: 2, com: [0.1, 0.03, 0], inertia: {zz: 0.01}, markers: {b: [0.2, 0, 0], p: [0.1, 0.12, 0]}}
+  rocker: {mass: 1.5, com: [0.08, 0, 0], inertia: {zz: 0.005}, markers: {b: [0.16, 0, 0]}}
+  link: {mass: 1, com: [0.12, 0, 0], inertia: {zz: 0.006}, markers: {e: [0.24, 0, 0]}}
+  out: {mass: 3, com: [0.09, 0, 0], inertia: {zz: 0.02}, markers: {e: [0.18, 0, 0]}}
+joints:
+  O2: {type: revolute, between: [ground, crank], coordinate: theta}
+  A: {type: revolute, between: [crank.a, coupler]}
+  B: {type: revolute, between: [coupler.b, rocker.b]}
+  O4: {type: revolute, between: [{body: ground, at: [0.22, 0, 0]}, rocker], coordinate: psi}
+  P: {type: revolute, between: [coupler.p, link]}
+  E: {type: revolute, between: [link.e, out.e]}
+  O6: {type: revolute, between: [{body: ground, at: [0.3, 0.25, 0]}, out], coordinate: phi}
+independent: [theta]
+initial: {theta: 0.5}
+guess: {psi: 1.8, phi: 2.5}
+""")
+    text = m.derive()._repr_latex_() or ""
+    assert "}^T M_t" not in text or "}^{\\ast}^T" not in text, "double superscript"
+    MathTextParser("agg").parse("$x$")
+
+
+def test_advice_keeps_the_mechanism() -> None:
+    """Redundant rows of planets: what a note advises to leave out leaves one degree of freedom."""
+    import re
+
+    def epicyclic(keep):
+        m = eg.Model("epi")
+        sun, arm = m.body("sun", mass=1, inertia={"zz": 1e-3}), m.body("arm", mass=1, inertia={"zz": 5e-3})
+        s, c = m.revolute("S", m.ground, sun, coordinate="th_s"), m.revolute("C", m.ground, arm, coordinate="th_c")
+        for i in range(3):
+            a = 2 * np.pi * i / 3
+            p = m.body(f"p{i}", mass=0.6, inertia={"zz": 4e-4})
+            joint = m.revolute(f"P{i}", arm.at(0.1 * np.cos(a), 0.1 * np.sin(a), 0), p, coordinate=f"th_{i}")
+            if f"g{i}" in keep:
+                m.planetary(f"g{i}", sun=s, carrier=c, planet=joint, teeth={"sun": 24, "planet": 18, "ring": 60})
+        return m.check()
+
+    whole = {"g0", "g1", "g2"}
+    notes = " ".join(map(str, epicyclic(whole).notes))
+    advice = re.search(r"leave ([\w, ]+?) out", notes)
+    if advice:
+        n = epicyclic(whole - set(re.findall(r"g\d", advice.group(1)))).degrees_of_freedom
+        assert n == 1, f"following the note: {n} degrees of freedom"
+
+
+def test_damaged_results() -> None:
+    """A trajectory file with a renamed array or a damaged header is a UsageError."""
+    mod = model(SPRING).compile(target="numpy")
+    with tempfile.TemporaryDirectory() as d:
+        mod.simulate((0, 1), events=[lambda t, x: x[0] - 0.5]).save(f"{d}/r.npz")
+        arrays = dict(np.load(f"{d}/r.npz"))
+        for k in list(arrays):
+            changed = {("x" + a if a == k else a): v for a, v in arrays.items()}
+            np.savez(f"{d}/b.npz", **changed)
+            with contextlib.suppress(eg.EomgenError):
+                eg.load_trajectory(f"{d}/b.npz")
+
+
+def test_auxiliary_forces_that_act() -> None:
+    """Kane with an auxiliary speed: the normal force also stands in a friction law of the main equations."""
+    import sympy as sm
+    from sympy.physics.mechanics import KanesMethod, Particle, Point, ReferenceFrame, dynamicsymbols
+
+    g, m, mu = sm.symbols("g m mu")
+    q, u, w, normal, push = dynamicsymbols("q u w normal push")
+    frame, origin, point = ReferenceFrame("A"), Point("O"), Point("P")
+    origin.set_vel(frame, 0)
+    point.set_pos(origin, q * frame.x)
+    point.set_vel(frame, u * frame.x + w * frame.y)
+    kane = KanesMethod(frame, [q], [u], kd_eqs=[q.diff() - u], u_auxiliary=[w])
+    kane.kanes_equations(
+        [Particle("b", point, m)], [(point, (normal - m * g) * frame.y + (push - mu * normal) * frame.x)]
+    )
+    try:
+        mod = eg.from_sympy(kane, "box", parameters={m: 2.0, mu: 0.3, g: 9.81}).compile(target="numpy")
+    except eg.EomgenError as e:
+        assert "auxiliary" in str(e).lower(), e
+        return
+    assert "normal" not in mod.u_names
+    assert "g" in mod.p_names
+    got = mod.rhs(0.0, mod.x0({"u": 1.0}), u={"push": 20.0})[-1]
+    assert abs(got - (20 - 0.3 * 2 * 9.81) / 2) < 1e-12, got
+    assert "normal" in mod.y_names
+
+
+def test_constants_of_auxiliary_equations() -> None:
+    """A constant that stands in the auxiliary equation only is a parameter, and the force an output: N = m g."""
+    import sympy as sm
+    from sympy.physics.mechanics import KanesMethod, Particle, Point, ReferenceFrame, dynamicsymbols
+
+    g, m, k = sm.symbols("g m k")
+    q, u, w, normal = dynamicsymbols("q u w normal")
+    frame, origin, point = ReferenceFrame("A"), Point("O"), Point("P")
+    origin.set_vel(frame, 0)
+    point.set_pos(origin, q * frame.x)
+    point.set_vel(frame, u * frame.x + w * frame.y)
+    kane = KanesMethod(frame, [q], [u], kd_eqs=[q.diff() - u], u_auxiliary=[w])
+    kane.kanes_equations([Particle("b", point, m)], [(point, -k * q * frame.x + (normal - m * g) * frame.y)])
+    mod = eg.from_sympy(kane, "block", parameters={m: 2.0, k: 3.0, g: 9.81}).compile(target="numpy")
+    out = dict(zip(mod.y_names, mod.outputs(0.0, mod.x0({"q": 0.1})), strict=False))
+    assert abs(abs(out["normal"]) - 2 * 9.81) < 1e-12, out
+
+
+def test_energy_with_linear_terms() -> None:
+    """L = m v^2/2 + B (x y' - y x')/2: T is the quadratic part, T + V is constant; from_lagrangian and from_sympy."""
+    import sympy as sm
+
+    x, y, xd, yd, m, b = sm.symbols("x y x_dot y_dot m b")
+    mod = eg.Model.from_lagrangian(
+        "charge", m * (xd**2 + yd**2) / 2 + b * (x * yd - y * xd) / 2, [x, y], parameters={m: 1.0, b: 2.0}
+    ).compile(target="numpy")
+    run = mod.simulate((0, 3), initial={"x": 0.3, "y": 0.2, "x_dot": 0.5, "y_dot": 0.4}, rtol=1e-10, atol=1e-12)
+    assert abs(run["T"][0] - 0.205) < 1e-12, run["T"][0]
+    assert np.ptp(run["energy"]) < 1e-8, np.ptp(run["energy"])
+
+
+def test_quaternion_rates_written_implicitly() -> None:
+    """Kinematics of a quaternion as angular velocity = given and e.e' = 0, norm as configuration constraint."""
+    import sympy as sm
+    from sympy.physics.mechanics import KanesMethod, Point, ReferenceFrame, RigidBody, dynamicsymbols, inertia
+
+    e = e0, e1, e2, e3 = dynamicsymbols("e0:4")
+    w = dynamicsymbols("w1:4")
+    i1, i2, i3, m = sm.symbols("i1:4 m")
+    t = dynamicsymbols._t
+    ground, body, point = ReferenceFrame("A"), ReferenceFrame("B"), Point("O")
+    body.orient_quaternion(ground, e)
+    point.set_vel(ground, 0)
+    own = body.ang_vel_in(ground)
+    given = w[0] * body.x + w[1] * body.y + w[2] * body.z
+    body.set_ang_vel(ground, given)
+    kd = [(own - given).dot(a) for a in (body.x, body.y, body.z)] + [sum(a * a.diff(t) for a in e)]
+    kane = KanesMethod(
+        ground,
+        q_ind=[e1, e2, e3],
+        q_dependent=[e0],
+        u_ind=w,
+        kd_eqs=kd,
+        configuration_constraints=[sum(a**2 for a in e) - 1],
+        explicit_kinematics=False,
+    )
+    kane.kanes_equations([RigidBody("b", point, body, m, (inertia(body, i1, i2, i3), point))], [])
+    mod = eg.from_sympy(kane, "spin", parameters={i1: 1.0, i2: 2.0, i3: 3.0}, guess={"e0": 1.0}).compile(target="numpy")
+    x = {"e0": 0.8, "e1": 0.36, "e2": 0.48, "e3": 0.0, "w1": 0.3, "w2": 0.2, "w3": 0.5}
+    got = dict(zip(mod.x_names, mod.rhs(0.0, [x[n] for n in mod.x_names]), strict=False))
+    np.testing.assert_allclose([got["w1"], got["w2"], got["w3"]], [-0.1, 0.15, -0.02], atol=1e-10)
+
+
+def test_parameters_without_a_value() -> None:
+    """A message about a parameter without a value does not offer what cannot be done."""
+    m = eg.Model("p", gravity=(0, "-g", 0))
+    for name in ("g", "l", "m"):
+        m.parameter(name)
+    m.revolute("J", m.ground, m.body("b", mass="m", com=(0, "-l", 0)), coordinate="q")
+    try:
+        mod = m.compile(target="numpy")
+    except eg.EomgenError as e:
+        assert "bind" not in str(e), e
+    else:
+        a = mod.rhs(0.0, [0.1, 0.0], p={"g": 9.81, "l": 1.0, "m": 1.0})[1]
+        assert abs(a + 9.81 * np.sin(0.1)) < 1e-12
+
+
+def test_weld_of_mjcf_without_torque() -> None:
+    """weld with torquescale 0 holds no rotation (MuJoCo's rows vanish)."""
+    text = (
+        '<mujoco><worldbody><body name="wall"><geom type="box" size=".1 .1 .1" contype="0" conaffinity="0"/></body>'
+        '<body name="beam" pos="0 -1 0"><freejoint/>'
+        '<geom type="box" size=".1 1 .1" mass="2" contype="0" conaffinity="0"/></body></worldbody>'
+        '<equality><weld body1="wall" body2="beam" torquescale="0" anchor="0 1 0"/></equality></mujoco>'
+    )
+    m = model(text, ".xml")
+    n = m.check().degrees_of_freedom
+    assert n == 3 or any("torquescale" in str(t) for t in m.notes), n
+
+
+def test_centre_of_mass_by_a_hair() -> None:
+    """Free bodies whose centre of mass lies 1e-9 to 1e-7 m off the origin fall freely, by every method."""
+    for off in ("1.0e-9", "1.0e-8", "1.0e-7", "3.0e-7"):
+        for rotation in ("euler_parameters", "euler_angles"):
+            m = model(
+                f"name: b\ngravity: [0, 0, -9.81]\nbodies: {{b: {{mass: 4.0, com: [{off}, {off}, {off}], "
+                "inertia: {xx: 0.3, yy: 0.25, zz: 0.1}}}\n"
+                f"joints: {{f: {{type: free, between: [ground, b], rotation: {rotation}}}}}\n"
+            )
+            for method in ("embedding", "recursive", "lagrange", "augmented"):
+                mod = m.derive(method).compile(target="numpy")
+                got = dict(zip(mod.v_names, mod.rhs(0.0, mod.x0())[mod.n_q :], strict=False))
+                assert abs(got["f_z_dot"] + 9.81) < 1e-6, (off, rotation, method, got)
+
+
+def test_leftovers_in_robot_files() -> None:
+    """A leftover xacro element in an expanded URDF is noted."""
+    text = (
+        '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="a"/><link name="b"><inertial>'
+        '<mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        '<joint name="j" type="continuous"><parent link="a"/><child link="b"/>'
+        '<axis xyz="0 0 1"/></joint><xacro:imu_sensor name="x"/></robot>'
+    )
+    model(text, ".urdf").check()
+    text = (
+        '<mujoco><worldbody><body name="a"><freejoint/><geom size=".1"/></body><body name="post">'
+        '<geom size=".1" pos="2 0 0"/></body>'
+        '<body name="rail"><geom size=".1" pos="3 0 0"/></body></worldbody><equality>'
+        '<weld name="w" body1="post" body2="rail"/></equality></mujoco>'
+    )
+    model(text, ".xml").compile(target="numpy")
+
+
+def test_sensitivities_with_tables() -> None:
+    """y = k u, so dy/dk = u(t), for held, linear and cubic tables, whichever part of the table a time lies in."""
+    m = eg.Model("cart")
+    b = m.body("cart", mass=1.0)
+    m.prismatic("J", m.ground, b, axis="x", coordinate="s")
+    m.parameter("k", 2.0)
+    u = m.input("u")
+    m.torque("push", "J", u)
+    m.output("y", "k*u")
+    mod = m.compile(target="numpy")
+    times = np.array([0.1, 0.7, 1.2, 1.9])
+    bad = []
+    for kind in ("linear", "zero-order", "cubic"):
+        signal = eg.Signal([0, 0.5, 1.0, 1.5, 2.0], [1.0, -2.0, 3.0, 5.0, 7.0], kind)
+        got = np.asarray(mod.sensitivities(["k"], (0, 2), inputs={"u": signal}, t_eval=times)["y", "k"]).ravel()
+        if not np.allclose(got, signal(times), atol=1e-6):
+            bad.append((kind, got.round(3).tolist()))
+    assert not bad, bad
