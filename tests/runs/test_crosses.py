@@ -428,3 +428,12 @@ def test_cells(mechanism: str, kind: str, call: str) -> None:
     n = mod.n_q + mod.n_v
     np.testing.assert_allclose(x[:n], reference.x[:n], atol=limit * max(1.0, np.abs(x).max()))
     np.testing.assert_allclose(y, reference.outputs(), atol=30 * limit * max(1.0, np.abs(y).max()))
+
+
+@pytest.mark.parametrize("k", [1, 5, 10])
+def test_a_sample_takes_what_an_input_is_before_it_jumps(k: int) -> None:
+    """Whatever the rounding of the two times."""
+    jump = 0.02 * k
+    u = eg.Signal([0.0, jump, 1.0], [1.0, 3.0, 5.0], "zero-order")
+    run = module("sampled").simulate(END, inputs={"u": u}, t_eval=[jump - 0.005, jump + 0.005], **TIGHT)
+    assert run["f"][1] + 3.0 * run["q"][1] == pytest.approx(1.0, abs=0.05)
