@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -100,7 +101,10 @@ def plain(value: Any) -> Any:
         return {key: plain(part) for key, part in value.items()}
     if isinstance(value, list):
         return [plain(part) for part in value]
-    return str(sympy.nsimplify(sympy.sympify(value), rational=True)) if isinstance(value, str) else value
+    if not isinstance(value, str):
+        return value
+    names = {name: sympy.Symbol(name) for name in re.findall(r"[a-z]\w*", value) if name not in ("sin", "cos")}
+    return str(sympy.nsimplify(sympy.sympify(value, locals=names), rational=True))
 
 
 def test_python_and_file_say_the_same_and_both_round_trip(tmp_path: Path) -> None:

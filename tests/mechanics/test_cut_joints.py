@@ -126,26 +126,3 @@ def same_pose(tree: eg.Module, x: np.ndarray, closed: eg.Module) -> np.ndarray:
     values |= dict(zip([f"{n}_dot" for n in FREE], rates, strict=True))
     values["swing_dot"] = x[tree.x_names.index("swing_dot")]
     return np.array([values[name] for name in closed.x_names])
-
-
-def test_perpendicular_and_spherical_make_a_universal_joint() -> None:
-    """The axes x of P and y of S stay perpendicular: those are the z axes of turned markers."""
-    tree = eg.Model("one", gravity=(0, -9.81, 0))
-    loop = eg.Model("two", gravity=(0, -9.81, 0))
-    for m in (tree, loop):
-        body = m.body("body", mass=1, com=(0.1, 0.2, 0.6), inertia=(0.2, 0.3, 0.1))
-        if m is tree:
-            m.universal("u", m.ground, body)
-        else:
-            m.spherical("s", m.ground, body, coordinates=["a", "b", "c"])
-            m.joint(
-                "perpendicular",
-                "p",
-                m.ground.at(0, 0, 0, rpy=(0, np.pi / 2, 0)),
-                body.at(0, 0, 0, rpy=(-np.pi / 2, 0, 0)),
-            )
-        m.output("ax", body.at(0, 0, 1).acceleration[0])
-    one, two = tree.compile(target="numpy"), loop.compile(target="numpy")
-    x = one.x0(u_1=0.3, u_2=0.8, u_1_dot=1.0, u_2_dot=-2.0)
-    y = two.x0(a=0.3, b=0.8, c=0.0, a_dot=1.0, b_dot=-2.0, c_dot=0.0)
-    assert two.outputs(0.0, y)[0] == pytest.approx(one.outputs(0.0, x)[0], rel=1e-12)

@@ -228,20 +228,6 @@ def test_a_ball_bounces_as_in_closed_form(bouncing: Any) -> None:
     np.testing.assert_allclose(at["h"], np.where(last < 0, 1.0, 0.0) + up * after - G * after**2 / 2, atol=1e-8)
 
 
-def test_runs_that_an_event_ends_and_bounces_that_die_away(bouncing: Any) -> None:
-    ended = ball(terminal=3).dae.solve((0, 10), rtol=1e-9, atol=1e-11)
-    assert (ended.status, len(ended.t_events["floor"])) == (1, 3)
-    assert ended.t[-1] == pytest.approx(hits(0.9, 3)[-1], abs=1e-9)
-    half = bouncing.dae.solve((0, 10), events={"half": {"expression": "h - 0.5", "terminal": True}})
-    assert half.t[-1] == pytest.approx(np.sqrt(1 / G), abs=1e-7)
-    with pytest.raises(eg.ZenoError, match=r"floor.*near t = 8.5789.*Zeno"):
-        bouncing.dae.solve((0, 20))
-    with pytest.raises(eg.ZenoError, match="repeats without an end"):
-        ball(reset={"h_dot": "0"}).dae.solve((0, 2))
-    with pytest.raises(eg.UsageError, match="sets eventsfn of IDA itself, so it cannot be given; give events="):
-        bouncing.dae.solve((0, 1), eventsfn=print)
-
-
 # -- Reactions as unknowns ---------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("method", ["newton_euler", "amalgamated", "embedding"])
 def test_the_ground_carries_the_change_of_momentum(method: str) -> None:

@@ -78,6 +78,26 @@ def test_some_directions_are_transverse(module: Callable[..., Any]) -> None:
         assert np.abs(J[:, n:] @ across).max() <= 1e-9 * np.abs(J).max() * np.abs(across).max()
 
 
+def test_jacobian_of_a_tree_by_recursion() -> None:
+    """Columns that turn themselves and Euler parameters, where recursion is shorter than what formulas give."""
+    m = eg.Model("arm", gravity=(0.5, -9.81, 1.0))
+    last: Any = m.ground
+    kinds = ["revolute", "universal", "revolute", "spherical", "cylindrical", "revolute"]
+    for k, kind in enumerate(kinds):
+        inertia = {"xx": 0.3, "yy": 0.2 + 0.01 * k, "zz": 0.25, "xy": 0.02, "xz": -0.03, "yz": 0.01}
+        body = m.body(f"b{k}", mass=1.0 + 0.3 * k, com=(0.3, -0.1 * k, 0.2), inertia=inertia)
+        keys = {"rotation": "euler_parameters"} if kind == "spherical" else {}
+        m.joint(kind, f"q{k}", last, body, **keys)
+        last = body.at(0.2, 0.3, 0.1, rpy=(0.4, 0.3 * k, -0.2))
+    m.damper("c", m.ground.at(1, 1, 0), last, damping=3)
+    mod = m.compile("embedding", target="numpy", kernels=["rhs", "jacobian", "project"])
+    random = np.random.default_rng(4)
+    for _ in range(2):
+        x = mod.project(random.uniform(-1, 1, mod.n_x))
+        expected = np.stack([judges.first(lambda y: mod.rhs(0.2, y), x, d, h=1e-4) for d in np.eye(mod.n_x)], 1)
+        assert np.abs(mod.jacobian(0.2, x) - expected).max() <= 1e-7 * np.abs(expected).max()
+
+
 # -- Of loops by articulated bodies, in C beside the dense system of NumPy ---------------------------------------------
 def rods(twice: bool = False) -> eg.Model:
     """Two bodies on ball joints in Euler parameters, held together by a rod, or by two in one place."""

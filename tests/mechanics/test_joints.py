@@ -138,19 +138,6 @@ def test_constant_velocity_joint_transmits_evenly() -> None:
         assert ratio(module, float(t1)) == pytest.approx(1.0, abs=1e-8)
 
 
-def test_bead_on_a_cycloid_swings_in_the_same_time_from_everywhere() -> None:
-    """Huygens: along x = r (s + sin s), y = r (1 - cos s) the period is 4 pi sqrt(r / g), whatever the amplitude."""
-    m = eg.Model("cycloid", gravity=(0, -9.81, 0))
-    m.parameter("r", 0.3)
-    bead = m.body("bead", mass=0.7)
-    m.curve_slider("s", m.ground, bead, curve=["r*(s + sin(s))", "r*(1 - cos(s))", 0])
-    module = m.compile(target="numpy")
-    period = 4 * np.pi * np.sqrt(0.3 / 9.81)
-    for start in (0.1, 1.0, 2.5):
-        end = module.simulate((0, period), initial={"s": start}, rtol=1e-10, atol=1e-12)
-        assert end["s"][-1] == pytest.approx(start, abs=1e-7)
-
-
 def test_bolt_falls_down_its_thread() -> None:
     """A screw of lead h with its axis upright: (m h^2 + I) a = - m g h."""
     m = eg.Model("bolt", gravity=(0, 0, -9.81))

@@ -196,16 +196,6 @@ def test_a_crank_rocker_turns_whichever_coordinate_is_preferred(preferred: str) 
     assert run.change_points == []
 
 
-def test_the_users_choice_is_kept_while_it_is_good() -> None:
-    """embedded_mass_matrix is that of the chosen coordinate: 2 T / rate^2 of a motion."""
-    for name in ("theta", "bend", "psi"):
-        mod = four_bar((0.3, 0.9, 0.7, 0.8)).compile(independent=[name], target="numpy")
-        x = mod.x0(theta=1.0, theta_dot=2.0)
-        rate = x[mod.n_q + mod.q_names.index(name)]
-        kinetic = mod.energy(x)[0]
-        assert mod.embedded_mass_matrix(x[: mod.n_q])[0, 0] == pytest.approx(2 * kinetic / rate**2, rel=1e-10)
-
-
 # -- Rows that hold whatever the motion --------------------------------------------------------------------------------
 def arm_and_plate(name: str, l3: float = 0.3) -> tuple[eg.Model, Any, Any]:
     """A pendulum and a plate that is still free."""

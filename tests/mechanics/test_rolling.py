@@ -218,6 +218,12 @@ def test_a_rounded_wheel_keeps_its_energy() -> None:
     assert mod.n_dof == 3
     run = mod.simulate((0, 3), rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(run["z"], 0.25 * np.sin(run["lean"]) + 0.05, atol=1e-12)
+    for state in run.x.T[:: len(run.t) // 5]:  # the lowest point of its tube rests
+        bodies = Bodies(mod, state[:6], state[6:])
+        axle = bodies.R[0][:, 2]
+        down = axle[2] * axle - [0, 0, 1]
+        lowest = 0.25 * down / np.linalg.norm(down) - [0, 0, 0.05]
+        assert np.abs(bodies.v[0] + np.cross(bodies.w[0], lowest)).max() < 1e-9
     energy = run["energy"]
     assert np.abs(energy - energy[0]).max() < 1e-8 * energy[0]
     assert np.hypot(run["x"], run["y"]).max() > 1

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import sympy as sm
-from children import child
 from scipy.integrate import solve_ivp
 from sweeps import part_of
 
@@ -97,31 +91,6 @@ def test_robertson() -> None:
     assert found.success
     expected = [0.2083340149701255e-07, 0.8333360770334713e-13, 0.9999999791665050]
     np.testing.assert_allclose(found.y[3:, -1], expected, rtol=1e-5)
-
-
-# -- Explicit methods --------------------------------------------------------------------------------------------------
-LONG = """
-import sys, numpy as np, eomgen as eg
-mod = eg.load(sys.argv[1]).compile()
-print("ready", flush=True)
-try:
-    mod.simulate((0, 1e6), rtol=1e-12, atol=1e-12, t_eval=[1e6])
-except KeyboardInterrupt:
-    print("stopped")
-"""
-
-
-def test_an_interrupt_is_heard() -> None:
-    model = Path(__file__).parents[2] / "examples" / "double_pendulum.yaml"
-    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n" + LONG
-    command = [sys.executable, "-c", code, str(model)]
-    with child(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline() == "ready\n"
-        time.sleep(0.3)
-        begun = time.perf_counter()
-        process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=30)[0] == "stopped\n"
-    assert time.perf_counter() - begun < 2.0  # its own share is a few hundredths; the rest is leaving Python
 
 
 # -- Step by step ------------------------------------------------------------------------------------------------------
