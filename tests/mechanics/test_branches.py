@@ -110,6 +110,14 @@ def test_a_slider_crank_of_equal_arms_runs_on_both_branches(s_dot: float, law: A
     assert abs(run["th_dot"][-1] - found.y[1, -1]) < 1e-7
 
 
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("off", [1e-15, 1e-12, 1e-9])
+def test_what_rounding_leaves_of_rows_tells_no_accelerations(off: float, target: str) -> None:
+    """Off both branches by so much no row is open by more than its square: nothing but rounding tells it."""
+    x = [np.pi / 2, -np.pi + off, off, 2.0, -4.0, -4.0]
+    assert np.abs(slider_crank(target).rhs(0.0, x)[3:]).max() < 1e-6
+
+
 # -- A massless toggle -------------------------------------------------------------------------------------------------
 R, L, MASS, TAU = 0.1, 0.35, 0.5, 1.0
 

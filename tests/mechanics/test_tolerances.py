@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import os
 import subprocess
 import sys
@@ -120,18 +121,15 @@ def test_a_wanted_angle_of_a_cut_joint_counts_modulo_full_turns() -> None:
 
 
 # -- sources -----------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("method", ["embedding", "recursive"])
+@pytest.mark.parametrize("method", ["embedding", "newton_euler"])
 def test_reading_the_equations_changes_no_source(method: str) -> None:
-    untouched = models.build("spherical_pendulum").derive(method).compile(target="numpy", kernels=["rhs", "energy"])
-    equations = models.build("spherical_pendulum").derive(method)
+    untouched = models.build("slider_crank").derive(method).to_casadi()
+    equations = models.build("slider_crank").derive(method)
     assert str(equations)
-    for name in ("T", "V", "lagrangian", "mass_matrix", "force", "quadratic_velocity", "generalized_forces"):
+    for name in ("T", "V", "lagrangian", "mass_matrix", "force", "quadratic_velocity", "generalized_forces", "poses"):
         assert getattr(equations, name) is not None
     assert equations.explain(level="full").markdown
-    read = equations.compile(target="numpy", kernels=["rhs", "energy"])
-    x = np.array([0.3, 0.8, -1.1, 0.7])
-    assert read.metadata == untouched.metadata
-    assert read.rhs(0.0, x).tolist() == untouched.rhs(0.0, x).tolist()
+    assert inspect.getsource(equations.to_casadi()) == inspect.getsource(untouched)
 
 
 @pytest.mark.thorough

@@ -195,12 +195,11 @@ FAULTS = (
     Fault(
         "rank-state", "eomgen/limits/constraints.py",
         "\nSTATE = 1e-10",
-        "\nSTATE = 1e-8",
-        "the tolerance of rank at a state, times 100",
+        "\nSTATE = 1e-1",
+        "the tolerance of rank at a state: a tenth, which refuses what is well conditioned",
         (
             ("tests/mechanics/test_change_points.py::test_accelerations_are_those_of_the_motion_that_goes_straight_on["
-             "ground-numpy-1e-07]"),
-            "tests/mechanics/test_change_points.py::test_accelerations_equal_those_in_fifty_digits[embedding-numpy]",
+             "ground-numpy-0.03]"),
         ),
     ),
     Fault(
@@ -215,23 +214,14 @@ FAULTS = (
         "half = 0.5 * float(np.sqrt(d[j : j + 3] @ d[j : j + 3]))",
         "half = float(np.sqrt(d[j : j + 3] @ d[j : j + 3]))",
         "steps of Euler parameters turn twice as far",
-        (
-            ("tests/mechanics/test_random_loops.py::test_closed_chains_move_as_multipliers_make_them[universal-euler_p"
-             "arameters]"),
-            ("tests/mechanics/test_random_loops.py::test_jacobians_are_the_derivatives_of_the_complete_right_hand_side"
-             "[2-False-True]"),
-        ),
+        ("tests/runs/test_equilibrium.py::test_rotations_and_rolling",),
     ),
     Fault(
         "ball-velocities", "eomgen/numeric/space.py",
         "e[0] * d[2] - e[2] * d[0] + e[1] * d[3] - e[3] * d[1]",
         "e[0] * d[2] - e[2] * d[0] - e[1] * d[3] + e[3] * d[1]",
         "angular velocity of a change of Euler parameters: wrong axes",
-        (
-            ("tests/mechanics/test_random_loops.py::test_closed_chains_move_as_multipliers_make_them[universal-euler_p"
-             "arameters]"),
-            "tests/mechanics/test_jacobians.py::test_jacobians_are_those_of_the_dense_system[rods held twice]",
-        ),
+        ("tests/mechanics/test_jacobians.py::test_jacobians_are_those_of_the_dense_system[rods held twice]",),
     ),
     Fault(
         "shift-velocity", "eomgen/numeric/shifts.py",
@@ -271,8 +261,8 @@ FAULTS = (
     Fault(
         "velocity-assembly", "eomgen/numeric/assembly_velocity.py",
         "(equations.y_t - equations.values[(slice(None), *k)])",
-        "(-equations.values[(slice(None), *k)])",
-        "wanted rates of functions that depend on time: their own rate is left out",
+        "(equations.y_t + equations.values[(slice(None), *k)])",
+        "wanted rates of what closes a loop are reached the other way round",
         ("tests/mechanics/test_tolerances.py::test_wanted_rates_of_a_cut_slider_that_moves_by_itself",),
     ),
     Fault(
