@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 import sympy
 
-from eomgen.graph import evaluate
-
 STEP = 0.02
 FIRST = np.array([5 / 6, -5 / 21, 5 / 84, -5 / 504, 1 / 1260])
 SECOND = np.array([5 / 3, -5 / 21, 5 / 126, -5 / 1008, 1 / 3150])
@@ -66,22 +64,6 @@ def described(model: Any, p: Mapping[str, float] | None = None) -> RigidBodies:
 def sympy_names(names: Iterable[str]) -> dict[str, sympy.Symbol]:
     """Symbols by name, so that none is taken for a function of SymPy's."""
     return {name: sympy.Symbol(name) for name in names}
-
-
-def rigid_bodies(mechanism: Any, p: Mapping[str, float] | None = None) -> RigidBodies:
-    """The numbers of a mechanism's bodies at its declared parameter values."""
-    values = {parameter.name: parameter.value for parameter in mechanism.parameters} | dict(p or {})
-
-    def numbers(expressions: list[Any]) -> np.ndarray:
-        return np.array(evaluate(expressions, values), dtype=float)
-
-    bodies = mechanism.bodies
-    return RigidBodies(
-        numbers([b.mass for b in bodies]),
-        numbers([x for b in bodies for x in b.com]).reshape(-1, 3),
-        numbers([x for b in bodies for row in b.inertia for x in row]).reshape(-1, 3, 3),
-        numbers(list(mechanism.gravity)),
-    )
 
 
 def vee(W: np.ndarray) -> np.ndarray:
