@@ -121,21 +121,6 @@ def tethered() -> eg.Model:
     return m
 
 
-def carried() -> eg.Model:
-    """A four-bar on a body that moves, its coupler held to ground by a rod: a loop within another."""
-    m = eg.Model("carried", gravity=(0.2, -9.81, 0.0))
-    base = m.body("base", mass=1.0, com=(0.1, 0, 0), inertia=(1e-3, 1e-2, 1e-2))
-    crank, coupler, rocker = (m.body(n, mass=0.2, com=(0, 0.05, 0), inertia=(1e-3, 1e-3, 1e-3)) for n in "rcs")
-    m.revolute("J", m.ground, base, coordinate="j")
-    m.revolute("R", base, crank, coordinate="r")
-    m.revolute("C", crank.at(0, 0.1, 0), coupler, coordinate="c")
-    m.revolute("S", base.at(0.1, 0, 0), rocker, coordinate="s")
-    m.revolute("E", coupler.at(0.1, 0.02, 0), rocker.at(0, 0.11, 0))
-    m.distance("rod", m.ground.at(0.05, 0.6, 0), coupler.at(0.05, 0.02, 0), length=0.5)
-    m.guess(j=0.1, r=0.1, s=0.1)
-    return m
-
-
 def driven() -> eg.Model:
     """A chain whose last joint is led over time."""
     m = closed_chain(6, False, False)
@@ -148,7 +133,6 @@ CASES: dict[str, Callable[[], eg.Model]] = {
     "spatial chain": lambda: closed_chain(9, True, True),
     "four-bars": lambda: four_bars(4),
     "rods": rods,
-    "carried": carried,
     "tethered": tethered,
     "rods held twice": lambda: rods(True),
     "driven chain": driven,
@@ -156,7 +140,7 @@ CASES: dict[str, Callable[[], eg.Model]] = {
 }
 
 
-ALWAYS_IN_C = {"spatial chain", "carried", "tethered", "rods held twice"}
+ALWAYS_IN_C = {"spatial chain", "tethered", "rods held twice"}
 
 
 def on_constraints(module: Any, seed: int, t: float) -> np.ndarray:
