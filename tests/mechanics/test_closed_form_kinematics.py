@@ -215,19 +215,6 @@ def test_a_mechanism_without_mass_is_led(target: str) -> None:
             call()
 
 
-@pytest.mark.parametrize("target", TARGETS)
-def test_outputs_of_positions_and_velocities_need_no_mass(target: str) -> None:
-    mod = light_four_bar(0, "vx").compile(target=target)
-    motion = mod.kinematic_analysis(**LED)
-    psi = freudenstein(LED["theta"])
-    along = (0.1 + 0.08 * np.cos(psi) - 0.04 * np.cos(LED["theta"])) / 0.12  # the coupler's direction, x
-    np.testing.assert_allclose(motion["px"], 0.04 * np.cos(LED["theta"]) + 0.05 * along, atol=1e-9)
-    at = np.linspace(1.0, 1.01, 11)
-    near = mod.kinematic_analysis(theta=at, theta_dot=10.0)
-    np.testing.assert_allclose(near["vx"][5], np.gradient(near["px"], at / 10.0, edge_order=2)[5], rtol=1e-5)
-    assert mod.outputs(0.0, mod.x0(theta=1.2)).shape == (2,)
-
-
 @pytest.mark.parametrize("method", ["recursive", "newton_euler"])
 def test_by_every_method(method: str) -> None:
     motion = light_four_bar(0).compile(method=method, target="numpy").kinematic_analysis(**LED)

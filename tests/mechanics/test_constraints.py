@@ -1,4 +1,4 @@
-"""The constraints section: the same from Python and from a file, with its faults told by line."""
+"""The constraints section: the same from Python and from a file, faults by line, equations that can be held."""
 
 from __future__ import annotations
 

@@ -253,14 +253,6 @@ def driven(value: str) -> eg.Model:
     return m
 
 
-@pytest.mark.parametrize(
-    ("value", "word"), [("max(0, t - 0.5)", "max"), ("abs(t - 0.5)", "abs"), ("where(t < 1, 0, t - 1)", "where")]
-)
-def test_corners_are_noted(value: str, word: str) -> None:
-    (note,) = driven(value).check().notes
-    assert f"motor: {word} in a driver's value can make a corner" in str(note)
-
-
 def test_a_motion_that_ends_is_told_as_such() -> None:
     mod = driven("sqrt(1 - t)").compile(target="numpy")
     with pytest.raises(

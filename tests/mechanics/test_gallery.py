@@ -112,37 +112,6 @@ def test_a_gear_train_starts_as_a_first_order_lag() -> None:
     assert traj["height"] == pytest.approx(p["r"] / ratio * traj["motor_angle"], rel=1e-12, abs=1e-14)
 
 
-# -- Jansen's leg ------------------------------------------------------------------------------------------------------
-def both_points(a: np.ndarray, ra: float, b: np.ndarray, rb: float) -> list[np.ndarray]:
-    """Both points at distances ra of a and rb of b."""
-    way = b - a
-    length = np.hypot(*way)
-    along = (ra**2 - rb**2 + length**2) / (2 * length)
-    off = np.sqrt(ra**2 - along**2)
-    u = way / length
-    return [a + along * u + side * off * np.array([-u[1], u[0]]) for side in (1.0, -1.0)]
-
-
-def test_jansens_foot_is_where_the_circles_meet() -> None:
-    a, b, c, d, e, f, g, h, i, j, k, l, m = np.array(
-        [38, 41.5, 39.3, 40.1, 55.8, 39.4, 36.7, 65.7, 49, 50, 61.9, 7.8, 15]
-    )
-    mod = eg.load(models.EXAMPLES / "jansen_leg.yaml").compile(target="numpy")
-    traj = mod.simulate(1.0, t_eval=np.linspace(0.0, 1.0, 25))
-    for t, x, y in zip(traj.t, traj["foot_x"], traj["foot_y"], strict=True):
-        P, B = m * np.array([np.cos(2 * np.pi * t), np.sin(2 * np.pi * t)]), np.array([-a, -l])
-        C = max(both_points(P, j, B, b), key=lambda p: p[1])
-        E = min(both_points(P, k, B, c), key=lambda p: p[1])
-        D = min(both_points(B, d, C, e), key=lambda p: p[0])
-        F = min(both_points(D, f, E, g), key=lambda p: p[0])
-        G = min(both_points(E, i, F, h), key=lambda p: p[1])
-        assert [100 * x, 100 * y] == pytest.approx(G, abs=1e-9)
-    # flat for half a turn: the lower part of the path is straight within a unit, over more than 40
-    low = traj["foot_y"] < traj["foot_y"].min() + 0.01
-    assert low.sum() >= 10
-    assert np.ptp(traj["foot_x"][low]) > 0.4
-
-
 # -- Engines -----------------------------------------------------------------------------------------------------------
 def gas(p: dict[str, float], after: sp.Expr) -> sp.Expr:
     """Force on a piston at the crank's angle after the dead centre at which it fires."""

@@ -107,21 +107,6 @@ def test_initial_accelerations_equal_the_reference(module: Callable[..., Any], s
     assert np.abs(ours - expected).max() <= 1e-12 * np.abs(expected).max()
 
 
-def test_either_coordinate_can_be_independent(module: Callable[..., Any]) -> None:
-    """Crank angle or slider position: one motion, two embedded mass matrices, M_s = M_theta (theta'/s')^2."""
-    turn, slide = module("slider_crank"), module("slider_crank", independent=("s",))
-    for theta, rate in ((0.5, 10.0), (1.7, -6.0), (4.0, 3.0)):
-        x = turn.x0(theta=theta, theta_dot=rate)
-        state = dict(zip(turn.x_names, x, strict=True))
-        other = np.array([state[name] for name in slide.x_names])
-        a = dict(zip(turn.v_names, turn.rhs(0.0, x)[3:], strict=True))
-        b = dict(zip(slide.v_names, slide.rhs(0.0, other)[3:], strict=True))
-        size = max(map(abs, a.values()))
-        assert all(abs(a[name] - b[name]) <= 1e-11 * size for name in a)
-        (M_theta,), (M_s,) = turn.embedded_mass_matrix(x[:3])[0], slide.embedded_mass_matrix(other[:3])[0]
-        assert M_s == pytest.approx(M_theta * (state["theta_dot"] / state["s_dot"]) ** 2, rel=1e-11)
-
-
 # -- Peaucellier's inversor --------------------------------------------------------------------------------------------
 GIVEN = models.reference("linkages_straight_line")["peaucellier"]
 R = float(GIVEN["r"])

@@ -1,4 +1,4 @@
-"""Published models in few lines, by the elements that they need: a gait model, an arm with muscles, a half car."""
+"""Published models in few lines, by the elements that they need: a gait model and an arm with muscles."""
 
 from __future__ import annotations
 

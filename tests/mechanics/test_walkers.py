@@ -1,4 +1,4 @@
-"""Toys and walkers of the literature: woodpecker, tippe top, simplest walker, compass gait."""
+"""Walkers of the literature: the simplest walker and the compass gait."""
 
 from __future__ import annotations
 
