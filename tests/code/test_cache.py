@@ -266,7 +266,7 @@ def test_two_processes_build_the_same_at_once(cache: Path, tmp_path: Path) -> No
     assert attempts(cache) == []
 
 
-@pytest.mark.parametrize("when", ["before", "behind"])
+@pytest.mark.parametrize("when", [pytest.param("before", marks=pytest.mark.thorough), "behind"])
 def test_a_build_that_is_killed_leaves_nothing_that_counts(cache: Path, tmp_path: Path, when: str) -> None:
     """By kill -9, before the first object is made and behind it: what is left is swept, and the next build is whole."""
     mark = tmp_path / "mark"

@@ -34,7 +34,7 @@ import numpy as np
 import {name} as m
 x = m.x0()
 n_q, n_v = len(m.q_names), len(m.v_names)
-q, v = x[:n_q], x[n_q:n_q + n_v]
+q, v = x[:n_q], x[n_q:]  # states follow the velocities
 dof = m.minimal.x0().size // 2 if getattr(m, "minimal", None) is not None else 0
 values = dict(t=0.0, x=x, q=q, v=v, a=v, q_i=m.minimal.x0()[:dof] if dof else q, v_i=v[:dof], a_i=v[:dof], span=0.01,
     w=np.ones(n_v), d=np.ones(2 * n_v + n_q), x_min=m.minimal.x0() if dof else x)
@@ -45,7 +45,11 @@ for call, shape in re.findall(r"^    (\\w.*\\)) -> (\\(.*?\\)|Module|Trajectory)
     if not shape.startswith("("):
         continue
     text = re.sub(r"\\*\\*\\w+", "", call)
-    found = eval("m." + text, {{"m": m, **values}})
+    try:
+        found = eval("m." + text, {{"m": m, **values}})
+    except m.UsageError as error:
+        wrong.append((call, str(error), shape))
+        continue
     sizes = str(tuple(np.shape(part) for part in found))[1:-1] if isinstance(found, tuple) else str(np.shape(found))
     tried += 1
     if sizes != shape:
@@ -103,7 +107,8 @@ def test_a_package_runs_with_numpy_alone(name: str, tmp_path: Path) -> None:
     found, module = alone(tmp_path, ALONE.format(name=name)), model.compile(target="numpy")
     np.testing.assert_array_equal(found["rhs"], module.rhs(0.0, module.x0()))
     assert found["tried"] >= 12
-    assert found["wrong"] == []
+    missing = ["inverse_dynamics_hessian_product"] if name == "touching" else []  # contacts have no second derivatives
+    assert [call.partition("(")[0] for call, *_ in found["wrong"]] == missing
     assert "scipy" in found["told"].lower()
 
 
