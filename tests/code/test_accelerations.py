@@ -350,7 +350,7 @@ def test_a_freedom_that_moves_no_inertia_is_reported() -> None:
 
 @pytest.mark.parametrize("name", ["tree", "long tree"])
 @pytest.mark.parametrize(
-    "parameters", [(0.0, 0.6), (1.0, 0.0), (1.0, 1e-10)], ids=["no mass", "coincident axes", "axes so close"]
+    "parameters", [(0.0, 0.6), (1.0, 0.0), (1.0, 1e-8)], ids=["no mass", "coincident axes", "axes so close"]
 )
 def test_a_tree_without_inertia_is_reported(name: str, parameters: tuple[float, float]) -> None:
     in_c, _, x = case(name)
