@@ -121,7 +121,7 @@ def fitting(out: Any, shape: tuple[int, ...], what: str = "out", error: type[Exc
         raise error(f"{what} must be a float64 array of shape {shape}, not {given}")
     if not out.flags.writeable:
         raise error(f"{what} is read-only")
-    if any(step == 0 and n > 1 for step, n in zip(out.strides, shape, strict=True)):
+    if out.size and any(step == 0 and n > 1 for step, n in zip(out.strides, shape, strict=True)):
         raise error(f"{what} has strides {out.strides}: several of its entries are one number in memory")
     return out
 

@@ -241,7 +241,7 @@ cdef class Kernel:
                 raise self.error(f"out of {self.name} must be a float64 array of shape {shape}, not {given}")
             if not out.flags.writeable:
                 raise self.error(f"out of {self.name} is read-only")
-            if 0 in [step for step, n in zip(out.strides, out.shape) if n > 1]:
+            if out.size and 0 in [step for step, n in zip(out.strides, out.shape) if n > 1]:
                 raise self.error(f"out of {self.name} has strides {out.strides}: several of its entries are one number in memory")
             if out.flags.carray and not any([np.may_share_memory(out, array) for array in held]):
                 return out

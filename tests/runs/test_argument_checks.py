@@ -151,6 +151,7 @@ def test_what_is_missing_and_what_takes_no_result(target: str) -> None:
     ):
         with pytest.raises(eg.UsageError, match=r"strides \(0.*one number in memory"):
             call()
+    assert mod.rhs(0.0, np.zeros((mod.n_x, 0)), out=np.empty((mod.n_x, 0))).shape == (mod.n_x, 0)
     for span, words in (
         ((0, 1e300), r"1e\+301 samples of a, one every 0\.1 s, so it would not end"),
         ((1e16, 1e16 + 2), r"the period of a, 0\.1 s, is lost in rounding at times near 1e\+16 s"),
