@@ -35,7 +35,7 @@ CALLED = set(
 METHODS = ("lagrange", "recursive", "augmented", "newton_euler", "amalgamated", "gibbs_appell", "hamilton")
 #: One loop always; by make thorough all examples, and a few by all methods.
 ALL = [(path.stem, "embedding") for path in sorted(EXAMPLES.glob("*.yaml")) if path.stem != "slider_crank"]
-ALL += [(name, method) for name in ("slider_crank", "satellite", "stewart_platform") for method in METHODS]
+ALL += [(name, method) for name in ("slider_crank", "satellite") for method in METHODS]
 EVERY = [("slider_crank", "embedding"), *(pytest.param(*one, marks=pytest.mark.thorough) for one in ALL)]
 
 
@@ -43,8 +43,6 @@ def exported(name: str, method: str, folder: Path) -> list[str]:
     """Write the C library of an example into a folder; the names of its C files."""
     words = ("--method", method, "--target", "c", "--out", ".")
     done = command.run("generate", EXAMPLES / f"{name}.yaml", *words, cwd=folder)
-    if done.code == 1:
-        pytest.skip(done.err)  # not by this method
     assert done.code == 0, done.err
     for file in (folder / name).iterdir():
         if file.suffix in (".c", ".h", ".json"):

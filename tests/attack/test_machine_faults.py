@@ -170,7 +170,6 @@ def test_damaged_files_of_a_build(damage: str, target: str, tmp_path: Path) -> N
 
 
 @pytest.mark.thorough
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
 def test_files_that_are_open_to_others_are_never_loaded(tmp_path: Path) -> None:
     """Every folder and file of a cache, and a folder above, given to another user or opened to all."""
     above, cache = tmp_path / "above", tmp_path / "above" / "cache"
@@ -179,10 +178,11 @@ def test_files_that_are_open_to_others_are_never_loaded(tmp_path: Path) -> None:
     entries = [path for path in cache.rglob("*") if path.is_dir() or path.suffix in (".so", ".json", ".c")]
     for path in [above, cache, *entries]:
         status = path.stat()
-        os.chown(path, STRANGER, -1)
-        outcome = run(cache, "cython")
-        os.chown(path, status.st_uid, -1)
-        survived(f"{path.name} of another user", outcome, after=run(cache, "cython"))
+        if os.geteuid() == 0:  # only root can give files away
+            os.chown(path, STRANGER, -1)
+            outcome = run(cache, "cython")
+            os.chown(path, status.st_uid, -1)
+            survived(f"{path.name} of another user", outcome, after=run(cache, "cython"))
         for mode in (0o777, 0o722):
             path.chmod(mode)
             outcome = run(cache, "cython")
