@@ -303,11 +303,12 @@ def test_compilers_that_are_broken_and_then_mended(name: str, tmp_path: Path) ->
 @pytest.mark.parametrize("target", ["numpy", "cython"])
 def test_two_versions_on_one_cache(target: str, tmp_path: Path) -> None:
     """One takes sines for their negatives: what either made never serves the other, in turns and at once."""
-    for name in ("templates", "examples", "eomgen"):
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__", "built"))
+    for name in ("eomgen", "eomgen/templates", "eomgen/examples"):
+        source = ROOT / name.removeprefix("eomgen/")
+        shutil.copytree(source, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__", "built"))
     for file, old, new in (
         ("eomgen/__init__.py", '__version__ = "', '__version__ = "9.'),
-        ("templates/c/eomgen_sincos.h", "*sine = (pack)(", "*sine = -(pack)("),
+        ("eomgen/templates/c/eomgen_sincos.h", "*sine = (pack)(", "*sine = -(pack)("),
         ("eomgen/operations/table.py", 'c="sine_of({})"', 'c="sine_of({})", numpy="(-np.sin({}))"'),
     ):
         text = (tmp_path / file).read_text(encoding="utf-8")
