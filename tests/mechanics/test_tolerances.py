@@ -121,7 +121,7 @@ def test_a_wanted_angle_of_a_cut_joint_counts_modulo_full_turns() -> None:
 
 
 # -- sources -----------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("method", ["embedding", "newton_euler"])
+@pytest.mark.parametrize("method", ["embedding", "lagrange"])
 def test_reading_the_equations_changes_no_source(method: str) -> None:
     untouched = models.build("slider_crank").derive(method).to_casadi()
     equations = models.build("slider_crank").derive(method)
