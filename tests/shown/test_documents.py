@@ -34,7 +34,7 @@ ROOT = EXAMPLES.parent
 DOCS = ROOT / "docs"
 DOCUMENTS = [ROOT / "README.md", *sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)]
 #: Pages whose blocks run always; those of all others by ``make thorough``.
-ALWAYS = ("README.md", "getting_started.md", "sympy.md", "symbolic.md", "reactions.md", "components.md")
+ALWAYS = ("README.md", "sympy.md", "symbolic.md", "reactions.md", "components.md")
 
 
 def blocks(path: Path, language: str) -> list[str]:
