@@ -41,13 +41,6 @@ FAULTS = (
         ("tests/attack/test_injected_texts.py::test_nothing_of_a_text_drives_the_terminal",),
     ),
     Fault(
-        "sources-looked-at", "eomgen/pipeline.py",
-        "kinematics, mobility, tree = equations.fresh()",
-        "kinematics, mobility, tree = equations.kinematics, equations.mobility, equations.tree",
-        "sources depend on what was read before",
-        ("tests/mechanics/test_tolerances.py::test_reading_the_equations_changes_no_source",),
-    ),
-    Fault(
         "wheel-native", "eomgen/compilation/wheel.py",
         "    if target == \"cython\":\n        _refuse_native()",
         "    if target == \"numpy\":\n        _refuse_native()",
