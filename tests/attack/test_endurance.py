@@ -15,7 +15,7 @@ import pytest
 import eomgen as eg
 
 THREADS = 8
-SPAN = (0.0, 0.5)
+SPAN = (0.0, 0.1)
 TARGETS = pytest.mark.parametrize("crank", ["cython", pytest.param("numpy", marks=pytest.mark.thorough)], indirect=True)
 
 
