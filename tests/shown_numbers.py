@@ -13,11 +13,6 @@ import sympy
 METHODS = (
     *("embedding", "lagrange", "recursive", "augmented", "newton_euler", "amalgamated", "gibbs_appell", "hamilton"),
 )
-#: Examples whose displays take seconds; what stands in them stands in those of the others too.
-LONG = (
-    *("andrews_squeezer", "bicycle", "bricard", "delta_robot", "double_wishbone", "excavator", "gait_leg", "half_car"),
-    *("n_four_bar", "puma560", "shaper", "spatial_slider_crank", "stewart_platform", "v_engine", "watt_six_bar"),
-)
 
 
 def evaluate(named: Sequence[tuple[Any, Any]], flat: Sequence[Any], values: Mapping[str, float]) -> np.ndarray:
