@@ -311,7 +311,7 @@ int main(void)
         double *out = malloc(sizeof(double) * (size_t)(f->n_out + 1));
         for (int i = 0; i < f->n_in; i++) { x[i] = i < %d ? x0[i] : 0.3; }
         const int status = f->call(0.1, x, u, c, out, w);
-        if (status < 0) { printf("%%s: %%d\n", f->name, status); return 1; }
+        if (status < 0) { printf("%%s: %%d\\n", f->name, status); return 1; }
         for (int i = 0; i < f->n_out; i++) { total += status == 0 ? out[i] : 0.0; }
         if (f->call(0.1, x, u, c, NULL, w) < 0) { return 2; }
         free(x), free(out);

@@ -243,7 +243,7 @@ def build(cc: Path, out: Path) -> AbstractContextManager[subprocess.Popen[str]]:
     return child(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
 
-def wait_for(condition: Callable[[], bool], seconds: float = 60.0) -> None:
+def wait_for(condition: Callable[[], bool], seconds: float = 180.0) -> None:
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "waited in vain"
@@ -258,7 +258,7 @@ def test_two_processes_build_the_same_at_once(cache: Path, tmp_path: Path) -> No
     cc, _ = compiler(tmp_path, lines)
     with build(cc, tmp_path / "one") as one, build(cc, tmp_path / "other") as other:
         for builder in (one, other):
-            builder.communicate(timeout=120)
+            builder.communicate(timeout=300)
     assert [one.returncode, other.returncode] == [0, 0]
     assert len(list(met.iterdir())) == 2
     assert (tmp_path / "one" / "pendulum.fmu").read_bytes() == (tmp_path / "other" / "pendulum.fmu").read_bytes()
@@ -270,7 +270,7 @@ def test_two_processes_build_the_same_at_once(cache: Path, tmp_path: Path) -> No
 def test_a_build_that_is_killed_leaves_nothing_that_counts(cache: Path, tmp_path: Path, when: str) -> None:
     """By kill -9, before the first object is made and behind it: what is left is swept, and the next build is whole."""
     mark = tmp_path / "mark"
-    hang = f"touch {mark}; exec sleep 60"
+    hang = f"touch {mark}; exec sleep 300"
     cc, _ = compiler(tmp_path, hang if when == "before" else f'gcc "$@"; {hang}')
     with build(cc, tmp_path / "out") as builder:
         wait_for(mark.exists)
@@ -282,7 +282,7 @@ def test_a_build_that_is_killed_leaves_nothing_that_counts(cache: Path, tmp_path
     assert not (tmp_path / "out" / "pendulum.fmu").exists()
     compiler(tmp_path)  # the same command, which works now
     with build(cc, tmp_path / "out") as builder:
-        builder.communicate(timeout=120)
+        builder.communicate(timeout=300)
     assert builder.returncode == 0
     assert len(entries()) == 1
     for folder in attempts(cache):
@@ -296,11 +296,11 @@ def test_a_build_that_is_ended_leaves_no_compiler_and_no_attempt(
     cache: Path, tmp_path: Path, by: signal.Signals
 ) -> None:
     mark = tmp_path / "mark"
-    cc, _ = compiler(tmp_path, f"echo $$ > {mark}.new; mv {mark}.new {mark}; exec sleep 60")
+    cc, _ = compiler(tmp_path, f"echo $$ > {mark}.new; mv {mark}.new {mark}; exec sleep 300")
     with build(cc, tmp_path / "out") as builder:
         wait_for(mark.exists)
         os.kill(builder.pid, by)
-        builder.communicate(timeout=60)
+        builder.communicate(timeout=180)
     assert builder.returncode != 0
     wait_for(lambda: not Path("/proc", mark.read_text().strip()).exists())
     assert entries() == []
