@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -221,3 +222,24 @@ def test_a_wheelset_hunts_above_its_critical_speed() -> None:
     assert late < 0.2
     loads = mod.outputs(0.0, mod.x0())
     assert loads[mod.y_names.index("wheel_load")] == pytest.approx((p["m"] * p["g"] + p["load"]) / 2, rel=1e-12)
+
+
+#: What the description of an example says of its motion -> whether a run does so.
+CLAIMS: list[tuple[str, str, Callable[[Any], bool]]] = [
+    ("cart_pendulum", "falls over", lambda run: run["phi"].max() > np.pi / 2),
+    ("four_bar", "coasting", lambda run: run["theta_dot"].min() > 0),
+    ("gear_train", "lifts a load", lambda run: run["height"][-1] > 0.1),
+    ("kapitza_pendulum", "upside down, held there", lambda run: np.abs(run["theta"] - np.pi).max() < 0.3),
+    ("pendulum", "released from the horizontal", lambda run: abs(run["y"][0]) < 1e-12),
+    ("planetary_gear", "load that sinks", lambda run: run["height"][-1] < -0.1),
+    ("slider_crank", "that swings", lambda run: np.ptp(run["theta"]) < np.pi + 1),
+    ("spherical_pendulum", "swinging round", lambda run: run["phi"][-1] > 2 * np.pi),
+    ("watt_six_bar", "output swings less", lambda run: np.ptp(run["swing_out"]) < np.ptp(run["swing_in"])),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "does"), CLAIMS, ids=[name for name, _, _ in CLAIMS])
+def test_examples_move_as_they_are_described(name: str, text: str, does: Callable[[Any], bool]) -> None:
+    module = models.build(name).compile(target="numpy")
+    assert text in module.doc
+    assert does(module.simulate())
