@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
@@ -79,7 +80,7 @@ def stack_of(sources: Iterable[str]) -> dict[str, int]:
         found = 0
         for kind, names in declaration.findall(text):
             each = places(structs[kind]) if kind in structs else 1
-            arrays = _ARRAY.findall(re.sub(r"=[^,]*", "", names))
+            arrays = _ARRAY.findall(re.sub(r"=\s*\{[^{}]*\}|=[^,]*", "", names))
             found += each * (1 + names.count(",")) + sum(_length(lengths, numbers) for lengths in arrays)
         return found
 
@@ -99,10 +100,17 @@ def stack_of(sources: Iterable[str]) -> dict[str, int]:
 
 
 def _length(lengths: str, numbers: Mapping[str, str]) -> int:
-    """Numbers in an array, each of its lengths a sum of products of names and whole numbers."""
+    """Numbers in an array, each of its lengths of sums and products of names and whole numbers."""
     return prod(_value(length, numbers) for length in re.findall(r"\[([^\]]+)\]", lengths))
 
 
 def _value(text: str, numbers: Mapping[str, str]) -> int:
-    terms = [[factor.strip() for factor in term.split("*")] for term in text.split("+")]
-    return sum(prod(int(f) if f.isdigit() else _value(numbers[f], numbers) for f in factors) for factors in terms)
+    return _whole(ast.parse(text.strip(), mode="eval").body, numbers)
+
+
+def _whole(node: ast.expr, numbers: Mapping[str, str]) -> int:
+    """The value of a sum or product of whole numbers and of names of such."""
+    if isinstance(node, ast.BinOp):
+        left, right = _whole(node.left, numbers), _whole(node.right, numbers)
+        return left * right if isinstance(node.op, ast.Mult) else left + right
+    return _value(numbers[node.id], numbers) if isinstance(node, ast.Name) else int(ast.unparse(node))
