@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
@@ -70,13 +71,7 @@ class Running:
         with self._lock:
             if self._stopped:
                 raise ToolchainError(f"the command {words} was not started, because the work was cancelled", words)
-            try:
-                process = subprocess.Popen(
-                    command, cwd=directory, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                    stderr=subprocess.PIPE, process_group=0,
-                )  # fmt: skip
-            except (OSError, ValueError) as error:  # ValueError: a NUL in a word
-                raise ToolchainError(f"the command {words} cannot be started: {error}", words) from error
+            process = _start(command, directory, environment)
             self._running.add(process)
         with process:
             try:
@@ -152,6 +147,24 @@ def _given() -> float | None:
     if not 0.0 < seconds < float("inf"):
         raise ToolchainError(f"{SECONDS} must be a positive number of seconds, not {text!r}")
     return seconds
+
+
+def _start(command: Sequence[str], directory: Path | None, environment: dict[str, str]) -> subprocess.Popen[bytes]:
+    """Begin a command, in a thread: a signal that came while Popen waits would leave a process that nobody knows of."""
+    with ThreadPoolExecutor(1) as starter:
+        started = starter.submit(
+            subprocess.Popen, command, cwd=directory, env=environment, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, process_group=0,
+        )  # fmt: skip
+        try:
+            return started.result()
+        except (OSError, ValueError) as error:  # ValueError: a NUL in a word
+            words = shlex.join(command)
+            raise ToolchainError(f"the command {words} cannot be started: {error}", words) from error
+        except BaseException:
+            if started.exception() is None:
+                _kill(started.result())
+            raise
 
 
 def _listen(process: subprocess.Popen[bytes], seconds: float) -> tuple[tuple[list[bytes], list[bytes]], str]:
