@@ -313,6 +313,7 @@ def test_pictures_are_whole_and_hold_no_element_of_a_text(tmp_path: Path) -> Non
         axes = Figure().add_subplot()
         run.plot("y0", ax=axes)
         shown = "".join(axes.get_ylabel().replace("\\$", "$").partition("(")[2].rpartition(")")[0].split())
+        assert shown
         assert shown.isprintable()
         with rc_context({"svg.fonttype": "none"}):
             axes.figure.savefig(tmp_path / "shown.svg")

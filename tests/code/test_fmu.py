@@ -262,8 +262,11 @@ def test_the_same_model_gives_the_same_bytes(tmp_path: Path) -> None:
 def test_names_units_and_start_values(tmp_path: Path) -> None:
     m = models.build("engine")
     m.output("theta", "theta")
+    m.simulation = {"end": 0.5, "rtol": 1e-7, "atol": 1e-5}
     path = m.derive().write_fmu(tmp_path / "engine.fmu")
-    variables = {v.name: v for v in read_model_description(str(path)).modelVariables}
+    described = read_model_description(str(path))
+    assert [float(getattr(described.defaultExperiment, key)) for key in ("stopTime", "tolerance")] == [0.5, 1e-7]
+    variables = {v.name: v for v in described.modelVariables}
     assert variables["theta"].initial == "exact"
     assert variables["s"].initial == "approx"
     assert variables["theta_out"].causality == "output"

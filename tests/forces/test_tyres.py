@@ -290,6 +290,18 @@ def test_locked_wheel_that_stops_gives_back_its_grip_alone(turn: float) -> None:
     assert 0.6 * held < back <= 1.001 * held
 
 
+def test_a_road_that_rocks_about_the_patch_does_not_slip() -> None:
+    """The place of the road that the wheel touches stands still, so that nothing is deflected sideways."""
+    m = eg.Model("rocking", gravity=(0, 0, 0))
+    road, wheel = m.body("road", mass=1.0, inertia=(1, 1, 1)), m.body("wheel", mass=20.0, inertia=(0.5, 0.9, 0.5))
+    m.revolute("rock", m.ground, road, axis="x")
+    m.revolute("spin", m.ground.at(0, 0, R - 0.02), wheel, axis="y")
+    m.tyre("tyre", road, wheel, radius=R, stiffness=STIFFNESS, relaxation=(0.3, 0.3), **BRUSH)
+    mod = m.compile(target="numpy")
+    rates = dict(zip(mod.x_names, mod.rhs(0.0, mod.x0(rock_dot=2.0)), strict=True))
+    assert rates["tyre_deflection_y"] == pytest.approx(0.0, abs=1e-12)
+
+
 def random_states(mod: Any, number: int = 12) -> list[np.ndarray]:
     """Some at and near the reversal of the motion."""
     random = np.random.default_rng(3)

@@ -180,4 +180,11 @@ FAULTS = (
         "the Jacobian of a long chain: rows in the wrong order",
         ("tests/code/test_accelerations.py::test_derivatives_are_differences[by columns]",),
     ),
+    Fault(
+        "c-jacobian-halved", "templates/c/drivers/jacobian_projection.c",
+        "NQ + k == column ? 1.0 / s[k] : 0.0",
+        "NQ + k == column ? 0.5 / s[k] : 0.0",
+        "columns of velocities in the Jacobian of loops are halved",
+        ("tests/code/test_accelerations.py::test_derivatives_are_differences[slider_crank]",),
+    ),
 )  # fmt: skip

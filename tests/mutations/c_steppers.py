@@ -229,4 +229,11 @@ FAULTS = (
         "steps of Taylor's method in lanes sum the coefficients of the step before",
         ("tests/code/test_steps.py::test_every_run_of_an_ensemble_has_its_own_closed_form[False-Taylor]",),
     ),
+    Fault(
+        "rk4-node", "templates/c/steppers/rk4.c",
+        "eomgen_evaluate(run, t + 0.5 * h, y, k2);",
+        "eomgen_evaluate(run, t + h, y, k2);",
+        "the third stage of RK4 is evaluated at the end of the step",
+        ("tests/runs/test_inputs.py::test_every_operation_means_the_same_on_a_tape",),
+    ),
 )  # fmt: skip

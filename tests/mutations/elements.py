@@ -256,4 +256,11 @@ FAULTS = (
         "angular velocity in ground axes: turns in the wrong order",
         ("tests/mechanics/test_rotations.py::test_angular_velocity[euler_angles-xyx-numbers]",),
     ),
+    Fault(
+        "tyre-turning-road", "eomgen/forces/tyres.py",
+        "vec.cross(whirl, vec.add(reach, place))",
+        "vec.cross(whirl, reach)",
+        "a road that turns moves under the wheel's centre, not where it touches",
+        ("tests/forces/test_tyres.py::test_a_road_that_rocks_about_the_patch_does_not_slip",),
+    ),
 )  # fmt: skip

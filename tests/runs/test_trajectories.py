@@ -71,6 +71,18 @@ def test_angles_of_cut_joints_do_not_jump() -> None:
     np.testing.assert_allclose(np.gradient(run["A"], run.t)[5:-5], run["A_dot"][5:-5], rtol=0.05)
 
 
+def test_parameters_of_a_cut_ball_do_not_jump() -> None:
+    """A door on a hinge and a ball, whose Euler parameters are those of half the angle, over two turns."""
+    m = eg.Model("door")
+    door = m.body("door", mass=1.0, inertia=(1, 1, 1))
+    m.revolute("hinge", m.ground, door, axis="z", coordinate="theta")
+    m.spherical("ball", m.ground.at(0, 0, 1), door.at(0, 0, 1), rotation="euler_parameters")
+    times = np.linspace(0.0, 4.0, 81)
+    run = m.compile(target="numpy").simulate(4.0, initial={"theta_dot": np.pi}, t_eval=times)
+    e = run["ball_e0"] + 1j * run["ball_e3"]
+    np.testing.assert_allclose(e, e[0] * np.exp(0.5j * np.pi * times), atol=1e-9)
+
+
 def test_saved_and_loaded_without_the_module(traj: eg.Trajectory, tmp_path: Path) -> None:
     path = traj.save(tmp_path / "run")
     assert path.name == "run.npz"

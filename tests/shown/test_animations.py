@@ -141,6 +141,20 @@ def test_the_longest_arrow_is_the_force_that_a_joint_bears() -> None:
         assert float(shown[1]) <= force * 1.001
 
 
+def test_the_arrow_of_a_spring_points_along_its_last_part(tmp_path: Path) -> None:
+    """A bob straight below a pin, over which its spring runs to a far wall."""
+    m = eg.Model("cord", gravity=(0, -9.81, 0))
+    m.prismatic("slide", m.ground, bob := m.body("bob", mass=1.0), axis="y", coordinate="y")
+    m.spring("cord", m.ground.at(-3, 0, 0), bob, stiffness=10, length=1, via=[m.ground.at(0, 1, 0)])
+    run, seen = m.compile(target="numpy").simulate(0.1, initial={"y": -1.0}), []
+    for forces in ((), ["cord"]):
+        run.animate(folder := tmp_path / f"frames{len(forces)}", fps=10, forces=forces)
+        seen.append(np.asarray(Image.open(min(folder.iterdir())).convert("RGB"), dtype=int))
+    before, after = (frame @ [65536, 256, 1] for frame in seen)
+    rows, columns = np.nonzero(~np.isin(after, before) & (np.ptp(seen[1], axis=2) > 60))
+    assert 10 < 2 * np.ptp(columns) < np.ptp(rows)
+
+
 @pytest.mark.needs("chromium")
 @pytest.mark.thorough
 def test_a_page_plays_and_its_slider_moves_it_without_a_network(run: Any, tmp_path: Path) -> None:

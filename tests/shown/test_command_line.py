@@ -272,6 +272,13 @@ def test_no_compiler(call: Call, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert not checks["cache"]["ok"]
 
 
+def test_a_library_that_is_missing_ends_as_a_compiler_that_is_missing(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    expect(call("run", PENDULUM, *NUMPY, "--end", "0.1", "--out", "run.nc"), 3, "pip install")
+
+
 @pytest.mark.slow
 @pytest.mark.thorough
 def test_the_doctor_finds_all_well(call: Call) -> None:

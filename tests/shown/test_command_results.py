@@ -223,6 +223,16 @@ def test_reactions_and_inverse(call: Call, tmp_path: Path) -> None:
     np.testing.assert_allclose(other["reactions"], forces["reactions"], atol=1e-9)
 
 
+def test_inverse_begins_where_it_is_told(call: Call, tmp_path: Path) -> None:
+    arm = yaml(
+        tmp_path,
+        "name: arm\ngravity: [0, -10, 0]\nbodies: {b: {mass: 2, com: [0, -0.5, 0]}}\n"
+        "joints: {A: {type: revolute, between: [ground, b], coordinate: theta}}\n",
+    )
+    found = call("inverse", arm, *NUMPY, "--json", "--set", "theta=0.5").json
+    assert found["forces"]["theta"] == pytest.approx(10 * np.sin(0.5))
+
+
 def test_impact(call: Call, tmp_path: Path) -> None:
     words = ("impact", CRANK, *NUMPY, "--gap", "s=0.5", "--closed", "--set", "theta=0.3")
     found = call(*words, "--json").json
