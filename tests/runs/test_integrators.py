@@ -88,6 +88,9 @@ def test_steps_of_one_size(compiled: Any) -> None:
     np.testing.assert_allclose(go(0.0, x, 0.1), by_hand, rtol=1e-14)
     short = compiled.simulate((0.0, 1e-3), x, method="RK4", step=0.01)  # a run shorter than a step
     np.testing.assert_array_equal(short.x[:, -1], go(0.0, x, 1e-3))
+    pushed = {"parameters": {"k": 0.0}, "inputs": {"F": "t**3"}}
+    run = compiled.simulate(1.0, [0.0, 0.0], **pushed, method="RK4", step=0.25)
+    assert run["x_dot"][-1] == pytest.approx(1 / 8, rel=1e-14)  # Simpson's rule, exact for cubics
     with pytest.raises(eg.UsageError, match="would not end"):
         go(0.0, x, 1e12)
 
