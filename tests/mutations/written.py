@@ -68,4 +68,11 @@ FAULTS = (
         "a functional mock-up unit states the absolute tolerance in place of the relative one",
         ("tests/code/test_fmu.py::test_names_units_and_start_values",),
     ),
+    Fault(
+        "exit-missing", "eomgen/cli/failures.py",
+        "isinstance(error, ToolchainError | MissingDependencyError)",
+        "isinstance(error, ToolchainError)",
+        "a library that is missing ends the command as a faulty model does",
+        ("tests/shown/test_command_line.py::test_a_library_that_is_missing_ends_as_a_compiler_that_is_missing",),
+    ),
 )  # fmt: skip
