@@ -52,14 +52,14 @@ FAULTS = (
         "+ BUILDS * size + ZERO}",
         "+ BUILDS * size}",
         "the tests of a package ask for the rounding of another build where a result is zero",
-        ("tests/verification/test_record_calls.py::test_c_is_within_the_bounds",),
+        ("tests/shown/test_verify.py::test_c_is_within_the_recorded_bounds",),
     ),
     Fault(
         "recorded-inputs", "eomgen/verification/record_calls.py",
         '"p": case.p, "u": case.u}',
         '"p": module.p, "u": case.u}',
         "packages are tested at the declared parameters alone",
-        ("tests/verification/test_record_calls.py::test_figures_are_those_of_the_pendulum",),
+        ("tests/shown/test_verify.py::test_recorded_figures_are_those_of_the_pendulum",),
     ),
     Fault(
         "fmu-tolerance", "eomgen/emit/fmu/content.py",

@@ -53,6 +53,7 @@ def test_an_equation_that_holds_identically(seed: int) -> None:
     assert (report.degrees_of_freedom, report.rank) == (2, 0)
 
 
+@pytest.mark.quick
 def test_angular_velocity_of_bodies_without_mass() -> None:
     """It needs no mass: w = theta' e_z, alpha = theta'' e_z."""
     m = eg.Model("massless")

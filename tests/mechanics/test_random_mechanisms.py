@@ -1,0 +1,340 @@
+"""What holds of any mechanism: balance of every body and of power, derivatives, methods, targets, other descriptions.
+
+Thirty mechanisms of each property run always, a thousand by ``make thorough``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import judges
+import numpy as np
+import pytest
+from hypothesis import Phase, given, reject, seed, settings
+from hypothesis import strategies as st
+from random_models import (
+    ANCHOR,
+    CORNER,
+    DAMPING,
+    FREE_LENGTH,
+    PUSH,
+    STIFFNESS,
+    TIME,
+    TIP,
+    TWIST,
+    Clothes,
+    Made,
+    Recipe,
+    basis,
+    mechanisms,
+)
+from sweeps import METHODS
+
+import eomgen as eg
+
+BATCHES = [0, *(pytest.param(k, marks=pytest.mark.thorough) for k in range(1, 34))]
+
+
+def for_each(batch: int, check: Callable[..., None], *more: Any, count: int = 30) -> None:
+    """Thirty mechanisms; those of a batch are the same for all properties of one mechanism, and built once."""
+    options = settings(max_examples=count, phases=[Phase.generate])  # smaller ones are sought for many minutes
+    seed(batch)(options(given(mechanisms(), *more)(check)))()
+
+
+@cache
+def compiled(recipe: Recipe) -> tuple[Made, Any]:
+    made = Made(recipe)
+    try:
+        return made, made.compile()
+    except eg.ModelError as why:  # rightly: its loop holds the coordinate that is driven
+        assert "the driver has no effect" in str(why)
+        reject()
+
+
+def sized(a: np.ndarray) -> float:
+    return float(np.abs(a).max(initial=0.0))
+
+
+class Balance:
+    """Loads on the bodies of a mechanism as it is made, and what moves them, from outside."""
+
+    def __init__(self, recipe: Recipe) -> None:
+        self.made, self.module = compiled(recipe)
+        made, module, self.recipe = self.made, self.module, recipe
+        self.x = made.state(module)
+        self.motion = made.motion(module, self.x)
+        self.wrenches = np.zeros((len(recipe.kinds), 6))  # about the bodies' origins
+        self.power = 0.0  # of all that is not in the energy
+        self.tau = np.zeros(module.n_v)  # along coordinates
+        self.columns = {name: k for k, name in enumerate(module.v_names)}
+        self.singles = [self.columns[f"{name}_dot"] for name in recipe.single]
+        for kind in recipe.forces:
+            getattr(self, kind, lambda: None)()
+        labels = [label.partition(".")[0] for label in module.constraint_labels]
+        self.multipliers = dict(zip(labels, module.multipliers(TIME, self.x), strict=True))
+        for kind in recipe.constraints:
+            getattr(self, kind)()
+
+    def point(self, body: int, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Its place and velocity."""
+        if body < 0:
+            return at, np.zeros(3)
+        m = self.motion
+        arm = m.R[body] @ at
+        return m.r[body] + arm, m.r_dot[body] + np.cross(m.w[body], arm)
+
+    def load(self, body: int, place: np.ndarray, force: np.ndarray, torque: np.ndarray | float = 0.0) -> None:
+        if body >= 0:
+            arm = place - self.motion.r[body]
+            self.wrenches[body] += np.concatenate([force, torque + np.cross(arm, force)])
+
+    def push_at(self, body: int, at: np.ndarray, force: np.ndarray) -> None:
+        place, rate = self.point(body, at)
+        self.load(body, place, force)
+        self.power += float(force @ rate)
+
+    def along(self, k: int, force: float) -> None:
+        self.tau[k] += force
+        self.power += force * self.motion.v[k]
+
+    # -- forces
+    def _reach(self) -> tuple[np.ndarray, float, np.ndarray]:
+        place, rate = self.point(self.recipe.last, TIP)
+        length = float(np.linalg.norm(place - ANCHOR))
+        return (place - ANCHOR) / length, length, rate
+
+    def spring(self) -> None:
+        along, length, _ = self._reach()
+        self.load(self.recipe.last, self.point(self.recipe.last, TIP)[0], -STIFFNESS * (length - FREE_LENGTH) * along)
+
+    def damper(self) -> None:
+        along, _, rate = self._reach()
+        self.push_at(self.recipe.last, TIP, -DAMPING * float(along @ rate) * along)
+
+    def push(self) -> None:
+        self.push_at(0, CORNER, self.motion.R[0] @ PUSH)
+
+    def twist(self) -> None:
+        body = self.recipe.last // 2
+        torque = self.motion.R[body] @ TWIST
+        self.load(body, self.motion.r[body], np.zeros(3), torque)
+        self.power += float(torque @ self.motion.w[body])
+
+    def state(self) -> None:
+        z = self.x[self.module.x_names.index("z")]
+        self.push_at(0, TIP, np.array([z, 0.0, 2.0 * z]))
+
+    def joint_spring(self) -> None:
+        for name, k in zip(self.recipe.single, self.singles, strict=True):
+            self.tau[k] -= 3.0 * (self.motion.q[self.module.q_names.index(name)] - 0.2)
+
+    def joint_damper(self) -> None:
+        for k in self.singles:
+            self.along(k, -0.4 * self.motion.v[k])
+
+    def armature(self) -> None:
+        """Its kinetic energy is in that of the module."""
+        for name, k in zip(self.recipe.single, self.singles, strict=True):
+            if self.made.joints[name][0] != self.recipe.closing:
+                self.tau[k] -= 0.3 * self.motion.a[k]
+
+    # -- constraint elements
+    def driver(self) -> None:
+        self.along(self.singles[0], -self.multipliers["driver"])
+
+    def coupling(self) -> None:
+        self.along(self.singles[-1], -self.multipliers["coupling"])
+        self.along(self.singles[-2], 0.5 * self.multipliers["coupling"])
+
+    def velocities(self) -> None:
+        b = self.motion.q[self.module.q_names.index(self.recipe.single[-2])]
+        self.along(self.singles[-1], -self.multipliers["velocities"])
+        self.along(self.singles[-2], (1.0 + b**2) * self.multipliers["velocities"])
+
+    def switched(self) -> None:
+        self.along(self.singles[-1], -self.module.outputs(TIME, self.x)[0])
+
+    def knife_edge(self) -> None:
+        axis = self.motion.R[self.recipe.last][:, 1]
+        self.push_at(self.recipe.last, TIP, -self.multipliers["knife_edge"] * axis)
+
+    # -- joints
+    def relative(self, name: str) -> tuple[np.ndarray, list[int]]:
+        """Velocity of S against P at S and angular velocity for a unit of each velocity of a joint (6, k)."""
+        _, i, _, j, S = self.made.joints[name]
+        m, place = self.motion, self.point(j, S.position)[0]
+        columns = [k for label, k in self.columns.items() if label == f"{name}_dot" or label.startswith(f"{name}_")]
+        result = np.zeros((6, len(columns)))
+        for body, sign in ((j, 1.0), (i, -1.0)):
+            if body >= 0:
+                turn = m.J_w[body][:, columns]
+                result[:3] += sign * (m.J_r[body][:, columns] + np.cross(turn, (place - m.r[body])[:, None], axis=0))
+                result[3:] += sign * turn
+        return result, columns
+
+    def drive(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Wrench of what acts along a joint's coordinates, torques for angles and forces for lengths; its motions."""
+        kind, i, P, *_ = self.made.joints[name]
+        motors = self.made.motors
+        if name in self.module.metadata["loop_joint_names"]:
+            axis = (self.motion.R[i] if i >= 0 else np.eye(3)) @ P.rotation[:, 2]
+            force = motors.get(name, 0.0) * axis
+            return np.concatenate([force, 0 * axis] if kind == "prismatic" else [0 * axis, force]), np.zeros((6, 0))
+        moves, columns = self.relative(name)
+        tau, basis = self.tau[columns].copy(), moves.copy()
+        for c, k in enumerate(columns):
+            tau[c] += motors.get(self.module.v_names[k].removesuffix("_dot"), 0.0)
+            length = self.module.metadata["velocity_kinds"][k] == "length"
+            basis[3:, c] *= not length
+            basis[:3, c] *= length
+        return basis @ np.linalg.solve(moves.T @ basis, tau) if columns else np.zeros(6), moves
+
+    def check_bodies(self) -> None:
+        """Newton and Euler for each body with what its joints, their drives and loads exert."""
+        m, numbers, needed = self.motion, self.made.numbers, []
+        for k, mass in enumerate(numbers.masses):
+            arm, tensor = m.R[k] @ numbers.centers[k], m.R[k] @ numbers.inertias[k] @ m.R[k].T
+            a = m.r_ddot[k] + np.cross(m.w_dot[k], arm) + np.cross(m.w[k], np.cross(m.w[k], arm))
+            force, spin = mass * (a - numbers.gravity), tensor @ m.w_dot[k] + np.cross(m.w[k], tensor @ m.w[k])
+            needed.append(np.concatenate([force, spin + np.cross(arm, force)]))
+        reactions = dict(zip(self.module.joint_names, self.module.reactions(TIME, self.x), strict=True))
+        drives = {name: self.drive(name) for name in reactions}
+        size = max(map(sized, (needed, self.wrenches, *reactions.values(), *(drive for drive, _ in drives.values()))))
+        for name, reaction in reactions.items():
+            _, i, _, j, S = self.made.joints[name]
+            drive, moves = drives[name]
+            place, whole = self.point(j, S.position)[0], reaction + drive
+            self.load(j, place, whole[:3], whole[3:])
+            self.load(i, place, -whole[:3], -whole[3:])
+            assert sized(reaction @ moves) <= 1e-9 * size * max(1.0, sized(moves))
+        np.testing.assert_allclose(self.wrenches, needed, rtol=0, atol=1e-9 * size)
+
+    def check_power(self) -> None:
+        """The rate of both energies is the power of all else."""
+        module, m = self.module, self.motion
+        x_dot = np.zeros(module.n_x)
+        x_dot[: module.n_q], x_dot[module.n_q : module.n_q + module.n_v] = m.q_dot, m.a
+        along = x_dot / max(1.0, sized(x_dot))
+        rates = judges.first(module.energy, self.x, along) * max(1.0, sized(x_dot))
+        given = self.power
+        for name, value in self.made.motors.items():
+            given += value * self.rate(name)
+        assert abs(rates.sum() - given) <= 1e-9 * max(1.0, sized(rates), abs(given))
+
+    def rate(self, name: str) -> float:
+        """Of a coordinate, or of a joint of one coordinate that is cut."""
+        if f"{name}_dot" in self.columns:
+            return float(self.motion.v[self.columns[f"{name}_dot"]])
+        kind, i, P, j, S = self.made.joints[name]
+        m = self.motion
+        axis = (m.R[i] if i >= 0 else np.eye(3)) @ P.rotation[:, 2]
+        w, (place, rate) = m.w[j] - (m.w[i] if i >= 0 else 0.0), self.point(j, S.position)
+        if kind != "prismatic":
+            return float(axis @ w)
+        base = m.r_dot[i] + np.cross(m.w[i], place - m.r[i]) if i >= 0 else np.zeros(3)
+        return float(axis @ (rate - base))
+
+
+@pytest.mark.parametrize("batch", BATCHES)
+def test_every_body_is_in_balance(batch: int) -> None:
+    for_each(batch, lambda recipe: Balance(recipe).check_bodies())
+
+
+@pytest.mark.parametrize("batch", BATCHES)
+def test_energy_changes_by_the_power_of_what_has_no_potential(batch: int) -> None:
+    for_each(batch, lambda recipe: Balance(recipe).check_power())
+
+
+@pytest.mark.parametrize("batch", BATCHES)
+def test_jacobians_are_derivatives(batch: int) -> None:
+    """Of the complete right-hand side, projection included, in directions across the constraints too."""
+
+    def check(recipe: Recipe) -> None:
+        made, module = compiled(recipe)
+        x = made.state(module)
+        free = [k for k, name in enumerate(module.x_names) if name != "switched_closed"]  # that one is 0 or 1
+        slopes = [judges.first(lambda y: module.rhs(TIME, y), x, d, h=1e-5) for d in np.eye(len(x))[free]]
+        expected = np.stack(slopes, 1)
+        assert sized(module.jacobian(TIME, x)[:, free] - expected) <= 1e-6 * sized(expected)
+
+    for_each(batch, check)
+
+
+def judge_alike(recipe: Recipe, other: Any) -> None:
+    """Another module of a mechanism gives what the first gives."""
+    made, module = compiled(recipe)
+    x = made.state(module)
+    assert other.x_names == module.x_names
+    M = module.embedded_mass_matrix(x[: module.n_q]) if module.n_rows else module.mass_matrix(x[: module.n_q])
+    cond = float(np.linalg.cond(M)) if M.size else 1.0
+    judges.agree(other.rhs(TIME, x), module.rhs(TIME, x), 1e-11, cond)
+    for call in (lambda m: m.reactions(TIME, x), lambda m: m.jacobian(TIME, x)):
+        ours, theirs = call(other), call(module)
+        assert sized(ours - theirs) <= 1e-10 * max(1.0, cond / 1e3) * sized(theirs)
+    np.testing.assert_allclose(other.energy(x), module.energy(x), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("batch", BATCHES)
+def test_methods_agree(batch: int) -> None:
+    def check(recipe: Recipe, method: str) -> None:
+        judge_alike(recipe, compiled(recipe)[0].compile(method))
+
+    for_each(batch, check, st.sampled_from(METHODS[1:]))
+
+
+def test_targets_agree() -> None:
+    for_each(1, lambda recipe: judge_alike(recipe, Made(recipe).compile(target="cython", optimize=0)), count=5)
+
+
+# -- the same physics, described otherwise -----------------------------------------------------------------------------
+def dressed(one: Made, x: np.ndarray, module: Any, clothes: Clothes) -> tuple[Made, Any, np.ndarray]:
+    """A mechanism in other clothes, and its state with the bodies where those of the first are, as fast."""
+    made = Made(one.recipe, clothes)
+    other = made.compile()
+    goal, n = one.motion(module, x), other.n_q
+    y = other.x0()
+    places = made.coordinates(dict(zip(module.q_names, x[: module.n_q].tolist(), strict=True)))
+    y[:n] = [places.get(name, value) for name, value in zip(other.q_names, y[:n], strict=True)]
+    for name, value in zip(module.x_names[module.n_q + module.n_v :], x[module.n_q + module.n_v :], strict=True):
+        y[other.x_names.index(made.name(name))] = value
+    for _ in range(6 if one.recipe.closing else 0):  # the joint that was cut may have coordinates now
+        here = made.motion(other, y)
+        turn = [judges.vee((R @ Q.T)[None])[0] for R, Q in zip(goal.R, here.R, strict=True)]
+        gap = np.concatenate([np.ravel(turn), np.ravel(goal.r - here.r)])
+        y[:n] += basis(other, y[:n]) @ (here.v_size * np.linalg.lstsq(jacobian_of(here), gap, rcond=None)[0])
+        for k in (k for k, name in enumerate(other.q_names) if name.endswith("_e0")):
+            y[k : k + 4] /= np.linalg.norm(y[k : k + 4])
+    here, twists = made.motion(other, y), np.concatenate([goal.w.ravel(), goal.r_dot.ravel()])
+    y[n : n + other.n_v] = here.v_size * np.linalg.lstsq(jacobian_of(here), twists, rcond=None)[0]
+    return made, other, y
+
+
+def jacobian_of(motion: Any) -> np.ndarray:
+    return np.concatenate([J.reshape(-1, J.shape[-1]) for J in (motion.J_w, motion.J_r)])
+
+
+def judge_dressed(recipe: Recipe, clothes: Clothes) -> None:
+    one, module = compiled(recipe)
+    x = one.state(module)
+    made, other, y = dressed(one, x, module, clothes)
+    assert other.n_dof == module.n_dof
+    first, second = one.motion(module, x), made.motion(other, y)
+    M = module.embedded_mass_matrix(x[: module.n_q]) if module.n_rows else module.mass_matrix(x[: module.n_q])
+    cond = float(np.linalg.cond(M)) if M.size else 1.0
+    for name in ("R", "r", "w", "r_dot"):
+        theirs = getattr(first, name)
+        np.testing.assert_allclose(
+            getattr(second, name), theirs, rtol=0, atol=1e-9 * max(1.0, sized(theirs)), err_msg=name
+        )
+    size = max(map(sized, (first.w_dot, first.r_ddot, first.w**2)))
+    for name in ("w_dot", "r_ddot"):
+        worst = sized(getattr(first, name) - getattr(second, name))
+        assert worst <= 1e-9 * max(1.0, cond / 1e3) * size, (name, worst, size, cond)
+
+
+@pytest.mark.parametrize("batch", BATCHES)
+def test_bodies_move_alike_in_other_clothes(batch: int) -> None:
+    """Frames turned, units, names and order, another joint cut, both rotations, values given late; together too."""
+    for_each(batch, judge_dressed, st.builds(Clothes, *[st.booleans()] * 6))
