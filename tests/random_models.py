@@ -567,13 +567,13 @@ class Made:
                     self.motors[name] = value * (INPUT + 1.0)
 
     def driven(self) -> list[str]:
-        """Each joint of one coordinate, cut or not, and each coordinate of the others but Euler parameters."""
+        """Each joint of one coordinate, cut or not, and each coordinate of others where no cut takes it."""
         found = []
         for name, (kind, *_) in self.joints.items():
             k = self.recipe.last + 1 if name == "close" else int(name[1:]) if name != "close2" else -2
             if kind in SINGLE and name != "close2":
                 found.append(name)
-            elif k >= 0 and not (self.recipe.closing and k == self.cut) and kind not in ("spherical", "free"):
+            elif k >= 0 and not (self.recipe.closing and k <= self.recipe.last) and kind not in ("spherical", "free"):
                 found += coordinates_of(kind, name, "euler_angles")
         return found
 
