@@ -1,4 +1,4 @@
-"""Models for the acceptance tests: the shipped examples by name, and variations on them in Python."""
+"""Models that tests share: the shipped examples by name, and variations on them in Python."""
 
 from __future__ import annotations
 
@@ -33,25 +33,8 @@ EXAMPLE_NAMES = (
     "bricard",
     "n_four_bar",
 )
-#: By Lagrange's method tests of all of the models above take these always, the rest by ``make thorough``: a tree in the
-#: plane and one in space, loops, redundant rows, rolling, and forces of all kinds.
-BY_LAGRANGE = (
-    "double_pendulum",
-    "spherical_pendulum",
-    "slider_crank",
-    "skewed_four_bar",
-    "rolling_disc",
-    "powered_slider_crank",
-    "powered_arm",
-)
 #: Partly driven ones, which the Newton-Euler judge does not know.
 DRIVEN_NAMES = ("car_axis", "kapitza_pendulum")
-
-
-def runs_always(case: tuple[str, str]) -> bool:
-    """Whether tests of a model by a method of derivation are in ``make test``."""
-    name, method = case
-    return method != "lagrange" or name in BY_LAGRANGE
 
 
 @cache

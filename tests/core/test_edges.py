@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
@@ -223,7 +222,7 @@ def test_casadi_without_holonomic_rows() -> None:
 
 def test_rates_as_a_list() -> None:
     """A list where a mapping is wanted is a named error."""
-    with contextlib.suppress(eg.EomgenError):
+    with pytest.raises(eg.EomgenError, match="rates"):
         eg.Model.from_equations("m", ["q"], velocities=["v"], rates=["v"], mass_matrix=[["1"]], forcing=["0"]).check()
 
 
@@ -325,20 +324,8 @@ def test_documents_are_well_formed() -> None:
     assert not bad, bad
 
 
-def test_sliding_is_seen() -> None:
-    """A force that changes sign with the velocity, over a short span, with and without t_eval."""
-    mod = model(SPRING.replace("u - c*q_dot - k*q", '"where(q_dot > 0, -4, 4)"')).compile()
-    for more in ({}, {"t_eval": [0, 0.05]}):
-        start = time.perf_counter()
-        with contextlib.suppress(Exception):
-            mod.simulate((0, 0.05), **more)
-        assert time.perf_counter() - start < 10, more
-
-
 def test_latex_of_loops() -> None:
     """No double superscript in LaTeX, whatever the joints are called (here B and P beside the projection)."""
-    from matplotlib.mathtext import MathTextParser
-
     m = model("""name: six
 bodies:
   crank: {mass: 1, com: [0.03, 0, 0], inertia: {zz: 0.001}, markers: {a: [0.06, 0, 0]}}
@@ -360,7 +347,6 @@ guess: {psi: 1.8, phi: 2.5}
 """)
     text = m.derive()._repr_latex_() or ""
     assert "}^T M_t" not in text or "}^{\\ast}^T" not in text, "double superscript"
-    MathTextParser("agg").parse("$x$")
 
 
 def test_advice_keeps_the_mechanism() -> None:

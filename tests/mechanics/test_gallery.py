@@ -100,19 +100,6 @@ def test_a_quadrotor_and_its_load_accelerate_as_published() -> None:
         )
 
 
-# -- Machines ----------------------------------------------------------------------------------------------------------
-def test_a_gear_train_starts_as_a_first_order_lag() -> None:
-    """J w' = tau_0 (1 - w/w_0) - m g r / 12, all inertias and the load reduced to the motor by the ratios 3 and 4."""
-    mod, p = compiled("gear_train")
-    ratio = 60 / 20 * 72 / 18
-    inertia = p["J_1"] + p["J_2"] / 9 + (p["J_3"] + p["m"] * p["r"] ** 2) / ratio**2
-    last = p["omega_0"] * (1 - p["m"] * p["g"] * p["r"] / ratio / p["tau_0"])
-    lag = inertia * p["omega_0"] / p["tau_0"]
-    traj = mod.simulate(0.5)
-    assert traj["motor_angle_dot"] == pytest.approx(last * (1 - np.exp(-traj.t / lag)), rel=1e-8, abs=1e-9)
-    assert traj["height"] == pytest.approx(p["r"] / ratio * traj["motor_angle"], rel=1e-12, abs=1e-14)
-
-
 # -- Engines -----------------------------------------------------------------------------------------------------------
 def gas(p: dict[str, float], after: sp.Expr) -> sp.Expr:
     """Force on a piston at the crank's angle after the dead centre at which it fires."""

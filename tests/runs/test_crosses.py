@@ -24,7 +24,6 @@ import eomgen as eg
 END = 0.29
 TIMES = np.array([0.003, 0.115, 0.19, END])  # no corner of an input and no sample among them
 PLACES, VALUES = [0.0, 0.05, 0.11, 0.21, 1.0], [1.0, -2.0, 3.0, 5.0, 7.0]
-OUTPUTS = ("position", "velocity", "acceleration", "reaction", "input", "parameter")
 
 
 class Wave:
