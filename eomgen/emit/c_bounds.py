@@ -105,7 +105,9 @@ def _length(lengths: str, numbers: Mapping[str, str]) -> int:
 
 
 def _value(text: str, numbers: Mapping[str, str]) -> int:
-    return _whole(ast.parse(text.strip(), mode="eval").body, numbers)
+    statement = ast.parse(text.strip()).body[0]
+    assert isinstance(statement, ast.Expr)
+    return _whole(statement.value, numbers)
 
 
 def _whole(node: ast.expr, numbers: Mapping[str, str]) -> int:
